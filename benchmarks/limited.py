@@ -24,6 +24,7 @@ from agents.evaluate import EVALUATION_SEED, judged, worth
 from agents.registry import make_agent
 from benchmarks.common import exactly, publish
 from hrc_env.core.results import Metric, over
+from hrc_env.experiments.study.intervals import ratio_over
 from hrc_env.experiments.study.report import Column, Report, table_of
 
 WINDOW_STEPS = 250_000
@@ -37,6 +38,7 @@ COLUMNS = (
     Column("{}.goals_per_minute", "goals a minute"),
     Column("{}.cost_per_episode", "cost"),
     Column("{}.contacts_per_episode", "contacts", 2),
+    Column("{}.towards", "contacts towards in 1,000 episodes", 1),
 )
 HELD_COLUMNS = (
     Column("{}.reached_at_steps", "limit reached after [steps]", 0),
@@ -64,7 +66,7 @@ class Arguments:
     """How many of the last windows count."""
     shields: tuple[str, ...] = ("qp",)
     """Under which the second is judged, too."""
-    episodes: int = 256
+    episodes: int = 1000
     """Of each row."""
 
 
@@ -131,7 +133,9 @@ def rows_of(name: str, folder: Path, arguments: Arguments, shield: str | None) -
     """What a policy is worth on fixed seeds, its mean action, at the level that it learnt at."""
     make = partial(make_agent, str(folder / "policy.zip"))
     kwargs = {"perception": "keypoints", "shield": shield}
-    found = worth(judged(make, arguments.episodes, **kwargs))
+    episodes = judged(make, arguments.episodes, **kwargs)
+    towards = [each["contacts_towards"] for each in episodes]
+    found = worth(episodes) | {"towards": ratio_over(towards, [1e-3] * len(towards), "per 1000")}
     return {f"{name}.{key}": each for key, each in found.items()}
 
 

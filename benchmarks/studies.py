@@ -113,6 +113,16 @@ STUDIES: dict[str, Study] = {
         ("benchmarks.learners", "agents.training", "agents.ppo", "agents.sac", "agents.experts"),
         ("learners",), is_keyed=False,
     ),
+    "shielded": Study(
+        "python -m benchmarks.shielded", 20, ("benchmarks.shielded", "agents.scripted"),
+        ("shielded",),
+    ),
+    "limited": Study(
+        "python -m benchmarks.limited", 30,
+        ("benchmarks.limited", "agents.training", "agents.ppo", "agents.ppo_lagrangian"),
+        ("limited",),
+        quick="--seeds 0 --timesteps 8192 --fast-timesteps 8192 --episodes 2", is_keyed=False,
+    ),
     "ablations": Study(
         EXPERIMENT + "ablations", 45, ("hrc_env.experiments.ablations.experiment",), ("ablations",),
         {f"ablations_{name}.png": f"{name}.png" for name in ("cameras", "occlusion", "filter")},
