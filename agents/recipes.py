@@ -31,7 +31,7 @@ RECIPES: Mapping[str, Mapping[str, Any]] = {
 """By task: where that differs from `Run`."""
 
 
-LIMITED: Mapping[str, Any] = {"timesteps": 2_000_000, "proximity": 0.0}
+LIMITED: Mapping[str, Any] = {"timesteps": 3_000_000, "proximity": 0.0}
 """With a limit of cost, which then is all that keeps the robot away."""
 
 

@@ -58,7 +58,7 @@ class Arguments:
     """Seeds of environments and learner."""
     cost_limit: float = 30.0
     """Of an episode."""
-    timesteps: int = 2_000_000
+    timesteps: int = 3_000_000
     """Of who learns with the limit."""
     fast_timesteps: int = 1_000_000
     """Of who learns without care."""

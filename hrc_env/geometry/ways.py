@@ -86,8 +86,8 @@ def _spread(price: Floats, goal_i: int, goal_j: int, cell: float, ways: Floats) 
 def ranges_m(
     places: Floats, angles: Floats, gaps: Floats, origin: Floats, cell: float, most_m: float
 ) -> Floats:
-    """(B, R) how far it is from places (B, 3), x, y [m] and yaw [rad], to what stands there, at
-    angles (R,) from ahead [rad]; at most `most_m`."""
+    """(B, R) how far it is from places (B, 2 or more), x, y [m], to what stands there, at angles
+    (R,) from the x axis [rad]; at most `most_m`."""
     found = np.empty((len(places), len(angles)))
     _trace(places, angles, gaps, origin, cell, most_m, found)
     return found
@@ -98,8 +98,7 @@ def _trace(places, angles, gaps, origin, cell, most_m, found):
     """Step on by the gap, which nothing can be nearer than."""
     for b in range(len(places)):
         for k in range(len(angles)):
-            angle, way = places[b, 2] + angles[k], 0.0
-            c, s = math.cos(angle), math.sin(angle)
+            way, c, s = 0.0, math.cos(angles[k]), math.sin(angles[k])
             for _ in range(STEPS):
                 x, y = places[b, 0] + way * c, places[b, 1] + way * s
                 gap = value_at(x, y, gaps, origin, cell)

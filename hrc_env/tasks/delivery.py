@@ -263,9 +263,9 @@ TASK = Task(
             lambda now: now.task.way_direction,
         ),
         ObservationTerm(
-            "ranges", lambda of: RAYS, "m", "base", RANGE_M, 2.0,
-            "From the middle of the base to what stands there by the map, at 24 angles from ahead "
-            "to the left, 15 degrees apart; people are not on the map.",
+            "ranges", lambda of: RAYS, "m", "world", RANGE_M, 2.0,
+            "From the middle of the base to what stands there by the map, at 24 angles from the x "
+            "axis to the left, 15 degrees apart; people are not on the map.",
             lambda now: now.task.ranges_m,
         ),
     ),
