@@ -35,6 +35,8 @@ NEAR_M, NEAR_GAIN_HZ, STOP_M = 1.0, 1.2, 0.15
 """So near to its zone the base makes straight for the middle, and stops."""
 GOOD_M, PEOPLE_PRICE, TOUCH_PRICE, FAST_PRICE, WALL_PRICE = 0.7, 6.0, 60.0, 20.0, 200.0
 """Room past people that costs nothing; prices against a metre of the way."""
+BESIDE_M, NEAR_PRICE = 0.25, 4.0
+"""So much more room past what stands there costs nothing; price of less: who imitates errs."""
 SLOW_M_S, STAY_M = 0.2, 0.25
 """Who drives slower turns towards the way, so as to fit between walls; not so near to people."""
 CHANGE_PRICE_S, TURN_HZ, TURN_RAD_S = 0.1, 1.5, 1.0
@@ -133,6 +135,7 @@ class Deliverer:
         ahead = DISC_AT_M * np.stack([np.cos(yaw), np.sin(yaw)], axis=1)[:, None, None]
         room = np.minimum(self._at(self._gaps, at + ahead), self._at(self._gaps, at - ahead))
         price = WALL_PRICE * np.maximum(DISC_M - room, 0.0).sum(-1)
+        price += NEAR_PRICE * np.maximum(DISC_M + BESIDE_M - room, 0.0).sum(-1)
         price += self._left(field, at[:, :, -1]) + 0.5 * self._left(field, at[:, :, 2])
         price += CHANGE_PRICE_S * np.linalg.norm(window - speed[:, None], axis=-1)
         price += _people_price(shift, window, *others)

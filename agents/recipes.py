@@ -26,7 +26,7 @@ RECIPES: Mapping[str, Mapping[str, Any]] = {
     "HRCPickPlaceGoal-v0": {**IMITATION, "demonstrations": 512},
     "HRCHandover-v0": IMITATION,
     "HRCDrywall-v0": IMITATION,
-    "HRCDelivery-v0": {**IMITATION, "control": "joint"},
+    "HRCDelivery-v0": {**IMITATION, "control": "joint", "demonstrations": 1024},
 }
 """By task: where that differs from `Run`."""
 
