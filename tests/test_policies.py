@@ -261,3 +261,12 @@ def test_policies_of_the_package_are_whole_and_small():
         kwargs = filled(asked_by(card.command)).keywords()
         del kwargs["num_threads"]
         assert policies.differences(card, here(**kwargs)) == []
+
+
+def test_who_plays_a_policy_need_not_say_what_its_actions_are(capsys):
+    policy = "hrc://HRCDrywall-v0/cloned"
+    command = ["play", "HRCDrywall-v0", "--perception", "truth", "--agent", policy]
+    assert main(command) == 0
+    assert "screws driven" in capsys.readouterr().out
+    assert main([*command, "--control", "joint"]) == 2
+    assert "its control is twist, here it is joint" in capsys.readouterr().err

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -27,7 +27,7 @@ class Play(EnvironmentArguments):
     """Which environment, by its id."""
     agent: str = "scripted_slowed"
     """random, scripted, scripted_slowed, hrc://ID/NAME (python -m hrc_env list), or the path of a
-    checkpoint of `train` (.zip) or a policy of `export` (.safetensors)."""
+    checkpoint of `train` (.zip) or a policy of `export` (.safetensors); those know --control."""
     episodes: int = 1
     """How many episodes to play."""
     seed: int = 0
@@ -44,12 +44,15 @@ class Play(EnvironmentArguments):
         at_least("--seed", self.seed, 0)
         if self.video is not None:
             writable_file(self.video, ".mp4", "--video")
-            filmed(self, self.agent, self.video)
+        own = self.control or agents("registry").control_of(self.agent)
+        asked = replace(self, control=own)
+        if self.video is not None:
+            filmed(asked, self.agent, self.video)
             return 0
         import gymnasium  # here: --help imports no simulator
 
         compile_kernels(Console(), self.perception)
-        with closing(gymnasium.make(self.task, **self.keywords())) as env:
+        with closing(gymnasium.make(self.task, **asked.keywords())) as env:
             for episode in range(self.episodes):
                 self._play(env, self.seed + episode)
         return 0
