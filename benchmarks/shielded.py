@@ -28,6 +28,7 @@ from hrc_env.experiments.study.fingerprint import fingerprint_of
 from hrc_env.experiments.study.intervals import ratio_over
 from hrc_env.experiments.study.report import Column, Report, table_of
 from hrc_env.perception.faults.fault import ALL, FaultConfig
+from hrc_env.safety.incidents import KINDS
 from hrc_env.scene.rigs import RIGS
 
 FOUR = PerceptionSetup()
@@ -35,7 +36,6 @@ TASK, SCENE, SEED = "HRCReach-v0", "lab", 8_000_000
 """The last: of the first episode."""
 TOGETHER = 250
 """So many episodes are a part, played side by side."""
-KINDS = ("towards", "standing", "fleeing")
 BLIND = (FaultConfig("lost", (ALL,), None, 3.0, 6.0),)
 STOP = {"kind": "qp", "unknown_m_s": 0.0}
 Episodes = list[dict[str, float]]

@@ -42,11 +42,9 @@ class Play(EnvironmentArguments):
         check_names("environment", [self.task], hrc_env.IDS)
         at_least("--episodes", self.episodes, 1)
         at_least("--seed", self.seed, 0)
+        asked = replace(self, control=self.control or agents("registry").control_of(self.agent))
         if self.video is not None:
             writable_file(self.video, ".mp4", "--video")
-        own = self.control or agents("registry").control_of(self.agent)
-        asked = replace(self, control=own)
-        if self.video is not None:
             filmed(asked, self.agent, self.video)
             return 0
         import gymnasium  # here: --help imports no simulator

@@ -5,12 +5,13 @@ import json
 import pytest
 
 from benchmarks import shielded
+from hrc_env.safety.incidents import KINDS
 
 KEPT = ("bare", "one")
 
 
 def episode(**changes: float) -> dict[str, float]:
-    kinds = {f"contacts_{kind}": 0.0 for kind in shielded.KINDS}
+    kinds = {f"contacts_{kind}": 0.0 for kind in KINDS}
     return {"seconds": 10.0, "cost": 0.0, "goals_reached": 4.0, **kinds} | changes
 
 
