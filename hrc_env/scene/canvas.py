@@ -82,6 +82,7 @@ class Canvas:
             self._look = look
             self._kept.clear()
             randomize(self._model, self._built, self._visuals, look)
+            self._take_over_textures()
 
     def pose(self, q: JointAngles, motion: WorkerMotion | None) -> None:
         """Put the arm at q (N,), or all that moves at q (nq,), the workers and what they hold where
@@ -213,6 +214,12 @@ class Canvas:
     def __del__(self) -> None:
         with contextlib.suppress(Exception):  # at exit, OpenGL may be gone before us
             self.close()
+
+    def _take_over_textures(self) -> None:
+        """Which material has which picture: the context keeps a copy of its own."""
+        if self._context is not None:
+            of_material = self._model.mat_texid.ravel()
+            self._context.mat_texid[: len(of_material)] = of_material
 
     def _open(self) -> None:
         if self._closed:

@@ -101,6 +101,24 @@ def test_a_look_changes_the_picture_and_what_is_kept_of_it_is_the_same():
     renderer.close()
 
 
+@pytest.mark.parametrize("name", ["lab", "site"])
+def test_a_look_is_drawn_as_by_a_renderer_that_never_had_another(name):
+    scene = build(None, name, 1)
+    window = Roi((960.0, 700.0), 1000.0, 0.0)
+
+    def drawn(renderer, look):
+        renderer.randomize(look)
+        renderer.pose(scene.home_q, rest_motion(load_body()))
+        return renderer.crop(0, window)
+
+    worn, looks = CropRenderer(scene), [draw_look(VARIED, 1, stream(k)) for k in range(4)]
+    for look in looks:
+        fresh = CropRenderer(scene)
+        np.testing.assert_array_equal(drawn(worn, look), drawn(fresh, look))
+        fresh.close()
+    worn.close()
+
+
 def test_hats_come_off_and_lamps_stay_above():
     from hrc_env.scene.build import drawing_model, visuals
 

@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from simulated import DT, HARD, LAB, Damage, detections, generators, keypoints, track, walk
 
-from hrc_env.geometry.cameras import project
+from hrc_env.geometry.cameras import pinhole, project, projections
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.tracking.measurements import make_seen
 from hrc_env.tracking.models.askew import (
@@ -21,6 +21,13 @@ from hrc_env.tracking.smoother import smooth
 from hrc_env.tracking.tree.state import TREE
 
 TWO = LAB[:2]
+FAR_OPPOSITE = projections(
+    tuple(
+        pinhole(f"camera_{k + 1}", np.array([x, y, 5.0]), np.array([0.0, 0, 1]), 72, 1920, 1080)
+        for k, (x, y) in enumerate([(9.6, 9.6), (-9.6, 9.6), (-9.6, -9.6)])
+    )
+)
+"""The first and the last see the middle from opposite sides."""
 TILTED = np.radians([2.2, 2.0, 1.0])
 """Mostly downwards: two lines of sight that should meet pass each other by 20 cm."""
 SEEDS = range(60, 68)
@@ -133,6 +140,16 @@ def test_where_a_third_camera_sees_them_too_two_are_not_doubted_for_what_the_det
     state, estimates = followed(px, LAB[:3])
     assert not pairs(state)["askew"].any()
     assert (off_m(estimates[-1], joints[-1]) < 0.05).all()
+
+
+def test_who_is_followed_is_not_begun_anew_where_turned_cameras_would_not_say_where_they_are():
+    """Opposite ones do not: their lines of sight lie in one plane, and turns move along it."""
+    joints, far = walkers(120), FAR_OPPOSITE
+    px = seen_by(np.stack([far[0], far[1], turned(far[2], TILTED)]), joints)
+    px[25:, :, 1] = np.nan
+    _, estimates = followed(px, far)
+    assert (off_m(estimates[-1], joints[-1]) < 0.5).all()
+    assert (said_m(estimates[-1]) < 0.5).all()
 
 
 def test_two_cameras_that_see_two_people_are_not_taken_for_askew():

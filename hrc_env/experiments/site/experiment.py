@@ -18,7 +18,7 @@ from hrc_env.experiments.site.report import report, site
 from hrc_env.experiments.site.walk import walk
 from hrc_env.experiments.study.cache import PartCache, PartProgress
 from hrc_env.experiments.study.intervals import mean_over, paired, rmse_of, rmse_over
-from hrc_env.experiments.study.recording import record, replay
+from hrc_env.experiments.study.recording import Recording, record, replay
 from hrc_env.experiments.study.rigs import CHOICES, DT_S, MULTI, N_WARM_UP, left_of
 from hrc_env.experiments.study.runner import Study, at_least_one, changed
 from hrc_env.tracking.config import TrackerConfig
@@ -104,14 +104,21 @@ def film(config: SiteConfig, seed: int, tick: PartProgress) -> dict[str, Any]:
     """One walk, filmed with the crops of the four-camera track, and everybody's word on it."""
     motions = walk(site(), seed, round(config.seconds / DT_S), DT_S)
     taken = record(site(), motions, SETTINGS, CROPS, seed, lambda share: tick(0.7 * share))
+    begin = _first_seen(taken)
     asked = [(name, row, "") for name in config.everybody for row in ROWS]
     asked += [(name, row, ALONE) for name in config.estimators for row in ROWS]
     said: dict[str, Any] = {}
     for name, row, protocol in asked:
-        beliefs = replay(taken, name, CHOICES[row], 0 if protocol else N_WARM_UP, seed)
+        beliefs = replay(taken, name, CHOICES[row], 0 if protocol else begin + N_WARM_UP, seed)
         said[f"{protocol}{name}.{row}"] = _head_path(beliefs)
         tick(0.3 / len(asked))
-    return {"truth": np.round(taken.joints_world[:, HEAD], 4).tolist(), "rows": said}
+    head = np.round(taken.joints_world[:, HEAD], 4).tolist()
+    return {"truth": head, "rows": said, "judged_from": begin + N_WARM_UP}
+
+
+def _first_seen(taken: Recording) -> int:
+    """The first frame in which a camera shows the worker: walks may begin out of sight of all."""
+    return int(np.argmax((taken.keypoints.confidence > 0).any((1, 2, 3))))
 
 
 def closed_loop(
@@ -135,42 +142,39 @@ def metrics_of(config: SiteConfig, played: Played) -> dict[str, Metric]:
     """Every number of results.json."""
     films, closed = played
     squared = {
-        key: np.array([_squared_m2(each, each["rows"][key]) for each in films.values()])
+        key: np.array([_squared_m2(each, each["rows"][key]).sum() for each in films.values()])
         for key in films[config.first_seed]["rows"]
     }
+    n_judged = [len(each["truth"]) - each["judged_from"] for each in films.values()]
     metrics = {}
     for name, row in product(config.everybody, ROWS):
         for key in (f"{name}.{row}", f"{ALONE}{name}.{row}"):
             if key in squared:
-                metrics[f"rmse_m.{key}"] = _rmse(squared[key])
+                metrics[f"rmse_m.{key}"] = rmse_over(squared[key], n_judged, "m")
                 tracked = [float(np.mean(each["rows"][key]["tracked"])) for each in films.values()]
                 metrics[f"tracked.{key}"] = mean_over(tracked, "share")
         if row != MULTI:
-            one, multi = (squared[f"{name}.{each}"].sum(1) for each in (row, MULTI))
+            one, multi = (squared[f"{name}.{each}"] for each in (row, MULTI))
             metrics[f"over_multi.{name}.{row}"] = rmse_over(one, multi, "ratio")
     first, *others = config.everybody
     for name, row, start in product(others, ROWS, ("", ALONE)):
         ours, theirs = f"{start}{first}.{row}", f"{start}{name}.{row}"
         if theirs in squared:
             both = np.concatenate([squared[ours], squared[theirs]])
-            off = rmse_of(both.sum(1), np.full(len(both), both.shape[1]))
+            off = rmse_of(both, np.tile(n_judged, 2))
             metrics |= paired(f"rmse_m.{theirs}", off, len(films), "m")
     for key, own in closed.items():
         squares = [_squared_m2(films[seed], said) for seed, said in own.items()]
-        metrics[f"closed_rmse_m.{key}"] = _rmse(np.array(squares))
+        sums, counts = zip(*((each.sum(), len(each)) for each in squares), strict=True)
+        metrics[f"closed_rmse_m.{key}"] = rmse_over(sums, counts, "m")
     return metrics
 
 
 def _squared_m2(film: Part, row: Part) -> Floats:
-    """(T,) squared errors of the head after the warm-up [m^2]; where the track is lost, the
+    """Squared errors of the head [m^2] in the frames that are judged; where the track is lost, the
     estimator's last word, or its prior, is its answer."""
     off_m = np.array(row["head"], float) - np.array(film["truth"], float)
-    return (off_m**2).sum(-1)[N_WARM_UP:]
-
-
-def _rmse(squares: Floats) -> Metric:
-    """Of squared errors (walks, T)."""
-    return rmse_over(squares.sum(1), np.full(len(squares), squares.shape[1]), "m")
+    return (off_m**2).sum(-1)[film["judged_from"] :]
 
 
 STUDY = Study(

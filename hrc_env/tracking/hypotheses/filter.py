@@ -13,7 +13,7 @@ from hrc_env.tracking.hypotheses.one_view import begin_from_one
 from hrc_env.tracking.hypotheses.sides import agree_on_sides
 from hrc_env.tracking.hypotheses.slots import Hypotheses, drop, merge, normalise, worker_slots
 from hrc_env.tracking.measurements import make_seen, read_worker
-from hrc_env.tracking.models.acquisition import heading
+from hrc_env.tracking.models.acquisition import WIDEST_STD_M, heading
 from hrc_env.tracking.models.askew import (
     compare,
     count_views,
@@ -162,13 +162,23 @@ def _doubt_cameras(own, P, seen, s):
         pair.waited = pair.waited + 1 if n_views == 2 else max(pair.waited - 1, 0)
     if pair.askew:
         pair.askew = hang_askew(pair)
-    elif hang_askew(pair) and n_views == 2 and (tree.tracked or pair.waited > s.wait_updates):
+    elif hang_askew(pair) and n_views == 2 and _may_be_turned(tree, P, s):
         pair.askew = True
         hang_as_known(pair, P, seen.P)
         pair.askew = _begin(own, seen, s)
     tree.displaced_m2[:] = 0.0
     if pair.askew and tree.tracked:
         displacement(pair, P, tree.body, tree.displaced_m2)
+
+
+@kernel(makes_arrays=True)
+def _may_be_turned(tree, P, s):
+    """Whether a track may begin with two cameras turned: where these leave open where a body is, as
+    nearly opposite ones do, whoever is followed already is better off without."""
+    if not tree.tracked:
+        return tree.pair.waited > s.wait_updates
+    displacement(tree.pair, P, tree.body, tree.displaced_m2)
+    return np.diag(tree.displaced_m2).max() < WIDEST_STD_M**2
 
 
 @kernel(makes_arrays=True)
