@@ -145,7 +145,7 @@ def metrics_of(config: SiteConfig, played: Played) -> dict[str, Metric]:
         key: np.array([_squared_m2(each, each["rows"][key]).sum() for each in films.values()])
         for key in films[config.first_seed]["rows"]
     }
-    n_judged = [len(each["truth"]) - each["judged_from"] for each in films.values()]
+    n_judged = [len(each["truth"][each["judged_from"] :]) for each in films.values()]
     metrics = {}
     for name, row in product(config.everybody, ROWS):
         for key in (f"{name}.{row}", f"{ALONE}{name}.{row}"):
