@@ -284,7 +284,7 @@ SETTINGS = {
     "perception_and_estimators.md": (
         "80 degrees, 118.2 degrees, 0.2 s, 0.02 rad, 0.05 m, 0.1 rad, 0.04 s, 8 px"
     ),
-    "tracking.md": "1 s, 2 cm, 10 %, 20 degrees, 25 degrees, 50 degrees, 0.5 m, 2 ms, 0.1 s, 25 Hz",
+    "tracking.md": "1 s, 2 cm, 10 %, 20 degrees, 25 degrees, 50 degrees, 0.5 m, 2 ms, 0.1 s",
 }
 """Sizes, limits and defaults by page: numbers with a unit that nobody measured of this project."""
 
