@@ -297,6 +297,7 @@ def test_a_search_goes_on_where_fresh_seeds_say_so(tmp_path, monkeypatch):
     row = experiment._price(TINY, cache, "HRCReach-v0", all_eyes()["truth"])
     assert sorted(row.searched) == pytest.approx([-0.8, -0.4, 0.0, 0.4, 0.45, 0.55, 0.75])
     assert row.ends_at(row.at(30.0)[0, 0])
+    assert row.margin_m == pytest.approx(0.75)  # what is achieved at the end is played there
 
 
 def test_workers_who_walk_otherwise_are_noticed_where_nobody_waits():

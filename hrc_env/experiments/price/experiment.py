@@ -156,16 +156,20 @@ def _price(config: PriceConfig, cache: PartCache, task: str, eyes: Eyes) -> Row:
             tried[margin_m] = rows = part(config.seeds(task, config.n_seeds), margin_m)
             return float(PER * np.sum(rows["towards"]) / np.sum(rows["minutes"]))
 
+        def confirmed(margin_m: float) -> Row:
+            fresh = part(config.seeds(task, config.n_fresh, FIRST_FRESH), margin_m)
+            return Row(tried, margin_m, fresh)
+
         searched(rate, *config.bracket_m, config.level, config.n_search)
-        margin_m = supposed_m(tried, config.level)
-        fresh = part(config.seeds(task, config.n_fresh, FIRST_FRESH), margin_m)
-        row = Row(tried, margin_m, fresh)
+        row = confirmed(supposed_m(tried, config.level))
         for beyond_m in BEYOND_M:  # where fresh seeds say so
             end_m = float(row.at(config.level)[0, 0])
             if not row.ends_at(end_m):
-                break
+                return row
             rate(end_m + (beyond_m if end_m == max(tried) else -beyond_m))
-    return row
+        end_m = float(row.at(config.level)[0, 0])
+        # At the last margin of all, throughput is played, not derived from far away.
+        return confirmed(end_m) if row.ends_at(end_m) else row
 
 
 def _unshielded(config: PriceConfig, cache: PartCache, task: str) -> Rows:
@@ -221,7 +225,7 @@ def _n_parts(config: PriceConfig) -> float:
     n_levels = 2 if config.n_pixels and FOUR in config.eyes else 0
     n_trained = 0 if config.trainings is None else config.trainings.n_parts
     return (
-        n_pairs * (config.n_search + 3 + len(BEYOND_M))
+        n_pairs * (config.n_search + 4 + len(BEYOND_M))
         + 1
         + len(config.others)
         + n_levels
