@@ -63,6 +63,13 @@ def test_a_repainted_worker_is_seen_anew(copied):
     assert of_now() != before
 
 
+def test_what_is_entered_in_the_leaderboard_makes_nothing_anew(copied):
+    before, folder = of_now(), copied / "hrc_env" / "experiments" / "benchmark" / "entries"
+    folder.mkdir(parents=True)
+    (folder / "mine.json").write_text("{}")
+    assert of_now() == before
+
+
 def test_deep_imports_are_followed_even_from_inside_a_function(copied):
     before = of_now()
     (copied / "hrc_env" / "other.py").write_text("X = 2\n")

@@ -17,6 +17,8 @@ OURS = ("hrc_env", "agents", "benchmarks", "assets")
 """Packages of this repository; where it is installed, others lie beside them."""
 _PACKAGE = Path(hrc_env.__file__).resolve().parent
 _CODE = {".py", ".pyc"}
+_NO_DATA = ("__pycache__", "experiments/benchmark/entries")
+"""Folders from which nothing is made: compiled code and the leaderboard's entries."""
 
 
 def fingerprint_of(settings: Mapping[str, Any], *modules: str) -> str:
@@ -82,12 +84,14 @@ def source_digest(made: Any) -> str:
 
 @cache
 def _surroundings() -> str:
-    """Versions of Python and libraries, and the content of every data file."""
+    """Versions of Python and libraries, and the content of every data file from which something is
+    made."""
     from hrc_env.worker.body import assets_dir  # here: --help of a command imports no compiler
 
     digest = hashlib.sha256(json.dumps({"python": sys.version} | versions()).encode())
     for root in sorted({assets_dir(), _PACKAGE}):
         for path in sorted(root.rglob("*")):
-            if path.is_file() and path.suffix not in _CODE and "__pycache__" not in path.parts:
+            is_made_from = not any(name in path.as_posix() for name in _NO_DATA)
+            if path.is_file() and path.suffix not in _CODE and is_made_from:
                 digest.update(path.name.encode() + path.read_bytes())
     return digest.hexdigest()
