@@ -100,7 +100,8 @@ def main(arguments: Arguments) -> None:
 def learnt(arguments: Arguments, level: str, agent: str) -> Path:
     """The policy that acts at a level; it is trained, or trained on, if it has not learnt enough.
 
-    At `none` nobody is believed to be near: the safety term is nothing, and both are the same.
+    At `none` whoever is there is unknown: the safety term is the same whatever the robot does, and
+    both are.
     """
     on = "keypoints" if level == "pixels" else level
     proximity = 0.0 if level == "none" else PPO[agent]
