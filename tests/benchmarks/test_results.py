@@ -101,6 +101,22 @@ def test_a_run_that_is_out_of_time_is_stopped_and_goes_on(desk):
     assert json.loads((folder / "whole" / "one.json").read_text())["minutes"] > spent > 0
 
 
+@pytest.mark.parametrize("goes_on", [True, False])
+def test_how_long_a_study_takes_is_what_it_takes_from_nothing(desk, goes_on):
+    folder = desk(goes_on=goes_on)
+    (folder / "whole").mkdir()
+    whole = folder / "whole" / "one.json"
+    whole.write_text(json.dumps({"minutes": 42.0}))  # parts of that run may be used again
+    main(Arguments())
+    took = results.expected_min("one")
+    assert took == 42.0 if goes_on else took < 1.0
+    mark = folder / "out" / "one" / "depends.json"
+    mark.write_text(json.dumps(json.loads(mark.read_text()) | {"minutes": 60.0}))
+    main(Arguments(only=("one",)))
+    took = results.expected_min("one")
+    assert took > 60.0 if goes_on else took < 1.0
+
+
 def test_what_does_not_stop_when_asked_is_killed(desk):
     folder = desk(60.0)
     script = folder / "made.py"
