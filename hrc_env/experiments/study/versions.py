@@ -1,0 +1,102 @@
+"""Versions of behaviour: the numbers by which finished parts and tables are known to be current.
+
+`behaviour.toml` gives each subsystem a number. A study names the subsystems that its numbers
+depend on; a part that was made at other numbers, or with other settings, is made anew. Probes
+(`tests/behaviour/`) raise a number when the behaviour of its subsystem moves, so that a change
+of code that moves nothing makes nothing anew.
+"""
+
+import hashlib
+import inspect
+import json
+import tomllib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from hrc_env.core.errors import ConfigError, check_names
+
+SUBSYSTEMS = ("env", "tracker", "emulator", "detector", "motion", "shield", "agents")
+"""Names in `behaviour.toml`."""
+_PACKAGE = Path(__file__).resolve().parents[2]
+
+
+def find_behaviour() -> Path:
+    """Return the path of `behaviour.toml`: inside an installed package, beside one in a clone."""
+    installed = _PACKAGE / "behaviour.toml"
+    return installed if installed.is_file() else _PACKAGE.parent / "behaviour.toml"
+
+
+def read_versions(path: Path | None = None) -> dict[str, int]:
+    """Return the version of every subsystem.
+
+    Args:
+        path: a file to read in place of the one that `find_behaviour` returns.
+
+    Raises:
+        ConfigError: the file is missing or unreadable, names a subsystem that does not exist,
+            leaves one out, or gives one a version that is not a whole number from 1 on.
+    """
+    path = path or find_behaviour()
+    if not path.is_file():
+        raise ConfigError(
+            f"There is no {path.name} with the version of each subsystem. In a clone, "
+            f"`git checkout {path.name}` brings it back; else install the package again."
+        )
+    try:
+        versions = tomllib.loads(path.read_text())
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{path.name} must be lines such as `env = 1`; {error}.") from error
+    check_names(f"subsystem in {path.name}", versions, SUBSYSTEMS)
+    for name in SUBSYSTEMS:
+        version = versions.get(name)
+        if not isinstance(version, int) or isinstance(version, bool) or version < 1:
+            came = "nothing" if version is None else repr(version)
+            raise ConfigError(
+                f"{path.name} must give {name} a whole number from 1 on, and gives {came}."
+            )
+    return versions
+
+
+def check_subsystems(subsystems: Iterable[str]) -> None:
+    """Raise `ConfigError` unless at least one subsystem is named, and all of them exist."""
+    names = tuple(subsystems)
+    if not names:
+        raise ConfigError(
+            "A study must name the subsystems that its numbers depend on, at least one of "
+            f"{', '.join(SUBSYSTEMS)}; it names none."
+        )
+    check_names("subsystem", names, SUBSYSTEMS)
+
+
+def versions_of(subsystems: Iterable[str]) -> dict[str, int]:
+    """Return the versions of some subsystems, in the order of `SUBSYSTEMS`."""
+    names = tuple(subsystems)
+    check_subsystems(names)
+    versions = read_versions()
+    return {name: versions[name] for name in SUBSYSTEMS if name in names}
+
+
+def key_of(settings: Mapping[str, Any], subsystems: Iterable[str]) -> str:
+    """Return the key of a finished part: a digest of its settings and of the subsystems' versions.
+
+    Args:
+        settings: all that the part's numbers depend on besides code, as JSON can hold it.
+        subsystems: names of the subsystems that they depend on.
+    """
+    content = json.dumps([settings, versions_of(subsystems)], sort_keys=True)
+    return hashlib.sha256(content.encode()).hexdigest()[:16]
+
+
+def source_digest(made: object) -> str:
+    """Return the digest of the file that defines something that a user registered.
+
+    An estimator of the user's own has no version; its file stands for it. The digest is "" for
+    parts of this package, which have one, and for anything that has no file.
+    """
+    try:
+        path = Path(inspect.getfile(made)).resolve()  # type: ignore[arg-type]
+        is_ours = path.is_relative_to(_PACKAGE)
+        return "" if is_ours else hashlib.sha256(path.read_bytes()).hexdigest()
+    except (OSError, TypeError):
+        return ""

@@ -1,0 +1,76 @@
+"""Actions of the scripted agents and of trained policies on stored observations."""
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from tests.behaviour import doors
+from tests.behaviour.probe import Played, Probe, Values
+
+EVERY = 17
+"""Of the episode from which observations are taken, every so many steps."""
+N_STEPS = {"HRCReachGoal-v0": 100, "HRCReach-v0": 250}
+SEED = 1049
+SCRIPTED = ("scripted", "scripted_slowed")
+
+
+def play(env_id: str, agents: tuple[str, ...], control: str, inputs: Values) -> Played:
+    """Return the actions of some agents for the stored observations, one after the other."""
+    env = _open(env_id, control)
+    observations = _split(inputs)
+    values = {}
+    for name in agents:
+        act = env.make_agent(name)
+        values[name.split("/")[-1]] = np.array([act(each) for each in observations])
+    env.close()
+    return Played(values)
+
+
+def record_observations(env_id: str, control: str) -> Values:
+    """Return observations of two episodes, one beside people who come near, one of random acts."""
+    env, rng, kept = _open(env_id, control), np.random.default_rng(SEED), []
+    for episode in range(2):
+        env.reset(SEED + episode)
+        act = env.make_agent("scripted")
+        for step in range(N_STEPS.get(env_id, 600)):
+            if step % EVERY == 0:
+                kept.append(env.observation)
+            action = np.asarray(act(env.observation), np.float32)
+            if episode == 1:
+                action = action + rng.normal(0, 0.5, action.shape).astype(np.float32)
+            if env.step(np.clip(action, -1, 1).astype(np.float32))[1]:
+                break
+    env.close()
+    if not isinstance(kept[0], dict):
+        return {"observation": np.array(kept)}
+    return {name: np.array([each[name] for each in kept]) for name in kept[0]}
+
+
+def _open(env_id: str, control: str) -> doors.Env:
+    return doors.Env(env_id, perception="keypoints", people="hurried", control=control)
+
+
+def _split(inputs: Values) -> list[Any]:
+    """Return the observations one by one, as an agent gets them."""
+    if list(inputs) == ["observation"]:
+        return list(inputs["observation"])
+    n = len(inputs["observation"])
+    return [{name: value[k] for name, value in inputs.items()} for k in range(n)]
+
+
+def _make(env_id: str, agents: tuple[str, ...], control: str = "joint", end: str = "") -> Probe:
+    return Probe(
+        name=f"{env_id}{end}",
+        play=partial(play, env_id, agents, control),
+        inputs=partial(record_observations, env_id, control),
+        subject=env_id,
+        is_short=True,
+    )
+
+
+PROBES: tuple[Probe, ...] = (
+    *(_make(env_id, SCRIPTED) for env_id in doors.ENV_IDS),
+    _make("HRCReach-v0", SCRIPTED, "tool", "_tool"),
+    *(_make(each.env_id, (each.name,), each.control, "_policy") for each in doors.policies()),
+)

@@ -1,0 +1,330 @@
+"""Episodes with recorded actions: whole ones of every id, and a set that covers the settings.
+
+An expert plays when a probe is recorded for the first time; afterwards its actions are replayed,
+so that rounding is not fed back through an agent. Until the first contact, and until a track is
+lost, everything is compared; afterwards only what has happened so far (goals, contacts by kind,
+cost, return).
+"""
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from tests.behaviour import doors
+from tests.behaviour.probe import Played, Probe, Values, stack
+
+EVERY = 10
+"""Every so many steps everything is recorded; rewards and costs are summed up in between."""
+SUMMED = ("reward", "cost")
+"""Names of what is summed up begin so."""
+EVENTS = (
+    "return", "episode_cost", "task/", "is_success", "safety/contacts_", "safety/near_misses",
+    "terminated", "truncated",
+)  # fmt: skip
+"""Names begin so of what counts after the first contact, too."""
+TOUCHED = "cost_contact"
+TRACKED = "observation/worker_tracked"
+PIXEL_TOLERANCE = 0.05
+"""Largest difference that another renderer may make to estimates."""
+RELEASING = "releasing"
+"""Said after an agent's name: from half of the episode on its hand is opened."""
+SEED = 49
+
+
+def play(env_id: str, seed: int, options: Mapping[str, Any], inputs: Values) -> Played:
+    """Play an episode with recorded actions."""
+    env = doors.Env(env_id, **options)
+    moments = [env.reset(seed)]
+    for action in inputs["actions"]:
+        moment, is_over = env.step(action)
+        moments.append(moment)
+        if is_over:
+            break
+    env.close()
+    return summarize(moments)
+
+
+def record_actions(
+    env_id: str, seed: int, agent: str, n_steps: int, options: Mapping[str, Any]
+) -> Values:
+    """Return the actions of an agent in one episode."""
+    env = doors.Env(env_id, **options)
+    env.reset(seed)
+    if agent == "noise":
+        actions = np.random.default_rng(seed).uniform(-1, 1, (n_steps, env.action_size))
+        env.close()
+        return {"actions": actions.astype(np.float32)}
+    name, _, manner = agent.partition(" ")
+    act, actions = env.make_agent(name), []
+    for k in range(n_steps):
+        action = np.array(act(env.observation), np.float32)
+        if manner == RELEASING and k >= n_steps // 2:
+            action[-1] = -1.0
+        actions.append(action)
+        if env.step(action)[1]:
+            break
+    env.close()
+    return {"actions": np.array(actions)}
+
+
+def summarize(moments: Sequence[Mapping[str, Any]]) -> Played:
+    """Return an episode's values at every few steps."""
+    names = dict.fromkeys(name for moment in moments for name in moment)
+    filled = [{name: _plain(moment.get(name)) for name in names} for moment in moments]
+    values = stack(_same_kinds(filled))
+    kept = np.append(np.arange(0, len(moments) - 1, EVERY), len(moments) - 1)
+    starts = np.append(0, kept[:-1] + 1)
+    short: Values = {}
+    for name, value in values.items():
+        if name.startswith(SUMMED):
+            short[name] = np.add.reduceat(np.nan_to_num(value.astype(float)), starts)
+        elif value.dtype.kind == "U":
+            parts = zip(starts, kept + 1, strict=True)
+            short[name] = np.array([" ".join(dict.fromkeys(value[a:b])) for a, b in parts])
+        else:
+            short[name] = value[kept]
+    short["return"] = np.cumsum(short["reward"])
+    events = frozenset(name for name in short if name.startswith(EVENTS))
+    return Played(short, _count_settled(values, kept), events)
+
+
+def _count_settled(values: Values, kept: np.ndarray) -> int | None:
+    """Count the kept moments before the first contact or the first loss of a track."""
+    ends = values.get(TOUCHED, np.zeros(len(values[TRACKED]))) > 0
+    tracked = values[TRACKED].reshape(len(ends), -1)
+    ends[1:] |= (tracked[1:] < tracked[:-1]).any(axis=1)
+    return int(np.searchsorted(kept, np.argmax(ends))) if ends.any() else None
+
+
+def _plain(value: Any) -> Any:
+    """Return a value as an array of numbers, or words as one string; None: not there."""
+    if isinstance(value, tuple | list):
+        return ",".join(map(str, value))
+    return value
+
+
+def _same_kinds(moments: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Put "" or NaN where a moment lacks a value that others have."""
+    for name in moments[0]:
+        known = next((m[name] for m in moments if m[name] is not None), 0.0)
+        absent = "" if isinstance(known, str) else np.full(np.shape(known), np.nan)
+        for moment in moments:
+            if moment[name] is None:
+                moment[name] = absent
+    return moments
+
+
+def play_bounds(env_id: str, options: Mapping[str, Any], inputs: Values) -> Played:
+    """Return an environment's spaces and time limit."""
+    env = doors.Env(env_id, **options)
+    values = {name: value[None] for name, value in env.bounds().items()}
+    env.close()
+    return Played(values)
+
+
+def play_scene(env_id: str, options: Mapping[str, Any], inputs: Values) -> Played:
+    """Return the numbers of a compiled scene."""
+    env = doors.Env(env_id, **options)
+    values = env.describe_scene()
+    env.close()
+    return Played({name: value for name, value in values.items() if len(value)})
+
+
+def play_pictures(env_id: str, options: Mapping[str, Any], inputs: Values) -> Played:
+    """Return the means over tiles of what is drawn for people, of three moments."""
+    env = doors.Env(env_id, render_mode="rgb_array", **options)
+    env.reset(SEED)
+    views, mosaics = [], []
+    for action in inputs["actions"]:
+        env.step(action)
+        views.append(_tile(env.view()))
+        mosaics.append(_tile(env.picture()))
+    env.close()
+    return Played({"view": np.array(views), "mosaic": np.array(mosaics)})
+
+
+def _tile(image: np.ndarray, n: int = 24) -> np.ndarray:
+    """Return the mean colour of n x n tiles of an image, in [0, 1]."""
+    height, width = (size // n * n for size in image.shape[:2])
+    tiles = image[:height, :width].reshape(n, height // n, n, width // n, -1)
+    return tiles.mean(axis=(1, 3)) / 255.0
+
+
+def play_judged(env_id: str, inputs: Values) -> Played:
+    """Return the rewards of pairs of goals."""
+    env = doors.Env(env_id, perception="keypoints")
+    values = {"reward": env.judge_goals(inputs["achieved"], inputs["desired"])}
+    env.close()
+    return Played(values)
+
+
+def draw_goals(env_id: str) -> Values:
+    """Return pairs of goals from equal to far apart."""
+    env = doors.Env(env_id, perception="keypoints")
+    env.reset(SEED)
+    size = len(env.observation["achieved_goal"])
+    env.close()
+    rng = np.random.default_rng(SEED)
+    desired = rng.uniform(-1, 1, (40, size))
+    off_m = rng.normal(0, 1, (40, size)) * np.geomspace(1e-3, 1.0, 40)[:, None]
+    return {"achieved": (desired + off_m).astype(np.float32), "desired": desired.astype(np.float32)}
+
+
+def _make(
+    name: str,
+    env_id: str,
+    n_steps: int,
+    agent: str = "scripted",
+    seed: int = SEED,
+    is_short: bool = False,
+    **options: Any,
+) -> Probe:
+    options = {"perception": "keypoints", **options}
+    has_pixels = options["perception"] == "pixels"
+    return Probe(
+        name=name,
+        play=partial(play, env_id, seed, options),
+        inputs=partial(record_actions, env_id, seed, agent, n_steps, options),
+        subject=env_id,
+        is_short=is_short,
+        needs_pixels=has_pixels,
+        tolerance=PIXEL_TOLERANCE if has_pixels else 1e-6,
+    )
+
+
+def _fault(kind: str, amount: float | None = None, camera: Any = "all", **when: float) -> Any:
+    fault = {"kind": kind, "cameras": (camera,), **when}
+    return [fault if amount is None else {**fault, "amount": amount}]
+
+
+REACH, PICK, HAND = "HRCReach-v0", "HRCPickPlace-v0", "HRCHandover-v0"
+DRYWALL, DELIVERY = "HRCDrywall-v0", "HRCDelivery-v0"
+REACH_GOAL, PICK_GOAL = "HRCReachGoal-v0", "HRCPickPlaceGoal-v0"
+LATE = [
+    {"name": f"camera_{k}", "eye_m": eye, "latency_s": late_s, "rate_hz": rate_hz}
+    for k, (eye, late_s, rate_hz) in enumerate((
+        ((2.9, 2.6, 2.45), 0.12, 0.0), ((2.9, -2.6, 2.45), 0.2, 12.5),
+        ((-2.6, 2.6, 2.45), 0.0, 5.0), ((-2.6, -2.6, 2.45), 0.08, 0.0),
+    ))
+]  # fmt: skip
+"""A rig whose images are late and say so."""
+
+WHOLE = (
+    _make("reach_whole", REACH, 250, seed=200, is_short=True),
+    _make("reach_touched", REACH, 250, seed=204),
+    _make("pick_place_whole", PICK, 750, is_short=True),
+    _make("handover_whole", HAND, 750, is_short=True),
+    _make("drywall_whole", DRYWALL, 1000, is_short=True),
+    _make("delivery_whole", DELIVERY, 1000, is_short=True),
+    _make("reach_goal_whole", REACH_GOAL, 100, seed=202, is_short=True),
+    _make("pick_place_goal_whole", PICK_GOAL, 750),
+)
+COVERING = (
+    # levels of perception, estimators, cameras
+    _make("reach_truth", REACH, 150, perception="truth"),
+    _make("reach_none", REACH, 100, "scripted_slowed", perception="none"),
+    _make("reach_kalman_one_camera", REACH, 200, seed=50, estimator="kalman", kept_cameras=[1]),
+    _make("reach_one_camera", REACH, 200, seed=51, kept_cameras=[2], shield="qp", is_short=True),
+    _make("pick_two_cameras", PICK, 150, seed=52, kept_cameras=[0, 3]),
+    _make("reach_triangulation", REACH, 150, seed=53, estimator="triangulation"),
+    _make("reach_ransac", REACH, 150, seed=54, estimator="ransac"),
+    _make("reach_paper_restarts", REACH, 60, seed=55, estimator="paper_restarts"),
+    # late and faulty images
+    _make("reach_late_known", REACH, 200, seed=56, cameras=LATE, shield="ssm"),
+    _make("reach_late_unknown", REACH, 150, seed=57, faults=_fault("out_of_step", 3.0)),
+    _make("hand_late_fault", HAND, 150, seed=58, faults=_fault("late", 0.16)),
+    _make("reach_dropped", REACH, 150, seed=59, faults=_fault("dropped", 0.5)),
+    _make("reach_frozen", REACH, 150, seed=60,
+          faults=_fault("frozen", camera="camera_1", from_s=2.0)),
+    _make(
+        "reach_blind", REACH, 220, seed=61, shield="qp", is_short=True,
+        faults=_fault("lost", from_s=3.0, until_s=6.0),
+    ),
+    _make("reach_turned", REACH, 250, seed=62, faults=_fault("wrong_rotation", 0.05, "camera_2")),
+    _make("reach_moved", REACH, 150, seed=63, faults=_fault("wrong_translation", 0.1, "camera_3")),
+    _make("reach_focal", REACH, 150, seed=64, faults=_fault("wrong_focal", 0.05)),
+    _make(
+        "drywall_knocked", DRYWALL, 150, seed=65,
+        faults=_fault("knocked", 0.1, "camera_4", from_s=2.0),
+    ),
+    # workers
+    _make("reach_two_workers", REACH, 200, seed=66, n_workers=2, shield="qp", is_short=True),
+    _make("pick_some_workers", PICK, 150, seed=67, n_workers=(0, 3), bodies="any"),
+    _make("reach_hurried", REACH, 250, seed=68, people="hurried"),
+    _make("reach_unaware", REACH, 250, seed=69, people="unaware", bodies=("worker_2", "worker_3")),
+    _make("site_headlong", REACH, 250, "scripted_slowed", seed=70, scene="site",
+          people="headlong", n_workers=2),
+    _make("reach_low_work", REACH, 250, seed=71, jobs="low_work", cost_components=(
+        "proximity", "contact", "towards", "force", "too_near", "near_miss")),
+    _make("handover_attentive_slowed", HAND, 300, "scripted_slowed", seed=72),
+    _make("reach_nobody", REACH, 60, seed=73, n_workers=0, shield="qp"),
+    # shields
+    _make("reach_qp_unaware", REACH, 250, seed=74, shield="qp", people="unaware",
+          observes_shield=True),
+    _make("reach_ssm", REACH, 150, seed=75, shield="ssm", jobs="low_work"),
+    _make("hand_pfl", HAND, 300, seed=76, shield="pfl", is_short=True),
+    _make("delivery_qp", DELIVERY, 300, seed=77, shield="qp", n_workers=3),
+    _make("drywall_qp", DRYWALL, 400, seed=78, shield="qp"),
+    # scenes, control, robots, observations, endings
+    _make("drywall_site", DRYWALL, 150, seed=79, scene="site"),
+    _make("delivery_unaware", DELIVERY, 500, seed=80, people="unaware", n_workers=4),
+    _make("delivery_careless", DELIVERY, 600, seed=95, people="headlong", n_workers=(2, 6),
+          bodies="any"),
+    _make("pick_dropped", PICK, 260, "scripted releasing", seed=96),
+    _make("hand_dropped", HAND, 500, "scripted releasing", seed=97, people="hurried"),
+    _make("drywall_dropped", DRYWALL, 700, "scripted releasing", seed=98),
+    _make("drywall_slowed", DRYWALL, 800, "scripted_slowed", seed=99, people="hurried"),
+    _make("pick_goal_all", PICK_GOAL, 200, seed=100, reward_kind="all"),
+    _make("reach_goal_tool", REACH_GOAL, 100, seed=101, control="tool"),
+    _make("reach_tool", REACH, 150, seed=81, control="tool"),
+    _make("pick_twist", PICK, 100, "noise", seed=82, control="twist"),
+    _make("reach_gripper", REACH, 150, "noise", seed=83, robot="ur10e_gripper"),
+    _make("reach_contact_ends", REACH, 250, seed=84, people="unaware", ends_on_contact=True,
+          jobs="low_work", cost_below_m=0.25),
+    _make("reach_forecast", REACH, 80, seed=85, forecast_s=(0.2, 0.6),
+          covariance_terms=("towards_robot", "factor"), is_short=True),
+    _make("pick_sparse", PICK, 300, seed=86, reward_kind="sparse", object_noise_m=0.004),
+    _make("reach_noise", REACH, 250, "noise", seed=87, step_s=0.08, joint_speed_share=0.8),
+    _make("drywall_noise", DRYWALL, 150, "noise", seed=88),
+    _make("hand_noise", HAND, 150, "noise", seed=89),
+    _make("pick_noise", PICK, 150, "noise", seed=90),
+    _make("delivery_noise", DELIVERY, 250, "noise", seed=91),
+)  # fmt: skip
+PIXELS = (
+    _make("reach_pixels", REACH, 40, seed=92, perception="pixels"),
+    _make("site_pixels_varied", REACH, 20, seed=93, perception="pixels", scene="site", n_workers=2,
+          appearance="varied"),
+    _make("delivery_pixels_faults", DELIVERY, 15, seed=94, perception="pixels", n_workers=1,
+          faults=[{"kind": kind, "cameras": (k % 4,), "amount": amount} for k, (kind, amount) in enumerate((
+            ("motion_blur", 0.04), ("defocus", 6.0), ("noise", 15.0), ("dirt", 0.1),
+            ("white_balance", 0.4), ("exposure", 1.0), ("darkness", 0.1), ("glare", 0.6)))]),
+)  # fmt: skip
+BOUNDS = tuple(
+    Probe(name=f"bounds_{env_id}", play=partial(play_bounds, env_id, {"perception": "none"}),
+          subject=env_id, is_short=True)
+    for env_id in doors.ENV_IDS
+)  # fmt: skip
+JUDGED = tuple(
+    Probe(name=f"goals_{env_id}", play=partial(play_judged, env_id),
+          inputs=partial(draw_goals, env_id), subject=env_id, is_short=True)
+    for env_id in (REACH_GOAL, PICK_GOAL)
+)  # fmt: skip
+SCENES = tuple(
+    Probe(name=f"scene_{name}", play=partial(play_scene, env_id, {"perception": "none", **options}),
+          subject=env_id, is_short=True)
+    for name, env_id, options in (
+        ("lab_arm", REACH, {"n_workers": 2, "bodies": "any"}), ("site_arm", REACH, {"scene": "site"}),
+        ("studs", PICK, {}), ("hand", HAND, {}), ("board", DRYWALL, {}), ("base", DELIVERY, {}),
+        ("lab_lenses", REACH, {"rig": "lab_gopro"}),
+    )
+)  # fmt: skip
+PICTURES = tuple(
+    Probe(name=f"picture_{env_id}",
+          play=partial(play_pictures, env_id, {"perception": "keypoints"}),
+          inputs=partial(record_actions, env_id, SEED, "scripted", 3, {"perception": "keypoints"}),
+          subject=env_id, needs_pixels=True, tolerance=0.01)
+    for env_id in (REACH, DELIVERY, DRYWALL)
+)  # fmt: skip
+PROBES: tuple[Probe, ...] = (*SCENES, *PICTURES, *BOUNDS, *JUDGED, *WHOLE, *COVERING, *PIXELS)
