@@ -210,6 +210,14 @@ LATE = [
     ))
 ]  # fmt: skip
 """A rig whose images are late and say so."""
+IMAGE_FAULTS = [
+    {"kind": kind, "cameras": (k % 4,), "amount": amount}
+    for k, (kind, amount) in enumerate((
+        ("motion_blur", 0.04), ("defocus", 6.0), ("noise", 15.0), ("dirt", 0.1),
+        ("white_balance", 0.4), ("exposure", 1.0), ("darkness", 0.1), ("glare", 0.6),
+    ))
+]  # fmt: skip
+"""Two of each camera."""
 
 WHOLE = (
     _make("reach_whole", REACH, 250, seed=200, is_short=True),
@@ -297,9 +305,7 @@ PIXELS = (
     _make("site_pixels_varied", REACH, 20, seed=93, perception="pixels", scene="site", n_workers=2,
           appearance="varied"),
     _make("delivery_pixels_faults", DELIVERY, 15, seed=94, perception="pixels", n_workers=1,
-          faults=[{"kind": kind, "cameras": (k % 4,), "amount": amount} for k, (kind, amount) in enumerate((
-            ("motion_blur", 0.04), ("defocus", 6.0), ("noise", 15.0), ("dirt", 0.1),
-            ("white_balance", 0.4), ("exposure", 1.0), ("darkness", 0.1), ("glare", 0.6)))]),
+          faults=IMAGE_FAULTS),
 )  # fmt: skip
 BOUNDS = tuple(
     Probe(name=f"bounds_{env_id}", play=partial(play_bounds, env_id, {"perception": "none"}),
@@ -315,7 +321,8 @@ SCENES = tuple(
     Probe(name=f"scene_{name}", play=partial(play_scene, env_id, {"perception": "none", **options}),
           subject=env_id, is_short=True)
     for name, env_id, options in (
-        ("lab_arm", REACH, {"n_workers": 2, "bodies": "any"}), ("site_arm", REACH, {"scene": "site"}),
+        ("lab_arm", REACH, {"n_workers": 2, "bodies": "any"}),
+        ("site_arm", REACH, {"scene": "site"}),
         ("studs", PICK, {}), ("hand", HAND, {}), ("board", DRYWALL, {}), ("base", DELIVERY, {}),
         ("lab_lenses", REACH, {"rig": "lab_gopro"}),
     )
