@@ -43,7 +43,6 @@ from hrc_env.core.records import (
     World,
 )
 from hrc_env.core.skeleton import JOINTS
-from hrc_env.experiments.study import versions
 from hrc_env.geometry import cameras, chains, distances, shapes, sight, ways
 from hrc_env.geometry import lines_of_sight as lines
 from hrc_env.geometry import rotations as turns
@@ -117,12 +116,18 @@ from hrc_env.worker import props
 
 # --- Versions (accept.py) ------------------------------------------------------------------------
 
-SUBSYSTEMS = versions.SUBSYSTEMS
-"""Names in `behaviour.toml`."""
+
+def subsystems() -> tuple[str, ...]:
+    """Return the names in `behaviour.toml`."""
+    from hrc_env.experiments.study.versions import SUBSYSTEMS  # here: older code has none
+
+    return SUBSYSTEMS
 
 
 def read_versions(path: Path) -> dict[str, int]:
     """Return the version of each subsystem that a file gives."""
+    from hrc_env.experiments.study import versions
+
     return versions.read_versions(path)
 
 

@@ -312,6 +312,10 @@ SHIFTS: dict[str, Shift] = {
         "site", EVENTFUL, 19, 60.0, robot=drive_about,
         options={"settings": BUSY, "girth_m": 0.45},
     ),
+    "shift_crowded": Shift(
+        "open", "attentive", 23, 16.0, n_workers=7, every_s=2.0,
+        options={"settings": {"near_probability": 0.5}},
+    ),
     "shift_drywall": Shift(
         "open", "attentive", 20, 90.0, n_workers=1, has_cues=True,
         options={"work": "drywall", "more_places": TASK, "settings": NEAR},

@@ -1,5 +1,6 @@
 """Play probes in several processes."""
 
+import os
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -31,6 +32,7 @@ class Outcome:
 
 def play_all(wanted: Sequence[Placed], n_processes: int, console: Console) -> Iterator[Outcome]:
     """Yield the outcomes of probes, played in some processes, as they come."""
+    os.environ.setdefault("OMP_NUM_THREADS", "1")  # processes share the cores
     pool = ProcessPoolExecutor(n_processes, mp_context=get_context("spawn"))
     with pool, Progress(console=console, transient=True) as progress:
         bar = progress.add_task("playing probes", total=len(wanted))

@@ -177,6 +177,8 @@ def _compare_value(
 def _distances(old: NDArray[Any], new: NDArray[Any]) -> NDArray[np.float64]:
     """(n,) the largest difference of each step, relative where values are above 1."""
     n = len(old)
+    if n == 0:
+        return np.zeros(0)
     if old.dtype.kind in "USO" or new.dtype.kind in "USO":
         same = np.asarray(old.astype(str) == new.astype(str)).reshape(n, -1)
         return np.where(same.all(axis=1), 0.0, np.inf)
