@@ -143,6 +143,40 @@ def _seen(rig: doors.Rig, c: int, joints: Any, rng: np.random.Generator) -> Wind
     return x + off[0], y + off[1], side * rng.choice([0.4, 0.8, 1.0, 1.2, 2.0]), turn
 
 
+def play_searches(inputs: Values) -> Played:
+    """Decide when images are searched, and where cameras look for two workers who go astray."""
+    rng, rig, steps = np.random.default_rng(14), doors.Rig("lab"), []
+    searches, people = doors.Searches(rig, n_workers=2, every=6), draw_people(rng, 3)
+    for k in range(80):
+        seen = [[_seen(rig, c, joints, rng) for joints in people] for c in range(4)]
+        seen = [[each for each in found if np.isfinite(each[0])] for found in seen]
+        has_image = (rng.random(4) < (0.9 if k % 20 < 15 else 0.3)).tolist()
+        due = searches.tick(has_image)
+        recent = searches.remember(due, [found[: k % 4] for found in seen])
+        if k % 3 == 0:
+            searches.rest()
+        step = {"due": _flags(due), "recent": np.array([len(each) for each in recent])}
+        for worker in range(2):
+            shown = rng.random(4) < (0.8 if k % 30 < 8 else 0.02)
+            blind = searches.count(worker, shown, has_image)
+            expected = [found[worker] if len(found) > worker else None for found in seen]
+            if blind:
+                others = [[found[2] if len(found) > 2 else None for found in seen]]
+                searches.learn(worker, seen, expected, others)
+            away = [None if each is None else (each[0] + 40.0, *each[1:]) for each in expected]
+            step |= {f"{worker}/blind": _flags(blind),
+                     f"{worker}/windows": np.array(searches.look(worker, away))}  # fmt: skip
+        if k == 50:
+            searches.forget()
+            searches.forget(1)
+        steps.append(step)
+    return Played(stack(steps))
+
+
+def _flags(cameras: list[int]) -> NDArray[np.bool_]:
+    return np.isin(np.arange(4), cameras)
+
+
 def play_lenses(inputs: Values) -> Played:
     """Bring keypoints of images with lenses to pinhole pixels, and joints of another's function."""
     rig, rng = doors.Rig("lab", LENSED), np.random.default_rng(13)
@@ -441,6 +475,7 @@ PROBES = (
     Probe(name="windows", play=play_windows, is_short=True),
     Probe(name="tensors", play=play_tensors, is_short=True),
     Probe(name="search", play=play_search, is_short=True),
+    Probe(name="searches", play=play_searches, is_short=True),
     Probe(name="lenses", play=play_lenses, is_short=True),
     Probe(name="images", play=play_images, tolerance=IMAGE_TOLERANCE, is_short=True),
     Probe(name="film", play=play_film, is_short=True),

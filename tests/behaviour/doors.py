@@ -79,6 +79,7 @@ from hrc_env.perception import emulator as keypoint_emulator
 from hrc_env.perception.faults import camera_film, corruptions
 from hrc_env.perception.faults import fault as faults
 from hrc_env.perception.faults import schedule as fault_schedule
+from hrc_env.pipeline import reacquisition
 from hrc_env.safety import contact, incidents, separation, solver, starts
 from hrc_env.safety.config import PRESETS, ShieldConfig
 from hrc_env.safety.guard import constraints
@@ -1671,6 +1672,57 @@ class Renderer:
     def close(self) -> None:
         """Free the graphics context."""
         self._renderer.close()
+
+
+class Searches:
+    """When images are searched, and where cameras look for workers who went astray."""
+
+    def __init__(self, rig: Rig, n_workers: int, every: int) -> None:
+        """Begin with one environment before the cameras of a rig."""
+        self._schedule = reacquisition.SearchSchedule(1, len(rig.cameras), every)
+        self._workers = reacquisition.Reacquisition(1, n_workers, rig.cameras)
+
+    def forget(self, worker: int | None = None) -> None:
+        """Begin anew, with one worker or with the searches."""
+        if worker is None:
+            self._schedule.reset(0)
+        else:
+            self._workers.reset(0, worker)
+
+    def tick(self, has_image: list[bool]) -> list[int]:
+        """Count a step and return the cameras whose images are to be searched."""
+        self._schedule.tick(0)
+        return self._schedule.due(0, has_image)
+
+    def remember(self, cameras: list[int], found: list[list[Window]]) -> list[list[Window]]:
+        """Keep what some cameras show and return it with what others showed lately."""
+        shown = self._schedule.remember(0, cameras, [list(map(_roi, each)) for each in found])
+        return [list(map(_window, each)) for each in shown]
+
+    def rest(self) -> None:
+        """Leave the cameras that were searched alone for a while."""
+        self._schedule.rest(0)
+
+    def count(self, worker: int, shown: NDArray[np.bool_], has_image: list[bool]) -> list[int]:
+        """Count the cameras that show a worker and return those to be searched for them."""
+        self._workers.saw(0, worker, shown)
+        return self._workers.blind(0, worker, has_image)
+
+    def learn(
+        self,
+        worker: int,
+        found: list[list[Window]],
+        windows: list[Window],
+        others: list[list[Window]],
+    ) -> None:
+        """Learn what a search for a worker has shown."""
+        candidates = [list(map(_roi, each)) for each in found]
+        theirs = [list(map(_roi, each)) for each in others]
+        self._workers.found(0, worker, candidates, list(map(_roi, windows)), theirs)
+
+    def look(self, worker: int, expected: list[Window]) -> list[Window]:
+        """Return where the cameras look for a worker."""
+        return list(map(_window, self._workers.windows(0, worker, list(map(_roi, expected)))))
 
 
 # --- Shield and incidents (shield.py) ------------------------------------------------------------

@@ -324,7 +324,8 @@ SCENES = tuple(
         ("lab_arm", REACH, {"n_workers": 2, "bodies": "any"}),
         ("site_arm", REACH, {"scene": "site"}),
         ("studs", PICK, {}), ("hand", HAND, {}), ("board", DRYWALL, {}), ("base", DELIVERY, {}),
-        ("lab_lenses", REACH, {"rig": "lab_gopro"}),
+        ("lab_lenses", REACH, {"rig": "lab_gopro"}), ("site_studs", PICK, {"scene": "site"}),
+        ("site_hand", HAND, {"scene": "site"}), ("site_board", DRYWALL, {"scene": "site"}),
     )
 )  # fmt: skip
 PICTURES = tuple(

@@ -743,9 +743,10 @@ def triangulate(_: Values) -> Played:
     sigma_px[1, 1, :, 5] = -1.0
     px[2, 2:, :, :4] = np.nan
     px[3, 1:, :, 2] = np.nan
-    behind = 2 * EYES_M[0] - np.array([0.2, 0.0, 1.0])
-    at = np.einsum("cij,j->ci", RIG[:, :, :3], behind) + RIG[:, :, 3]
-    px[4, :, 0, 6] = at[:, :2] / at[:, 2:]
+    for c, eye_m in enumerate(EYES_M):
+        behind = 2 * eye_m - np.array([0.2, 0.0, 1.0])
+        at = np.einsum("cij,j->ci", RIG[:, :, :3], behind) + RIG[:, :, 3]
+        px[4, :, 0, 6 + c] = at[:, :2] / at[:, 2:]
     values: Values = {}
     for gate in (0.0, 5.0, 2.0):
         made = doors.triangulate_views(RIG, px, sigma_px, gate)
