@@ -4,7 +4,8 @@
 # make test-stock   all of it in a fresh environment with the packages that everybody gets
 # make test-long    what a release needs: that, and what takes longest
 # make train-quick  a policy
-# make results      all numbers and pictures of the documentation that are older than the code (hours)
+# make results      all numbers and pictures of the documentation made at older versions (hours)
+# make behaviour    whether anything behaves otherwise than recorded
 # make check        style, types, floors
 PYTHON ?= python3
 VENV ?= .venv
@@ -16,7 +17,7 @@ TRAIN := $(VENV)/.train
 DEV := $(VENV)/.dev
 PYTEST := $(RUN) -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
-.PHONY: demo test test-all test-stock test-long check bench train-quick results clean
+.PHONY: demo test test-all test-stock test-long behaviour check bench train-quick results clean
 .DEFAULT_GOAL := demo
 
 $(CORE): NEEDED := .
@@ -53,7 +54,11 @@ test-stock:
 	env -i HOME="$(CURDIR)/$(STOCK)/home" PATH="$$PATH" MAKEFLAGS="$(MAKEFLAGS)" \
 		$(MAKE) test-all VENV="$(STOCK)/venv" PYTHON="$(PYTHON)"
 
+behaviour: $(DEV)
+	$(RUN) -m tests.behaviour
+
 check: $(DEV)
+	$(RUN) -m tests.behaviour --commits
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/lint-imports
@@ -63,8 +68,6 @@ bench: $(DEV)
 	$(RUN) -m hrc_env bench speed
 	$(RUN) -m hrc_env bench perception
 	$(RUN) benchmarks/soak.py
-	$(RUN) -m benchmarks.sim_dt
-	$(RUN) benchmarks/prediction.py
 
 train-quick: $(TRAIN)
 	$(RUN) train.py

@@ -31,9 +31,13 @@ from hrc_env.cli.checks import at_least, writable_folder
 from hrc_env.cli.progress import progress_bar
 from hrc_env.core.results import Metric
 from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.fingerprint import fingerprint_of
 from hrc_env.experiments.study.report import Column, Report, table_of
+from hrc_env.experiments.study.versions import key_of
 
+DEPENDS = ("env", "tracker", "emulator", "detector", "motion", "agents")
+"""Subsystems that finished parts depend on."""
+TRAINED_ON = ("env", "tracker", "emulator", "motion", "agents")
+"""Subsystems that policies depend on."""
 PPO = {"ppo": 0.0, "ppo_safety": 2.0}
 """The weight of the safety term in what each of them learns from."""
 ROWS = {
@@ -62,11 +66,11 @@ class Arguments:
     """Folder for results.json, baselines.md, policies and finished parts."""
     quick: bool = False
     """Policies that have hardly learnt, and few episodes: every number, in a few minutes."""
-    episodes: int = 256
+    episodes: int = 128
     """Episodes of each row; 8 if quick."""
-    pixel_episodes: int = 10
+    pixel_episodes: int = 5
     """Those at `pixels`; 2 if quick."""
-    timesteps: int = 1_000_000
+    timesteps: int = 500_000
     """Environment steps that a policy learns; 4096 if quick."""
     threads: int | None = None
     """Threads that the environments share; all cores by default."""
@@ -83,12 +87,11 @@ def main(arguments: Arguments) -> None:
     settings = {name: value for name, value in asdict(arguments).items() if name != "out"}
     policies = {(level, agent): learnt(arguments, level, agent) for level in ORDER for agent in PPO}
     metrics: dict[str, Metric] = {}
-    mark = fingerprint_of(settings, "benchmarks.baselines", "agents.scripted", "agents.ppo")
     with progress_bar(Console(), "baselines") as progress:
-        parts = PartCache(arguments.out / "parts", mark, len(ORDER) * len(ROWS), progress)
+        parts = PartCache(arguments.out / "parts", key(arguments), len(ORDER) * len(ROWS), progress)
         for level, agent in product(ORDER, ROWS):
             done = played(parts, arguments, level, agent, policies.get((level, agent)))
-            metrics |= {f"{level}.{agent}.{key}": each for key, each in worth(done).items()}
+            metrics |= {f"{level}.{agent}.{name}": each for name, each in worth(done).items()}
     rows = {
         f"{level}.{agent}": f"`{level}`, {ROWS[agent]}" for level, agent in product(ORDER, ROWS)
     }
@@ -97,17 +100,32 @@ def main(arguments: Arguments) -> None:
     publish(arguments.out, report, settings, seeds, metrics)
 
 
-def learnt(arguments: Arguments, level: str, agent: str) -> Path:
-    """The policy that acts at a level; it is trained, or trained on, if it has not learnt enough.
+def key(arguments: Arguments) -> str:
+    """Return the key of finished parts."""
+    names = ("quick", "episodes", "pixel_episodes", "timesteps")
+    return key_of({name: getattr(arguments, name) for name in names}, DEPENDS)
+
+
+def lesson(level: str, agent: str) -> tuple[str, float]:
+    """Return the level that the policy of a row learns at, and its weight of the safety term.
 
     At `none` whoever is there is unknown: the safety term is the same whatever the robot does, and
     both are.
     """
-    on = "keypoints" if level == "pixels" else level
-    proximity = 0.0 if level == "none" else PPO[agent]
-    folder = arguments.out / "policies" / f"{on}-{proximity:g}-{arguments.timesteps}"
-    policy = folder / "policy.zip"
-    begun = policy.exists()
+    return ("keypoints" if level == "pixels" else level), (0.0 if level == "none" else PPO[agent])
+
+
+def policy_of(arguments: Arguments, level: str, agent: str) -> Path:
+    """Return the path of the policy of a row, whether it has learnt or not."""
+    on, proximity = lesson(level, agent)
+    trained = key_of({"timesteps": arguments.timesteps}, TRAINED_ON)
+    return arguments.out / "policies" / f"{on}-{proximity:g}-{trained}" / "policy.zip"
+
+
+def learnt(arguments: Arguments, level: str, agent: str) -> Path:
+    """Return the policy that acts at a level, which is trained until it has learnt enough."""
+    (on, proximity), policy = lesson(level, agent), policy_of(arguments, level, agent)
+    folder, begun = policy.parent, policy.exists()
     if begun and checkpoints.describe(policy)["num_timesteps"] >= arguments.timesteps:
         return policy
     options: dict[str, Any] = {"resume" if begun else "out": folder}

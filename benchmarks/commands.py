@@ -36,7 +36,7 @@ class TrackingBench(AnyBench):
     out: Path = Path("out/bench_tracking")
     """Folder; of --real and --baselines, which are parts of their own, with that word after it."""
     seeds: int | None = None
-    """Sequences per rig and condition, instead of 100 (8 if quick)."""
+    """Sequences per rig and condition, instead of 70 (8 if quick)."""
     processes: int | None = None
     """Conditions that are run at once; as many as there are cores if not given. Times are taken
     alone, at the end."""
@@ -88,7 +88,7 @@ class SpeedBench(AnyBench):
     shield: str | None = None
     """What may change commands: qp, ssm, pfl, or one that was registered (--import)."""
     rounds: int | None = None
-    """In how many rounds everybody has a turn, instead of 7 (1 if quick); medians count."""
+    """In how many rounds everybody has a turn, instead of 6 (1 if quick); medians count."""
 
     def run(self) -> int:
         """Run, show the tables."""

@@ -23,11 +23,13 @@ from hrc_env.cli.progress import progress_bar
 from hrc_env.core.errors import check_names
 from hrc_env.core.results import Metric
 from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.fingerprint import fingerprint_of
 from hrc_env.experiments.study.intervals import mean_over
 from hrc_env.experiments.study.report import Column, Report, table_of
+from hrc_env.experiments.study.versions import key_of
 from hrc_env.tasks import BUILT_IN
 
+DEPENDS = ("env", "tracker", "emulator", "detector", "motion", "agents")
+"""Subsystems that finished parts depend on."""
 SEED = 3_000_000
 """Of the first episode."""
 
@@ -79,9 +81,9 @@ class Arguments:
     """Ids."""
     ways: tuple[str, ...] = tuple(WAYS)
     """Of alone, truth, keypoints, slowed, pixels."""
-    episodes: int = 200
+    episodes: int = 50
     """Of each row."""
-    pixel_episodes: int = 20
+    pixel_episodes: int = 5
     """Those at `pixels`."""
     threads: int | None = None
     """Threads that the environments share; all cores by default."""
@@ -101,18 +103,22 @@ def main(arguments: Arguments) -> None:
         for (task, way), words in ROWS.items()
         if task in arguments.tasks and way in arguments.ways
     }
-    mark = fingerprint_of({"seed": SEED, "quick": arguments.quick}, "benchmarks.experts")
     metrics: dict[str, Metric] = {}
     with progress_bar(Console(), "experts") as progress:
-        parts = PartCache(arguments.out / "parts", mark, len(rows), progress)
+        parts = PartCache(arguments.out / "parts", key(arguments), len(rows), progress)
         for task, way in rows:
             done = played(parts, arguments, task, way)
-            metrics |= {f"{task}.{way}.{key}": each for key, each in worth(done).items()}
+            metrics |= {f"{task}.{way}.{name}": each for name, each in worth(done).items()}
     table = table_of("", {".".join(k): words for k, words in rows.items()}, COLUMNS, metrics)
     seeds = list(range(SEED, SEED + arguments.episodes))
     settings = {name: value for name, value in asdict(arguments).items() if name != "out"}
     report = Report("Scripted agents", (__doc__ or "").strip(), [table])
     publish(arguments.out, report, settings, seeds, metrics)
+
+
+def key(arguments: Arguments) -> str:
+    """Return the key of finished parts."""
+    return key_of({"seed": SEED, "quick": arguments.quick}, DEPENDS)
 
 
 def played(parts: PartCache, arguments: Arguments, task: str, way: str) -> list[dict[str, float]]:
@@ -133,7 +139,9 @@ def played(parts: PartCache, arguments: Arguments, task: str, way: str) -> list[
     each = replace(parts, n_parts=parts.n_parts * arguments.pixel_episodes)
     seeds = range(SEED, SEED + arguments.pixel_episodes)
     return [
-        each.part(f"{task}.{way}.{seed}", partial(play, 1, seed))["episodes"][0] for seed in seeds
+        episode
+        for seed in seeds
+        for episode in each.part(f"{task}.{way}.{seed}", partial(play, 1, seed))["episodes"]
     ]
 
 

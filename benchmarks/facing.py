@@ -18,10 +18,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import tyro
+from rich.console import Console
 
 from benchmarks.common import publish
 from benchmarks.tracking.matched import heading
-from hrc_env.cli.progress import track
+from hrc_env.cli.progress import progress_bar
 from hrc_env.config import HRCConfig
 from hrc_env.core.batching import rows
 from hrc_env.core.records import PoseEstimate
@@ -30,10 +31,12 @@ from hrc_env.core.skeleton import TORSO
 from hrc_env.core.typing import Bools, Floats, Ints, Points3
 from hrc_env.experiments.ablations.play import BODIES, Walks, walks_of
 from hrc_env.experiments.lab.sides import MISSED_CONFIDENCE, MISSED_SHARE
+from hrc_env.experiments.study.cache import PartCache, PartProgress
 from hrc_env.experiments.study.counts import ERRORS_M, Bins
 from hrc_env.experiments.study.intervals import counted_quantile_over, ratio_over
 from hrc_env.experiments.study.report import Column, Report, table_of
 from hrc_env.experiments.study.rigs import ALL, DT_S, N_WARM_UP, SINGLE, Rig, left_with
+from hrc_env.experiments.study.versions import key_of
 from hrc_env.geometry.cameras import project, projections
 from hrc_env.geometry.sight import hidden
 from hrc_env.pipeline.levels import make_pipeline
@@ -42,6 +45,8 @@ from hrc_env.scene.build import build
 from hrc_env.scene.rigs import RIGS
 from hrc_env.worker.body import worker_truth
 
+DEPENDS = ("env", "tracker", "emulator", "detector", "motion")
+"""Subsystems that finished parts depend on."""
 YAWS = {0: "faces it", 45: "45 degrees", 90: "sideways", 135: "135 degrees", 180: "turns its back"}
 """Middles of the ranges of 45 degrees (the outer ones are half), and words."""
 ESTIMATORS = {"keypoints": ("particle", "paper"), "pixels": ("particle",)}
@@ -58,7 +63,7 @@ class Arguments:
     """Folder for results.json and a report."""
     quick: bool = False
     """Few episodes."""
-    episodes: tuple[int, int] = (200, 20)
+    episodes: tuple[int, int] = (120, 12)
     """At the levels `keypoints` and `pixels`."""
     seconds: float = 10.0
     """Length of an episode [s], the first second included."""
@@ -171,12 +176,30 @@ def _quantiles(key: str, bins: Bins, counts: Ints, unit: str) -> dict[str, Metri
     }
 
 
-def main(arguments: Arguments) -> None:
-    """Follow, sort, write, show."""
+def key(arguments: Arguments) -> str:
+    """Return the key of finished parts."""
+    return key_of({"seconds": arguments.seconds, "seed": arguments.seed}, DEPENDS)
+
+
+def played(parts: PartCache, arguments: Arguments) -> dict[str, Metric]:
+    """Return the numbers of both levels, each from the cache or anew."""
     metrics: dict[str, Metric] = {}
     asked = (12, 4) if arguments.quick else arguments.episodes
-    for level, n_episodes in zip(track(ESTIMATORS, "levels"), asked, strict=True):
-        metrics |= metrics_of(level, n_episodes, arguments)
+    for level, n in zip(ESTIMATORS, asked, strict=True):
+
+        def make(tick: PartProgress, level: str = level, n: int = n) -> dict[str, Any]:
+            return {name: asdict(each) for name, each in metrics_of(level, n, arguments).items()}
+
+        part = parts.part(f"{level}.{n}", make)
+        metrics |= {name: Metric(**each) for name, each in part.items()}
+    return metrics
+
+
+def main(arguments: Arguments) -> None:
+    """Follow, sort, write, show."""
+    with progress_bar(Console(), "facing") as progress:
+        parts = PartCache(arguments.out / "parts", key(arguments), len(ESTIMATORS), progress)
+        metrics = played(parts, arguments)
     rows = {f"{level}.{yaw}": f"{level}, {YAWS[yaw]}" for level in ESTIMATORS for yaw in YAWS}
     columns = [
         Column("off_share.{}.median", "in the image [% of stature]", 2, 100),

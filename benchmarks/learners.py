@@ -29,12 +29,14 @@ from hrc_env.cli.progress import progress_bar
 from hrc_env.cli.train import Train
 from hrc_env.core.results import Metric, over
 from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.fingerprint import fingerprint_of
 from hrc_env.experiments.study.intervals import mean_over, ratio_over
 from hrc_env.experiments.study.report import Column, Report, table_of
+from hrc_env.experiments.study.versions import key_of
 from hrc_env.sb3 import ACHIEVED, FAILED
 from hrc_env.tasks import BUILT_IN
 
+DEPENDS = ("env", "tracker", "emulator", "motion", "agents")
+"""Subsystems that policies and finished parts depend on."""
 Episodes = list[dict[str, float]]
 COLUMNS = (
     Column("{}.learnt.success", "success of the policy", 2),
@@ -77,13 +79,12 @@ def main(arguments: Arguments) -> None:
     writable_folder(arguments.out)
     torch.set_num_threads(1)
     settings = {name: value for name, value in asdict(arguments).items() if name != "out"}
-    mark = fingerprint_of({"episodes": arguments.episodes}, "benchmarks.learners", "agents.experts")
     metrics: dict[str, Metric] = {}
     n_parts = len(arguments.ids) * (1 + len(arguments.seeds))
     runs = {task: [learnt(arguments, task, seed) for seed in arguments.seeds]
             for task in arguments.ids}  # fmt: skip
     with progress_bar(Console(), "judging") as progress:
-        parts = PartCache(arguments.out / "parts", mark, n_parts, progress)
+        parts = PartCache(arguments.out / "parts", key(arguments), n_parts, progress)
         for task in arguments.ids:
             metrics |= worth(parts, arguments, task, runs[task])
     rows = {task: f"`{task}`" for task in arguments.ids}
@@ -92,9 +93,20 @@ def main(arguments: Arguments) -> None:
     publish(arguments.out, report, settings, seeds, metrics)
 
 
+def key(arguments: Arguments) -> str:
+    """Return the key of finished parts."""
+    return key_of({"episodes": arguments.episodes}, DEPENDS)
+
+
+def folder_of(arguments: Arguments, task: str, seed: int) -> Path:
+    """Return the folder of a policy, whether it has learnt or not."""
+    trained = key_of({"quick": arguments.quick}, DEPENDS)
+    return arguments.out / "policies" / f"{task}-{seed}-{trained}"
+
+
 def learnt(arguments: Arguments, task: str, seed: int) -> Path:
     """The folder of a policy, which is learnt if it is not there, or learnt on."""
-    folder = arguments.out / "policies" / f"{task}-{seed}"
+    folder = folder_of(arguments, task, seed)
     if (folder / "score.json").exists():
         return folder
     options: dict[str, Any] = {"task": task, "seed": seed, "out": folder, "episodes": 1}
@@ -111,27 +123,33 @@ def learnt(arguments: Arguments, task: str, seed: int) -> Path:
 
 def worth(parts: PartCache, arguments: Arguments, task: str, runs: list[Path]) -> dict[str, Metric]:
     """What a task's policies and its scripted agents are worth."""
-    kwargs = filled(Train(task=task, perception="keypoints")).keywords()
-    kwargs["config"] = {}  # the default reward
-
-    def played(agent: str, label: str) -> Episodes:
-        def play(tick: PartProgress) -> dict[str, Any]:
-            make: Callable[[Any], Any] = partial(make_agent, agent)
-            return {"episodes": judged(make, arguments.episodes, tick=tick, **kwargs)}
-
-        return parts.part(f"{task}.{label}", play)["episodes"]
-
-    expert = score(played("scripted", "scripted"))
-    metrics = {f"{task}.scripted.{key}": each for key, each in expert.items()}
-    policies = [folder / "policy.zip" for folder in runs]
-    marks = [hashlib.sha256(path.read_bytes()).hexdigest()[:12] for path in policies]
-    scores = [score(played(str(p), f"policy.{m}")) for p, m in zip(policies, marks, strict=True)]
-    for key in scores[0]:
-        metrics[f"{task}.learnt.{key}"] = over([each[key].value for each in scores], "1")
+    expert = score(played(parts, arguments, task))
+    metrics = {f"{task}.scripted.{name}": each for name, each in expert.items()}
+    scores = [score(played(parts, arguments, task, run / "policy.zip")) for run in runs]
+    for name in scores[0]:
+        metrics[f"{task}.learnt.{name}"] = over([each[name].value for each in scores], "1")
     told = [json.loads((folder / "score.json").read_text())["processor_s"] for folder in runs]
     metrics[f"{task}.minutes"] = over([seconds / 60 for seconds in told], "min")
     share = metrics[f"{task}.learnt.success"].value / expert["success"].value
     return {**metrics, f"{task}.share_of_expert": exactly(share, "share", len(runs))}
+
+
+def played(
+    parts: PartCache, arguments: Arguments, task: str, policy: Path | None = None
+) -> Episodes:
+    """Return the episodes of a policy, or of the scripted agent, from the cache or anew."""
+    kwargs = filled(Train(task=task, perception="keypoints")).keywords()
+    kwargs["config"] = {}  # the default reward
+    agent = label = "scripted"
+    if policy is not None:
+        agent = str(policy)
+        label = f"policy.{hashlib.sha256(policy.read_bytes()).hexdigest()[:12]}"
+
+    def play(tick: PartProgress) -> dict[str, Any]:
+        make: Callable[[Any], Any] = partial(make_agent, agent)
+        return {"episodes": judged(make, arguments.episodes, tick=tick, **kwargs)}
+
+    return parts.part(f"{task}.{label}", play)["episodes"]
 
 
 def score(episodes: Episodes) -> dict[str, Metric]:

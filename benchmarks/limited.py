@@ -6,10 +6,11 @@ the truth, over windows of 250,000 steps, which are 1,000 episodes. Both are jud
 fixed seeds, the second also under shields. What is finished stays in the folder.
 """
 
+import hashlib
 import json
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -18,15 +19,23 @@ from typing import Any
 import numpy as np
 import torch
 import tyro
+from rich.console import Console
 
 from agents.callbacks import Curve
 from agents.evaluate import EVALUATION_SEED, judged, worth
 from agents.registry import make_agent
 from benchmarks.common import exactly, publish
+from hrc_env.cli.progress import progress_bar
 from hrc_env.core.results import Metric, over
+from hrc_env.experiments.study.cache import PartCache, PartProgress
 from hrc_env.experiments.study.intervals import ratio_over
 from hrc_env.experiments.study.report import Column, Report, table_of
+from hrc_env.experiments.study.versions import key_of
 
+DEPENDS = ("env", "tracker", "emulator", "motion", "shield", "agents")
+"""Subsystems that the numbers depend on."""
+TRAINED_ON = ("env", "tracker", "emulator", "motion", "agents")
+"""Subsystems that policies depend on."""
 WINDOW_STEPS = 250_000
 HELD = 1.1
 """Times the limit: below that it is reached."""
@@ -74,14 +83,18 @@ def main(arguments: Arguments) -> None:
     """Learn, judge, show."""
     torch.set_num_threads(1)
     metrics: dict[str, Metric] = {}
-    for seed in arguments.seeds:
-        limited, fast = (learnt(arguments, name, seed) for name in RUNS)
-        curve = json.loads((limited / "curve.json").read_text())
-        found = held(curve, arguments.cost_limit, arguments.windows)
-        metrics |= {f"seed_{seed}.{name}": each for name, each in found.items()}
-        metrics |= rows_of(f"limited_{seed}", limited, arguments, None)
-        for shield in (None, *arguments.shields):
-            metrics |= rows_of(f"fast_{seed}.{shield or 'none'}", fast, arguments, shield)
+    runs = {(name, seed): learnt(arguments, name, seed)
+            for seed in arguments.seeds for name in RUNS}  # fmt: skip
+    n_parts = len(arguments.seeds) * (2 + len(arguments.shields))
+    with progress_bar(Console(), "judging") as progress:
+        parts = PartCache(arguments.out / "parts", key(arguments), n_parts, progress)
+        for seed in arguments.seeds:
+            curve = json.loads((runs["limited", seed] / "curve.json").read_text())
+            found = held(curve, arguments.cost_limit, arguments.windows)
+            metrics |= {f"seed_{seed}.{name}": each for name, each in found.items()}
+            for row, name, shield in rows(arguments, seed):
+                episodes = played(parts, arguments, row, runs[name, seed], shield)
+                metrics |= worth_of(row, episodes)
     names = dict.fromkeys(n.rpartition(".")[0] for n in metrics if n.endswith("cost_per_episode"))
     parts = [
         table_of("Staying at the limit", {f"seed_{s}": f"seed {s}" for s in arguments.seeds},
@@ -93,15 +106,34 @@ def main(arguments: Arguments) -> None:
     publish(arguments.out, report, asdict(arguments), list(seeds), metrics)
 
 
+def key(arguments: Arguments) -> str:
+    """Return the key of finished parts."""
+    return key_of({"episodes": arguments.episodes, "seed": EVALUATION_SEED}, DEPENDS)
+
+
+def rows(arguments: Arguments, seed: int) -> Iterator[tuple[str, str, str | None]]:
+    """Yield the rows of a seed: name, run, and the shield under which its policy is judged."""
+    yield f"limited_{seed}", "limited", None
+    for shield in (None, *arguments.shields):
+        yield f"fast_{seed}.{shield or 'none'}", "fast", shield
+
+
+def folder_of(arguments: Arguments, name: str, seed: int) -> Path:
+    """Return the folder of a run, whether it has learnt or not."""
+    limited = name == "limited"
+    timesteps = arguments.timesteps if limited else arguments.fast_timesteps
+    made_of = {"timesteps": timesteps, "cost_limit": arguments.cost_limit if limited else None}
+    return arguments.out / f"{name}-{seed}-{key_of(made_of, TRAINED_ON)}"
+
+
 def learnt(arguments: Arguments, name: str, seed: int) -> Path:
     """The folder of a run, which is made, or goes on, if it is not there."""
-    folder = arguments.out / f"{name}-{seed}"
+    folder, limited = folder_of(arguments, name, seed), name == "limited"
+    timesteps = arguments.timesteps if limited else arguments.fast_timesteps
     if (folder / "score.json").exists():
         return folder
-    limited = name == "limited"
     options: dict[str, Any] = {"resume" if (folder / "policy.zip").exists() else "out": folder}
-    options |= {"seed": seed, "episodes": 1}
-    options["timesteps"] = arguments.timesteps if limited else arguments.fast_timesteps
+    options |= {"seed": seed, "episodes": 1, "timesteps": timesteps}
     if limited:
         options["cost-limit"] = arguments.cost_limit
     words = [word for option, value in options.items() for word in (f"--{option}", str(value))]
@@ -129,11 +161,23 @@ def held(curve: Curve, limit: float, windows: int) -> dict[str, Metric]:
     }
 
 
-def rows_of(name: str, folder: Path, arguments: Arguments, shield: str | None) -> dict[str, Metric]:
-    """What a policy is worth on fixed seeds, its mean action, at the level that it learnt at."""
-    make = partial(make_agent, str(folder / "policy.zip"))
-    kwargs = {"perception": "keypoints", "shield": shield}
-    episodes = judged(make, arguments.episodes, **kwargs)
+def played(
+    parts: PartCache, arguments: Arguments, row: str, folder: Path, shield: str | None
+) -> list[dict[str, float]]:
+    """Return a policy's episodes on fixed seeds, by its mean action, at its own level."""
+    policy = folder / "policy.zip"
+    digest = hashlib.sha256(policy.read_bytes()).hexdigest()[:12]
+
+    def play(tick: PartProgress) -> dict[str, Any]:
+        make = partial(make_agent, str(policy))
+        kwargs: dict[str, Any] = {"perception": "keypoints", "shield": shield}
+        return {"episodes": judged(make, arguments.episodes, tick=tick, **kwargs)}
+
+    return parts.part(f"{row}.{digest}", play)["episodes"]
+
+
+def worth_of(name: str, episodes: list[dict[str, float]]) -> dict[str, Metric]:
+    """What a policy is worth, from its episodes."""
     towards = [each["contacts_towards"] for each in episodes]
     found = worth(episodes) | {"towards": ratio_over(towards, [1e-3] * len(towards), "per 1000")}
     return {f"{name}.{key}": each for key, each in found.items()}

@@ -1,9 +1,10 @@
 """Every number and picture of the documentation again: make results, python -m benchmarks.results
 
-Runs the studies that are older than the code and data they depend on, one after the other; puts
-their numbers into `docs/results/`, their pictures into `docs/pictures/`, both into the pages. What
-is finished of a study stays in `out/results/`: a run that was stopped goes on. Numbers come from a
-clean commit; changes in `docs/` do not count.
+Runs the studies that are older than the subsystems they depend on (`behaviour.toml`), one after the
+other; puts their numbers into `docs/results/`, their pictures into `docs/pictures/`, both into the
+pages, and a summary of every part into `docs/results/parts/`, by which `benchmarks.verify` replays
+some. What is finished of a study stays in `out/results/`: a run that was stopped goes on. Numbers
+come from a clean commit; changes in `docs/` do not count.
 
     python -m benchmarks.results --list            # what is stale, why, and how long it would take
     python -m benchmarks.results --only site lab
@@ -11,9 +12,7 @@ clean commit; changes in `docs/` do not count.
     python -m benchmarks.results --quick           # whether every table finds its numbers
 """
 
-import ast
 import datetime
-import hashlib
 import json
 import os
 import shutil
@@ -24,7 +23,6 @@ import time
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -33,23 +31,20 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.studies import STUDIES, Study
+from benchmarks import defaults, records
+from benchmarks.studies import COMMANDS, STUDIES, Command, commands_of
 from docs import generate, tables
-from hrc_env.core.errors import HRCError, check_names
+from hrc_env.core.errors import HRCError
 from hrc_env.core.results import provenance
-from hrc_env.experiments.study.fingerprint import sources_of
+from hrc_env.experiments.study.versions import versions_of
 
 ROOT = Path(__file__).resolve().parent.parent
 OUT, QUICK_OUT = ROOT / "out" / "results", ROOT / "out" / "results_quick"
 WHOLE, PICTURES = tables.RESULTS / "whole", ROOT / "docs" / "pictures"
+MARK = "made_by.json"
+"""In a study's folder: versions, how long it has run, and when its latest run began."""
 STOPPING_S = 3.0
 """What is asked to stop is killed after so long [s]."""
-NO_NUMBERS = (
-    "hrc_env/cli",
-    "hrc_env/core/kernels/signatures.json",
-    "hrc_env/experiments/benchmark/entries",
-)
-"""What changes no number: command lines, what is compiled ahead, the leaderboard's entries."""
 
 
 @dataclass(frozen=True)
@@ -66,14 +61,17 @@ class Arguments:
     """Run short forms in out/results_quick, and see that every table finds its metrics there."""
     dirty: bool = False
     """Although there are changes that are not committed; numbers say so."""
+    trainings: bool = False
+    """Also what is for a release only: trainings of policies, for hours."""
 
 
 def main(arguments: Arguments) -> int:
     """Run what is asked for."""
-    console, names = Console(), arguments.only or tuple(STUDIES)
-    check_names("study", names, STUDIES)
+    console, names = Console(), commands_of(arguments.only or tuple(STUDIES))
+    if not arguments.trainings:
+        names = tuple(name for name in names if not COMMANDS[name].is_release)
     if arguments.quick:
-        return max(try_out(console, name) for name in names if STUDIES[name].quick)
+        return max(try_out(console, name) for name in names if COMMANDS[name].quick)
     stale = {name: why_stale(name) for name in names}
     if arguments.list:
         console.print(plan(stale))
@@ -85,10 +83,11 @@ def main(arguments: Arguments) -> int:
     todo = [name for name in names if stale[name] or arguments.only]
     until_s = float("inf") if arguments.hours is None else time.monotonic() + 3600 * arguments.hours
     for k, name in enumerate(todo):
-        mine, all_left = expected_min(name), sum(expected_min(each) for each in todo[k:])
+        mine = COMMANDS[name].minutes
+        all_left = sum(COMMANDS[each].minutes for each in todo[k:])
         console.print(f"{k + 1} of {len(todo)}: {name}, about {spoken(mine)}; {spoken(all_left)} "
                       "for all that is left", style="bold")  # fmt: skip
-        is_begun = time.monotonic() + (0 if STUDIES[name].goes_on else 60 * mine) < until_s
+        is_begun = time.monotonic() + (0 if COMMANDS[name].goes_on else 60 * mine) < until_s
         if is_begun and run(name, until_s):
             publish(name)
         else:
@@ -98,13 +97,19 @@ def main(arguments: Arguments) -> int:
 
 
 def plan(stale: Mapping[str, str]) -> Table:
-    """Every study, how long it takes, and why it is stale."""
-    table = Table("study", "makes", "takes", "is", title="python -m benchmarks.results")
+    """Return a table of commands by study: budget, how long it took last, and why it is stale."""
+    heads = ("study", "command", "makes", "budget", "took", "is")
+    table = Table(*heads, title="python -m benchmarks.results")
+    study_of = {name: each for each, study in STUDIES.items() for name in study.commands}
     for name, why in stale.items():
-        made = ", ".join((*STUDIES[name].tables, *STUDIES[name].pictures))
-        table.add_row(name, made, spoken(expected_min(name)), f"stale: {why}" if why else "fresh")
-    minutes = sum(expected_min(name) for name, why in stale.items() if why)
-    table.caption = f"{spoken(minutes)} for what is stale"
+        command, took = COMMANDS[name], whole(name).get("minutes")
+        made = ", ".join((*command.tables, *command.pictures))
+        table.add_row(study_of[name], name, made, spoken(command.minutes),
+                      "" if took is None else spoken(took),
+                      f"stale: {why}" if why else "fresh")  # fmt: skip
+    minutes = sum(COMMANDS[name].minutes for name, why in stale.items() if why)
+    all_minutes = sum(COMMANDS[name].minutes for name in stale)
+    table.caption = f"{spoken(minutes)} for what is stale, {spoken(all_minutes)} from nothing"
     return table
 
 
@@ -113,54 +118,42 @@ def spoken(minutes: float) -> str:
     return f"{minutes:.0f} min" if minutes < 100 else f"{minutes / 60:.1f} h"
 
 
-def expected_min(name: str) -> float:
-    """How long a study takes: as long as it took [min]."""
-    return float(whole(name).get("minutes", STUDIES[name].minutes))
-
-
 def whole(name: str) -> dict[str, Any]:
-    """All that a study found when it was run last; empty if that is not known."""
+    """Return all that a command found when it was run last; empty if that is not known."""
     path = WHOLE / f"{name}.json"
     return json.loads(path.read_text()) if path.exists() else {}
 
 
 def why_stale(name: str) -> str:
-    """What has changed since a study's numbers were made; "" if nothing."""
-    before, now = whole(name).get("depends"), depends(STUDIES[name])
+    """Return what has changed since a study's numbers were made; "" if nothing has."""
+    command, made = COMMANDS[name], whole(name)
+    before = made.get("depends")
     if before is None:
-        return "no record of what it was made by"
-    return ", ".join(sorted(k for k in before | now if before.get(k) != now.get(k)))
-
-
-def depends(study: Study) -> dict[str, str]:
-    """Digests of the command, of the code that it imports, and of all data, folder by folder."""
-    digests = {"command": hashlib.sha256(study.command.encode())}
-    files = [*sources_of(*study.modules), ROOT / "constraints.txt"]
-    files += [
-        each
-        for top in ("assets", "hrc_env")
-        for each in (ROOT / top).rglob("*")
-        if each.is_file() and "__pycache__" not in each.parts and each.suffix != ".py"
+        return "no record of the versions that it was made at"
+    found = [
+        f"{subsystem} {before.get(subsystem, 'not recorded')} -> {version}"
+        for subsystem, version in versions_of(command.depends).items()
+        if before.get(subsystem) != version
     ]
-    for path in sorted(files):
-        inside = path.relative_to(ROOT)
-        if not inside.as_posix().startswith(NO_NUMBERS):
-            content = code_of(path.read_text()) if path.suffix == ".py" else path.read_bytes()
-            digest = digests.setdefault("/".join(inside.parts[:2]), hashlib.sha256())
-            digest.update(inside.as_posix().encode() + content)
-    return {name: digest.hexdigest()[:8] for name, digest in digests.items()}
+    if made.get("command") != command.command:
+        found.append("another command")
+    else:
+        found += defaults.changed_settings(made.get("config", {}), defaults.settings_of(name))
+    if spoiled := records.read(name).spoiled:
+        first, words = next(iter(spoiled.items()))
+        rest = f" (and {len(spoiled) - 1} more)" if len(spoiled) > 1 else ""
+        found.append(f"replayed, part {first}{rest} differs: {words}")
+    return ", ".join(found)
 
 
-@cache
-def code_of(text: str) -> bytes:
-    """What a module's text does: without comments, docstrings and layout."""
-    tree = ast.parse(text)
-    for node in ast.walk(tree):
-        if isinstance(body := getattr(node, "body", None), list):
-            said = [isinstance(getattr(each, "value", None), ast.Constant)
-                    and isinstance(each, ast.Expr) for each in body]  # fmt: skip
-            body[:] = [each for each, is_said in zip(body, said, strict=True) if not is_said]
-    return ast.unparse(tree).encode()
+def made_by(name: str) -> dict[str, Any]:
+    """Return what the parts of a study in `out/` must have been made by."""
+    command = COMMANDS[name]
+    return {
+        "command": command.command,
+        "depends": versions_of(command.depends),
+        "spoiled": records.read(name).spoiled,
+    }
 
 
 def run(name: str, until_s: float) -> bool:
@@ -169,29 +162,29 @@ def run(name: str, until_s: float) -> bool:
     Raises:
         HRCError: the command failed.
     """
-    study, out = STUDIES[name], OUT / name
-    mark, now = out / "depends.json", depends(study)
+    command, out = COMMANDS[name], OUT / name
+    mark, now = out / MARK, made_by(name)
     kept = json.loads(mark.read_text()) if mark.exists() else {}
-    is_new = kept.get("depends") != now
-    if is_new and not study.is_keyed:
-        shutil.rmtree(out, ignore_errors=True)
-    if is_new or not study.goes_on:
-        kept = {"depends": now, "minutes": 0.0}
+    if now["spoiled"] and kept.get("spoiled") != now["spoiled"]:
+        shutil.rmtree(out, ignore_errors=True)  # its parts have valid keys, and wrong values
+    if {each: kept.get(each) for each in now} != now or not command.goes_on:
+        kept = {**now, "minutes": 0.0}
+    kept["began_s"] = time.time()
     out.mkdir(parents=True, exist_ok=True)
     mark.write_text(json.dumps(kept))
     started_s = time.monotonic()
-    status = call(study, out, "", until_s)
+    status = call(command, out, "", until_s)
     kept["minutes"] += (time.monotonic() - started_s) / 60
     mark.write_text(json.dumps(kept))
     if status:
-        raise HRCError(f"{study.command} ended with status {status}; what it finished is kept.")
+        raise HRCError(f"{command.command} ended with status {status}; what it finished is kept.")
     return status == 0
 
 
-def call(study: Study, out: Path, more: str, until_s: float = float("inf")) -> int | None:
+def call(command: Command, out: Path, more: str, until_s: float = float("inf")) -> int | None:
     """Call a study's command: its status, None if it was stopped as the time was up."""
-    words = [sys.executable, *study.command.split()[1:], *more.split()]
-    words += ["--out", str(out)] if study.tables else []
+    words = [sys.executable, *command.command.split()[1:], *more.split()]
+    words += ["--out", str(out)] if command.tables else []
     process = subprocess.Popen(words, cwd=ROOT, start_new_session=True)
     left_s = until_s - time.monotonic()
     try:
@@ -209,12 +202,15 @@ def call(study: Study, out: Path, more: str, until_s: float = float("inf")) -> i
 
 def publish(name: str) -> None:
     """A finished study's numbers and pictures into the documentation."""
-    study, out = STUDIES[name], OUT / name
-    content = json.loads((out / "results.json").read_text()) if study.tables else provenance()
-    content |= json.loads((out / "depends.json").read_text())
-    if study.goes_on and study.is_keyed:  # parts of earlier runs may have been there
-        content["minutes"] = max(content["minutes"], whole(name).get("minutes", 0.0))
+    command, out = COMMANDS[name], OUT / name
+    content = json.loads((out / "results.json").read_text()) if command.tables else provenance()
+    mark = json.loads((out / MARK).read_text())
+    content |= {each: mark[each] for each in ("command", "depends", "minutes")}
     content.get("config", {}).pop("out", None)  # of this machine
+    before = whole(name)
+    if command.goes_on and before.get("config") == content.get("config"):
+        # Parts of earlier runs may have been there.
+        content["minutes"] = max(content["minutes"], before.get("minutes", 0.0))
     content["machine"].pop("system", None)
     content["date"] = datetime.date.today().isoformat()
     for metric in content.get("metrics", {}).values():
@@ -222,11 +218,11 @@ def publish(name: str) -> None:
     WHOLE.mkdir(exist_ok=True)
     kept = WHOLE / f"{name}.json"
     kept.write_text(tables.written(content))
-    word = hashlib.sha256(json.dumps(content["depends"]).encode()).hexdigest()[:12]
-    for each in study.tables:
-        table = tables.renewed(tables.read(each), kept, depends=word)
+    records.write(name, mark["depends"], out / "parts", mark["began_s"])
+    for each in command.tables:
+        table = tables.renewed(tables.read(each), kept) | {"command": command.command}
         (tables.RESULTS / f"{each}.json").write_text(tables.written(table))
-    for picture, figure in study.pictures.items():
+    for picture, figure in command.pictures.items():
         drawn = out / "figures" / figure
         if picture.endswith(".png"):
             shutil.copy(drawn, PICTURES / picture)
@@ -237,13 +233,13 @@ def publish(name: str) -> None:
 
 def try_out(console: Console, name: str) -> int:
     """A study's short form: 0 if it makes all metrics and pictures that are asked for."""
-    study, out, started_s = STUDIES[name], QUICK_OUT / name, time.monotonic()
-    if status := call(study, out, study.quick):
+    command, out, started_s = COMMANDS[name], QUICK_OUT / name, time.monotonic()
+    if status := call(command, out, command.quick):
         console.print(f"{name}: ended with status {status}")
         return status
     made = json.loads((out / "results.json").read_text())["metrics"].keys()
-    asked = {each for table in study.tables for each in tables.asked(tables.read(table))}
-    missing = {each for each in study.pictures.values() if not (out / "figures" / each).exists()}
+    asked = {each for table in command.tables for each in tables.asked(tables.read(table))}
+    missing = {each for each in command.pictures.values() if not (out / "figures" / each).exists()}
     missing |= asked - made
     took_s = time.monotonic() - started_s
     console.print(f"{name}: {took_s:.0f} s, " + (f"missing {sorted(missing)}" if missing else "ok"))

@@ -24,13 +24,15 @@ from hrc_env.cli.progress import progress_bar
 from hrc_env.core.results import Metric
 from hrc_env.experiments.impact.setups import PerceptionSetup
 from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.fingerprint import fingerprint_of
 from hrc_env.experiments.study.intervals import ratio_over
 from hrc_env.experiments.study.report import Column, Report, table_of
+from hrc_env.experiments.study.versions import key_of
 from hrc_env.perception.faults.fault import ALL, FaultConfig
 from hrc_env.safety.incidents import KINDS
 from hrc_env.scene.rigs import RIGS
 
+DEPENDS = ("env", "tracker", "emulator", "motion", "shield", "agents")
+"""Subsystems that finished parts depend on."""
 FOUR = PerceptionSetup()
 TASK, SCENE, SEED = "HRCReach-v0", "lab", 8_000_000
 """The last: of the first episode."""
@@ -57,8 +59,8 @@ class Row:
 
 
 ROWS: Mapping[str, Row] = {
-    "bare": Row("four cameras, no shield", 3000, shield=None),
-    "four": Row("four cameras", 3000),
+    "bare": Row("four cameras, no shield", 2000, shield=None),
+    "four": Row("four cameras", 2000),
     "truth": Row("the truth", 500, PerceptionSetup("truth")),
     "one": Row("one camera after 1 s", 1000, PerceptionSetup(n_cameras=1)),
     "late": Row("200 ms late, which is told", 1000, PerceptionSetup(latency_s=0.2)),
@@ -93,20 +95,26 @@ class Arguments:
 def main(arguments: Arguments) -> None:
     """Play, print, write."""
     writable_folder(arguments.out)
-    mark = fingerprint_of({"seed": SEED, "quick": arguments.quick}, "benchmarks.shielded")
     n_all = sum(row.n_episodes for row in ROWS.values())
     done: dict[str, Episodes] = {}
     metrics: dict[str, Metric] = {}
     with progress_bar(Console(), "shielded") as progress:
-        parts = PartCache(arguments.out / "parts", mark, n_all / TOGETHER, progress)
+        parts = PartCache(arguments.out / "parts", key(arguments), n_all / TOGETHER, progress)
         for name, row in ROWS.items():
             done[name] = episodes_of(name, row, parts, arguments)
-            metrics |= {f"{name}.{key}": m for key, m in counts(done[name], done[row.of]).items()}
+            metrics |= {
+                f"{name}.{which}": m for which, m in counts(done[name], done[row.of]).items()
+            }
     table = table_of("", {name: row.says for name, row in ROWS.items()}, COLUMNS, metrics)
     settings = {name: value for name, value in asdict(arguments).items() if name != "out"}
     seeds = list(range(SEED, SEED + max(map(len, done.values()))))
     report = Report("Under the shield", (__doc__ or "").strip(), [table])
     publish(arguments.out, report, settings, seeds, metrics)
+
+
+def key(arguments: Arguments) -> str:
+    """Return the key of finished parts."""
+    return key_of({"seed": SEED, "quick": arguments.quick}, DEPENDS)
 
 
 def episodes_of(name: str, row: Row, parts: PartCache, arguments: Arguments) -> Episodes:

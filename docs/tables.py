@@ -5,10 +5,11 @@ table stands between that and `<!-- end of results -->`; for a number in a sente
 `<!-- number: NAME.WHICH -->`, and it stands between that and `<!-- end -->`. Where all this comes
 from stands once a page, between `<!-- provenance -->` and `<!-- end of provenance -->`.
 
-A file holds title, command, commit, date, machine, note, columns, rows, "keys" (a list of words a
-row; null: the row is not measured), "numbers" by name, how many minutes its study takes and what it
-depends on. A cell is a text, a number, or [value, low, high]; null is an empty cell. A column has
-name, unit and digits, and so has a number, whose "value" is a cell; both may have
+A file holds title, command, version of the package, "depends" (versions of the subsystems that the
+numbers depend on), date, machine, note, columns, rows, "keys" (a list of words a row; null: the row
+is not measured), and "numbers" by name. A cell is a text, a number, or [value, low, high]; null is
+an empty cell. A column has name, unit and digits, and so has a number, whose "value" is a cell;
+both may have
 
 - "metric": which of the command's results.json it is, where a row's words fill in {0}, {1}, ...;
   a cell that is empty stays so while the command has no such metric;
@@ -27,6 +28,8 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+
+from hrc_env.experiments.study.versions import SUBSYSTEMS, versions_of
 
 RESULTS = Path(__file__).parent / "results"
 BLOCK = re.compile(
@@ -96,22 +99,33 @@ def markdown(table: Mapping[str, Any], intervals: bool = True) -> str:
 
 
 def provenance(names: list[str]) -> str:
-    """One line: by which commands, at which commits, when and on what tables were measured."""
-    sources: dict[tuple[str, ...], list[str]] = {}
-    for name in dict.fromkeys(names):
-        table = read(name)
-        key = tuple(table[part] for part in ("machine", "command", "commit", "date"))
-        sources.setdefault(key, []).append(f'"{table["title"]}"')
-    parts = [
-        f"{', '.join(titles)} by `{command}` at {commit} ({date})"
-        for (_, command, commit, date), titles in sources.items()
-    ]
-    machines = ", ".join(dict.fromkeys(machine for machine, *_ in sources))
+    """Return one line: by which commands, at which versions, when and on what tables were made."""
+    found = [read(name) for name in dict.fromkeys(names)]
+    stated = {
+        pair for table in found for pair in (("", table["version"]), *table["depends"].items())
+    }
+    is_same = len(dict(stated)) == len(stated)
+    sources: dict[str, list[str]] = {}
+    for table in found:
+        at = "" if is_same else f" at {_versions(table['version'], table['depends'])}"
+        source = f"`{table['command']}`{at} ({table['date']})"
+        sources.setdefault(source, []).append(f'"{table["title"]}"')
+    parts = [f"{', '.join(titles)} by {source}" for source, titles in sources.items()]
+    machines = ", ".join(dict.fromkeys(table["machine"] for table in found))
+    if is_same and found:
+        depends = {name: number for table in found for name, number in table["depends"].items()}
+        machines += f", at {_versions(found[0]['version'], depends)}"
     return f"*Measured on {machines}: {'; '.join(parts)}.*"
 
 
-def renewed(table: Mapping[str, Any], path: Path, **more: Any) -> dict[str, Any]:
-    """A file with the numbers of a `results.json` that its command wrote, and with `more` fields.
+def _versions(version: str, depends: Mapping[str, int]) -> str:
+    """Return versions as sentences have them: 0.1.0 (env 1, tracker 1)."""
+    known = (f"{name} {depends[name]}" for name in SUBSYSTEMS if name in depends)
+    return f"{version} ({', '.join(known)})"
+
+
+def renewed(table: Mapping[str, Any], path: Path) -> dict[str, Any]:
+    """Return a file with the numbers of a `results.json` that its command wrote.
 
     Raises:
         KeyError: a metric is not there.
@@ -128,7 +142,9 @@ def renewed(table: Mapping[str, Any], path: Path, **more: Any) -> dict[str, Any]
     }
     date = found.get("date") or datetime.date.fromtimestamp(path.stat().st_mtime).isoformat()
     machine = f"{found['machine']['cores']} cores, no GPU"
-    new = {"commit": found["git"], "date": date, "machine": machine, **more, "rows": rows}
+    depends = found.get("depends") or versions_of(table["depends"])
+    new = {"version": found["hrc_env"], "depends": depends, "date": date, "machine": machine}
+    new |= {"rows": rows}
     return {**table, **new, **({"numbers": numbers} if numbers else {})}
 
 

@@ -10,6 +10,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # workers share the cores; read b
 import gymnasium
 import pytest
 from commands import ROOT
+from figures import Figures, collect, write
 
 import hrc_env
 from hrc_env.perception.detector import DETECTORS
@@ -35,6 +36,22 @@ def pytest_collection_modifyitems(items: list[pytest.Function]) -> None:
         words = {each for each in given if isinstance(each, str)}
         if SLOW & set(item.fixturenames) or SLOW_WORDS & words:
             item.add_marker(pytest.mark.slow)
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Print the figures that the tests of this run measured, and write them."""
+    stats = terminalreporter.stats
+    figures = collect(each for kind in ("passed", "failed") for each in stats.get(kind, ()))
+    if figures:
+        terminalreporter.section("figures")
+        for line in write(figures):
+            terminalreporter.line(line)
+
+
+@pytest.fixture
+def figures(request: pytest.FixtureRequest) -> Figures:
+    """The figures of one test: `figures.hold(Figure(...))` notes and bounds them."""
+    return Figures(request.node.user_properties)
 
 
 @pytest.fixture(scope="session")

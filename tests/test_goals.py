@@ -173,6 +173,7 @@ def test_the_expert_solves_it(task, n_episodes, least):
     assert score.success_rate >= least
 
 
+@pytest.mark.slow  # a learner is trained
 def test_sb3_learns_from_hindsight():
     """HER asks the vector environment for rewards; infos may be kept for the terms beside."""
     for copied in (False, True):

@@ -16,6 +16,8 @@ from hrc_env.__main__ import main
 from hrc_env.core.errors import ConfigError
 from hrc_env.sb3 import HRCVecEnv
 
+pytestmark = pytest.mark.slow  # learners are trained
+
 TINY = ["--perception", "truth", "--num-envs", "4", "--episodes", "2", "--no-film"]
 LIMITED = ["--algorithm", "ppo_lagrangian", "--cost-limit", "30"]
 

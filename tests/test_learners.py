@@ -21,6 +21,8 @@ from hrc_env.env import HRCEnv
 from hrc_env.sb3 import HRCVecEnv
 from hrc_env.tasks import BUILT_IN
 
+pytestmark = pytest.mark.slow  # learners are trained
+
 TINY = ["--perception", "truth", "--n-workers", "0", "--num-envs", "4", "--episodes", "2"]
 REACH = "HRCReachGoal-v0"
 

@@ -29,6 +29,8 @@ from hrc_env.env import HRCEnv
 from hrc_env.safety.shield import SHIELDS
 from hrc_env.sb3 import HRCVecEnv
 
+pytestmark = pytest.mark.slow  # a learner is trained
+
 NEAR_QP = '{"kind": "qp", "margin_m": 0.1}'
 TINY = ["--perception", "truth", "--num-envs", "4", "--episodes", "2", "--no-film"]
 

@@ -167,6 +167,7 @@ def test_only_the_reset_after_a_seed_is_staggered_and_the_same_seed_gives_the_sa
     assert ends[1][-1].all()
 
 
+@pytest.mark.slow  # a learner is trained
 def test_sb3s_evaluation_sees_whole_episodes_only():
     """In the callback every time, not the first time only."""
     env = HRCVecEnv(2, perception="none", n_workers=0, seed=3)
@@ -214,6 +215,7 @@ def test_pictures_of_all_environments_are_tiled():
     env.close()
 
 
+@pytest.mark.slow  # a learner is trained
 def test_sb3s_own_wrappers_and_learners_take_it():
     """On policy and off; VecCheckNan raises at the first NaN."""
     made = HRCVecEnv(4, perception="truth", max_episode_steps=20)

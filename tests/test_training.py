@@ -24,6 +24,8 @@ from hrc_env.cli.train import Train
 from hrc_env.core.errors import CheckpointError, ConfigError
 from hrc_env.env import HRCEnv
 
+pytestmark = pytest.mark.slow  # learners are trained
+
 TINY = ["--perception", "truth", "--num-envs", "4", "--episodes", "2", "--no-film"]
 
 

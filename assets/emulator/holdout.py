@@ -10,9 +10,11 @@ the joints of the other bodies lie where those of the six do on average (`bodies
 Clips and fit are kept in the folder, so that a run that was stopped goes on.
 """
 
+import hashlib
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import tyro
 from rich.console import Console
@@ -24,7 +26,7 @@ from assets.emulator.fit.novelty import poses_of
 from assets.emulator.matching import matched
 from assets.emulator.run import part_of
 from assets.emulator.samples import samples_of
-from assets.emulator.shelf import kept
+from assets.emulator.shelf import DEPENDS, kept
 from assets.emulator.validate import (
     Compared,
     Say,
@@ -38,6 +40,8 @@ from assets.emulator.writing import write_calibration
 from hrc_env.cli.progress import progress_bar
 from hrc_env.config import HRCConfig
 from hrc_env.core.results import Metric, write_results
+from hrc_env.experiments.study.cache import PartCache, PartProgress
+from hrc_env.experiments.study.versions import key_of
 from hrc_env.perception.emulator import EmulatorConfig
 from hrc_env.worker.body import Body, load_body, worker_names
 
@@ -49,6 +53,8 @@ FITTED_MOTIONS = tuple(m for motions in FAMILIES.values() for m in motions if m 
 FITTED_SCENE, HELD_SCENE = "lab", "site"
 
 
+ROUNDS = 3
+"""Of clips, if not asked otherwise."""
 TRUTHS = {"joint": "joints_world", "landmark": "landmarks_world"}
 """What errors are taken from: where BlazePose means a joint to be, or anatomical landmarks."""
 
@@ -78,24 +84,53 @@ SAMPLES = {
 }
 
 
-def main(out: Path = Path("out/trueness"), rounds: int = 4) -> None:
+def main(out: Path = Path("out/trueness"), rounds: int = ROUNDS) -> None:
     """Fit to a part, compare on the rest; writes results.json.
 
     Args:
         out: folder of clips, calibration and results.
         rounds: how often each motion is played for the fit, and at most for the rest.
     """
-    console, metrics = Console(), dict[str, Metric]()
+    console = Console()
     with progress_bar(console, "trueness") as say:
         config = fitted(out, rounds, part_of(say, 0.5))
-        for name, sample in SAMPLES.items():
-            rest = part_of(say, 0.5 / len(SAMPLES))
-            seen = compared(sample.clips(rounds), rest, config, out, joints_of)
-            metrics |= {f"{name}.{key}": metric for key, metric in metrics_of(seen)}
+        parts = PartCache(out / "parts", "", len(SAMPLES), part_of(say, 0.5))
+        metrics = judged(parts, config, rounds, out)
     settings = {"rounds": rounds, "bodies": HELD_BODIES, "motions": HELD_MOTIONS}
     write_results(out / "results.json", {**settings, "scene": HELD_SCENE}, [0], metrics)
     for key, each in metrics.items():
         console.print(f"{key:55s} {each.value:8.3f} ({each.low:.3f} to {each.high:.3f})")
+
+
+def judged(
+    parts: PartCache, config: HRCConfig, rounds: int, store: Path | None
+) -> dict[str, Metric]:
+    """Return the numbers of all samples, each from the cache or anew.
+
+    Args:
+        parts: where they are kept.
+        config: with the calibration that is judged.
+        rounds: how often each motion is played, at most.
+        store: folder of rendered clips; None: they are rendered anew.
+    """
+    metrics = dict[str, Metric]()
+    digest = hashlib.sha256(Path(config.emulator.calibration).read_bytes()).hexdigest()
+    key = key_of({"calibration": digest, "rounds": rounds}, DEPENDS)
+    for name, sample in SAMPLES.items():
+
+        def make(tick: PartProgress, sample: Sample = sample) -> dict[str, Any]:
+            clips = sample.clips(rounds)
+            seen = compared(clips, lambda share, _: tick(share), config, store, joints_of)
+            return {each: asdict(metric) for each, metric in metrics_of(seen)}
+
+        part = parts.part(name, make, key)
+        metrics |= {f"{name}.{each}": Metric(**values) for each, values in part.items()}
+    return metrics
+
+
+def calibration_of(out: Path, rounds: int) -> Path:
+    """Return the path of the calibration that is fitted to what is not held out."""
+    return out / f"keypoints-{key_of({'rounds': rounds}, DEPENDS)}.json"
 
 
 def joints_of(name: str) -> Body:
@@ -105,8 +140,7 @@ def joints_of(name: str) -> Body:
 
 def fitted(out: Path, rounds: int, say: Say) -> HRCConfig:
     """Settings with a calibration that is fitted to what is not held out, made if need be."""
-    path = out / "keypoints.json"
-    config = HRCConfig()
+    path, config = calibration_of(out, rounds), HRCConfig()
     where = (FITTED_BODIES, FITTED_MOTIONS, (FITTED_SCENE,))
     clips, pixels = clips_of(rounds, 0, FIT_RIGS, *where), []
     for clip, watched in zip(clips, kept("pixels", clips, config, out), strict=True):

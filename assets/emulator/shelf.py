@@ -10,8 +10,11 @@ from assets.emulator.clips import Clip
 from assets.emulator.watch import BodyOf, Watched, load, save, watch
 from hrc_env.config import HRCConfig
 from hrc_env.core.typing import Floats
-from hrc_env.experiments.study.fingerprint import fingerprint_of
+from hrc_env.experiments.study.versions import key_of
 from hrc_env.worker.body import load_body
+
+DEPENDS = ("env", "tracker", "emulator", "detector", "motion")
+"""Subsystems that decide what is seen of clips."""
 
 
 def kept(
@@ -23,7 +26,7 @@ def kept(
 ) -> Iterator[Watched]:
     """What a level saw of clips, from the folder where it is there, else played and put there.
 
-    What other code or settings saw does not count, nor what was seen when the tracker was told
+    What other versions or settings saw does not count, nor what was seen when the tracker was told
     other deviations or offsets of joints, or that these are elsewhere in a body (`watch`).
     """
     if folder is None:
@@ -32,9 +35,9 @@ def kept(
     known = config.emulator.calibrated()
     told = _digest(known.sigma, known.offset_m, known.wander_m, known.between_m)
     settings = {"level": level, "detector": asdict(config.detector), "told": told}
-    code = fingerprint_of(settings, "assets.emulator.watch")
+    key = key_of(settings, DEPENDS)
     joints = {clip.body: _digest(body_of(clip.body).joint_offset) for clip in clips}
-    paths = [folder / f"{_name(clip, code + joints[clip.body])}.npz" for clip in clips]
+    paths = [folder / f"{_name(clip, key + joints[clip.body])}.npz" for clip in clips]
     todo = [clip for clip, path in zip(clips, paths, strict=True) if not path.exists()]
     fresh = watch(level, todo, config, body_of)
     for path in paths:
@@ -47,6 +50,6 @@ def _digest(*arrays: Floats) -> str:
     return hashlib.sha256(b"".join(array.tobytes() for array in arrays)).hexdigest()
 
 
-def _name(clip: Clip, code: str) -> str:
-    text = json.dumps([asdict(clip), code], sort_keys=True)
+def _name(clip: Clip, key: str) -> str:
+    text = json.dumps([asdict(clip), key], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:20]

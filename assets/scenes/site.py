@@ -3,7 +3,7 @@
 The robot stands on the house's slab, where the laboratory has it, so that tasks fit both. Two
 walls are up, half of them open studs; a scaffold stands outside one of them. Truck, container and
 stacks stand where deliveries leave them: at the sides. The four cameras hang on masts in the
-corners at 5 m. Layout and colours: judgement; `benchmarks/occlusion.py` measures what hides.
+corners at 5 m. Layout and colours: judgement; `tests/properties/` measures what hides.
 """
 
 from typing import Any

@@ -86,7 +86,7 @@ def _unit(key: str) -> str:
 
 MOTION = Study(
     name="bench motion",
-    modules=("benchmarks.motion.statistics",),
+    depends=("motion",),
     settings=lambda config: {"bench": asdict(config)},
     seeds=lambda config: list(range(config.n_seeds)),
     n_parts=lambda _: 1,

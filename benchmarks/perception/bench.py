@@ -1,7 +1,7 @@
 """The perception bench: how fast detection is, how well workers are seen, and what goes wrong.
 
 Each part is written to DIR/parts as soon as it is done, so that a bench that was stopped goes on
-where it was; parts made by other code or settings are made anew. Times are taken last.
+where it was; parts made at other versions or settings are made anew. Times are taken last.
 """
 
 import zlib
@@ -41,23 +41,23 @@ BLOCK = 5
 class PerceptionBenchConfig:
     """How much is measured."""
 
-    episodes: tuple[tuple[str, int], ...] = (("lab", 30), ("site", 15))
+    episodes: tuple[tuple[str, int], ...] = (("lab", 15), ("site", 8))
     """Episodes at `pixels`, scene by scene; faults are compared with the lab's first ones."""
     n_steps: int = 250
     """Steps of each."""
-    n_faults: int = 8
+    n_faults: int = 4
     """Episodes of every fault at `pixels`; the four cameras have it in turns."""
     fault_steps: int = 150
     """Steps of each."""
-    n_emulated: int = 40
+    n_emulated: int = 20
     """Episodes of every fault at `keypoints`, of `n_steps` each."""
     kinds: tuple[str, ...] = tuple(KINDS)
     """Which faults."""
     bodies: tuple[str, ...] = worker_names()
     """Whose crops are looked at."""
-    n_instants: int = 30
+    n_instants: int = 15
     """Moments of each body in each scene, and of each lens; four crops each."""
-    emulator_rounds: int | None = 4
+    emulator_rounds: int | None = 2
     """How often each motion is rendered in each scene to hold the emulator against pixels; 0: once,
     in one of them; None: not at all."""
     cameras: tuple[int, ...] = (1, 2, 4)
@@ -229,7 +229,7 @@ def play(config: PerceptionBenchConfig, parts: PartCache) -> dict[str, dict[str,
 
 PERCEPTION = Study(
     name="bench perception",
-    modules=("benchmarks.perception.bench",),
+    depends=("env", "tracker", "emulator", "detector", "motion"),
     settings=lambda config: {"bench": asdict(config)},
     seeds=lambda config: [FIRST_SEED + k for k in range(max(n for _, n in config.episodes))],
     n_parts=lambda config: len(list(tasks_of(config))),

@@ -87,7 +87,7 @@ def report(metrics: Metrics) -> Report:
 
 RECORDED = Study(
     name="bench recorded",
-    modules=("benchmarks.recorded.metrics",),
+    depends=("tracker", "detector"),
     settings=lambda _: {"recording": POSE2SIM.requirement, "follower": FOLLOWER},
     seeds=lambda _: [0],
     n_parts=lambda _: 1,

@@ -40,7 +40,7 @@ class SpeedBenchConfig:
     """Which environment, by its id; "every": the speed of each, and nothing else."""
     shield: str | None = None
     """What may change its commands, by its name."""
-    n_rounds: int = 7
+    n_rounds: int = 6
     """How often everybody has a turn."""
     least_steps: int = 4000
     """Environment steps of a turn, at least; whole episodes are run."""
@@ -178,7 +178,7 @@ def metrics_of(measured: Measured) -> dict[str, Metric]:
 
 SPEED = Study(
     name="bench speed",
-    modules=("benchmarks.speed.contenders",),
+    depends=("env", "tracker", "emulator", "motion"),
     settings=lambda config: {"bench": asdict(config)},
     seeds=lambda _: [0],
     n_parts=lambda _: 1,

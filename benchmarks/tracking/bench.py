@@ -1,7 +1,7 @@
 """The tracking bench: every estimator on the same sequences, beside the bound.
 
 Each (rig, condition, estimator) is written to DIR/parts as soon as it is done, so that a bench
-that was stopped goes on where it was; parts made by other code or settings are made anew.
+that was stopped goes on where it was; parts made at other versions or settings are made anew.
 """
 
 import multiprocessing
@@ -28,14 +28,14 @@ from hrc_env.tracking.estimators import ESTIMATORS
 class TrackingBenchConfig:
     """How much is run."""
 
-    n_seeds: int = 100
+    n_seeds: int = 70
     """Sequences per rig and condition."""
     first_seed: int = 20_000
     """Seed of the first sequence; the others count up. No setting was chosen on these: seeds
     1000 to 1023, 5000 to 5023 and 7000 to 7023 served for that."""
-    n_matched: int = 200
+    n_matched: int = 140
     """Matched sequences per rig."""
-    n_smoothed: int = 25
+    n_smoothed: int = 18
     """Sequences per rig and condition for the smoother, which is slow; the first ones."""
     timing_repeats: int = 7
     """How often the time per update is taken."""
@@ -135,7 +135,7 @@ def _timing(config: TrackingBenchConfig, parts: PartCache) -> Parts:
 
 TRACKING = Study(
     name="bench tracking",
-    modules=("benchmarks.tracking.cells",),
+    depends=("env", "tracker", "emulator", "motion"),
     settings=settings,
     seeds=seeds_of,
     n_parts=lambda _: sum(len(names_of(each)) for _, each in conditions()) + len(ESTIMATORS),

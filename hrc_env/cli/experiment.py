@@ -46,7 +46,7 @@ class SiteExperiment(AnyExperiment):
     name = "site"
     out: Path = Path("out/site")
     seeds: int | None = None
-    """Walks, instead of 10 (2 if quick)."""
+    """Walks, instead of 9 (2 if quick)."""
     estimator: tuple[str, ...] = ("particle", "paper")
     """Estimators: python -m hrc_env list."""
 
@@ -58,7 +58,7 @@ class LabExperiment(AnyExperiment):
     name = "lab"
     out: Path = Path("out/lab")
     seeds: int | None = None
-    """Films of every motion, instead of 10 (2 if quick)."""
+    """Films of every motion, instead of 7 (2 if quick)."""
     folded: str = "full"
     """The landmark network for workers who are folded up: full, or heavy, which is fetched once
     with `python -m hrc_env setup --networks heavy`."""
@@ -75,7 +75,7 @@ class ImpactExperiment(AnyExperiment):
     shield: str | None = None
     """What may change their commands: qp, ssm, pfl, or one that was registered (--import)."""
     seeds: int | None = None
-    """Episodes of every row, instead of 200 (8 if quick)."""
+    """Episodes of every row, instead of 90 (8 if quick)."""
     estimator: tuple[str, ...] = ()
     """Compare these only, with the default one, the truth and nothing; all setups if not given."""
 
@@ -89,7 +89,8 @@ class PriceExperiment(AnyExperiment):
     task: str = DEFAULT
     """What the robots do, by the environment's id."""
     seeds: int | None = None
-    """Episodes of every step of a search, instead of 300; then 10 for 3 of these confirm it."""
+    """Episodes of every step of a search, instead of 300; then 10 for 3 of these confirm it,
+    instead of 1000 (600 if quick)."""
     eyes: tuple[str, ...] = ()
     """Compare these only, by name, as truth particle one_camera; quick: twelve."""
     trainings: bool = False
@@ -104,7 +105,7 @@ class AblationsExperiment(AnyExperiment):
     name = "ablations"
     out: Path = Path("out/ablations")
     seeds: int | None = None
-    """Episodes of every setting, instead of 80 (4 if quick)."""
+    """Episodes of every setting, instead of 30 (4 if quick)."""
     studies: tuple[str, ...] | None = None
     """Which of cameras, algorithm1, latency, calibration, occlusion, workers, filter, kinematics;
     all if not given."""

@@ -64,7 +64,7 @@ class SceneConfig:
     """Whether furniture and building material stand in the room."""
     sim_dt: float = 0.008
     """Length of a physics substep [s]: the coarsest tried that keeps the tool within 1 mm (95 %) of
-    the integral of smooth commands, and contacts shallow and calm (`benchmarks/sim_dt.py`)."""
+    the integral of smooth commands, and contacts shallow and calm (`tests/properties/`)."""
     slew_rad_s2: float = 8.0
     """Fastest change of a commanded joint velocity [rad/s^2]; keeps the overshoot below 5 %."""
     integrator_clamp_rad: float = 0.05

@@ -9,6 +9,8 @@ from benchmarks import baselines
 from docs import tables
 from hrc_env.core.results import Metric
 
+pytestmark = pytest.mark.slow  # a study is played
+
 
 def episode(**changes: float) -> dict[str, float]:
     return {"r": 1.0, "seconds": 10.0, "goals_reached": 2.0, "cost": 0.0, "contacts": 0.0} | changes

@@ -11,6 +11,8 @@ from hrc_env.experiments.impact.policies import Policy, maker
 from hrc_env.experiments.impact.setups import REFERENCE, setup_called
 from hrc_env.tasks.task import task_called
 
+pytestmark = pytest.mark.slow  # studies are played
+
 IDS = ("HRCPickPlace-v0", "HRCReachGoal-v0")
 
 

@@ -7,6 +7,8 @@ import pytest
 from benchmarks import experts
 from hrc_env.core.errors import ConfigError
 
+pytestmark = pytest.mark.slow  # a study is played
+
 TASK = "HRCReachGoal-v0"
 
 

@@ -10,6 +10,8 @@ from hrc_env.experiments.ablations.play import walks_of
 from hrc_env.experiments.study.rigs import ALL, N_WARM_UP
 from hrc_env.geometry.rotations import about_axis
 
+pytestmark = pytest.mark.slow  # a study is played
+
 SEEDS = (5, 6, 7, 8)
 
 

@@ -14,6 +14,8 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.motion.repertoire import SCENES
 from hrc_env.scene.build import build
 
+pytestmark = pytest.mark.slow  # a gallery is drawn
+
 
 def test_a_page_shows_every_picture_with_its_words(tmp_path):
     shown = [Exhibit("Motions", "a.png", "saw <wood>", "by worker 1", True)]

@@ -7,6 +7,8 @@ import pytest
 
 from benchmarks import learners
 
+pytestmark = pytest.mark.slow  # a study is played
+
 
 def test_a_task_is_learnt_and_judged_and_goes_on(tmp_path, monkeypatch):
     arguments = learners.Arguments(tmp_path, ids=("HRCReach-v0",), quick=True)

@@ -7,6 +7,8 @@ import pytest
 
 from benchmarks import limited
 
+pytestmark = pytest.mark.slow  # a study is played
+
 
 def points(costs: list[float]) -> list[dict[str, float]]:
     """A curve of a rollout every 50,000 steps; the limit is whole from the fourth on."""

@@ -1,17 +1,21 @@
 """make results: what is stale is run, what is finished is kept, numbers reach their tables."""
 
+import importlib
 import json
+import os
 import sys
 from dataclasses import replace
 
 import pytest
 from rich.console import Console
 
-from benchmarks import results
-from benchmarks.results import STUDIES, Arguments, Study, depends, main, why_stale
+from benchmarks import defaults, records, results
+from benchmarks.replays import REPLAYS
+from benchmarks.results import COMMANDS, STUDIES, Arguments, Command, main, why_stale
+from benchmarks.studies import Study, commands_of
 from docs import tables
+from hrc_env.core.errors import ConfigError
 
-MODULE = "benchmarks.occlusion"
 WRITES = """
 import json, sys, time
 from pathlib import Path
@@ -22,15 +26,43 @@ with open(out / "begun", "a") as begun:
     begun.write("x")
 time.sleep(SECONDS)
 metric = {"value": 0.25, "low": 0.2, "high": 0.3, "n": 8}
-content = {"git": "abc1234", "machine": {"cores": 2}, "metrics": {"found.lab": metric}}
+content = {"hrc_env": "0.2.0", "machine": {"cores": 2}, "metrics": {"found.lab": metric}}
+content["config"] = {"asked": 1}
+(out / "parts").mkdir(exist_ok=True)
+part = {"key": "k", "seconds": 1.0, "notes": {}, "part": {"x": [1.0, 2.0]}}
+(out / "parts" / "lab.1.json").write_text(json.dumps(part))
 (out / "results.json").write_text(json.dumps(content))
 """
 TABLE = {
-    "title": "Found", "command": "python made.py", "commit": "", "date": "", "machine": "",
+    "title": "Found", "command": "python made.py", "version": "", "depends": {}, "date": "",
+    "machine": "",
     "columns": [{"name": "scene"}, {"name": "found", "unit": "%", "metric": "found.{0}",
                                     "factor": 100}],
     "keys": [["lab"]], "rows": [["lab", 1]],
 }  # fmt: skip
+
+
+EXPERIMENTS = "hrc_env.experiments"
+PARTS_OF = {
+    **{name: f"{EXPERIMENTS}.{name}.experiment:STUDY"
+       for name in ("site", "lab", "ablations", "impact", "price")},
+    "tracking": "benchmarks.tracking.bench:TRACKING",
+    "perception": "benchmarks.perception.bench:PERCEPTION",
+    "footage": "benchmarks.recorded.bench:RECORDED",
+    "speed": "benchmarks.speed.bench:SPEED",
+    **{name: f"benchmarks.{name}:DEPENDS"
+       for name in ("experts", "shielded", "baselines", "learners", "limited", "facing")},
+    "trueness": "assets.emulator.shelf:DEPENDS",
+}  # fmt: skip
+"""Where a study's parts get their subsystems from."""
+
+
+def declare(monkeypatch, command):
+    """Declare one study, of one command."""
+    for known, one in ((STUDIES, Study({"one": command})), (COMMANDS, command)):
+        for name in list(known):
+            monkeypatch.delitem(known, name)
+        monkeypatch.setitem(known, "one", one)
 
 
 @pytest.fixture
@@ -44,13 +76,14 @@ def desk(tmp_path, monkeypatch):
     monkeypatch.setattr(tables, "RESULTS", tmp_path)
     monkeypatch.setattr(results.generate, "main", lambda words: None)
     monkeypatch.setattr(results, "provenance", lambda: {"git": "abc1234"})
+    monkeypatch.setattr(results, "versions_of", lambda names: dict.fromkeys(names, 1))
     (tmp_path / "found.json").write_text(json.dumps(TABLE))
 
     def study(seconds=0.0, **changes):
         script = tmp_path / "made.py"
         script.write_text(WRITES.replace("SECONDS", str(seconds)))
-        made = Study(f"python {script}", 0.1, (MODULE,), ("found",), {"shown.png": "a.png"})
-        monkeypatch.setattr(results, "STUDIES", {"one": replace(made, **changes)})
+        made = Command(f"python {script}", 0.1, ("env",), ("found",), {"shown.png": "a.png"})
+        declare(monkeypatch, replace(made, **changes))
         return tmp_path
 
     return study
@@ -66,11 +99,26 @@ def test_numbers_pictures_and_what_they_depend_on_reach_the_documentation(desk):
     assert main(Arguments()) == 0
     table = json.loads((folder / "found.json").read_text())
     assert table["rows"] == [["lab", [25.0, 20.0, 30.0]]]
-    assert (table["commit"], table["machine"]) == ("abc1234", "2 cores, no GPU")
+    assert (table["version"], table["machine"]) == ("0.2.0", "2 cores, no GPU")
     whole = json.loads((folder / "whole" / "one.json").read_text())
-    assert len(table["depends"]) == 12
-    assert whole["depends"].keys() == depends(results.STUDIES["one"]).keys()
+    assert table["depends"] == whole["depends"] == {"env": 1}
     assert (folder / "shown.png").read_bytes() == b"picture"
+    assert tables.provenance(["found"]) == (
+        f'*Measured on 2 cores, no GPU, at 0.2.0 (env 1): "Found" by `{table["command"]}` '
+        f"({table['date']}).*"
+    )
+
+
+def test_a_summary_of_every_part_of_the_latest_run_is_recorded(desk):
+    folder = desk()
+    old = folder / "out" / "one" / "parts" / "old.json"
+    old.parent.mkdir(parents=True)
+    old.write_text("{}")
+    os.utime(old, (0, 0))
+    main(Arguments())
+    record = records.read("one")
+    assert (record.depends, record.parts.keys()) == ({"env": 1}, {"lab.1"})
+    assert record.parts["lab.1"].summary["x*"][:3] == [2, 2, 1.5]
 
 
 def test_only_what_is_stale_is_run_unless_it_is_named(desk, monkeypatch):
@@ -82,11 +130,55 @@ def test_only_what_is_stale_is_run_unless_it_is_named(desk, monkeypatch):
     assert n_runs(folder) == 1
     main(Arguments(only=("one",)))
     assert n_runs(folder) == 2
-    kept = results.code_of
-    monkeypatch.setattr(results, "code_of", lambda text: kept(text) + b"changed")
-    assert "benchmarks/occlusion.py" in why_stale("one")
+    monkeypatch.setattr(results, "versions_of", lambda names: dict.fromkeys(names, 2))
+    assert why_stale("one") == "env 1 -> 2"
     main(Arguments())
     assert n_runs(folder) == 3
+    declare(monkeypatch, replace(COMMANDS["one"], depends=("env", "shield")))
+    assert why_stale("one") == "shield not recorded -> 2"
+
+
+def test_another_command_makes_a_study_stale(desk, monkeypatch):
+    folder = desk()
+    main(Arguments())
+    command = COMMANDS["one"]
+    declare(monkeypatch, replace(command, command=f"{command.command} --more"))
+    assert why_stale("one") == "another command"
+    main(Arguments())
+    assert n_runs(folder) == 2
+
+
+def test_another_value_of_a_setting_makes_a_study_stale_and_another_name_does_not(
+    desk, monkeypatch
+):
+    folder = desk()
+    main(Arguments())
+    path = folder / "whole" / "one.json"
+    config = {"n_seeds": 10, "bench": {"levels": ["truth"], "old_name": 3}}
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"config": config}))
+    now = {"n_seeds": 10, "bench": {"levels": ["truth"], "new_name": 3}, "added": 1}
+    monkeypatch.setattr(results.defaults, "settings_of", lambda name: now)
+    assert why_stale("one") == ""
+    now["bench"]["levels"] = ["truth", "none"]
+    now["n_seeds"] = 9
+    assert why_stale("one") == 'n_seeds 10 -> 9, levels ["truth"] -> ["truth", "none"]'
+
+
+def test_the_settings_of_a_command_are_called_as_its_results_call_them():
+    for name in (*defaults.MADE, *defaults.SCRIPTS):
+        recorded, now = results.whole(name).get("config"), defaults.settings_of(name)
+        assert recorded is None or now.keys() & recorded.keys(), name
+
+
+def test_a_part_that_came_out_otherwise_makes_a_study_stale_and_all_its_parts_anew(desk):
+    folder = desk()
+    main(Arguments())
+    record = records.read("one")
+    records.save("one", replace(record, spoiled={"lab.1": "x* has mean 2"}))
+    assert why_stale("one") == "replayed, part lab.1 differs: x* has mean 2"
+    main(Arguments())
+    assert n_runs(folder) == 1  # in a folder that was emptied
+    assert why_stale("one") == ""
 
 
 def test_a_run_that_is_out_of_time_is_stopped_and_goes_on(desk):
@@ -94,7 +186,7 @@ def test_a_run_that_is_out_of_time_is_stopped_and_goes_on(desk):
     main(Arguments(hours=5.0 / 3600))
     assert n_runs(folder) == 1
     assert not (folder / "whole").exists()
-    spent = json.loads((folder / "out" / "one" / "depends.json").read_text())["minutes"]
+    spent = json.loads((folder / "out" / "one" / results.MARK).read_text())["minutes"]
     desk(0.0)
     main(Arguments())
     assert n_runs(folder) == 2
@@ -106,14 +198,15 @@ def test_how_long_a_study_takes_is_what_it_takes_from_nothing(desk, goes_on):
     folder = desk(goes_on=goes_on)
     (folder / "whole").mkdir()
     whole = folder / "whole" / "one.json"
-    whole.write_text(json.dumps({"minutes": 42.0}))  # parts of that run may be used again
+    earlier = {"minutes": 42.0, "config": {"asked": 1}}  # parts of that run may be used again
+    whole.write_text(json.dumps(earlier))
     main(Arguments())
-    took = results.expected_min("one")
+    took = results.whole("one")["minutes"]
     assert took == 42.0 if goes_on else took < 1.0
-    mark = folder / "out" / "one" / "depends.json"
+    mark = folder / "out" / "one" / results.MARK
     mark.write_text(json.dumps(json.loads(mark.read_text()) | {"minutes": 60.0}))
     main(Arguments(only=("one",)))
-    took = results.expected_min("one")
+    took = results.whole("one")["minutes"]
     assert took > 60.0 if goes_on else took < 1.0
 
 
@@ -136,16 +229,6 @@ def test_what_keeps_nothing_is_not_begun_without_the_time_for_it(desk):
     assert n_runs(folder) == 1
 
 
-@pytest.mark.parametrize("is_keyed", [True, False])
-def test_what_does_not_say_by_what_it_was_made_is_made_anew(desk, is_keyed):
-    folder = desk(is_keyed=is_keyed)
-    main(Arguments())
-    mark = folder / "out" / "one" / "depends.json"
-    mark.write_text(mark.read_text().replace(depends(results.STUDIES["one"])["command"], "old"))
-    main(Arguments(only=("one",)))
-    assert n_runs(folder) == (2 if is_keyed else 1)
-
-
 def test_numbers_of_a_tree_with_changes_are_refused_or_marked(desk, monkeypatch, capsys):
     folder = desk()
     monkeypatch.setattr(results, "provenance", lambda: {"git": "abc1234+changes"})
@@ -163,37 +246,70 @@ def test_a_short_form_says_which_metrics_are_missing(desk, capsys):
     assert "missing ['found.site']" in capsys.readouterr().out
 
 
-def test_what_is_said_of_code_does_not_count():
-    before = results.code_of("X = 1\ndef f():\n    return X\n")
-    assert (
-        results.code_of('"""Of X."""\nX =  1  # one\n"""Of f."""\ndef f():\n    "f"\n    return X')
-        == before
-    )
-    assert results.code_of('X = "1"\ndef f():\n    return X\n') != before
+@pytest.mark.parametrize(
+    ("depends", "words"), [((), "it names none"), (("envs",), "Unknown subsystem 'envs'")]
+)
+def test_a_study_that_names_no_subsystem_or_an_unknown_one_is_refused(depends, words):
+    with pytest.raises(ConfigError, match=words):
+        Command("python -m made", 1, depends)
 
 
-def test_a_study_depends_on_what_it_imports_and_not_on_command_lines():
-    found = depends(STUDIES["tracking"])
-    assert {"benchmarks/tracking", "hrc_env/tracking", "assets/workers", "command"} <= found.keys()
-    for study in STUDIES.values():
-        assert "hrc_env/cli" not in depends(study)
-        assert "constraints.txt" in depends(study)
-    assert "hrc_env/sb3.py" not in found
-    assert "hrc_env/sb3.py" in depends(STUDIES["baselines"])
-    assert "hrc_env/tracking" not in depends(STUDIES["occlusion"])
+def test_a_study_names_the_subsystems_that_its_parts_are_keyed_by():
+    for name, place in PARTS_OF.items():
+        module, _, variable = place.partition(":")
+        made = getattr(importlib.import_module(module), variable)
+        depends = getattr(made, "depends", made)
+        assert set(COMMANDS[name].depends) == set(depends), name
+
+
+def test_every_study_can_be_replayed_or_keeps_no_parts():
+    assert COMMANDS.keys() - REPLAYS.keys() == {"speed", "speed_tasks", "pictures"}
+    assert REPLAYS.keys() <= COMMANDS.keys()
 
 
 def test_every_file_of_results_is_one_studys():
-    files = [name for study in STUDIES.values() for name in study.tables]
+    files = [name for command in COMMANDS.values() for name in command.tables]
     assert sorted(files) == sorted(path.stem for path in tables.RESULTS.glob("*.json"))
-    for name, study in STUDIES.items():
-        assert all(tables.read(each)["command"] == study.command for each in study.tables), name
+    recorded = {results.whole(name).get("command") for name in COMMANDS}
+    for name, command in COMMANDS.items():  # a table of an older command says so
+        known = {command.command, *recorded}
+        assert all(tables.read(each)["command"] in known for each in command.tables), name
 
 
 def test_the_plan_names_every_study_and_sums_what_is_stale():
     console = Console(width=120, record=True, file=sys.stderr)
-    console.print(results.plan({"occlusion": "", "impact": "hrc_env/tracking"}))
+    console.print(results.plan({"site": "", "impact": "tracker 1 -> 2"}))
     said = console.export_text()
-    assert "stale: hrc_env/tracking" in said
+    assert "stale: tracker 1 -> 2" in said
     assert "fresh" in said
-    assert f"{results.spoken(results.expected_min('impact'))} for what is stale" in said
+    assert "20 min for what is stale, 30 min from nothing" in said
+
+
+def test_ten_studies_take_three_and_a_half_hours_without_trainings():
+    assert len(STUDIES) <= 10
+    assert sum(study.minutes for study in STUDIES.values()) <= 3.5 * 60
+    assert len(COMMANDS) == sum(len(study.commands) for study in STUDIES.values())
+    trained = {name for name, command in COMMANDS.items() if command.is_release}
+    assert trained == {"learners", "limited", "frontier"}
+
+
+def test_a_name_of_a_study_stands_for_all_its_commands():
+    assert commands_of(["perception", "trueness"]) == ("perception", "trueness")
+    with pytest.raises(ConfigError, match="Unknown study 'fuzz'"):
+        commands_of(["fuzz"])
+
+
+def test_what_is_for_a_release_only_is_left_out(desk):
+    folder = desk(is_release=True)
+    main(Arguments())
+    assert n_runs(folder) == 0
+    main(Arguments(trainings=True))
+    assert n_runs(folder) == 1
+
+
+def test_other_settings_took_another_time(desk):
+    folder = desk()
+    (folder / "whole").mkdir()
+    (folder / "whole" / "one.json").write_text(json.dumps({"minutes": 42.0, "config": {}}))
+    main(Arguments())
+    assert results.whole("one")["minutes"] < 1.0

@@ -7,6 +7,8 @@ import pytest
 from benchmarks import shielded
 from hrc_env.safety.incidents import KINDS
 
+pytestmark = pytest.mark.slow  # a study is played
+
 KEPT = ("bare", "one")
 
 

@@ -19,6 +19,8 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.experiments.study import runner
 from hrc_env.tracking.estimators import ESTIMATORS
 
+pytestmark = pytest.mark.slow  # a study is played
+
 TINY = TrackingBenchConfig(n_seeds=2, n_matched=2, n_smoothed=1, timing_repeats=1)
 
 
@@ -30,14 +32,13 @@ def no_time(name, rig, clean, hard, n_repeats, tick):
 
 @contextmanager
 def small():
-    """Few frames, no clock, and code that nobody edits meanwhile."""
+    """Few frames and no clock."""
     short = {name: min(n, 20) for name, n in sequences.N_FRAMES.items()}
     windows = {name: dict.fromkeys(inner, (10, 20)) for name, inner in sequences.WINDOWS.items()}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sequences, "N_FRAMES", short)
         patch.setattr(sequences, "WINDOWS", windows)
         patch.setattr(tracking_bench, "time_estimator", no_time)
-        patch.setattr(runner, "fingerprint_of", lambda settings, *modules: "the same code")
         yield patch
 
 

@@ -13,6 +13,8 @@ from hrc_env.experiments.benchmark.conditions import CONDITIONS, MAIN, VERSION, 
 from hrc_env.experiments.benchmark.experiment import worth
 from hrc_env.safety.incidents import KINDS
 
+pytestmark = pytest.mark.slow  # an experiment is played
+
 KEY = "HRCReach-v0.unaware.keypoints.none"
 
 

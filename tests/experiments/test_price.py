@@ -178,7 +178,8 @@ def test_what_the_command_asks_for():
     full, quick = config_for(), config_for(quick=True)
     assert quick.eyes == QUICK
     assert (quick.others, quick.n_pixels) == ((), 0)
-    assert (quick.n_seeds, quick.n_fresh, quick.n_search) == (300, 1000, 4)
+    assert (quick.n_seeds, quick.n_fresh, quick.n_search) == (300, 600, 4)
+    assert full.n_fresh == 1000
     assert len(full.others) == 6
     assert full.n_pixels == 40
     assert config_for(seeds=3).n_fresh == 10

@@ -50,12 +50,12 @@ def test_a_half_written_result_is_said_and_kept(tmp_path):
 def test_a_half_written_part_is_made_anew(tmp_path):
     cache = PartCache(tmp_path, "code", 2, silent)
     cache.part("one", lambda tick: {"x": 1})
-    (tmp_path / "one.json").write_text('{"fingerp')
+    (tmp_path / "one.json").write_text('{"ke')
     assert cache.part("one", lambda tick: {"x": 2}) == {"x": 2}
     assert cache.part("one", lambda tick: {"x": 3}) == {"x": 2}
 
 
-def test_parts_of_other_code_do_not_count(tmp_path):
+def test_parts_of_another_key_do_not_count(tmp_path):
     PartCache(tmp_path, "old", 1, silent).part("one", lambda tick: {"x": 1})
     cache = PartCache(tmp_path, "new", 1, silent)
     assert cache.part("one", lambda tick: {"x": 2}) == {"x": 2}
@@ -186,7 +186,7 @@ def test_a_study_plays_each_part_once_and_again_with_other_settings(tmp_path):
         return cache.part("one", make)
 
     study = runner.Study(
-        "count", ("hrc_env.metrics",), asdict, lambda config: [0], lambda config: 1, play,
+        "count", ("env",), asdict, lambda config: [0], lambda config: 1, play,
         lambda config, part: {"x": Metric(part["x"], part["x"], part["x"], "1", 1)},
         lambda config, part, metrics, figures: report.Report("Counted", "How many?", ()),
     )  # fmt: skip

@@ -1,11 +1,9 @@
-"""The construction site: it hides people about as often as the paper's, honestly and cheaply."""
+"""The construction site: its cameras, and poses in which its arm touches nothing."""
 
 import mujoco
 import numpy as np
 import pytest
 
-from benchmarks.occlusion import hidden_from, random_heads
-from hrc_env.geometry.cameras import project, projections
 from hrc_env.geometry.chains import capsules
 from hrc_env.scene.build import SceneConfig, build, drawing_model
 from hrc_env.scene.places import SCENES
@@ -16,45 +14,9 @@ SITE = build(name="site")
 EYES = np.stack([camera.eye_world for camera in SITE.cameras])
 
 
-@pytest.fixture(scope="module")
-def heads():
-    return random_heads(SITE.grounds, 6000, np.random.default_rng(3))
-
-
 def test_four_cameras_hang_in_the_corners_at_five_metres():
     assert EYES.shape == (4, 3)
     np.testing.assert_allclose(np.abs(EYES), np.tile([9.6, 9.6, 5.0], (4, 1)))
-
-
-def test_a_head_is_hidden_from_one_camera_in_a_third_of_places_and_from_two_in_a_tenth(heads):
-    """The paper has 30 % and 10 %; heads are all over the walkable area."""
-    times = hidden_from(SITE, heads).sum(0)
-    assert 0.25 < (times >= 1).mean() < 0.36
-    assert 0.07 < (times >= 2).mean() < 0.14
-
-
-def test_no_camera_is_walled_in(heads):
-    """Every camera sees most heads, and nothing stands within three metres before its lens."""
-    assert hidden_from(SITE, heads).mean(1).max() < 0.25
-    ahead = np.stack(
-        [
-            eye + 3.0 * camera.T_world_from_cam[:3, 2]
-            for eye, camera in zip(EYES, SITE.cameras, strict=True)
-        ]
-    )
-    assert hidden_from(SITE, ahead).diagonal().sum() == 0
-
-
-def test_heads_are_in_the_pictures(heads):
-    px, depth_m = project(projections(SITE.cameras), heads[None])
-    size = [SITE.cameras[0].width_px, SITE.cameras[0].height_px]
-    inside = ((px > 0) & (px < size)).all(-1) & (depth_m > 0)
-    assert inside.mean() > 0.97
-
-
-def test_without_clutter_every_head_is_seen(heads):
-    bare = build(SceneConfig(clutter=False), "site")
-    assert hidden_from(bare, heads).mean() < 0.01
 
 
 def test_other_cameras_can_hang_there():

@@ -160,7 +160,7 @@ def missing_sentence() -> str:
 
 BASELINES = Study(
     name="bench baselines",
-    modules=("benchmarks.tracking.cells", __name__),
+    depends=("tracker",),
     settings=lambda config: {
         "baselines": asdict(config),
         "versions": {name: version(name) for name in LIBRARIES if installed(name)},

@@ -18,12 +18,12 @@ from hrc_env.experiments.ablations.questions.rigs import CAMERAS, OCCLUSION, WOR
 from hrc_env.experiments.ablations.report import report
 from hrc_env.experiments.study.cache import PartCache, PartProgress
 from hrc_env.experiments.study.counts import ERRORS_M
-from hrc_env.experiments.study.fingerprint import fingerprint_of
 from hrc_env.experiments.study.intervals import counted_quantile_of as quantile_of
 from hrc_env.experiments.study.intervals import counted_quantile_over as quantile_over
 from hrc_env.experiments.study.intervals import mean_over, paired, ratio_over, rmse_over
 from hrc_env.experiments.study.rigs import DT_S, WARM_UP_S
 from hrc_env.experiments.study.runner import Study, at_least_one, changed
+from hrc_env.experiments.study.versions import key_of
 
 ABLATIONS: dict[str, Ablation] = {
     ablation.name: ablation
@@ -32,7 +32,8 @@ ABLATIONS: dict[str, Ablation] = {
     )
 }  # fmt: skip
 """By name, in the order of the report."""
-PARTS_FROM = ("hrc_env.experiments.ablations.play",)
+DEPENDS = ("env", "tracker", "emulator", "motion")
+"""Subsystems that finished parts depend on."""
 Played = Mapping[str, Mapping[str, Sums]]
 """Sums by question and setting."""
 
@@ -41,7 +42,7 @@ Played = Mapping[str, Mapping[str, Sums]]
 class AblationsConfig:
     """How much is played."""
 
-    n_seeds: int = 80
+    n_seeds: int = 30
     """Episodes of every setting."""
     first_seed: int = 2_000_000
     """Seed of the first episode; the others count up."""
@@ -97,8 +98,8 @@ def play_all(config: AblationsConfig, cache: PartCache) -> Played:
     )
     played: dict[str, dict[str, Sums]] = {ablation.name: {} for ablation in config.asked}
     for name, setting in order:
-        depends = settings_of(config) | {"setting": asdict(setting) | {"words": ""}}
-        key, make = fingerprint_of(depends, *PARTS_FROM), partial(part, config, setting)
+        made_of = settings_of(config) | {"setting": asdict(setting) | {"words": ""}}
+        key, make = key_of(made_of, DEPENDS), partial(part, config, setting)
         played[name][setting.name] = cache.part(f"{name}.{setting.name}", make, key)
     return played
 
@@ -162,7 +163,7 @@ def _by_sight(of_settings: Mapping[str, Sums]) -> dict[str, dict[str, Any]]:
 
 STUDY = Study(
     name="ablations",
-    modules=PARTS_FROM,
+    depends=DEPENDS,
     settings=settings_of,
     seeds=lambda config: config.seeds,
     n_parts=lambda config: sum(len(ablation.settings) for ablation in config.asked),

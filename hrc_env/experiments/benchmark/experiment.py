@@ -15,13 +15,14 @@ from hrc_env.experiments.benchmark.conditions import CONDITIONS, SEED, VERSION
 from hrc_env.experiments.benchmark.entries import Entry, enter, entries, regret
 from hrc_env.experiments.benchmark.report import report
 from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.fingerprint import fingerprint_of
 from hrc_env.experiments.study.intervals import ratio_over
 from hrc_env.experiments.study.runner import Study, at_least_one
+from hrc_env.experiments.study.versions import key_of
 from hrc_env.safety.incidents import KINDS
 from hrc_env.tasks import BUILT_IN
 
-PARTS_FROM = ("hrc_env.experiments.benchmark.experiment", "agents.evaluate", "agents.registry")
+DEPENDS = ("env", "tracker", "emulator", "motion", "shield", "agents")
+"""Subsystems that finished parts depend on."""
 Episodes = list[dict[str, float]]
 Played = Mapping[tuple[str, str], Episodes]
 """By task and condition."""
@@ -61,7 +62,7 @@ def play(config: BenchmarkConfig, cache: PartCache) -> Played:
     played = {}
     for task in config.ids:
         for name in CONDITIONS:
-            key = fingerprint_of({**made_of, "n": config.n_seeds, "row": [task, name]}, *PARTS_FROM)
+            key = key_of({**made_of, "n": config.n_seeds, "row": [task, name]}, DEPENDS)
             make = partial(_episodes, config, task, name)
             played[task, name] = cache.part(f"{task}.{name}", make, key)["episodes"]
     return played
@@ -124,7 +125,7 @@ def entered(name: str, config: BenchmarkConfig, out: Path) -> Path:
 
 STUDY = Study(
     name=f"benchmark, version {VERSION}",
-    modules=PARTS_FROM,
+    depends=DEPENDS,
     settings=lambda config: {"version": VERSION, **asdict(config)},
     seeds=lambda config: range(SEED, SEED + config.n_seeds),
     n_parts=lambda config: len(config.ids) * len(CONDITIONS),

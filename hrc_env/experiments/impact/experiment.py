@@ -20,18 +20,15 @@ from hrc_env.experiments.impact.setups import (
     usual_setups,
 )
 from hrc_env.experiments.study.cache import PartCache
-from hrc_env.experiments.study.fingerprint import fingerprint_of, source_digest
 from hrc_env.experiments.study.runner import Study, at_least_one, changed
+from hrc_env.experiments.study.versions import key_of, source_digest
 from hrc_env.safety.shield import shield_called
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import task_called
 from hrc_env.tracking.estimators import estimator_called
 
-PARTS_FROM = (
-    "hrc_env.experiments.impact.episodes", "hrc_env.experiments.impact.policies",
-    "agents.registry", "agents.ppo", "agents.checkpoints", "agents.callbacks",
-)  # fmt: skip
-"""Those that make finished parts."""
+DEPENDS = ("env", "tracker", "emulator", "detector", "motion", "shield", "agents")
+"""Subsystems that finished parts depend on."""
 FIRST_SEED = 1_000_000
 """Of the episodes, far from those that the policy learns in."""
 
@@ -44,9 +41,9 @@ class ImpactConfig:
     """What the robots do."""
     shield: str | None = None
     """What may change their commands, by its name."""
-    n_seeds: int = 200
+    n_seeds: int = 90
     """Episodes of every row, at level `pixels` at most `n_pixels`."""
-    n_pixels: int = 6
+    n_pixels: int = 3
     """Episodes of a row at level `pixels`, where every image is drawn."""
     n_steps: int = 250
     """Control steps of an episode; the commands say the task's."""
@@ -112,7 +109,7 @@ def play(config: ImpactConfig, cache: PartCache) -> Table:
     if PPO in config.policies:
         n = config.learning_steps
         learnt = {"task": config.task, "people": PEOPLE, "learning_steps": n}
-        key = fingerprint_of(learnt, *PARTS_FROM)
+        key = key_of(learnt, DEPENDS)
         ppo = trained(cache, n, checkpoint, key, config.task)
     for setup, policies in config.rows():
         made_of = {
@@ -131,7 +128,7 @@ def play(config: ImpactConfig, cache: PartCache) -> Table:
                 table[policy.label, setup.name] = cache.part(
                     f"{policy.label}.{setup.name}",
                     partial(stage.play, maker(policy, checkpoint), policy.margin_m),
-                    fingerprint_of(made_of | who, *PARTS_FROM),
+                    key_of(made_of | who, DEPENDS),
                 )
     check_walks(table)
     return table
@@ -150,7 +147,7 @@ def check_walks(table: Mapping[tuple[str, str], Mapping[str, list[Any]]]) -> Non
 
 STUDY = Study(
     name="impact",
-    modules=PARTS_FROM,
+    depends=DEPENDS,
     settings=lambda config: {"people": PEOPLE, **asdict(config)},
     seeds=lambda config: config.seeds(),
     n_parts=lambda config: (

@@ -77,8 +77,8 @@ LATE_S = (0.12, 0.2)
 """How late images are [s]: three and five control steps."""
 LATE = tuple(PerceptionSetup(latency_s=s, is_told=told) for told in (True, False) for s in LATE_S)
 """Late images of four cameras: those that say how late they are, and those that do not."""
-ON_REQUEST = ("ransac", "paper")
-"""Estimators that are compared on request only."""
+ON_REQUEST = ("kalman", "ransac", "paper")
+"""Estimators that are compared on request only; with four cameras `kalman` equals the default."""
 REFERENCE = PerceptionSetup().name
 """What everybody is compared with."""
 

@@ -38,7 +38,7 @@ Films = Mapping[tuple[str, int], Film]
 class LabConfig:
     """How much is run."""
 
-    n_seeds: int = 10
+    n_seeds: int = 7
     """Films of every motion."""
     max_frames: int = 250
     """No film is longer."""
@@ -166,7 +166,7 @@ def _known(film: Film) -> Bools:
 
 STUDY = Study(
     name="lab",
-    modules=(__name__,),
+    depends=("env", "tracker", "emulator", "detector", "motion"),
     settings=lambda config: {
         **asdict(config), "rig": RIG, "estimators": ESTIMATORS, "crops": CROPS,
     },

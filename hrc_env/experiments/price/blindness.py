@@ -22,11 +22,12 @@ import numpy as np
 from hrc_env.core.results import Metric
 from hrc_env.experiments.price.trainings import BELIEF, REWARDS, TRUE, Training, learn
 from hrc_env.experiments.study.cache import PartCache
-from hrc_env.experiments.study.fingerprint import fingerprint_of
 from hrc_env.experiments.study.intervals import mean_over
 from hrc_env.experiments.study.runner import at_least_one
+from hrc_env.experiments.study.versions import key_of
 
-PARTS_FROM = ("hrc_env.experiments.price.trainings", "agents.ppo", "agents.callbacks")
+DEPENDS = ("env", "tracker", "emulator", "motion", "agents")
+"""Subsystems that trainings depend on."""
 MEASURED = {
     "optimism_m": "m", "lost": "share", "hidden": "share", "unseen": "share", "near": "steps",
     "goals_per_min": "1/min", "contacts": "per episode",
@@ -83,7 +84,7 @@ def play(config: TrainingConfig, cache: PartCache) -> Learnt:
     """Every training, from the cache or anew."""
     found: dict[tuple[str, int], list[Curves]] = {}
     for training in config.trainings():
-        key = fingerprint_of({**asdict(training), "with": REWARDS[training.reward]}, *PARTS_FROM)
+        key = key_of({**asdict(training), "with": REWARDS[training.reward]}, DEPENDS)
         part = cache.part(f"training.{training.name}", partial(learn, training), key)
         found.setdefault((training.reward, training.n_cameras), []).append(part)
     return found

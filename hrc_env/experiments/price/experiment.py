@@ -1,6 +1,6 @@
 """What sight costs at equal safety: every pair of eyes with the shield margin that it needs."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass, field
 from functools import partial
@@ -26,16 +26,14 @@ from hrc_env.experiments.price.report import report
 from hrc_env.experiments.price.search import searched
 from hrc_env.experiments.price.shield import SHIELD
 from hrc_env.experiments.study.cache import PartCache
-from hrc_env.experiments.study.fingerprint import fingerprint_of, source_digest
 from hrc_env.experiments.study.runner import Study, at_least_one, changed
+from hrc_env.experiments.study.versions import key_of, source_digest
 from hrc_env.tasks import BUILT_IN, DEFAULT
 from hrc_env.tasks.task import task_called
 from hrc_env.tracking.estimators import estimator_called
 
-PARTS_FROM = (
-    "hrc_env.experiments.price.episodes", "agents.registry", "agents.experts",
-)  # fmt: skip
-"""Those that make finished parts."""
+DEPENDS = ("env", "tracker", "emulator", "detector", "motion", "shield", "agents")
+"""Subsystems that finished parts depend on."""
 FIRST_SEED, FIRST_FRESH, FIRST_PIXELS = 3_000_000, 4_000_000, 5_000_000
 """Of the search, of the episodes that confirm it, of those with rendered images."""
 BEYOND_M = (0.05, 0.1, 0.2)
@@ -122,7 +120,7 @@ def config_for(
 ) -> PriceConfig:
     """The settings that the command line asks for. Quick: twelve pairs of eyes, the first task. Of
     another task than the first three pairs of eyes, if none are named."""
-    usual = PriceConfig(eyes=QUICK, n_pixels=0) if quick else PriceConfig(
+    usual = PriceConfig(eyes=QUICK, n_fresh=600, n_pixels=0) if quick else PriceConfig(
         others=tuple(each for each in BUILT_IN if each != DEFAULT)
     )  # fmt: skip
     if task != DEFAULT:
@@ -186,12 +184,17 @@ def _pixels(config: PriceConfig, cache: PartCache, table: Any) -> dict[str, Rows
     margin_m, found = table[config.task][FOUR].margin_m, {}
     (eyes,) = eyes_called([FOUR])
     for level in ("keypoints", "pixels"):
-        setup = changed(eyes.setup, level=level)
-        of_level = changed(eyes, name=f"{FOUR}_{level}", setup=setup)
+        of_level = _at_level(eyes, level)
         with closing(Stage(of_level, config.task, config.steps_of(config.task))) as stage:
             seeds = [FIRST_PIXELS + k for k in range(config.n_pixels)]
             found[level] = _part(config, cache, stage, seeds, margin_m)
     return found
+
+
+def _at_level(eyes: Eyes, level: str) -> Eyes:
+    """Return eyes that look at a perception level, named after it."""
+    setup = changed(eyes.setup, level=level)
+    return changed(eyes, name=f"{FOUR}_{level}", setup=setup)
 
 
 def _part(
@@ -206,9 +209,35 @@ def _part(
     }  # fmt: skip
     which = {FIRST_SEED: "searched", FIRST_FRESH: "fresh", FIRST_PIXELS: "pixels"}[seeds[0]]
     kept = f"{1e4 * margin_m:+.0f}" if stage.is_shielded else "unshielded"
-    key = fingerprint_of(made_of, *PARTS_FROM)
+    key = key_of(made_of, DEPENDS)
     make = partial(stage.play, seeds, margin_m)
-    return cache.part(f"{stage.task}.{eyes.name}.{which}.{kept}", make, key)
+    label = f"{stage.task}.{eyes.name}.{which}.{kept}"
+    return cache.part(label, make, key, {"margin_m": margin_m})
+
+
+def replay(config: PriceConfig, cache: PartCache, margins_m: Mapping[str, float]) -> None:
+    """Play parts of a search by themselves, not in the order in which it came to them.
+
+    Args:
+        config: the settings of the study that they are of.
+        cache: is asked for every part.
+        margins_m: the margin of each, by its label (`_part`).
+    """
+    for label, margin_m in margins_m.items():
+        task, _, rest = label.partition(".")
+        name, which, kept = rest.rsplit(".", 2)
+        seeds = {
+            "searched": config.seeds(task, config.n_seeds),
+            "fresh": config.seeds(task, config.n_fresh, FIRST_FRESH),
+            "pixels": [FIRST_PIXELS + k for k in range(config.n_pixels)],
+        }[which]
+        known, level = (FOUR, name.removeprefix(f"{FOUR}_")) if which == "pixels" else (name, None)
+        (eyes,) = eyes_called([known])
+        if level is not None:
+            eyes = _at_level(eyes, level)
+        is_shielded = kept != "unshielded"
+        with closing(Stage(eyes, task, config.steps_of(task), is_shielded=is_shielded)) as stage:
+            _part(config, cache, stage, seeds, margin_m)
 
 
 def check_walks(task: str, alone: Rows, row: Row) -> None:
@@ -235,7 +264,7 @@ def _n_parts(config: PriceConfig) -> float:
 
 STUDY = Study(
     name="price",
-    modules=PARTS_FROM,
+    depends=DEPENDS,
     settings=lambda config: {"people": PEOPLE, "shield": SHIELD, **asdict(config)},
     seeds=lambda config: (
         config.seeds(config.task, config.n_seeds)

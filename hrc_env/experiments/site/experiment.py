@@ -40,7 +40,7 @@ ALSO = ("kalman", "paper_restarts")
 class SiteConfig:
     """How much is run."""
 
-    n_seeds: int = 10
+    n_seeds: int = 9
     """Walks."""
     first_seed: int = 100
     """Seed of the first walk; the others count up."""
@@ -179,7 +179,7 @@ def _squared_m2(film: Part, row: Part) -> Floats:
 
 STUDY = Study(
     name="site",
-    modules=(__name__,),
+    depends=("env", "tracker", "emulator", "detector", "motion"),
     settings=lambda config: {**asdict(config), "also": ALSO, "crops": CROPS},
     seeds=lambda config: config.seeds,
     n_parts=lambda config: (

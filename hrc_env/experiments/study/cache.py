@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,17 +23,29 @@ class PartCache:
     """Finished parts, each a JSON file beside the key of what it was made from."""
 
     folder: Path
-    fingerprint: str
-    """Key of parts that are given none of their own (`fingerprint_of`)."""
+    key: str
+    """Key of parts that are given none of their own (`versions.key_of`)."""
     n_parts: float
     """A part is one of so many in the progress."""
     progress: Progress
 
     def part(
-        self, label: str, make: Callable[[PartProgress], dict[str, Any]], key: str | None = None
+        self,
+        label: str,
+        make: Callable[[PartProgress], dict[str, Any]],
+        key: str | None = None,
+        notes: Mapping[str, float] | None = None,
     ) -> dict[str, Any]:
-        """The part called `label`: the one that is there if its key is the same, or a new one."""
-        key, told = key or self.fingerprint, 0.0
+        """Return the part that is there, if its key is the same, or make it.
+
+        Args:
+            label: the part's name, which is also its file's.
+            make: makes the part, and reports its progress.
+            key: the key of what it is made from; the cache's own if it is not given.
+            notes: numbers that are kept beside the part, for a study whose labels do not say
+                all that is needed to make it again.
+        """
+        key, told = key or self.key, 0.0
 
         def tick(share: float) -> None:
             nonlocal told
@@ -42,18 +55,24 @@ class PartCache:
         part = self._load(label, key)
         if part is None:
             tick(0.0)
+            started_s = time.monotonic()
             part = make(tick)
-            content = json.dumps({"fingerprint": key, "part": part})
-            write_whole(self.folder / f"{label}.json", content)
+            took_s = round(time.monotonic() - started_s, 2)
+            content = {"key": key, "seconds": took_s, "notes": dict(notes or {}), "part": part}
+            write_whole(self.folder / f"{label}.json", json.dumps(content))
         tick(max(1.0 - told, 0.0))
         return part
 
     def _load(self, label: str, key: str) -> dict[str, Any] | None:
+        path = self.folder / f"{label}.json"
         try:
-            content: Mapping[str, Any] = json.loads((self.folder / f"{label}.json").read_text())
+            content: Mapping[str, Any] = json.loads(path.read_text())
         except (FileNotFoundError, json.JSONDecodeError):
             return None
-        return content["part"] if content["fingerprint"] == key else None
+        if content.get("key") != key:
+            return None
+        path.touch()  # by this it is known as a part of the latest run
+        return content["part"]
 
 
 def own_folder(out: Path, name: str, overwrite: bool = False) -> None:

@@ -60,7 +60,7 @@ class Report:
     ) -> None:
         """Write results.json, report.md and report.html, which holds its pictures, into `out`."""
         write_results(out / "results.json", settings, seeds, metrics)
-        origin = f"Commit {provenance()['git']}, seeds {min(seeds)} to {max(seeds)}; "
+        origin = f"Version {provenance()['hrc_env']}, seeds {min(seeds)} to {max(seeds)}; "
         origin += f"numbers are given with {self.spread}, all of them in results.json."
         text = "\n\n".join([f"# {self.title}", self.asked, *self.parts, origin]) + "\n"
         write_whole(out / "report.md", text)

@@ -8,8 +8,8 @@ from typing import Any, Generic, TypeVar
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric
 from hrc_env.experiments.study.cache import PartCache, Progress, own_folder
-from hrc_env.experiments.study.fingerprint import fingerprint_of
 from hrc_env.experiments.study.report import Report
+from hrc_env.experiments.study.versions import check_subsystems, key_of
 
 ConfigT = TypeVar("ConfigT")
 PlayedT = TypeVar("PlayedT")
@@ -21,8 +21,8 @@ class Study(Generic[ConfigT, PlayedT]):
     """A question asked of simulated episodes with some configuration."""
 
     name: str
-    modules: tuple[str, ...]
-    """Dotted names of those that make parts: with what they import, they are in the parts' key."""
+    depends: tuple[str, ...]
+    """Subsystems that all numbers depend on; their versions are in the parts' key."""
     settings: Callable[[ConfigT], Settings]
     """What all numbers depend on."""
     seeds: Callable[[ConfigT], Sequence[int]]
@@ -33,6 +33,10 @@ class Study(Generic[ConfigT, PlayedT]):
     report: Callable[[ConfigT, PlayedT, dict[str, Metric], Path], Report]
     """Draws the figures into a folder; what is to be read."""
 
+    def __post_init__(self) -> None:
+        """Raise `ConfigError` unless subsystems are named, and exist."""
+        check_subsystems(self.depends)
+
 
 def run(
     study: Study[ConfigT, Any],
@@ -41,11 +45,11 @@ def run(
     progress: Progress,
     overwrite: bool = False,
 ) -> dict[str, Metric]:
-    """Play what an earlier run with the same settings and code did not finish in `out`; write
+    """Play what an earlier run with the same settings and versions did not finish in `out`; write
     results.json, figures/, report.html and report.md there, over other results only if asked."""
     own_folder(out, study.name, overwrite)
     settings = {"experiment": study.name, **study.settings(config)}
-    key = fingerprint_of(settings, *study.modules)
+    key = key_of(settings, study.depends)
     played = study.play(config, PartCache(out / "parts", key, study.n_parts(config), progress))
     metrics = study.metrics(config, played)
     report = study.report(config, played, metrics, out / "figures")

@@ -1,30 +1,18 @@
-"""Whether the default estimator is ever surely wrong, on rigs and motions drawn at random.
-
-    python -m benchmarks.tracking.fuzz --cases 2000
+"""Sequences on rigs and motions that are drawn at random, and the faults of the default estimator.
 
 A case is a rig of 2 to 6 cameras that hang anywhere, a little otherwise than is believed, and 50
 people who walk, run, turn over or fall while they are shaken by up to 60 m/s2; detections are
 noisy, occluded, grossly wrong and of exchanged sides, all by chance, and cameras fail. The last
-1.5 s of each sequence are clean. Counted: numbers that are not finite, exceptions; *surely wrong*,
-the mean joint more than 1 m off for more than 1 s with less than 0.3 m reported; *not recovered*,
-at the end 0.5 m off, and twice as far as triangulation of that frame, although two cameras had most
-joints all the time.
+1.5 s of each sequence are clean.
 """
 
-import multiprocessing
 import traceback
-from collections import Counter
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
-import tyro
-from rich.console import Console
 from scipy.spatial.transform import Rotation
 
-from benchmarks.common import exactly, publish
 from benchmarks.tracking.athletes import fall, run, tumble
 from benchmarks.tracking.cells import beliefs
 from benchmarks.tracking.detections import Damage, detect
@@ -33,92 +21,54 @@ from benchmarks.tracking.names import DEFAULT
 from benchmarks.tracking.rigs import DT_S, HEIGHT_PX, WIDTH_PX, Rig
 from benchmarks.tracking.sequences import Sequences
 from benchmarks.tracking.walks import walk
-from hrc_env.cli.progress import progress_bar
-from hrc_env.core.machine import n_cores
 from hrc_env.core.typing import Bools, Floats, Points2, Points3
-from hrc_env.experiments.study.report import Column, Report, table_of
 from hrc_env.geometry.cameras import PinholeCamera, pinhole, projections
 from hrc_env.tracking.config import ParticleConfig
 
 N_FRAMES, CLEAN, EACH = 120, 38, 50
-"""Frames of a sequence, of its clean end; sequences of a case."""
+"""Frames of a sequence and of its clean end; sequences of a case."""
 WRONG_M, SURE_M, LONG, RECOVERED_M = 1.0, 0.3, 25, 0.5
 MOTIONS: tuple[Callable[[tuple[float, float], list[int], int], Points3], ...] = (
     walk, fall, tumble, lambda walk_m, seeds, n: run(walk_m, seeds, n, 3.0),
 )  # fmt: skip
 KINDS = ("not_finite", "surely_wrong", "not_recovered")
+"""Surely wrong: the mean joint is more than 1 m off for more than 1 s, with less than 0.3 m
+reported. Not recovered: at the end 0.5 m off, and twice as far as triangulation of that frame,
+although two cameras had most joints all the time."""
 
 
-@dataclass(frozen=True)
-class Arguments:
-    """How much is drawn."""
-
-    cases: int = 2000
-    """Of 50 sequences each."""
-    first_case: int = 0
-    """The others count up; a case depends on its number only."""
-    processes: int = field(default_factory=n_cores)
-    """In which they are tracked; they change no number."""
-    out: Path = Path("out/fuzz")
-
-
-def main(arguments: Arguments) -> None:
-    """Draw, track, count; writes results.json, and found.txt with what was found."""
-    cases = range(arguments.first_case, arguments.first_case + arguments.cases)
-    counts, found = Counter[str](), list[str]()
-    context = multiprocessing.get_context("spawn")
-    with (
-        ProcessPoolExecutor(arguments.processes, mp_context=context) as pool,
-        progress_bar(Console(), "fuzz") as say,
-    ):
-        for case, wrong in zip(cases, pool.map(judged, cases), strict=True):
-            for kind, sequence in wrong:
-                counts[kind] += 1
-                found.append(f"{kind}: case {case}, sequence {sequence}")
-            say(1 / arguments.cases, f"{len(found)} found")
-    n = EACH * arguments.cases
-    rows = {name: name.replace("_", " ") for name in ("exceptions", *KINDS)}
-    metrics = {name: exactly(1000 * counts[name] / n, "per 1,000", n) for name in rows}
-    part = table_of("Sequences", rows, [Column("{}", "per 1,000", 3)], metrics)
-    report = Report("Fuzz of the default estimator", (__doc__ or "").strip(), [part])
-    publish(arguments.out, report, asdict(arguments), list(cases), metrics)
-    (arguments.out / "found.txt").write_text("".join(f"{each}\n" for each in found))
-
-
-def judged(case: int) -> list[tuple[str, int]]:
-    """What is wrong in a case: the kind, and in which sequence (-1: all)."""
-    return list(_judged(case))
-
-
-def _judged(case: int) -> Iterator[tuple[str, int]]:
+def judge(case: int) -> list[tuple[str, int]]:
+    """Return the kinds of faults in a case with their sequences; -1 stands for all sequences."""
     rng = np.random.default_rng([case, 11])
     seeds = [EACH * case + k for k in range(EACH)]
     try:
-        rig, seen_by = _rig(rng)
-        joints = _shaken(rng, MOTIONS[rng.integers(len(MOTIONS))](rig.walk_m, seeds, N_FRAMES))
-        px = _detected(rng, seen_by, joints, seeds)
-        yield from _faults(rig, joints, px, seeds)
-    except Exception:  # that none is raised is what is asked
+        rig, P_true = draw_rig(rng)
+        joints = shake(rng, MOTIONS[rng.integers(len(MOTIONS))](rig.walk_m, seeds, N_FRAMES))
+        return list(find_faults(rig, joints, draw_pixels(rng, P_true, joints, seeds), seeds))
+    except Exception:  # that none is raised is the property
         traceback.print_exc()
-        yield "exceptions", -1
+        return [("exceptions", -1)]
 
 
-def _faults(rig: Rig, joints: Points3, px: Points2, seeds: list[int]) -> Iterator[tuple[str, int]]:
+def find_faults(
+    rig: Rig, joints: Points3, px: Points2, seeds: list[int]
+) -> Iterator[tuple[str, int]]:
+    """Yield each fault of the default estimator on sequences: its kind and the sequence."""
     given = Sequences(joints[:, :, None], px[:, :, :, None], {}, rig.tracker)
-    off, said, finite = [], [], []
+    off_m, reported_m, finite = [], [], []
     for t, (mean, cov) in enumerate(beliefs(DEFAULT, rig, given, seeds)):
-        assert cov is not None  # the default says how sure it is
-        off.append(np.linalg.norm(mean[:, 0] - joints[t], axis=-1).mean(-1))
-        said.append(np.sqrt(np.trace(cov[:, 0], axis1=-2, axis2=-1)).mean(-1))
+        assert cov is not None
+        off_m.append(np.linalg.norm(mean[:, 0] - joints[t], axis=-1).mean(-1))
+        reported_m.append(np.sqrt(np.trace(cov[:, 0], axis1=-2, axis2=-1)).mean(-1))
         finite.append(np.isfinite(mean).all((1, 2, 3)) & np.isfinite(cov).all((1, 2, 3, 4)))
-    error_m, sure = np.array(off), np.array(said) < SURE_M
+    error_m, sure = np.array(off_m), np.array(reported_m) < SURE_M
     in_view = (np.isfinite(px[-CLEAN:, ..., 0]).sum(2) >= 2).mean(-1).min(0) > 0.8
     last = np.tile(np.array(rig.tracker.prior_mean_world), (*joints.shape[1:3], 1))
     plain = triangulate_frame(rig.P, px[-1], last)
     least_m = np.linalg.norm(plain - joints[-1], axis=-1).mean(-1)
     wrong = {
         "not_finite": ~np.all(finite, axis=0),
-        "surely_wrong": _longest((error_m > WRONG_M) & sure) > LONG,
+        "surely_wrong": find_longest((error_m > WRONG_M) & sure) > LONG,
         "not_recovered": in_view & (error_m[-1] > np.maximum(RECOVERED_M, 2 * least_m)),
     }
     for kind in KINDS:
@@ -126,8 +76,8 @@ def _faults(rig: Rig, joints: Points3, px: Points2, seeds: list[int]) -> Iterato
             yield kind, sequence
 
 
-def _longest(flags: Bools) -> Floats:
-    """(S,) longest run of True along the frames (T, S)."""
+def find_longest(flags: Bools) -> Floats:
+    """Return (S,) the longest run of True along the frames (T, S)."""
     longest = run_of = np.zeros(flags.shape[1])
     for flag in flags:
         run_of = np.where(flag, run_of + 1, 0)
@@ -135,8 +85,8 @@ def _longest(flags: Bools) -> Floats:
     return longest
 
 
-def _rig(rng: np.random.Generator) -> tuple[Rig, Floats]:
-    """Cameras round a place as they are believed to hang, and the true projections (C, 3, 4)."""
+def draw_rig(rng: np.random.Generator) -> tuple[Rig, Floats]:
+    """Return cameras as they are believed to hang, and their true projections (C, 3, 4)."""
     n, far_m = int(rng.integers(2, 7)), rng.uniform(2.5, 9.0)
     around = rng.uniform(0, 2 * np.pi) + 2 * np.pi * (np.arange(n) + rng.uniform(-0.3, 0.3, n)) / n
     cameras = [
@@ -148,7 +98,7 @@ def _rig(rng: np.random.Generator) -> tuple[Rig, Floats]:
         for k, a in enumerate(around)
     ]  # fmt: skip
     worst = rng.integers(n) if rng.random() < 0.2 else -1
-    true = [_askew(rng, each, 2.0 if k == worst else 0.2) for k, each in enumerate(cameras)]
+    true = [turn_askew(rng, each, 2.0 if k == worst else 0.2) for k, each in enumerate(cameras)]
     tracker = ParticleConfig(
         prior_mean_world=(0.0, 0.0, 1.0), prior_std_m=far_m / 2,
         image_area_px=float(WIDTH_PX * HEIGHT_PX), noise_share=0.0,
@@ -158,15 +108,15 @@ def _rig(rng: np.random.Generator) -> tuple[Rig, Floats]:
     return Rig("drawn", believed, (room_m, room_m), tracker), projections(tuple(true))
 
 
-def _askew(rng: np.random.Generator, camera: PinholeCamera, std_deg: float) -> PinholeCamera:
+def turn_askew(rng: np.random.Generator, camera: PinholeCamera, std_deg: float) -> PinholeCamera:
     pose = camera.T_world_from_cam.copy()
     turn = np.radians(rng.normal(0, std_deg, 3)).clip(-0.1, 0.1)
     pose[:3, :3] = pose[:3, :3] @ Rotation.from_rotvec(turn).as_matrix()
     return replace(camera, T_world_from_cam=pose)
 
 
-def _shaken(rng: np.random.Generator, joints: Points3) -> Points3:
-    """Bodies (T, S, J, 3) that are thrown about the ground for a while, by up to 60 m/s2."""
+def shake(rng: np.random.Generator, joints: Points3) -> Points3:
+    """Return bodies (T, S, J, 3) that are thrown about for a while, by up to 60 m/s2."""
     n_bodies = joints.shape[1]
     time_s = DT_S * np.arange(len(joints), dtype=float)[:, None]
     rate = 2 * np.pi * rng.uniform(0.5, 3.0, n_bodies)
@@ -181,8 +131,8 @@ def _shaken(rng: np.random.Generator, joints: Points3) -> Points3:
     return out
 
 
-def _detected(rng: np.random.Generator, P: Floats, joints: Points3, seeds: list[int]) -> Points2:
-    """Pixels (T, S, C, J, 2): damaged, cameras failing by turns, clean at the end."""
+def draw_pixels(rng: np.random.Generator, P: Floats, joints: Points3, seeds: list[int]) -> Points2:
+    """Return pixels (T, S, C, J, 2): damaged, cameras failing by turns, clean at the end."""
     damage = Damage(
         sigma_px=rng.uniform(1.0, 4.0),
         drift_px=rng.choice([0.0, 3.0]),
@@ -199,7 +149,3 @@ def _detected(rng: np.random.Generator, P: Floats, joints: Points3, seeds: list[
             px[begin : begin + lasts, s, gone] = np.nan
     px[-CLEAN:] = clean[-CLEAN:]
     return px
-
-
-if __name__ == "__main__":
-    main(tyro.cli(Arguments, description=__doc__))
