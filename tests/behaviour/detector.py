@@ -19,6 +19,8 @@ NETWORK_TOLERANCE = 1e-3
 their order is another on processors with other instructions."""
 IMAGE_TOLERANCE = 3e-4
 """Of grey levels as shares of white, means over 64 pixels: a pixel may be rounded the other way."""
+FOLLOWED_TOLERANCE = 3e-3
+"""Of what is believed of somebody whom the network finds [m, m/s, s]."""
 DRAWN_TOLERANCE = 0.03
 """The same of drawn pictures: drivers of graphics draw edges and shades a little differently."""
 BODIES = ("worker_1", "worker_4", "worker_6")
@@ -443,6 +445,28 @@ def play_found(inputs: Values) -> Played:
     return Played(values)
 
 
+def play_followed(inputs: Values) -> Played:
+    """Follow a worker from image to image: found, at rest, elsewhere, out of sight, forgotten."""
+    rig, steps, now = doors.Rig("lab"), [], [Stored(inputs, 0)]
+    for estimator, n_workers in (("particle", 1), ("triangulation", 2)):
+        follower = doors.Follower(
+            rig, lambda c, window: now[0].crop(c, window), n_workers, estimator
+        )
+        for k, moment in enumerate((0, 0, 0, 0, 1, 1, 1, None, None, *[2] * 9)):
+            if moment is None:
+                now[0].spoil = partial(_darken, 0.0)
+            else:
+                now[0] = Stored(inputs, moment)
+            if k == 9:
+                follower.forget()
+            belief = follower.update(0.08 if k == 3 else None, k)
+            spread = np.sqrt(np.diagonal(belief.pop("cov_world"), axis1=-2, axis2=-1))
+            parts = {**belief, "std_m": spread}
+            steps.append({name: value[:, :1] for name, value in parts.items()})
+        follower.close()
+    return Played(stack(steps))
+
+
 # --- Drawn pictures ------------------------------------------------------------------------------
 
 
@@ -481,6 +505,7 @@ PROBES = (
     Probe(name="film", play=play_film, is_short=True),
     Probe(name="network", play=play_network, inputs=draw_crops, tolerance=NETWORK_TOLERANCE,
           is_short=True),
+    Probe(name="followed", play=play_followed, inputs=draw_crops, tolerance=FOLLOWED_TOLERANCE),
     Probe(name="drawn", play=play_drawn, inputs=film_moments, tolerance=DRAWN_TOLERANCE,
           needs_pixels=True),
 )  # fmt: skip

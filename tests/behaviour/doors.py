@@ -80,6 +80,7 @@ from hrc_env.perception.faults import camera_film, corruptions
 from hrc_env.perception.faults import fault as faults
 from hrc_env.perception.faults import schedule as fault_schedule
 from hrc_env.pipeline import reacquisition
+from hrc_env.pipeline.pose_tracker import PoseTracker
 from hrc_env.safety import contact, incidents, separation, solver, starts
 from hrc_env.safety.config import PRESETS, ShieldConfig
 from hrc_env.safety.guard import constraints
@@ -1645,6 +1646,34 @@ class Detector:
     def close(self) -> None:
         """Stop threads."""
         self._detector.close()
+
+
+class Follower:
+    """People followed through a rig's images that a function gives, without a simulator."""
+
+    def __init__(
+        self, rig: Rig, crop: Callable[[int, Window], Picture], n_workers: int, estimator: str
+    ) -> None:
+        """Follow at most so many people with an estimator."""
+        self._tracker = PoseTracker(rig.cameras, n_workers, estimator=estimator)
+        self._crop = crop
+
+    def crop(self, camera_index: int, window: Roi) -> Picture:
+        """Give a window of an image, as the detector asks for it."""
+        return self._crop(camera_index, _window(window))
+
+    def update(self, dt_s: float | None, seed: int) -> Arrays:
+        """Take in the present images and return the belief."""
+        belief = self._tracker.update(self, dt_s, [np.random.default_rng(seed)])
+        return _as_values(belief)
+
+    def forget(self) -> None:
+        """Begin anew with nobody known."""
+        self._tracker.forget()
+
+    def close(self) -> None:
+        """Stop threads."""
+        self._tracker.close()
 
 
 def joints_by(find: Callable[[Picture], Any], picture: Picture, window: Window) -> Any:
