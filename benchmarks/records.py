@@ -73,9 +73,10 @@ def write(study: str, depends: Mapping[str, int], folder: Path, began_s: float) 
         study: name of the study.
         depends: versions of the subsystems that it depends on.
         folder: where its parts are; without any there is no record.
-        began_s: when the run began, as `time.time` gives it [s]; older parts are left out.
+        began_s: when the run began, as `time.time` gives it [s]; parts that were last used before
+            are left out.
     """
-    made = [path for path in sorted(folder.glob("*.json")) if path.stat().st_mtime >= began_s - 1]
+    made = [path for path in sorted(folder.glob("*.json")) if path.stat().st_atime >= began_s - 1]
     parts = {}
     for path in made:
         content = json.loads(path.read_text())

@@ -51,7 +51,7 @@ SURPRISES: dict[str, Damage] = {
         ("fallen_one_camera", "worker_falls_one_camera"), Damage(alone_s=(FALLS_S, 6.0))
     ),
 }
-"""Damage by the conditions of `tests/properties/test_surprises.py`."""
+"""Damage by the conditions of `tests/properties/test_sudden_motions.py`."""
 
 
 def detect(P: Floats, joints: Points3, damage: Damage, seeds: list[int]) -> Points2:
