@@ -77,7 +77,11 @@ def accept(moved: list[Placed], console: Console) -> int:
         return 0
     versions = doors.read_versions(VERSIONS)
     played = {each.label: _play(each) for each in moved}
-    is_first = {each.label: not path_of(each.room, each.probe).exists() for each in moved}
+    tracked = set(_git("ls-files", RECORDED).splitlines())  # a deleted recording is not a new one
+    is_first = {
+        each.label: path_of(each.room, each.probe).relative_to(ROOT).as_posix() not in tracked
+        for each in moved
+    }
     raised: dict[str, list[str]] = {}
     for each in moved:
         if not is_first[each.label]:
