@@ -123,6 +123,17 @@ def test_an_observation_that_is_no_number_is_named():
         env.reset(seed=1)
 
 
+def test_one_entry_of_one_environment_that_is_no_number_is_enough():
+    def view(state, ids, config):
+        seen = np.zeros((len(ids), 3))
+        seen[-1, 1] = np.nan
+        return seen
+
+    env = HRCVectorEnv(2, task=dataclasses.replace(TASKS[TASK], view=view), perception="none")
+    with pytest.raises(FloatingPointError, match=r"not a number: station\.$"):
+        env.reset(seed=1)
+
+
 def test_an_observation_term_of_another_size_is_named():
     term = dataclasses.replace(TASKS[TASK].observations[0], size=lambda of: 4)
     task = dataclasses.replace(TASKS[TASK], observations=(term,))

@@ -89,6 +89,14 @@ def test_a_term_that_is_not_a_number_is_a_fault_and_raises():
         reward(believed(1.0), progress(np.nan), np.zeros((1, 6)), RewardConfig())
 
 
+def test_one_environment_of_two_whose_reward_is_not_finite_raises():
+    for wrong in (np.nan, np.inf):
+        terms = {"reach": np.ones(2), "effort": np.array([0.5, wrong])}
+        with pytest.raises(FloatingPointError, match="finite: effort"):
+            total(terms, 2)
+    assert total({"reach": np.ones(2), "effort": np.full(2, 0.5)}, 2).tolist() == [1.5, 1.5]
+
+
 def proximity_of(env, weight):
     """The proximity term of a first step with this weight, and a reach as wide as the room."""
     env.reset(seed=3)

@@ -5,21 +5,29 @@ commit that changes this file must not change recorded values, and the other way
 (`python -m tests.behaviour --commits` refuses it).
 """
 
+import contextlib
 import dataclasses
+import functools
+import io
+import json
+import os
+import tempfile
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
 from numpy.typing import NDArray
+from rich.console import Console
 
 import hrc_env
 from agents import policies as trained
 from agents.env_info import env_info
 from agents.registry import control_of, make_agent
 from assets.recordings.written import ORDERS, Y_UP, cmu_name, write_acclaim, write_bvh
+from hrc_env import metrics
 from hrc_env.belief import (
     Belief,
     covariance_factor_m,
@@ -31,6 +39,7 @@ from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import (
     Cue,
+    HandState,
     Held,
     Keypoints,
     ObjectState,
@@ -50,7 +59,7 @@ from hrc_env.geometry.assignment import assign_rows
 from hrc_env.geometry.camera_config import CameraConfig, made
 from hrc_env.geometry.lens import Lens, lens_row
 from hrc_env.geometry.rotations import matrix
-from hrc_env.geometry.triangulation import triangulate
+from hrc_env.geometry.triangulation import linear_point, triangulate
 from hrc_env.mocap import footing, person, repair, stance
 from hrc_env.mocap.guess import first_guess
 from hrc_env.mocap.poses import joints_in, marks_of, posed
@@ -89,6 +98,7 @@ from hrc_env.safety.shield import shield_called, shielded
 from hrc_env.safety.watch import Watch
 from hrc_env.scene.build import SceneConfig
 from hrc_env.scene.build import build as build_scene
+from hrc_env.scene.objects import held_by
 from hrc_env.scene.render import CropRenderer
 from hrc_env.scene.rig import pinholes
 from hrc_env.scene.rigs import floor as floor_points
@@ -96,7 +106,7 @@ from hrc_env.simulation import Simulation
 from hrc_env.tracking import oracle
 from hrc_env.tracking.calibration_monitor import forget_monitor, make_monitor, monitor
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.estimators import estimator_called, make_estimator
+from hrc_env.tracking.estimators import ESTIMATORS, estimator_called, make_estimator
 from hrc_env.tracking.forecast import forecast
 from hrc_env.tracking.frozen_frames import (
     believed,
@@ -179,6 +189,20 @@ MODEL_ARRAYS = (
     "site_pos", "cam_pos", "cam_quat", "cam_fovy", "light_pos", "light_dir", "eq_data",
 )  # fmt: skip
 """Arrays of MuJoCo's compiled model, by MuJoCo's names."""
+CONTACT_ARRAYS = (
+    "pair_geom1", "pair_geom2", "pair_dim", "pair_friction", "pair_solref", "pair_solimp",
+    "pair_margin", "exclude_signature", "geom_group", "geom_rbound", "geom_dataid", "geom_matid",
+    "body_gravcomp", "body_parentid", "body_ipos", "body_iquat", "jnt_margin", "jnt_limited",
+    "dof_invweight0", "actuator_trnid", "actuator_gear", "eq_active0", "eq_solref", "eq_solimp",
+    "cam_intrinsic", "cam_sensorsize", "cam_resolution", "light_diffuse", "light_ambient",
+    "light_specular", "light_castshadow", "mat_rgba", "mat_specular", "mat_shininess", "site_size",
+    "site_quat", "mesh_pos", "mesh_vertnum",
+)  # fmt: skip
+"""Others of them: which bodies may touch, and how they look and move."""
+OPTIONS = (
+    "timestep", "gravity", "integrator", "cone", "solver", "iterations", "tolerance", "impratio",
+    "disableflags", "enableflags",
+)  # fmt: skip
 RENAMED: dict[str, str] = {}
 """Today's names of observation terms, reward terms and infos that the probes know by another."""
 
@@ -216,7 +240,7 @@ class Env:
         self._simulation = base.simulation
         self.action_size = int(np.prod(self._env.action_space.shape or ()))
 
-    def reset(self, seed: int) -> dict[str, Any]:
+    def reset(self, seed: int | None) -> dict[str, Any]:
         """Start an episode and return everything that is known of it then."""
         self.observation, info = self._env.reset(seed=seed)
         return self._name_values({}, info)
@@ -226,6 +250,14 @@ class Env:
         self.observation, reward, terminated, truncated, info = self._env.step(action)
         values = {"reward": reward, "terminated": terminated, "truncated": truncated}
         return self._name_values(values, info), bool(terminated or truncated)
+
+    def save(self) -> Any:
+        """Return a copy of everything that changes in an episode."""
+        return self._env.unwrapped.get_state()  # type: ignore[attr-defined]
+
+    def restore(self, state: Any) -> None:
+        """Go back to a saved state."""
+        self._env.unwrapped.set_state(state)  # type: ignore[attr-defined]
 
     def bounds(self) -> dict[str, NDArray[np.float64]]:
         """Return the bounds of the observation and of the action, and each term's scale."""
@@ -260,6 +292,14 @@ class Env:
             _collect_numbers(getattr(scene, field.name), numbers)
         return {**model, "numbers": np.sort(np.concatenate(numbers))}
 
+    def describe_contacts(self) -> dict[str, NDArray[np.float64]]:
+        """Return which bodies may touch, how they look, and the settings of the physics."""
+        model = self._simulation.scene.model
+        arrays = {name: np.array(getattr(model, name), float) for name in CONTACT_ARRAYS}
+        settings = {name: np.atleast_1d(np.array(getattr(model.opt, name), float))
+                    for name in OPTIONS}  # fmt: skip
+        return arrays | settings
+
     def view(self) -> NDArray[np.uint8]:
         """Return the scene from the viewpoint of people who look on."""
         base: Any = self._env.unwrapped
@@ -281,6 +321,84 @@ class Env:
         named |= {f"observation/{k}": v for k, v in parts.items() if k != "observation"}
         named |= {**values, **info}
         return {RENAMED.get(name, name): value for name, value in named.items()}
+
+
+def settings() -> dict[str, str]:
+    """Return every setting's default by its place in the configuration, as "ID/task/radius_m"."""
+    return {
+        SETTING_NAMES.get(name, name): default
+        for place, record in _records().items()
+        for name, default in (
+            (f"{place}/{field.name}", repr(getattr(record, field.name)))
+            for field in dataclasses.fields(record)
+            if not _is_record(getattr(record, field.name))
+        )
+    }
+
+
+SETTING_NAMES: dict[str, str] = {}
+"""Today's names of settings that the probes know by another."""
+
+
+def _records() -> dict[str, Any]:
+    """Return all parts of the configuration, and what else holds settings, by place."""
+    found: dict[str, Any] = {}
+
+    def walk(place: str, record: Any) -> None:
+        found[place] = record
+        for field in dataclasses.fields(record):
+            if _is_record(getattr(record, field.name)):
+                walk(f"{place}/{field.name}", getattr(record, field.name))
+
+    for env_id in ENV_IDS:
+        walk(env_id, settle(task=env_id, config={}).config)
+    for name, spec in ESTIMATORS.items():
+        if spec.config is not None:
+            walk(name, spec.config())
+    walk("camera", CameraConfig("camera_1", (2.9, 2.6, 2.45)))
+    return found | {f"shield_{name}": preset for name, preset in PRESETS.items()}
+
+
+def _is_record(value: Any) -> bool:
+    return dataclasses.is_dataclass(value) and not isinstance(value, type)
+
+
+def compare_tracks(
+    means_m: NDArray[np.float64],
+    joints_m: NDArray[np.float64],
+    tracked: NDArray[np.bool_],
+    present: NDArray[np.bool_],
+) -> dict[str, NDArray[np.float64]]:
+    """Return the errors of tracks (T, W, J, 3) from workers (T, W, J, 3), and who was whose."""
+    n_workers = means_m.shape[1]
+    identities = metrics.no_identities(1, n_workers)
+    prior = oracle.prior(1, n_workers, TrackerConfig())
+    found = []
+    for mean, joints, known, there in zip(means_m, joints_m, tracked, present, strict=True):
+        estimate = dataclasses.replace(prior, mean_world=mean[None], tracked=known[None])
+        capsules = np.zeros((1, n_workers, 1, 2, 3)), np.zeros((1, n_workers, 1))
+        truth = WorkerTruth(joints[None], np.zeros_like(joints[None]), *capsules)
+        found.append(metrics.tracking_error(estimate, truth, there[None], identities)[0])
+    return {name: np.array([each[name] for each in found]) for name in metrics.TRACKING.names}
+
+
+def objects_in_hand(
+    env_id: str, poses: NDArray[np.float64], points_m: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Return (n, O) which loose objects a closed and an open hand at points (n, 3) hold, where
+    all objects are at poses (n, 7): place and quaternion."""
+    env: Any = gymnasium.make(env_id, perception="none", disable_env_checker=True).unwrapped
+    objects, n = env.simulation.scene.objects, len(poses)
+    first, n_objects = objects.first, len(objects.names)
+    qpos = np.zeros((n, first + 7 * n_objects))
+    away = np.arange(n_objects)[:, None] * [0.02, 0, 0, 0, 0, 0, 0]
+    qpos[:, first:] = (poses[:, None] + away).reshape(n, -1)
+    held = [
+        held_by(objects, qpos, points_m, HandState(np.zeros(n), np.zeros(n), closed))
+        for closed in (np.ones(n, bool), np.arange(n) % 2 == 0)
+    ]
+    env.close()
+    return np.concatenate(held, axis=1)
 
 
 class Policy(NamedTuple):
@@ -329,6 +447,138 @@ def _put(config: dict[str, Any], path: str, value: Any) -> None:
     for branch in branches:
         config = config.setdefault(branch, {})
     config[leaf] = value
+
+
+# --- Learning (learning.py) ----------------------------------------------------------------------
+
+
+def learn(
+    algorithm: str, env_id: str, ends: tuple[int, ...], folder: Path, **options: Any
+) -> dict[str, NDArray[np.float64]]:
+    """Train a policy, judge it and export it; return the curves and what it is worth.
+
+    Args:
+        algorithm: a learner's name.
+        env_id: a registered id.
+        ends: environment steps at which runs end; each goes on with the one before.
+        folder: an empty one. The policy is left in LEARNT and EXPORTED of it.
+        options: other arguments of a training, by the command line's names.
+    """
+    from agents import export, training  # here, as in all of this part: they need PyTorch
+    from agents.recipes import Run
+    from hrc_env.cli.export import Export
+
+    torch_on_one_thread()
+    console, values = Console(file=io.StringIO()), {}
+    asked = Run(algorithm=algorithm, task=env_id, episodes=4, **options)
+    for k, end in enumerate(ends):
+        resumed = folder if k else None
+        run = dataclasses.replace(asked, timesteps=end, out=folder, resume=resumed)
+        for name, value in _columns(training.train(run, folder, console)[0]).items():
+            if not name.endswith("_s"):  # but for the clock's
+                values[f"run_{k}/{name}"] = value
+    score = dataclasses.asdict(training.judge(asked, folder, console))
+    values |= {f"score/{name}": np.array([float(value)]) for name, value in score.items()}
+    with contextlib.redirect_stdout(io.StringIO()):
+        export.run(Export(run_folder=folder, name="probe", out=folder, episodes=4))
+    (folder / env_id / "probe.safetensors").rename(folder / EXPORTED)
+    card = folder / env_id / "probe.json"
+    for name, metric in json.loads(card.read_text())["worth"][0].items():
+        if isinstance(metric, dict):
+            values[f"card/{name}"] = np.array([metric[each] for each in ("value", "low", "high")])
+    card.rename((folder / EXPORTED).with_suffix(".json"))
+    return values
+
+
+LEARNT, EXPORTED = "policy.zip", "exported.safetensors"
+
+
+def clone(
+    env_id: str, control: str, seed: int, n_rounds: int, n_steps: int
+) -> dict[str, NDArray[np.float64]]:
+    """Teach a policy what the scripted agent does; return its errors and what it does then."""
+    from agents import cloning, ppo
+    from hrc_env.sb3 import HRCVecEnv
+
+    torch_on_one_thread()
+    env = HRCVecEnv(16, task=env_id, perception="keypoints", control=control, seed=seed)
+    policy = ppo.make_learner(env, ppo.IMITATOR, seed).policy
+    settings = cloning.CloningSettings(rounds=n_rounds, steps=n_steps)
+    shares: list[float] = []
+    errors = cloning.clone(policy, env, 4, settings, seed, shares.append)
+    env.seed(seed)
+    acts, observation = [], env.reset()
+    for _ in range(8):
+        acts.append(policy.predict(observation, deterministic=True)[0])  # type: ignore[arg-type]
+        observation = env.step(acts[-1])[0]
+    env.close()
+    log_std: Any = policy.log_std
+    return {
+        "errors": np.array(errors), "acts": np.array(acts), "share": np.array([sum(shares)]),
+        "log_std": log_std.detach().numpy(),
+    }  # fmt: skip
+
+
+def record_episodes(
+    env_id: str, agent: str, n_episodes: int, seed: int
+) -> list[dict[str, NDArray[Any]]]:
+    """Return the episodes of a data set that an agent recorded, two at a time."""
+    import minari
+
+    from agents import recording
+    from hrc_env.cli.record import Record
+
+    name, before = "hrc/probe-v0", os.environ.get(recording.ROOT)
+    with tempfile.TemporaryDirectory() as place, contextlib.redirect_stdout(io.StringIO()):
+        os.environ[recording.ROOT] = place
+        try:
+            recording.run(Record(task=env_id, agent=agent, episodes=n_episodes, seed=seed,
+                                 out=name, num_envs=2))  # fmt: skip
+            found = list(minari.load_dataset(name).iterate_episodes())
+        finally:
+            os.environ.pop(recording.ROOT)
+            os.environ |= {} if before is None else {recording.ROOT: before}
+    return [
+        {
+            **(each.observations if isinstance(each.observations, dict)
+               else {"observation": each.observations}),
+            "actions": each.actions, "rewards": each.rewards, "cost": each.infos["cost"],
+            "success": each.infos["is_success"],
+            "ends": np.array([each.terminations, each.truncations]),
+        }
+        for each in found
+    ]  # fmt: skip
+
+
+def judge_agent(
+    env_id: str, agent: str, n_episodes: int, one_by_one: bool, **options: Any
+) -> dict[str, NDArray[np.float64]]:
+    """Return the statistics of an agent's episodes, and its score."""
+    from agents import evaluate
+
+    play = evaluate.one_by_one if one_by_one else evaluate.judged
+    make = functools.partial(make_agent, agent)
+    options = {"task": env_id, "perception": "keypoints", **options}
+    episodes = play(make, n_episodes, evaluate.EVALUATION_SEED, **options)
+    score = dataclasses.asdict(evaluate.summarise(episodes))
+    worth = evaluate.worth(episodes)
+    return {
+        **_columns(episodes),
+        **{f"score/{name}": np.array([float(value)]) for name, value in score.items()},
+        **{f"worth/{k}": np.array([v.value, v.low, v.high], float) for k, v in worth.items()},
+    }
+
+
+def torch_on_one_thread() -> None:
+    """Let PyTorch round as it does in trainings."""
+    import torch
+
+    torch.set_num_threads(1)
+
+
+def _columns(rows: Sequence[Mapping[str, float]]) -> dict[str, NDArray[np.float64]]:
+    names = [name for name in rows[0] if name != "t"] if rows else []  # but for the clock's
+    return {name: np.array([float(each[name]) for each in rows]) for name in names}
 
 
 # --- Motion (motion.py) --------------------------------------------------------------------------
@@ -903,6 +1153,16 @@ def project_points(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return pinhole pixels and depths of points in every camera."""
     return cameras.project(P, points_world)
+
+
+def meet_planes(
+    P: NDArray[np.float64], px: NDArray[np.float64], use: NDArray[np.bool_]
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Return the points nearest to the planes of views px (n, C, 2), and whether there are any."""
+    points, are_found = np.zeros((len(px), 3)), np.zeros(len(px), bool)
+    for k in range(len(px)):
+        are_found[k] = linear_point(P, px[k], use[k], points[k])
+    return points, are_found
 
 
 def triangulate_views(

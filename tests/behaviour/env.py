@@ -6,7 +6,7 @@ lost, everything is compared; afterwards only what has happened so far (goals, c
 cost, return).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -31,6 +31,9 @@ PIXEL_TOLERANCE = 0.05
 RELEASING = "releasing"
 """Said after an agent's name: from half of the episode on its hand is opened."""
 SEED = 49
+REACH, PICK, HAND = "HRCReach-v0", "HRCPickPlace-v0", "HRCHandover-v0"
+DRYWALL, DELIVERY = "HRCDrywall-v0", "HRCDelivery-v0"
+REACH_GOAL, PICK_GOAL = "HRCReachGoal-v0", "HRCPickPlaceGoal-v0"
 
 
 def play(env_id: str, seed: int, options: Mapping[str, Any], inputs: Values) -> Played:
@@ -42,6 +45,36 @@ def play(env_id: str, seed: int, options: Mapping[str, Any], inputs: Values) -> 
         moments.append(moment)
         if is_over:
             break
+    env.close()
+    return summarize(moments)
+
+
+def play_again(env_id: str, seed: int, options: Mapping[str, Any], inputs: Values) -> Played:
+    """Play half an episode, then its second half twice: the state is saved and brought back."""
+    env = doors.Env(env_id, **options)
+    env.reset(seed)
+    actions = inputs["actions"]
+    half = len(actions) // 2
+    for action in actions[:half]:
+        env.step(action)
+    saved = env.save()
+    halves = []
+    for _ in range(2):
+        halves.append(summarize([env.step(action)[0] for action in actions[half:]]))
+        env.restore(saved)
+    env.close()
+    first, second = halves
+    names = {f"again/{name}": value for name, value in second.values.items()}
+    return Played(first.values | names, first.n_settled, first.events)
+
+
+def play_episodes(env_id: str, seed: int, options: Mapping[str, Any], inputs: Values) -> Played:
+    """Play the beginnings of some episodes in one environment, only the first of them seeded."""
+    env = doors.Env(env_id, **options)
+    moments = []
+    for k, actions in enumerate(np.array_split(inputs["actions"], 3)):
+        moments.append(env.reset(seed if k == 0 else None))
+        moments.extend(env.step(action)[0] for action in actions)
     env.close()
     return summarize(moments)
 
@@ -132,6 +165,14 @@ def play_scene(env_id: str, options: Mapping[str, Any], inputs: Values) -> Playe
     return Played({name: value for name, value in values.items() if len(value)})
 
 
+def play_contacts(env_id: str, options: Mapping[str, Any], inputs: Values) -> Played:
+    """Return which bodies of a compiled scene may touch, how they look, and how it is solved."""
+    env = doors.Env(env_id, **options)
+    values = env.describe_contacts()
+    env.close()
+    return Played({name: value for name, value in values.items() if len(value)})
+
+
 def play_pictures(env_id: str, options: Mapping[str, Any], inputs: Values) -> Played:
     """Return the means over tiles of what is drawn for people, of three moments."""
     env = doors.Env(env_id, render_mode="rgb_array", **options)
@@ -160,6 +201,43 @@ def play_judged(env_id: str, inputs: Values) -> Played:
     return Played(values)
 
 
+def compare_tracks(_: Values) -> Played:
+    """Return the errors of tracks of three workers who cross, leave and are taken for others."""
+    rng, n = np.random.default_rng(SEED), 120
+    t = np.linspace(-1, 1, n)[:, None, None, None]
+    ways = np.array([[1.5, 0, 0], [-1.5, 0.2, 0], [0.1, 1.2, 0]])[:, None]
+    joints = ways * t + rng.normal(0, 0.3, (3, len(doors.JOINTS), 3)) + [0, 0, 1]
+    means = joints + rng.normal(0, 0.05, joints.shape)
+    means[50:80, [0, 1]] = means[50:80, [1, 0]]  # exchanged, then found again
+    means[90:, 2] += rng.uniform(0.3, 0.9, (n - 90, 1, 1))  # lost bit by bit
+    tracked, present = rng.random((n, 3)) < 0.95, np.ones((n, 3), bool)
+    present[:15, 2] = present[100:, 0] = False
+    return Played(doors.compare_tracks(means, joints, tracked, present))
+
+
+def name_settings() -> Values:
+    """Return the names of all settings that there are today."""
+    return {"names": np.array(list(doors.settings()))}
+
+
+def describe_settings(inputs: Values) -> Played:
+    """Return the defaults of the settings that there were; others may have come."""
+    defaults = doors.settings()
+    return Played(
+        {"defaults": np.array([f"{name} = {defaults[name]}" for name in inputs["names"]])}
+    )
+
+
+def take_in_hand(env_id: str, _: Values) -> Played:
+    """Return what a hand holds at points in and beside turned objects."""
+    rng, n = np.random.default_rng(SEED), 400
+    turns = rng.normal(size=(n, 4))
+    places = rng.uniform(-1, 1, (n, 3))
+    poses = np.hstack([places, turns / np.linalg.norm(turns, axis=1, keepdims=True)])
+    points_m = places + rng.normal(0, 1, (n, 3)) * np.geomspace(0.003, 0.3, n)[:, None]
+    return Played({"held": doors.objects_in_hand(env_id, poses, points_m)})
+
+
 def draw_goals(env_id: str) -> Values:
     """Return pairs of goals from equal to far apart."""
     env = doors.Env(env_id, perception="keypoints")
@@ -179,6 +257,7 @@ def _make(
     agent: str = "scripted",
     seed: int = SEED,
     is_short: bool = False,
+    play: Callable[[str, int, Mapping[str, Any], Values], Played] = play,
     **options: Any,
 ) -> Probe:
     options = {"perception": "keypoints", **options}
@@ -199,9 +278,6 @@ def _fault(kind: str, amount: float | None = None, camera: Any = "all", **when: 
     return [fault if amount is None else {**fault, "amount": amount}]
 
 
-REACH, PICK, HAND = "HRCReach-v0", "HRCPickPlace-v0", "HRCHandover-v0"
-DRYWALL, DELIVERY = "HRCDrywall-v0", "HRCDelivery-v0"
-REACH_GOAL, PICK_GOAL = "HRCReachGoal-v0", "HRCPickPlaceGoal-v0"
 LATE = [
     {"name": f"camera_{k}", "eye_m": eye, "latency_s": late_s, "rate_hz": rate_hz}
     for k, (eye, late_s, rate_hz) in enumerate((
@@ -239,6 +315,7 @@ COVERING = (
     _make("reach_triangulation", REACH, 150, seed=53, estimator="triangulation"),
     _make("reach_ransac", REACH, 150, seed=54, estimator="ransac"),
     _make("reach_paper_restarts", REACH, 60, seed=55, estimator="paper_restarts"),
+    _make("reach_paper", REACH, 20, seed=55, estimator="paper"),
     # late and faulty images
     _make("reach_late_known", REACH, 200, seed=56, cameras=LATE, shield="ssm"),
     _make("reach_late_unknown", REACH, 150, seed=57, faults=_fault("out_of_step", 3.0)),
@@ -300,10 +377,71 @@ COVERING = (
     _make("pick_noise", PICK, 150, "noise", seed=90),
     _make("delivery_noise", DELIVERY, 250, "noise", seed=91),
 )  # fmt: skip
+MORE = (
+    # the same tasks beside other people, under other shields, with other cameras
+    _make("reach_headlong", REACH, 250, seed=110, people="headlong", bodies="any", shield="pfl"),
+    _make("reach_three_hurried", REACH, 250, "scripted_slowed", seed=111, people="hurried",
+          n_workers=3, shield="ssm"),
+    _make("reach_triangulation_two", REACH, 150, seed=112, estimator="triangulation", n_workers=2),
+    _make("reach_kalman_two", REACH, 200, seed=113, estimator="kalman", n_workers=2,
+          kept_cameras=[0, 2]),
+    _make("site_pick", PICK, 300, seed=114, scene="site", people="hurried"),
+    _make("site_hand", HAND, 400, seed=115, scene="site", people="unaware", shield="ssm"),
+    _make("site_drywall", DRYWALL, 500, seed=116, scene="site", people="hurried", shield="pfl",
+          n_workers=2),
+    _make("pick_unaware_qp", PICK, 500, seed=117, people="unaware", shield="qp", n_workers=2),
+    _make("pick_twist_slowed", PICK, 300, "scripted_slowed", seed=118, control="twist"),
+    _make("pick_goal_twist", PICK_GOAL, 300, seed=119, control="twist", people="hurried"),
+    _make("reach_goal_dense", REACH_GOAL, 100, seed=120, people="unaware",
+          shield="qp"),
+    _make("hand_twist", HAND, 500, seed=121, control="twist", bodies=("worker_3",)),
+    _make("hand_sparse", HAND, 500, seed=122, reward_kind="sparse", object_noise_m=0.01),
+    _make("drywall_twist", DRYWALL, 500, seed=123, control="twist", reward_kind="sparse"),
+    _make("delivery_blind", DELIVERY, 500, "scripted_slowed", seed=124, people="hurried",
+          n_workers=3, shield="ssm", faults=_fault("lost", from_s=5.0, until_s=9.0)),
+    _make("delivery_truth", DELIVERY, 700, seed=125, perception="truth", people="unaware",
+          n_workers=(1, 5), shield="qp", observes_shield=True),
+    _make("reach_costs", REACH, 250, seed=126, people="headlong", jobs="low_work",
+          cost_components=("towards", "near_miss"), n_workers=2),
+    _make("pick_truth", PICK, 400, seed=127, perception="truth", people="headlong",
+          cost_components=("force", "too_near"), forecast_s=(0.4,), covariance_terms=("factor",)),
+    _make("reach_slow_frames", REACH, 150, seed=128, faults=_fault("late", 0.2), n_workers=2,
+          estimator="kalman"),
+    _make("reach_some_noise", REACH, 200, "noise", seed=129, people="unaware", shield="pfl",
+          n_workers=2),
+    _make("drywall_noise_qp", DRYWALL, 200, "noise", seed=130, people="unaware", shield="qp"),
+    _make("hand_noise_unaware", HAND, 250, "noise", seed=131, people="unaware", shield="qp"),
+    # other controls under shields
+    _make("reach_tool_qp", REACH, 250, seed=144, control="tool", shield="qp", people="unaware"),
+    _make("reach_tool_noise", REACH, 250, "noise", seed=145, control="tool", shield="pfl",
+          people="hurried", n_workers=2),
+    _make("pick_twist_ssm", PICK, 250, seed=146, control="twist", shield="ssm", people="unaware"),
+    _make("hand_twist_noise", HAND, 250, "noise", seed=147, control="twist", shield="qp",
+          people="unaware", observes_shield=True),
+    _make("drywall_twist_pfl", DRYWALL, 300, seed=148, control="twist", shield="pfl",
+          people="hurried"),
+    # again, and from a saved state
+    _make("reach_episodes", REACH, 240, seed=132, play=play_episodes, n_workers=(0, 2),
+          bodies="any"),
+    _make("pick_episodes", PICK, 240, seed=133, play=play_episodes, object_noise_m=0.004),
+    _make("delivery_episodes", DELIVERY, 240, seed=134, play=play_episodes),
+    _make("drywall_episodes", DRYWALL, 180, seed=135, play=play_episodes),
+    _make("hand_episodes", HAND, 180, seed=136, play=play_episodes),
+    _make("reach_again", REACH, 160, seed=137, play=play_again, n_workers=2, cameras=LATE,
+          shield="ssm"),
+    _make("reach_again_faulty", REACH, 160, seed=138, play=play_again, people="hurried",
+          faults=_fault("out_of_step", 3.0), estimator="paper_restarts"),
+    _make("delivery_again", DELIVERY, 300, seed=139, play=play_again),
+    _make("pick_again", PICK, 200, seed=140, play=play_again, object_noise_m=0.004),
+    _make("drywall_again", DRYWALL, 200, seed=141, play=play_again),
+    _make("hand_again", HAND, 300, seed=142, play=play_again, observes_shield=True, shield="qp"),
+)  # fmt: skip
 PIXELS = (
     _make("reach_pixels", REACH, 40, seed=92, perception="pixels"),
     _make("site_pixels_varied", REACH, 20, seed=93, perception="pixels", scene="site", n_workers=2,
           appearance="varied"),
+    _make("reach_pixels_again", REACH, 24, seed=143, perception="pixels", play=play_again,
+          n_workers=2, kept_cameras=[0, 1, 2]),
     _make("delivery_pixels_faults", DELIVERY, 15, seed=94, perception="pixels", n_workers=1,
           faults=IMAGE_FAULTS),
 )  # fmt: skip
@@ -317,16 +455,33 @@ JUDGED = tuple(
           inputs=partial(draw_goals, env_id), subject=env_id, is_short=True)
     for env_id in (REACH_GOAL, PICK_GOAL)
 )  # fmt: skip
+PARTS = (
+    Probe(name="settings", play=describe_settings, inputs=name_settings, is_short=True),
+    Probe(name="identities", play=compare_tracks, is_short=True),
+    *(
+        Probe(name=f"in_hand_{env_id}", play=partial(take_in_hand, env_id), subject=env_id,
+              is_short=True)
+        for env_id in (PICK, HAND)
+    ),
+)  # fmt: skip
+PLACES: tuple[tuple[str, str, dict[str, Any]], ...] = (
+    ("lab_arm", REACH, {"n_workers": 2, "bodies": "any"}),
+    ("site_arm", REACH, {"scene": "site"}),
+    ("studs", PICK, {}),
+    ("hand", HAND, {}),
+    ("board", DRYWALL, {}),
+    ("base", DELIVERY, {}),
+    ("lab_lenses", REACH, {"rig": "lab_gopro"}),
+    ("site_studs", PICK, {"scene": "site"}),
+    ("site_hand", HAND, {"scene": "site"}),
+    ("site_board", DRYWALL, {"scene": "site"}),
+)
+"""Scenes: a name, an environment and its arguments."""
 SCENES = tuple(
-    Probe(name=f"scene_{name}", play=partial(play_scene, env_id, {"perception": "none", **options}),
+    Probe(name=f"{kind}_{name}", play=partial(play_kind, env_id, {"perception": "none", **options}),
           subject=env_id, is_short=True)
-    for name, env_id, options in (
-        ("lab_arm", REACH, {"n_workers": 2, "bodies": "any"}),
-        ("site_arm", REACH, {"scene": "site"}),
-        ("studs", PICK, {}), ("hand", HAND, {}), ("board", DRYWALL, {}), ("base", DELIVERY, {}),
-        ("lab_lenses", REACH, {"rig": "lab_gopro"}), ("site_studs", PICK, {"scene": "site"}),
-        ("site_hand", HAND, {"scene": "site"}), ("site_board", DRYWALL, {"scene": "site"}),
-    )
+    for kind, play_kind in (("scene", play_scene), ("contacts", play_contacts))
+    for name, env_id, options in PLACES
 )  # fmt: skip
 PICTURES = tuple(
     Probe(name=f"picture_{env_id}",
@@ -335,4 +490,14 @@ PICTURES = tuple(
           subject=env_id, needs_pixels=True, tolerance=0.01)
     for env_id in (REACH, DELIVERY, DRYWALL)
 )  # fmt: skip
-PROBES: tuple[Probe, ...] = (*SCENES, *PICTURES, *BOUNDS, *JUDGED, *WHOLE, *COVERING, *PIXELS)
+PROBES: tuple[Probe, ...] = (
+    *SCENES,
+    *PICTURES,
+    *BOUNDS,
+    *JUDGED,
+    *PARTS,
+    *WHOLE,
+    *COVERING,
+    *MORE,
+    *PIXELS,
+)

@@ -12,6 +12,7 @@ from tests.behaviour.probe import Difference, Probe, compare, path_of, read
 ROOMS: dict[str, str] = {
     "env": "env",
     "agents": "agents",
+    "learning": "agents",
     "tracker": "tracker",
     "emulator": "emulator",
     "detector": "detector",

@@ -4,7 +4,7 @@ import pytest
 
 from tests.behaviour.rooms import check, probes
 
-ROOMS = ("env", "agents")
+ROOMS = ("env", "agents", "learning")
 PLACED = {each.label: each for each in probes(ROOMS)}
 
 

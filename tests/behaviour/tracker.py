@@ -774,6 +774,17 @@ def triangulate(_: Values) -> Played:
     return Played(_shrunk(values))
 
 
+def meet_planes(_: Values) -> Played:
+    """Play points of the planes of some views, also of points behind one of the cameras."""
+    rng, n = np.random.default_rng(10), 200
+    points_m = rng.normal([0.0, 0.0, 1.0], 1.5, (n, 3))
+    points_m[::2] = EYES_M[np.arange(n // 2) % 4] * rng.uniform(1.01, 2.0, (n // 2, 1))
+    at = np.einsum("cij,nj->nci", RIG[:, :, :3], points_m) + RIG[:, :, 3]
+    px = at[..., :2] / at[..., 2:] + rng.normal(0, 2.0, (n, 4, 2))
+    found_m, are_found = doors.meet_planes(RIG, px, rng.random((n, 4)) < 0.7)
+    return Played({"points_m": np.where(are_found[:, None], found_m, 0.0), "found": are_found})
+
+
 def move_chains(_: Values) -> Played:
     """Play a robot of hinges and slides, and how far capsules of all kinds are apart."""
     rng = np.random.default_rng(10)
@@ -875,6 +886,7 @@ def find_ways(_: Values) -> Played:
 
 
 BESIDE: tuple[Probe, ...] = (
+    Probe(name="planes", play=meet_planes, is_short=True),
     Probe(name="smoother", play=smooth, is_short=True),
     Probe(name="poses_assigned", play=partial(assign_poses, 4), is_short=True),
     Probe(name="poses_of_one_camera", play=partial(assign_poses, 1), is_short=True),

@@ -39,10 +39,17 @@ class CodeRoom:
     """Its folder or file."""
     probes: tuple[str, ...]
     """Rooms of probes, in the order in which they are likely to notice something."""
-    tests: tuple[str, ...]
-    """Its unit tests."""
+    own_tests: tuple[str, ...]
+    """Its unit tests, without `SETTINGS`."""
+
+    @property
+    def tests(self) -> tuple[str, ...]:
+        """The unit tests that speak for it."""
+        return tuple(dict.fromkeys((*self.own_tests, *SETTINGS)))
 
 
+SETTINGS = ("tests/test_limits.py", "tests/test_env.py")
+"""Unit tests of what settings and arguments take, of all rooms."""
 CODE: dict[str, CodeRoom] = {
     "tasks": CodeRoom(
         "hrc_env/tasks", ("env", "agents"),
@@ -68,7 +75,7 @@ CODE: dict[str, CodeRoom] = {
     ),
     "observations": CodeRoom(
         "hrc_env/observations.py", ("env", "agents"),
-        ("tests/test_observations.py", "tests/test_uncertainty.py"),
+        ("tests/test_observations.py", "tests/test_uncertainty.py", "tests/test_bring_your_own.py"),
     ),
     "belief": CodeRoom(
         "hrc_env/belief.py", ("env", "shield"),
@@ -80,9 +87,11 @@ CODE: dict[str, CodeRoom] = {
         ("tests/test_env.py", "tests/test_states.py", "tests/test_several_workers.py"),
     ),
     "rewards": CodeRoom("hrc_env/rewards.py", ("env",), ("tests/test_rewards.py",)),
-    "metrics": CodeRoom("hrc_env/metrics.py", ("env",), ("tests/test_metrics.py",)),
+    "metrics": CodeRoom(
+        "hrc_env/metrics.py", ("env",), ("tests/test_metrics.py", "tests/test_several_workers.py")
+    ),
     "agents": CodeRoom(
-        "agents", ("agents",),
+        "agents", ("agents", "learning"),
         (
             "tests/test_policies.py", "tests/test_recording.py", "tests/test_lagrangian.py",
             "tests/test_training.py", "tests/test_learners.py", "tests/tasks",
