@@ -355,6 +355,7 @@ def test_bad_arguments_are_answered_with_the_valid_ones(kwargs, said):
     [
         (np.zeros(5), r"shape \(6,\)"),
         (np.full(6, np.nan), "finite"),
+        (np.array([0, 0, np.nan, 0, 0, 0]), "finite"),
         (np.full(6, np.inf), "finite"),
         ("abc", "must be numbers"),
     ],

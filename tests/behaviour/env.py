@@ -28,6 +28,10 @@ TOUCHED = "cost_contact"
 TRACKED = "observation/worker_tracked"
 PIXEL_TOLERANCE = 0.05
 """Largest difference that another renderer may make to estimates."""
+NOISE, RUSH = "noise", "rush"
+"""Agents that look at nothing: another action at every step; full speed one way for a while."""
+RUSHES_FOR = 40
+"""Steps."""
 RELEASING = "releasing"
 """Said after an agent's name: from half of the episode on its hand is opened."""
 SEED = 49
@@ -85,9 +89,11 @@ def record_actions(
     """Return the actions of an agent in one episode."""
     env = doors.Env(env_id, **options)
     env.reset(seed)
-    if agent == "noise":
-        actions = np.random.default_rng(seed).uniform(-1, 1, (n_steps, env.action_size))
+    if agent in (NOISE, RUSH):
         env.close()
+        rng, shape = np.random.default_rng(seed), (n_steps, env.action_size)
+        whole = rng.choice([-1.0, 1.0], shape)[np.arange(n_steps) // RUSHES_FOR]
+        actions = rng.uniform(-1, 1, shape) if agent == NOISE else whole
         return {"actions": actions.astype(np.float32)}
     name, _, manner = agent.partition(" ")
     act, actions = env.make_agent(name), []
@@ -213,6 +219,21 @@ def compare_tracks(_: Values) -> Played:
     tracked, present = rng.random((n, 3)) < 0.95, np.ones((n, 3), bool)
     present[:15, 2] = present[100:, 0] = False
     return Played(doors.compare_tracks(means, joints, tracked, present))
+
+
+def mistake_tracks(_: Values) -> Played:
+    """Return the errors of tracks that are of anybody in a crowd, in many short episodes."""
+    rng, kept = np.random.default_rng(SEED), []
+    for n_workers in (1, 2, 3, 4) * 10:
+        at = rng.uniform(-0.6, 0.6, (1, n_workers, 1, 3)) * [1, 1, 0]
+        walks = at + np.cumsum(rng.normal(0, 0.08, (10, n_workers, 1, 3)), axis=0)
+        joints = walks + rng.normal(0, 0.2, (n_workers, len(doors.JOINTS), 3))
+        order = np.array([rng.permutation(n_workers) for _ in range(3)])[np.arange(10) // 4]
+        means = np.take_along_axis(joints, order[:, :, None, None], axis=1)
+        means = means + rng.normal(0, 0.25, (10, n_workers, 1, 3))
+        tracked, present = rng.random((2, 10, n_workers)) < 0.85
+        kept.append(doors.compare_tracks(means, joints, tracked, present))
+    return Played({name: np.concatenate([each[name] for each in kept]) for name in kept[0]})
 
 
 def name_settings() -> Values:
@@ -420,6 +441,20 @@ MORE = (
           people="unaware", observes_shield=True),
     _make("drywall_twist_pfl", DRYWALL, 300, seed=148, control="twist", shield="pfl",
           people="hurried"),
+    # people who are touched
+    _make("reach_touched_ends", REACH, 250, seed=151, people="headlong", n_workers=2,
+          ends_on_contact=True),
+    _make("reach_touched_twice", REACH, 250, seed=153, people="headlong", n_workers=2,
+          cost_components=("proximity", "contact", "towards", "force", "too_near", "near_miss")),
+    _make("pick_touched", PICK, 640, seed=168, people="headlong", n_workers=3),
+    _make("delivery_rush", DELIVERY, 500, RUSH, seed=170, people="headlong", n_workers=6),
+    _make("delivery_rush_truth", DELIVERY, 600, RUSH, seed=179, perception="truth",
+          people="headlong", n_workers=6, cost_components=("contact", "towards", "force")),
+    _make("drywall_rush", DRYWALL, 300, RUSH, seed=180, people="headlong", n_workers=3),
+    _make("hand_rush", HAND, 300, RUSH, seed=181, people="headlong", n_workers=2),
+    _make("pick_rush", PICK, 300, RUSH, seed=182, people="headlong", n_workers=3),
+    _make("reach_rush", REACH, 250, RUSH, seed=183, people="unaware", n_workers=3, jobs="low_work",
+          ends_on_contact=True),
     # again, and from a saved state
     _make("reach_episodes", REACH, 240, seed=132, play=play_episodes, n_workers=(0, 2),
           bodies="any"),
@@ -458,6 +493,7 @@ JUDGED = tuple(
 PARTS = (
     Probe(name="settings", play=describe_settings, inputs=name_settings, is_short=True),
     Probe(name="identities", play=compare_tracks, is_short=True),
+    Probe(name="identities_crowd", play=mistake_tracks, is_short=True),
     *(
         Probe(name=f"in_hand_{env_id}", play=partial(take_in_hand, env_id), subject=env_id,
               is_short=True)

@@ -69,7 +69,7 @@ class Arguments:
     """Run no unit tests."""
     at_once: int = 2
     """How many mutants are judged at the same time."""
-    limit_min: float = 15.0
+    limit_min: float = 5.0
     """Probes, and tests, that take longer than this count as noticed: they hang [min]."""
 
 

@@ -48,8 +48,8 @@ class CodeRoom:
         return tuple(dict.fromkeys((*self.own_tests, *SETTINGS)))
 
 
-SETTINGS = ("tests/test_limits.py", "tests/test_env.py")
-"""Unit tests of what settings and arguments take, of all rooms."""
+SETTINGS = ("tests/test_limits.py", "tests/test_env.py", "tests/test_bring_your_own.py")
+"""Unit tests of what settings, arguments and own things must be like, of all rooms."""
 CODE: dict[str, CodeRoom] = {
     "tasks": CodeRoom(
         "hrc_env/tasks", ("env", "agents"),
@@ -75,7 +75,7 @@ CODE: dict[str, CodeRoom] = {
     ),
     "observations": CodeRoom(
         "hrc_env/observations.py", ("env", "agents"),
-        ("tests/test_observations.py", "tests/test_uncertainty.py", "tests/test_bring_your_own.py"),
+        ("tests/test_observations.py", "tests/test_uncertainty.py"),
     ),
     "belief": CodeRoom(
         "hrc_env/belief.py", ("env", "shield"),
