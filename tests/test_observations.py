@@ -32,6 +32,12 @@ def test_horizons_add_their_terms_and_no_others():
     assert more.slices[ADDED[1]].stop == len(more.low)
 
 
+def test_who_gives_no_more_sizes_asks_for_no_more_terms():
+    plain, made = layout(TERMS, Sizes(6, 6, 1)), HRCEnv(perception="none").simulation.layout
+    assert (plain.slices, plain.terms) == (made.slices, made.terms)
+    np.testing.assert_array_equal(plain.low, made.low)
+
+
 @pytest.mark.parametrize("level", ["keypoints", "truth", "none"])
 def test_asking_changes_nothing_else(level):
     plain, more = HRCEnv(perception=level), HRCEnv(perception=level, config=ASKED)

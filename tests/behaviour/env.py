@@ -484,6 +484,15 @@ BOUNDS = tuple(
     Probe(name=f"bounds_{env_id}", play=partial(play_bounds, env_id, {"perception": "none"}),
           subject=env_id, is_short=True)
     for env_id in doors.ENV_IDS
+) + tuple(
+    Probe(name=f"bounds_{env_id}_{end}", is_short=True, subject=env_id,
+          play=partial(play_bounds, env_id, {"perception": "none", **options}))
+    for env_id in (REACH, PICK, HAND, DRYWALL, DELIVERY)
+    for end, options in (
+        ("all", {"forecast_s": (0.2, 0.6), "observes_shield": True, "shield": "qp",
+                 "covariance_terms": ("towards_robot", "factor"), "n_workers": 2}),
+        ("far", {"forecast_s": (0.9,), "covariance_terms": ("factor",)}),
+    )
 )  # fmt: skip
 JUDGED = tuple(
     Probe(name=f"goals_{env_id}", play=partial(play_judged, env_id),
