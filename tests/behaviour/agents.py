@@ -1,5 +1,6 @@
 """Actions of the scripted agents and of trained policies on stored observations."""
 
+from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
@@ -15,9 +16,11 @@ SEED = 1049
 SCRIPTED = ("scripted", "scripted_slowed")
 
 
-def play(env_id: str, agents: tuple[str, ...], control: str, inputs: Values) -> Played:
+def play(
+    env_id: str, agents: tuple[str, ...], options: Mapping[str, Any], inputs: Values
+) -> Played:
     """Return the actions of some agents for the stored observations, one after the other."""
-    env = _open(env_id, control)
+    env = _open(env_id, options)
     observations = _split(inputs)
     values = {}
     for name in agents:
@@ -27,14 +30,14 @@ def play(env_id: str, agents: tuple[str, ...], control: str, inputs: Values) -> 
     return Played(values)
 
 
-def record_observations(env_id: str, control: str) -> Values:
+def record_observations(env_id: str, options: Mapping[str, Any], every: int) -> Values:
     """Return observations of two episodes, one beside people who come near, one of random acts."""
-    env, rng, kept = _open(env_id, control), np.random.default_rng(SEED), []
+    env, rng, kept = _open(env_id, options), np.random.default_rng(SEED), []
     for episode in range(2):
         env.reset(SEED + episode)
         act = env.make_agent("scripted")
         for step in range(N_STEPS.get(env_id, 600)):
-            if step % EVERY == 0:
+            if step % every == 0:
                 kept.append(env.observation)
             action = np.asarray(act(env.observation), np.float32)
             if episode == 1:
@@ -47,8 +50,8 @@ def record_observations(env_id: str, control: str) -> Values:
     return {name: np.array([each[name] for each in kept]) for name in kept[0]}
 
 
-def _open(env_id: str, control: str) -> doors.Env:
-    return doors.Env(env_id, perception="keypoints", people="hurried", control=control)
+def _open(env_id: str, options: Mapping[str, Any]) -> doors.Env:
+    return doors.Env(env_id, **{"perception": "keypoints", "people": "hurried", **options})
 
 
 def _split(inputs: Values) -> list[Any]:
@@ -59,18 +62,23 @@ def _split(inputs: Values) -> list[Any]:
     return [{name: value[k] for name, value in inputs.items()} for k in range(n)]
 
 
-def _make(env_id: str, agents: tuple[str, ...], control: str = "joint", end: str = "") -> Probe:
+def _make(
+    env_id: str, agents: tuple[str, ...], end: str = "", every: int = EVERY, **options: Any
+) -> Probe:
     return Probe(
         name=f"{env_id}{end}",
-        play=partial(play, env_id, agents, control),
-        inputs=partial(record_observations, env_id, control),
+        play=partial(play, env_id, agents, options),
+        inputs=partial(record_observations, env_id, options, every),
         subject=env_id,
-        is_short=True,
+        is_short=every == EVERY,
     )
 
 
 PROBES: tuple[Probe, ...] = (
     *(_make(env_id, SCRIPTED) for env_id in doors.ENV_IDS),
-    _make("HRCReach-v0", SCRIPTED, "tool", "_tool"),
-    *(_make(each.env_id, (each.name,), each.control, "_policy") for each in doors.policies()),
-)
+    _make("HRCReach-v0", SCRIPTED, "_tool", control="tool"),
+    *(_make(each.env_id, (each.name,), "_policy", control=each.control)
+      for each in doors.policies()),
+    *(_make(env_id, SCRIPTED, "_crowd", 11, people="headlong", n_workers=4, perception=level)
+      for env_id, level in zip(doors.ENV_IDS, ("keypoints", "truth") * 4, strict=False)),
+)  # fmt: skip

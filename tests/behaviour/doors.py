@@ -96,6 +96,7 @@ from hrc_env.safety.guard import constraints
 from hrc_env.safety.robot import RobotModel
 from hrc_env.safety.shield import shield_called, shielded
 from hrc_env.safety.watch import Watch
+from hrc_env.scene import rigs
 from hrc_env.scene.build import SceneConfig
 from hrc_env.scene.build import build as build_scene
 from hrc_env.scene.objects import held_by
@@ -203,6 +204,12 @@ OPTIONS = (
     "timestep", "gravity", "integrator", "cone", "solver", "iterations", "tolerance", "impratio",
     "disableflags", "enableflags",
 )  # fmt: skip
+DRAWING = (
+    ("quality", ("offsamples", "shadowsize", "numslices", "numstacks", "numquads")),
+    ("headlight", ("ambient", "diffuse", "specular", "active")),
+    ("map", ("znear", "zfar", "fogstart", "fogend", "haze", "shadowclip", "shadowscale", "alpha")),
+)
+"""How MuJoCo draws, by its names."""
 RENAMED: dict[str, str] = {}
 """Today's names of observation terms, reward terms and infos that the probes know by another."""
 
@@ -298,7 +305,18 @@ class Env:
         arrays = {name: np.array(getattr(model, name), float) for name in CONTACT_ARRAYS}
         settings = {name: np.atleast_1d(np.array(getattr(model.opt, name), float))
                     for name in OPTIONS}  # fmt: skip
-        return arrays | settings
+        drawn = {f"{part}/{name}": np.atleast_1d(np.array(getattr(getattr(model.vis, part), name)))
+                 for part, names in DRAWING for name in names}  # fmt: skip
+        return arrays | settings | drawn
+
+    def describe_rig(self) -> dict[str, NDArray[Any]]:
+        """Return which places the cameras see, and how many sentences there are on the rig."""
+        scene = self._simulation.scene
+        places = rigs.workspace(scene.grounds)
+        return {
+            "places_m": places, "seen": rigs.sees(scene.cameras, scene.obstacles, places).T,
+            "n_findings": np.array([len(rigs.findings(scene))]),
+        }  # fmt: skip
 
     def view(self) -> NDArray[np.uint8]:
         """Return the scene from the viewpoint of people who look on."""

@@ -179,6 +179,14 @@ def play_contacts(env_id: str, options: Mapping[str, Any], inputs: Values) -> Pl
     return Played({name: value for name, value in values.items() if len(value)})
 
 
+def play_rig(env_id: str, options: Mapping[str, Any], inputs: Values) -> Played:
+    """Return what the cameras of a scene see of the places where people are."""
+    env = doors.Env(env_id, **options)
+    values = env.describe_rig()
+    env.close()
+    return Played(values)
+
+
 def play_pictures(env_id: str, options: Mapping[str, Any], inputs: Values) -> Played:
     """Return the means over tiles of what is drawn for people, of three moments."""
     env = doors.Env(env_id, render_mode="rgb_array", **options)
@@ -475,6 +483,14 @@ PIXELS = (
     _make("reach_pixels", REACH, 40, seed=92, perception="pixels"),
     _make("site_pixels_varied", REACH, 20, seed=93, perception="pixels", scene="site", n_workers=2,
           appearance="varied"),
+    _make("reach_pixels_late", REACH, 24, seed=149, perception="pixels", cameras=LATE,
+          faults=IMAGE_FAULTS[:4], n_workers=2, people="hurried"),
+    _make("pick_pixels_blurred", PICK, 16, RUSH, seed=150, perception="pixels", people="headlong",
+          faults=[{"kind": "motion_blur", "cameras": ("all",), "amount": 0.04},
+                  {"kind": "late", "cameras": (1, 2), "amount": 0.12}]),
+    _make("site_pixels_dropped", REACH, 20, seed=151, perception="pixels", scene="site",
+          faults=[{"kind": "dropped", "cameras": ("all",), "amount": 0.5},
+                  {"kind": "frozen", "cameras": (0,), "from_s": 0.3}]),
     _make("reach_pixels_again", REACH, 24, seed=143, perception="pixels", play=play_again,
           n_workers=2, kept_cameras=[0, 1, 2]),
     _make("delivery_pixels_faults", DELIVERY, 15, seed=94, perception="pixels", n_workers=1,
@@ -492,6 +508,19 @@ BOUNDS = tuple(
         ("all", {"forecast_s": (0.2, 0.6), "observes_shield": True, "shield": "qp",
                  "covariance_terms": ("towards_robot", "factor"), "n_workers": 2}),
         ("far", {"forecast_s": (0.9,), "covariance_terms": ("factor",)}),
+    )
+)  # fmt: skip
+POOR = [
+    {"name": f"camera_{k}", "eye_m": eye, "target_m": (2.0, 2.2, 1.0), "field_deg": 45.0}
+    for k, eye in enumerate(((2.9, 2.6, 2.45), (-9.0, 2.6, 2.45), (0.1, 0.1, 0.2)))
+]
+"""Cameras that look past the room, hang outside of it, and inside the robot."""
+RIGS = tuple(
+    Probe(name=f"rig_{name}", subject=REACH, is_short=True,
+          play=partial(play_rig, REACH, {"perception": "keypoints", **options}))
+    for name, options in (
+        ("lab", {}), ("site", {"scene": "site"}), ("gopro", {"rig": "lab_gopro"}),
+        ("one", {"kept_cameras": [2]}), ("poor", {"cameras": POOR}),
     )
 )  # fmt: skip
 JUDGED = tuple(
@@ -540,6 +569,7 @@ PROBES: tuple[Probe, ...] = (
     *PICTURES,
     *BOUNDS,
     *JUDGED,
+    *RIGS,
     *PARTS,
     *WHOLE,
     *COVERING,

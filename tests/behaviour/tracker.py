@@ -785,6 +785,24 @@ def meet_planes(_: Values) -> Played:
     return Played({"points_m": np.where(are_found[:, None], found_m, 0.0), "found": are_found})
 
 
+def meet_nearly_parallel(_: Values) -> Played:
+    """Play points of two or three cameras that nearly are in the same place."""
+    rng, n = np.random.default_rng(11), 400
+    baselines_m = np.geomspace(1e-8, 3e-1, n)
+    found, made = [], []
+    for k in range(n):
+        n_cameras = 2 + k % 2
+        P = np.repeat(RIG[:1], n_cameras, axis=0)
+        P[1:, :, 3] += P[1:, :, :3] @ rng.normal(0, baselines_m[k], 3)
+        point_m = rng.normal([0.0, 0.0, 1.0], 0.5)
+        at = np.einsum("cij,j->ci", P[:, :, :3], point_m) + P[:, :, 3]
+        px = at[:, :2] / at[:, 2:]
+        found.append(doors.meet_planes(P, px[None], np.ones((1, n_cameras), bool))[1])
+        views = px[None, :, None, None], np.full((1, n_cameras, 1, 1), 2.0)
+        made.append(np.isfinite(doors.triangulate_views(P, *views, 0.0)["points_world"]).all())
+    return Played({"found": np.concatenate(found), "made": np.array(made)})
+
+
 def move_chains(_: Values) -> Played:
     """Play a robot of hinges and slides, and how far capsules of all kinds are apart."""
     rng = np.random.default_rng(10)
@@ -887,6 +905,7 @@ def find_ways(_: Values) -> Played:
 
 BESIDE: tuple[Probe, ...] = (
     Probe(name="planes", play=meet_planes, is_short=True),
+    Probe(name="nearly_parallel", play=meet_nearly_parallel, is_short=True),
     Probe(name="smoother", play=smooth, is_short=True),
     Probe(name="poses_assigned", play=partial(assign_poses, 4), is_short=True),
     Probe(name="poses_of_one_camera", play=partial(assign_poses, 1), is_short=True),
