@@ -295,11 +295,14 @@ def _shuffle_lines(
 ) -> Iterator[Mutant]:
     """Yield a mutant of each line of a room, in random order."""
     for k in rng.permutation(len(lines)).tolist():
-        kinds = sorted({each.kind for each in lines[k]})
+        left = [each for each in lines[k] if each.key not in others]
+        if not left:
+            continue
+        kinds = sorted({each.kind for each in left})
         kind = kinds[rng.integers(len(kinds))]
-        changes = [each for each in lines[k] if each.kind == kind]
+        changes = [each for each in left if each.kind == kind]
         mutant = changes[rng.integers(len(changes))]
-        if mutant.key not in others and changes_code(mutant, root):
+        if changes_code(mutant, root):
             yield mutant
     raise MutantError(f"Room {room!r} has no more lines to draw from.")
 
