@@ -84,7 +84,7 @@ MADE: dict[str, Callable[[], Made]] = {
     "speed": _speed, "speed_tasks": _speed_tasks,
 }  # fmt: skip
 """By command."""
-SCRIPTS = ("experts", "shielded", "baselines", "learners", "limited", "facing")
+SCRIPTS = ("experts", "shielded", "baselines", "learners", "limited", "kept", "facing")
 """Commands whose settings are the `Arguments` of the module of that name."""
 
 

@@ -143,6 +143,15 @@ def _limited(given: Replayed) -> None:
                 limited.played(cache, arguments, row, folder, shield)
 
 
+def _kept(given: Replayed) -> None:
+    from benchmarks import kept
+
+    arguments = kept.Arguments(out=given.out)
+    cache = replace(given.cache, key=kept.key(arguments))
+    for row in kept.rows():
+        kept.played(cache, arguments, row)
+
+
 def _facing(given: Replayed) -> None:
     from benchmarks import facing
 
@@ -175,6 +184,7 @@ REPLAYS: dict[str, Replay] = {
     "learners": Replay(_learners, learnt=(".policy.",)),
     "shielded": Replay(_shielded),
     "limited": Replay(_limited, learnt=("",)),
+    "kept": Replay(_kept),
     "ablations": Replay(partial(walk_usual, "ablations")),
     "impact": Replay(_impact, trainings=("ppo",), learnt=("ppo",)),
     "price": Replay(partial(_price, "price")),

@@ -124,7 +124,10 @@ STUDIES: dict[str, Study] = {
             "python -m benchmarks.baselines", 11, (*PIXELS, "agents"), ("baselines",),
         ),
         "experts": Command(
-            "python -m benchmarks.experts", 19, (*PIXELS, "agents"), ("experts",),
+            "python -m benchmarks.experts", 16, (*PIXELS, "agents"), ("experts",),
+        ),
+        "kept": Command(
+            "python -m benchmarks.kept", 3, (*KEYPOINTS, "shield", "agents"), ("kept",),
         ),
         "learners": Command(
             "python -m benchmarks.learners", 240, (*KEYPOINTS, "agents"), ("learners",),

@@ -51,7 +51,7 @@ PARTS_OF = {
     "footage": "benchmarks.recorded.bench:RECORDED",
     "speed": "benchmarks.speed.bench:SPEED",
     **{name: f"benchmarks.{name}:DEPENDS"
-       for name in ("experts", "shielded", "baselines", "learners", "limited", "facing")},
+       for name in ("experts", "shielded", "baselines", "learners", "limited", "kept", "facing")},
     "trueness": "assets.emulator.shelf:DEPENDS",
 }  # fmt: skip
 """Where a study's parts get their subsystems from."""

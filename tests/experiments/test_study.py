@@ -81,6 +81,14 @@ def test_a_full_disk_is_said_and_loses_nothing(tmp_path, monkeypatch):
     assert path.read_text() == "before"
 
 
+def test_a_rate_of_what_never_happened_says_how_often_it_may():
+    none, some = (intervals.rate_of([k] * 50, 0.05, "per 1000") for k in (0, 1))
+    assert (none.value, none.low) == (0.0, 0.0)
+    assert none.high == pytest.approx(-np.log(0.025) / 0.05)
+    assert (some.value, some.n) == (1000.0, 50)
+    assert (some.low, some.high) == pytest.approx((742.2, 1318.4), abs=0.1)  # tables: 37.11, 65.92
+
+
 def test_intervals_hold_the_truth_as_often_as_they_say():
     rng = np.random.default_rng(0)
     held = [

@@ -89,6 +89,16 @@ def ratio_over(above: Numbers, below: Numbers, unit: str) -> Metric:
     return bootstrap(ratio_of(x, y), len(x), unit)
 
 
+def rate_of(counts: Numbers, exposure: float, unit: str) -> Metric:
+    """How often something happened, of its counts a seed, with the exact interval of their sum: of
+    what never happened it says how often it may (Garwood 1936, doi:10.2307/2333958)."""
+    total = float(np.sum(counts))
+    low = stats.chi2.ppf(0.025, 2 * total) / 2 if total else 0.0
+    high = stats.chi2.ppf(0.975, 2 * total + 2) / 2
+    value, low, high = (float(each) / exposure for each in (total, low, high))
+    return Metric(value, low, high, unit, len(counts))
+
+
 def mean_over(values: Numbers, unit: str) -> Metric:
     """The mean of one number a seed."""
     return ratio_over(values, np.ones(len(values)), unit)
