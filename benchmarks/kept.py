@@ -16,7 +16,7 @@ from rich.console import Console
 
 from agents import policies
 from agents.evaluate import EVALUATION_SEED, judged
-from agents.registry import control_of, make_agent
+from agents.registry import make_agent
 from benchmarks.common import publish, share
 from hrc_env.cli.checks import writable_folder
 from hrc_env.cli.progress import progress_bar
@@ -61,11 +61,6 @@ class Row:
     address: str
     """As hrc://ID/NAME."""
     shield: str | None
-
-    @property
-    def task(self) -> str:
-        """The id that it was made for."""
-        return self.address.removeprefix(policies.PREFIX).partition("/")[0]
 
     @property
     def name(self) -> str:
@@ -115,7 +110,7 @@ def played(parts: PartCache, arguments: Arguments, row: Row) -> Episodes:
 
     def play(tick: PartProgress) -> dict[str, Any]:
         kwargs = {
-            "task": row.task, "perception": "keypoints", "control": control_of(row.address),
+            "task": card.task, "perception": "keypoints", "control": card.control,
             "shield": row.shield, "num_threads": arguments.threads,
         }  # fmt: skip
         make = partial(make_agent, row.address)
