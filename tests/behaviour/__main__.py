@@ -3,6 +3,7 @@
     python -m tests.behaviour                    # all of them, in as many processes as cores
     python -m tests.behaviour env shield --short # two rooms, the short form
     python -m tests.behaviour --accept           # record what differs, and raise versions
+    python -m tests.behaviour --bounds           # no kernel reads or writes past an array's end
     python -m tests.behaviour --commits          # no commit changes doors and recordings at once
 
 A difference is given by name, by the first step in which it is seen, and by its size. To accept
@@ -20,8 +21,11 @@ import tyro
 from rich.console import Console
 
 from tests.behaviour import accept
-from tests.behaviour.playing import play_all
+from tests.behaviour.playing import BOUNDED, bounds_checked, play_all
 from tests.behaviour.rooms import ROOMS, find, probes
+
+BOUNDED_KERNELS = accept.ROOT / "out" / "bounds"
+"""Kernels that check every index."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +38,8 @@ class Arguments:
     """Play the covering short form only."""
     accept: bool = False
     """Record what differs and raise the version of each subsystem that moved."""
+    bounds: bool = False
+    """Play the probes of kernels with each index checked; these are compiled once more for it."""
     commits: bool = False
     """Check instead that no commit changes doors.py and recorded values at once."""
     processes: int = os.cpu_count() or 1
@@ -45,13 +51,17 @@ def main(arguments: Arguments) -> int:
     console = Console()
     if arguments.commits:
         return accept.check_commits(console)
+    rooms = arguments.rooms
+    if arguments.bounds:
+        os.environ.update(bounds_checked(BOUNDED_KERNELS))
+        rooms = rooms or BOUNDED
     unknown = [room for room in arguments.rooms if room not in ROOMS]
     if unknown:
         console.print(f"There is no room {unknown[0]!r}; there are {', '.join(ROOMS)}.")
         return 2
     if arguments.accept:
         accept.check_ready()
-    wanted = list(probes(arguments.rooms or tuple(ROOMS), arguments.short))
+    wanted = list(probes(rooms or tuple(ROOMS), arguments.short))
     started_s = time.monotonic()
     outcomes = list(play_all(wanted, arguments.processes, console))
     moved = [each for each in outcomes if not each.is_same]

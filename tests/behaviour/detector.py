@@ -32,6 +32,11 @@ LENSED: tuple[dict[str, Any], ...] = (
     {"name": "upright", "eye_m": (3.4, 0.4, 1.5), "target_m": (0.6, -0.1, 1.0), "field_deg": 60.0,
      "width_px": 720, "height_px": 1280, "roll_deg": 12.0},
 )  # fmt: skip
+NEIGHBOURS: tuple[dict[str, Any], ...] = (
+    {"name": "left", "eye_m": (2.6, 0.9, 1.6), "target_m": (0.4, 0.2, 1.0)},
+    {"name": "middle", "eye_m": (2.2, 0.0, 1.9), "target_m": (0.4, 0.0, 1.0)},
+    {"name": "right", "eye_m": (2.7, -0.8, 1.3), "target_m": (0.3, 0.1, 1.0), "field_deg": 70.0},
+)  # fmt: skip
 Window = tuple[float, float, float, float]
 """Middle x and y, side [px] and turn [rad]."""
 STICKS = np.array(
@@ -143,6 +148,46 @@ def _seen(rig: doors.Rig, c: int, joints: Any, rng: np.random.Generator) -> Wind
     x, y, side, turn = doors.window_round(rig, c, px, depth)
     off = rng.normal(0.0, 0.03, 3) * side
     return x + off[0], y + off[1], side * rng.choice([0.4, 0.8, 1.0, 1.2, 2.0]), turn
+
+
+def play_close(inputs: Values) -> Played:
+    """Find out whom several cameras agree on who is near one of them, or behind it."""
+    rng, values = np.random.default_rng(15), Values()
+    for label, cameras in (("lab", ()), ("near each other", NEIGHBOURS)):
+        rig, windows, counts = doors.Rig("lab", cameras), [], []
+        n_cameras, described = len(rig.cameras), rig.describe()
+        for k in range(40):
+            c = k % n_cameras
+            P, eye_m = described["projection"][c], described["eye_m"][c]
+            ahead = P[2, :3] / np.linalg.norm(P[2, :3])
+            depth_m = (0.15, 0.4, 0.6, 0.9, 0.98, 1.03, 1.3, 1.8, -0.4, -1.2)[k % 10]
+            hips_m = eye_m + depth_m * ahead + rng.normal(0.0, 0.15 * abs(depth_m), 3)
+            candidates = [[_seen_near(rig, i, hips_m, rng)] for i in range(n_cameras)]
+            if k % 3 == 0:  # two see somebody else besides
+                other_m = rng.uniform((0.0, -1.0, 0.8), (2.0, 1.0, 1.1))
+                for i in ((c + 1) % n_cameras, (c + 2) % n_cameras):
+                    candidates[i].append(_seen_near(rig, i, other_m, rng))
+            proposed, left = doors.agree(rig, candidates)
+            windows.append(
+                np.nan_to_num(proposed[0] if len(proposed) else np.zeros((1, 4)), nan=-9)
+            )
+            counts.append([len(proposed), *left])
+        shown = [each for each in windows if each.shape == (n_cameras, 4)]
+        values |= {f"{label}/first": np.stack(shown), f"{label}/counts": np.array(counts)}
+    return Played(values)
+
+
+def _seen_near(
+    rig: doors.Rig, c: int, hips_m: NDArray[np.float64], rng: np.random.Generator
+) -> Window:
+    """Return the window of somebody whose hips are there, also where a camera looks the other way,
+    a little off."""
+    P = rig.describe()["projection"][c]
+    px, depth_m = doors.project_joints(rig, c, hips_m[None])
+    focal_px = np.linalg.norm(np.cross(P[0, :3], P[2, :3]))
+    side_px = rng.uniform(1.0, 3.7) * focal_px / abs(depth_m[0])
+    x, y = px[0] + rng.normal(0.0, 0.02, 2) * side_px
+    return float(x), float(y), float(side_px), 0.1
 
 
 def play_searches(inputs: Values) -> Played:
@@ -467,6 +512,21 @@ def play_followed(inputs: Values) -> Played:
     return Played(stack(steps))
 
 
+def play_nobody(inputs: Values) -> Played:
+    """Look for people in images without any, until nobody is thought to be there; begin anew."""
+    grey, steps = np.full((256, 256, 3), 128, np.uint8), []
+    for n_workers in (1, 2):
+        follower = doors.Follower(doors.Rig("lab"), lambda c, window: grey, n_workers, "particle")
+        for k in range(40):
+            if k == 30:
+                follower.forget()
+            belief = follower.update(0.3 if k > 25 else None, k)
+            names = ("unknown", "blind_s", "tracked")
+            steps.append({name: belief[name][:, 0] for name in names})
+        follower.close()
+    return Played(stack(steps))
+
+
 # --- Drawn pictures ------------------------------------------------------------------------------
 
 
@@ -499,6 +559,7 @@ PROBES = (
     Probe(name="windows", play=play_windows, is_short=True),
     Probe(name="tensors", play=play_tensors, is_short=True),
     Probe(name="search", play=play_search, is_short=True),
+    Probe(name="search_close", play=play_close, is_short=True),
     Probe(name="searches", play=play_searches, is_short=True),
     Probe(name="lenses", play=play_lenses, is_short=True),
     Probe(name="images", play=play_images, tolerance=IMAGE_TOLERANCE, is_short=True),
@@ -506,6 +567,7 @@ PROBES = (
     Probe(name="network", play=play_network, inputs=draw_crops, tolerance=NETWORK_TOLERANCE,
           is_short=True),
     Probe(name="followed", play=play_followed, inputs=draw_crops, tolerance=FOLLOWED_TOLERANCE),
+    Probe(name="followed_nobody", play=play_nobody),
     Probe(name="drawn", play=play_drawn, inputs=film_moments, tolerance=DRAWN_TOLERANCE,
           needs_pixels=True),
 )  # fmt: skip

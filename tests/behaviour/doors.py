@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import gymnasium
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
@@ -56,7 +57,7 @@ from hrc_env.geometry import cameras, chains, distances, shapes, sight, ways
 from hrc_env.geometry import lines_of_sight as lines
 from hrc_env.geometry import rotations as turns
 from hrc_env.geometry.assignment import assign_rows
-from hrc_env.geometry.camera_config import CameraConfig, made
+from hrc_env.geometry.camera_config import MAKES, CameraConfig, made
 from hrc_env.geometry.lens import Lens, lens_row
 from hrc_env.geometry.rotations import matrix
 from hrc_env.geometry.triangulation import linear_point, triangulate
@@ -71,7 +72,7 @@ from hrc_env.motion import floorplan, lying, paths, repertoire, routes, schedule
 from hrc_env.motion import generator as motion
 from hrc_env.motion.activities.pieces import stage, stocked
 from hrc_env.motion.anatomy import anatomy
-from hrc_env.motion.clip import Clip, fitted_to
+from hrc_env.motion.clip import Clip, fitted_to, load_clip, placed_at_origin, save_clip
 from hrc_env.motion.traffic import meets
 from hrc_env.perception import (
     believing,
@@ -96,14 +97,18 @@ from hrc_env.safety.guard import constraints
 from hrc_env.safety.robot import RobotModel
 from hrc_env.safety.shield import shield_called, shielded
 from hrc_env.safety.watch import Watch
+from hrc_env.scene import domain_randomization as looks
 from hrc_env.scene import rigs
-from hrc_env.scene.build import SceneConfig
+from hrc_env.scene.build import SceneConfig, drawing_model, visuals
 from hrc_env.scene.build import build as build_scene
 from hrc_env.scene.objects import held_by
 from hrc_env.scene.render import CropRenderer
 from hrc_env.scene.rig import pinholes
 from hrc_env.scene.rigs import floor as floor_points
+from hrc_env.scene.robot import ROBOTS, chain_of
 from hrc_env.simulation import Simulation
+from hrc_env.tasks.spot import Spot, check_spots
+from hrc_env.tasks.task import task_called
 from hrc_env.tracking import oracle
 from hrc_env.tracking.calibration_monitor import forget_monitor, make_monitor, monitor
 from hrc_env.tracking.config import TrackerConfig
@@ -318,6 +323,30 @@ class Env:
             "n_findings": np.array([len(rigs.findings(scene))]),
         }  # fmt: skip
 
+    def dress(self, appearance: str, seed: int) -> dict[str, NDArray[Any]]:
+        """Return how an episode of an appearance looks to the cameras."""
+        scene = self._simulation.scene
+        built, model, worn = drawing_model(scene), drawing_model(scene), visuals(scene)
+        rng = np.random.default_rng([seed, 49])
+        look = looks.draw_look(looks.APPEARANCES[appearance], scene.n_workers, rng)
+        looks.randomize(model, built, worn, look)
+        looks.take_off_hats(model, worn, look)
+        drawn = mujoco.MjvScene(model, maxgeom=80)
+        looks.strew(drawn, scene.grounds, look)
+        litter = np.zeros((looks.MOST_LITTER, 19))
+        for row, geom in zip(litter, drawn.geoms[: drawn.ngeom], strict=False):
+            row[:] = [*geom.size, *geom.pos, *np.ravel(geom.mat), *geom.rgba]
+        light = [model.light_dir, model.light_diffuse, model.light_specular]
+        head = model.vis.headlight
+        return {
+            "look": np.concatenate([np.ravel(part) for part in look]),
+            "light": np.concatenate([np.ravel(each) for each in light]),
+            "headlight": np.concatenate([head.ambient, head.diffuse, head.specular]),
+            "surfaces": model.mat_rgba.copy(), "pictures": model.mat_texid.copy(),
+            "skins": model.skin_rgba.copy(), "groups": model.geom_group.copy(),
+            "litter": litter, "n_litter": np.array(drawn.ngeom),
+        }  # fmt: skip
+
     def view(self) -> NDArray[np.uint8]:
         """Return the scene from the viewpoint of people who look on."""
         base: Any = self._env.unwrapped
@@ -356,6 +385,43 @@ def settings() -> dict[str, str]:
 
 SETTING_NAMES: dict[str, str] = {}
 """Today's names of settings that the probes know by another."""
+
+
+APPEARANCE_NAMES = tuple(looks.APPEARANCES)
+ROBOT_NAMES = tuple(ROBOTS)
+
+
+def presets() -> dict[str, NDArray[np.float64]]:
+    """Return the numbers of every appearance and of every make of camera."""
+    named = {f"appearance/{name}": each for name, each in looks.APPEARANCES.items()}
+    named |= {f"make/{name}": each for name, each in MAKES.items()}
+    values = {}
+    for name, record in named.items():
+        numbers: list[NDArray[np.float64]] = []
+        _collect_numbers(record, numbers)
+        values[name] = np.concatenate(numbers)
+    return values
+
+
+def spots_of(env_id: str, fields: Mapping[str, Any]) -> NDArray[np.float64]:
+    """Return where a task with some settings has the tool get to: (n, 7), a place [m], a direction
+    (0 if any will do), and how near is near enough [m]."""
+    task = task_called(env_id)
+    spots = task.spots(task.config(**fields))
+    rows = [[*each.place_world, *(each.along_world or (0, 0, 0)), each.within_m] for each in spots]
+    return np.array(rows, float).reshape(-1, 7)
+
+
+def can_reach(
+    robot: str, place_m: NDArray[np.float64], along: tuple[float, ...] | None, within_m: float
+) -> bool:
+    """Return whether a robot at the origin is thought to get its tool to a place."""
+    spot = Spot("a place", place_m, along, within_m)
+    try:
+        check_spots("a probe", robot, chain_of(ROBOTS[robot], (0.0, 0.0, 0.0)), [spot])
+    except ConfigError:
+        return False
+    return True
 
 
 def _records() -> dict[str, Any]:
@@ -760,6 +826,41 @@ def bound_props() -> NDArray[np.float64]:
     """Return the boxes round all props, and where hands grip them (P, 4, 3) [m]."""
     grips = np.stack([prop.grips for prop in props.PROPS])
     return np.concatenate([props.BOUNDS_M, grips], axis=1)
+
+
+def make_clip_of(controls: Any, contacts: Any, size_m: Any, fps: float, source: str) -> Any:
+    """Return a clip of control vectors (T, 47), which feet stand and lengths; None: refused."""
+    with contextlib.suppress(ConfigError):
+        return Clip(controls, fps, contacts, size_m, source)
+    return None
+
+
+def write_clip(clip: Any, path: Path) -> None:
+    """Write a clip to a file."""
+    save_clip(clip, path)
+
+
+def read_clip(path: Path) -> Any:
+    """Return the clip that a file holds; None: refused."""
+    with contextlib.suppress(ConfigError):
+        return load_clip(path)
+    return None
+
+
+def time_pieces(clips: Any, names: tuple[str, ...], place: str) -> float:
+    """Return how long the pieces last into which clips are cut for bodies in a place [s]."""
+    sizes = np.stack([anatomy(bodies.load_body(name)).size for name in names])
+    plan = floorplan.floorplan(Floor(place).grounds)
+    return stocked(clips, sizes, stage(plan, motion_config.MotionConfig())).lasts_s
+
+
+def list_clip(clip: Any) -> Arrays:
+    """Return what a clip holds, and its controls from the origin on."""
+    return {
+        "controls": clip.controls, "contacts": clip.contacts, "size_m": clip.size,
+        "at_origin": placed_at_origin(clip.controls), "fps": np.array([clip.fps]),
+        "source": np.array([clip.source], "U"),
+    }  # fmt: skip
 
 
 class Floor:

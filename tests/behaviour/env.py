@@ -35,6 +35,8 @@ RUSHES_FOR = 40
 RELEASING = "releasing"
 """Said after an agent's name: from half of the episode on its hand is opened."""
 SEED = 49
+ALONG = (0.6, 0.0, 0.8)
+"""A direction."""
 REACH, PICK, HAND = "HRCReach-v0", "HRCPickPlace-v0", "HRCHandover-v0"
 DRYWALL, DELIVERY = "HRCDrywall-v0", "HRCDelivery-v0"
 REACH_GOAL, PICK_GOAL = "HRCReachGoal-v0", "HRCPickPlaceGoal-v0"
@@ -125,8 +127,29 @@ def summarize(moments: Sequence[Mapping[str, Any]]) -> Played:
         else:
             short[name] = value[kept]
     short["return"] = np.cumsum(short["reward"])
+    short |= _blend(values, starts, kept + 1)
     events = frozenset(name for name in short if name.startswith(EVENTS))
     return Played(short, _count_settled(values, kept), events)
+
+
+def _blend(values: Values, starts: np.ndarray, ends: np.ndarray) -> Values:
+    """Return two sums with unlike weights of all numbers in the steps from each start to its end:
+    of observations and of the rest. Numbers above 1 count by their logarithm, as they are compared
+    relative to their size, and the sums are as exact as one number."""
+    blended: Values = {}
+    for kind, is_observed in (("observation", True), ("rest", False)):
+        chosen = [
+            np.nan_to_num(value.astype(float).reshape(len(value), -1), nan=3.0, posinf=5.0)
+            for name, value in values.items()
+            if value.dtype.kind in "fiub" and name.startswith("observation/") == is_observed
+        ]
+        numbers = np.concatenate(chosen, axis=1)
+        numbers = np.sign(numbers) * np.log1p(np.abs(numbers))
+        parts = [numbers[a:b].ravel() for a, b in zip(starts, ends, strict=True)]
+        blended[f"every step/{kind}"] = np.array(
+            [part @ np.cos(1.0 + np.arange(len(part)) ** 1.3) / len(part) ** 0.5 for part in parts]
+        )
+    return blended
 
 
 def _count_settled(values: Values, kept: np.ndarray) -> int | None:
@@ -255,6 +278,50 @@ def describe_settings(inputs: Values) -> Played:
     return Played(
         {"defaults": np.array([f"{name} = {defaults[name]}" for name in inputs["names"]])}
     )
+
+
+def describe_presets(_: Values) -> Played:
+    """Return the numbers that stand behind names of appearances and makes of cameras."""
+    return Played(doors.presets())
+
+
+def dress_scene(env_id: str, options: Mapping[str, Any], _: Values) -> Played:
+    """Return how episodes of every kind of appearance look: light, colours, hats, litter."""
+    env, values = doors.Env(env_id, perception="none", **options), Values()
+    for name in doors.APPEARANCE_NAMES:
+        looks = [env.dress(name, seed) for seed in range(5)]
+        values |= {f"{name}/{key}": value for key, value in stack(looks).items()}
+    env.close()
+    return Played({name: value for name, value in values.items() if value.size})
+
+
+def list_spots(_: Values) -> Played:
+    """Return where tasks have the tool get to, whatever their settings."""
+    values: Values = {}
+    for env_id in (REACH, PICK, DRYWALL, HAND, DELIVERY):
+        values[env_id] = doors.spots_of(env_id, {})
+    turned = {"azimuth_rad": (0.2, 1.3), "distance_m": (0.4, 0.7), "height_m": (0.5, 1.4)}
+    values["turned"] = doors.spots_of(REACH, turned)
+    return Played({name: value for name, value in values.items() if len(value)})
+
+
+def measure_reach(_: Values) -> Played:
+    """Return how far every robot gets in some directions, by bisection [m]."""
+    rng, values = np.random.default_rng(SEED), Values()
+    ways = rng.normal(0, 1, (6, 3))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    for robot in doors.ROBOT_NAMES:
+        found = []
+        for way in ways:
+            for along, within_m in ((None, 0.0), (None, 0.2), (tuple(-way), 0.0), (ALONG, 0.1)):
+                near_m, far_m = 0.0, 50.0
+                for _halving in range(44):
+                    middle_m = (near_m + far_m) / 2
+                    can = doors.can_reach(robot, middle_m * way, along, within_m)
+                    near_m, far_m = (middle_m, far_m) if can else (near_m, middle_m)
+                found.append(near_m)
+        values[robot] = np.array(found)
+    return Played(values)
 
 
 def take_in_hand(env_id: str, _: Values) -> Played:
@@ -530,6 +597,13 @@ JUDGED = tuple(
 )  # fmt: skip
 PARTS = (
     Probe(name="settings", play=describe_settings, inputs=name_settings, is_short=True),
+    Probe(name="presets", play=describe_presets, is_short=True),
+    Probe(name="looks_lab", subject=REACH, is_short=True,
+          play=partial(dress_scene, REACH, {"n_workers": 3, "bodies": "any"})),
+    Probe(name="looks_site", subject=REACH, is_short=True,
+          play=partial(dress_scene, REACH, {"scene": "site"})),
+    Probe(name="spots", play=list_spots, is_short=True),
+    Probe(name="reach_of_robots", play=measure_reach, is_short=True),
     Probe(name="identities", play=compare_tracks, is_short=True),
     Probe(name="identities_crowd", play=mistake_tracks, is_short=True),
     *(

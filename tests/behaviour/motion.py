@@ -1,8 +1,10 @@
 """Workers: everything that they do alone, their bodies, ways over the floor, and whole shifts."""
 
+import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -189,6 +191,198 @@ def play_floors(n_ways: int, inputs: Values) -> Played:
     return Played(values)
 
 
+# --- Clips ---------------------------------------------------------------------------------------
+
+
+def stride(
+    rng: np.random.Generator, n: int, fps: float, speed_m_s: float, airborne: float = 0.0
+) -> dict[str, Any]:
+    """Return control vectors (n, 47) of somebody who goes along a curve, now and then stands, and
+    which feet stand; `airborne` is the share of steps in which both feet are off the floor."""
+    size_m = doors.measure_body(doors.BODY_NAMES[rng.integers(len(doors.BODY_NAMES))])["sizes_m"][0]
+    t = np.arange(n) / fps
+    goes = np.clip(1.5 * np.sin(0.8 * t + rng.uniform(0.0, 6.0)) + 0.8, 0.0, 1.0)
+    yaw = rng.uniform(-3.0, 3.0) + np.cumsum(rng.uniform(-0.7, 0.7) * goes) / fps
+    yaw += 0.4 * np.sin(0.5 * t)
+    q = draw_controls(rng, 1)[0] * np.ones((n, 1))
+    q[:, 20:28] = q[:, 40:] = 0.0
+    q[:, 7:20] += 0.1 * np.sin(rng.uniform(0.5, 2.0, 13) * t[:, None] + rng.uniform(0.0, 6.0, 13))
+    q[:, 0] = rng.uniform(-2.0, 2.0) + np.cumsum(speed_m_s * goes * np.cos(yaw)) / fps
+    q[:, 1] = rng.uniform(-2.0, 2.0) + np.cumsum(speed_m_s * goes * np.sin(yaw)) / fps
+    q[:, 2], q[:, 3] = yaw, 0.9 + 0.03 * np.sin(3.0 * t)
+    steps = np.cumsum(5.0 * goes) / fps + rng.uniform(0.0, 6.0)
+    contacts = np.zeros((n, 2), bool)
+    for foot, side in enumerate((0.11, -0.11)):
+        at, lifted = 28 + 6 * foot, goes * np.sin(steps + np.pi * foot) + airborne
+        q[:, at] = q[:, 0] - side * np.sin(yaw) + 0.2 * goes * np.cos(yaw) * np.cos(steps)
+        q[:, at + 1] = q[:, 1] + side * np.cos(yaw) + 0.2 * goes * np.sin(yaw) * np.cos(steps)
+        q[:, at + 2] = size_m[5] + 0.16 * np.maximum(lifted, 0.0)
+        q[:, at + 3] = yaw + 0.1 * np.sin(t + foot)
+        q[:, at + 4] = 0.3 * np.maximum(lifted, 0.0) + rng.normal(0.0, 0.02, n)
+        q[:, at + 5] = 0.1 * np.sin(2.0 * t + foot)
+        contacts[:, foot] = lifted < 0.1
+    return {"controls": q, "contacts": contacts, "size_m": size_m, "fps": fps, "source": "probe"}
+
+
+FILMS: tuple[tuple[int, float, float, float], ...] = (
+    (140, 20.0, 0.6, 0.0), (90, 30.0, 1.1, 0.0), (700, 15.0, 0.3, 0.0), (1500, 30.0, 0.25, 0.1),
+    (60, 10.0, 1.4, 0.0), (420, 12.0, 0.9, 0.15), (16, 25.0, 0.7, 0.0), (12, 25.0, 0.4, 0.0),
+    (11, 25.0, 0.2, -0.2), (500, 25.0, 2.4, 0.0), (200, 25.0, 0.6, 1.0), (260, 8.0, 0.1, 0.3),
+    (900, 40.0, 0.05, 0.05), (640, 16.0, 0.5, 0.2),
+)  # fmt: skip
+"""Frames, frames a second, speed [m/s] and how much of the time is spent in the air."""
+
+
+def dash(rng: np.random.Generator, n: int, fps: float, first: int, last: int) -> dict[str, Any]:
+    """Return a film as `stride` makes it, of somebody who dashes ahead between two frames."""
+    film = stride(rng, n, fps, 0.3)
+    q, ahead = film["controls"], np.zeros(n)
+    ahead[first:last] = 13.0 / fps
+    way_m = np.cumsum(ahead[:, None] * np.stack([np.cos(q[:, 2]), np.sin(q[:, 2])], -1), axis=0)
+    for at in (0, 28, 34):
+        q[:, at : at + 2] += way_m
+    return film
+
+
+DASHES = ((80, 20.0, 0, 21), (90, 25.0, 0, 40), (120, 20.0, 40, 60), (70, 15.0, 45, 70),
+          (100, 25.0, 3, 30), (60, 12.0, 5, 14), (30, 20.0, 0, 3), (30, 20.0, 0, 3),
+          (40, 12.0, 0, 2), (40, 12.0, 0, 2), (40, 12.0, 0, 2), (40, 12.0, 0, 2))  # fmt: skip
+"""Frames, frames a second, first and last frame of a dash."""
+
+
+def film_strides(seed: int, films: tuple[tuple[int, float, float, float], ...] = FILMS) -> Any:
+    """Return a clip of each of some films."""
+    rng = np.random.default_rng([31, seed])
+    return [doors.make_clip_of(**stride(rng, *film)) for film in films]
+
+
+def play_pieces(inputs: Values) -> Played:
+    """Cut clips of all lengths, ways and rates into pieces, for several bodies and places."""
+    values: Values = {}
+    for seed, place in enumerate(("lab", "site", "open")):
+        clips = film_strides(seed)
+        groups = [[clip] for clip in clips] + [clips[:4], clips[1::-1]]
+        for k, group in enumerate(groups):
+            names = doors.BODY_NAMES[k % 4 :: 3]
+            cut = doors.cut_clips(group, names, place)
+            label = f"{place}/{k}"
+            values[f"{label}/is refused"] = np.array([cut is None])
+            if cut is None:
+                continue
+            values[f"{label}/seconds"] = np.array([doors.time_pieces(group, names, place)])
+            values |= {f"{label}/{name}": cut[name] for name in ("row", "count", "fps")}
+            sums = [weigh(cut[name][None])[0] / cut[name].size for name in ("frames", "starts")]
+            values[f"{label}/sums"] = np.array([*sums, len(cut["starts"])])
+    return Played(values)
+
+
+def play_dashes(inputs: Values) -> Played:
+    """Cut clips in which there is room for parts only."""
+    values: Values = {}
+    for place in ("lab", "site", "open"):
+        for k, film in enumerate(DASHES):
+            clip = doors.make_clip_of(**dash(np.random.default_rng([33, k]), *film))
+            cut = doors.cut_clips([clip], doors.BODY_NAMES[k % 3 :: 4], place)
+            found = np.zeros(0) if cut is None else cut["frames"].sum(1)
+            values[f"{place}/{k}/frames"] = found
+            values[f"{place}/{k}/count"] = np.zeros(0) if cut is None else cut["count"]
+            values[f"{place}/{k}/starts"] = np.zeros(0) if cut is None else weigh(cut["starts"])
+    return Played({name: value for name, value in values.items() if value.size})
+
+
+def play_clip_files(inputs: Values) -> Played:
+    """Make clips of numbers at the edge of what is believed, and read files, also spoilt ones."""
+    rng = np.random.default_rng(32)
+    film = stride(rng, 40, 25.0, 0.8)
+    values: Values = {"believed": np.array([_is_believed(film, k) for k in range(N_TRIALS)])}
+    clips = [doors.make_clip_of(**film), *film_strides(3, ((30, 20.0, 0.5, 0.0),) * 2)]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "clip.npz"
+        read = [doors.read_clip(path)]
+        for k, clip in enumerate(clips):
+            doors.write_clip(clip, path)
+            again = doors.read_clip(path)
+            read.append(again)
+            listed = {
+                name: v if len(v) == 1 else weigh(v) for name, v in doors.list_clip(again).items()
+            }
+            values |= {f"{k}/{name}": value for name, value in listed.items()}
+        doors.write_clip(clips[0], path)
+        whole, stored = path.read_bytes(), _load(path)
+        for content in (whole[:-30], whole[: len(whole) // 2], b"", b"no clip at all"):
+            path.write_bytes(content)
+            read.append(doors.read_clip(path))
+        for spoil in SPOILT:
+            np.savez(path, **spoil(dict(stored)))
+            read.append(doors.read_clip(path))
+    values["read"] = np.array([clip is not None for clip in read])
+    values["is_same"] = np.array([[a == b for b in (*clips, film)] for a in (*read, *clips)])
+    return Played(values)
+
+
+def _load(path: Path) -> dict[str, Any]:
+    with np.load(path) as file:
+        return {name: file[name] for name in file.files}
+
+
+Stored = dict[str, Any]
+SPOILT: tuple[Callable[[Stored], Stored], ...] = (
+    lambda stored: stored,
+    lambda stored: stored | {"more": np.zeros(3)},
+    lambda stored: stored | {"version": np.array(0)},
+    lambda stored: stored | {"version": np.array(2)},
+    lambda stored: stored | {"controls": stored["controls"][:, 1:]},
+    lambda stored: stored | {"controls": stored["controls"][None]},
+    lambda stored: stored | {"contacts": stored["contacts"][1:]},
+    lambda stored: stored | {"contacts": stored["contacts"] * 2},
+    lambda stored: stored | {"size": stored["size"][1:]},
+    lambda stored: stored | {"size": stored["size"].astype(np.float32)},
+    lambda stored: stored | {"fps": np.array(3.0)},
+    lambda stored: stored | {"source": np.array("another")},
+    *(lambda stored, name=name: {n: v for n, v in stored.items() if n != name}
+      for name in ("version", "controls", "contacts", "size", "fps", "source")),
+)  # fmt: skip
+"""What is changed in a file that is a clip."""
+N_TRIALS = 36
+
+
+def _is_believed(film: dict[str, Any], k: int) -> bool:
+    """Return whether a clip is made of a film of which one number is another."""
+    made = {name: np.copy(value) if name[:2] != "fp" else value for name, value in film.items()}
+    q, size_m = made["controls"], made["size_m"]
+    if k < 12:
+        made["fps"] = (
+            2.0,
+            4.9,
+            5.0,
+            5.5,
+            60.0,
+            600.0,
+            999.0,
+            1000.0,
+            1001.0,
+            3000.0,
+            -25.0,
+            np.nan,
+        )[k]
+        q[:, :2] = 0.0
+    elif k < 20:
+        q[:, :2] = (0.0, 60.0, 150.0, 199.9, 200.1, 260.0, -150.0, -260.0)[k - 12]
+        q[:, k % 2] = 0.0
+    elif k < 26:
+        q[:, :2] = 0.0
+        q[20:, :2] += np.array((3.0, 4.0)) * (0.05, 0.09, 0.119, 0.121, 0.2, -0.121)[k - 20]
+    elif k < 30:
+        (q[5] if k < 28 else size_m)[k % 3 + 1] = (np.nan, np.inf)[k % 2]
+    elif k < 33:
+        size_m[2] = (0.0, -0.1, 1e-3)[k - 30]
+    else:
+        n = (1, 2, 3)[k - 33]
+        made |= {"controls": q[:n], "contacts": made["contacts"][:n]}
+    made["source"] = "probe"
+    return doors.make_clip_of(**made) is not None
+
+
 # --- Shifts --------------------------------------------------------------------------------------
 
 LOOK_STEPS, STEP_S = 2, 0.04
@@ -219,6 +413,16 @@ def drive_about(robot_m: tuple[float, float], time_s: float, b: int) -> list[lis
     return [[middle[0] + s * ahead[0], middle[1] + s * ahead[1], 0.5] for s in (1.0, -1.0)]
 
 
+def sweep_pile(robot_m: tuple[float, float], time_s: float, b: int) -> list[list[float]]:
+    """Return elbow and tool of an arm that comes near to a pile of loads, and goes away again."""
+    t, (x, y) = time_s + 3.0 * b, robot_m
+    reach = 2.05 - 0.5 * (1.0 + np.sin(0.9 * t))
+    return [
+        [x + 0.5 * reach, y + 0.2, 1.1],
+        [x + reach, y + 0.3 + 0.5 * np.sin(0.37 * t), 0.7 + 0.2 * np.sin(0.5 * t)],
+    ]
+
+
 @dataclass(frozen=True)
 class Shift:
     """Some workers, where they work and for how long."""
@@ -235,15 +439,18 @@ class Shift:
     """Interval at which they are recorded [s]."""
     has_cues: bool = False
     """Whether a task tells them how far it has come."""
+    n_clips: int = 0
+    """How many of the films they play."""
     options: Mapping[str, Any] = field(default_factory=dict)
     """Further arguments of `doors.Crew`."""
 
 
 def play_shift(shift: Shift, inputs: Values) -> Played:
     """Let workers go about their work while a robot moves."""
+    clips = film_strides(shift.seed, PLAYED[: shift.n_clips])
     crew = doors.Crew(
         shift.place, shift.n_environments, shift.n_workers, shift.bodies, shift.people, shift.seed,
-        **shift.options,
+        clips=tuple(clips), **shift.options,
     )  # fmt: skip
     since_s = LOOK_STEPS * STEP_S
     every = max(1, round(shift.every_s / since_s))
@@ -330,6 +537,62 @@ SHIFTS: dict[str, Shift] = {
     ),
 }  # fmt: skip
 
+PLAYED = (
+    (140, 20.0, 0.35, 0.0),
+    (300, 12.0, 0.1, 0.1),
+    (90, 30.0, 0.5, 0.0),
+    (200, 25.0, 0.2, 0.0),
+)
+"""Films, as in `FILMS`, for which there is room among workers."""
+BACKING: dict[str, Any] = {
+    **EVENTFUL, "step_back_probability": 0.9, "pause_probability": 0.05, "notice_m": 3.0,
+    "calm_s": 0.5, "detour_m": 0.5,
+}  # fmt: skip
+"""People who step back, so that they must go to their place again."""
+THRONGED: dict[str, Any] = {"near_probability": 0.6, "dwell_s": (4.0, 9.0)}
+
+
+UNMOVED: dict[str, Any] = {"pause_probability": 0.05, "step_back_probability": 0.0, "notice_m": 0.5}
+"""People who react to little."""
+
+
+def _throng(
+    place: str, seed: int, n_workers: int, people: Mapping[str, Any] = BACKING, **changes: Any
+) -> Shift:
+    """Return a shift in which workers are in each other's way, and wait."""
+    settings = THRONGED | changes.pop("settings", {})
+    options = {"settings": settings, "fewest": n_workers}
+    shift = {"lasts_s": 40.0, "every_s": 3.2, "options": options} | changes
+    return Shift(place, people, seed, n_workers=n_workers, **shift)
+
+
+ALONE: dict[str, Any] = {"near_probability": 1.0}
+SHIFTS |= {
+    "shift_waiting": _throng("open", 32, 8),
+    "shift_waiting_lab": _throng("lab", 32, 4, settings=ALONE),
+    "shift_waiting_lab_again": _throng("lab", 31, 6),
+    "shift_waiting_site": _throng("site", 32, 6, settings=ALONE),
+    "shift_waiting_site_again": _throng("site", 31, 8),
+    "shift_hampered": _throng("site", 32, 8, EVENTFUL),
+    "shift_pile_reached": Shift(
+        "open", UNMOVED, 36, 80.0, n_workers=1, robot=sweep_pile,
+        options={"work": "stack", "more_places": STACKED, "settings": BUSY},
+    ),
+    "shift_pile_shared": Shift(
+        "open", UNMOVED | {"notice_m": 0.8}, 37, 60.0, n_workers=2, robot=sweep_pile,
+        options={"work": "stack", "more_places": STACKED, "settings": BUSY},
+    ),
+    "shift_clips_lab": _throng(
+        "lab", 33, 3, n_clips=4, lasts_s=60.0, settings={"motions_probability": 0.7}
+    ),
+    "shift_clips_site": _throng(
+        "site", 34, 4, EVENTFUL, n_clips=3, lasts_s=60.0, settings={"motions_probability": 0.9}
+    ),
+    "shift_clips_open": _throng(
+        "open", 35, 2, EVENTFUL, n_clips=2, lasts_s=60.0, settings={"motions_probability": 0.5}
+    ),
+}  # fmt: skip
+
 SCENES: dict[str, tuple[str, ...]] = {
     "scenes_standing": ("stand", "look round", "point", "turn", "step back", "lunge", "stumble"),
     "scenes_walking": tuple(n for n in doors.SCENE_NAMES if n.startswith(("walk", "run"))),
@@ -357,6 +620,9 @@ def _probes() -> tuple[Probe, ...]:
         Probe(name="floors", play=partial(play_floors, 24), is_short=True),
         Probe(name="heights", play=play_heights, is_short=True),
         Probe(name="reaches", play=play_reaches, is_short=True),
+        Probe(name="clip_pieces", play=play_pieces, is_short=True),
+        Probe(name="clip_dashes", play=play_dashes, is_short=True),
+        Probe(name="clip_files", play=play_clip_files, is_short=True),
     )
     scenes = [(n, partial(play_scenes, s, 1, EVERY_S)) for n, s in SCENES.items()]
     scenes += [(f"{n}_again", partial(play_scenes, s, 4, AGAIN_S)) for n, s in SCENES.items()]

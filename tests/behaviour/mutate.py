@@ -6,9 +6,9 @@
     python -m tests.behaviour.mutate --draw B --seed 20261201     # make a draw; plays nothing
 
 Each mutant is made in a copy of the checkout. The probes of its room are played, those first that
-are likely to notice it, then the room's unit tests; the first notice ends it. Finished
-mutants are kept in `out/mutants/LIST.json`, from which a run that was stopped goes on. The exit
-status is 1 if any was not noticed.
+are likely to notice it; then those of kernels once more with every index checked; then the room's
+unit tests. The first notice ends it. Finished mutants are kept in `out/mutants/LIST.json`, from
+which a run that was stopped goes on. The exit status is 1 if any was not noticed.
 """
 
 import contextlib
@@ -37,9 +37,11 @@ from scipy.stats import binomtest
 from hrc_env.cli.progress import Meter
 from tests.behaviour.mutants import CODE, ROOT, Mutant, MutantError, draw, read_list
 from tests.behaviour.mutants.child import ELSEWHERE, MARK, NOTICED, SAME
+from tests.behaviour.playing import BOUNDED, bounds_checked
 
 OUT = ROOT / "out" / "mutants"
 KERNELS = ROOT / "hrc_env" / "__pycache__" / "kernels"
+BOUNDED_KERNELS = ROOT / "out" / "bounds" / "hrc_env"
 JUDGED = ("hrc_env", "agents", "assets", "tests", "pyproject.toml")
 """Parts of the checkout on which an outcome depends."""
 OURS = ("tests/behaviour/mut", "tests/behaviour/test_mutations.py")
@@ -178,11 +180,18 @@ class Processes:
         self._lock, self._is_over = threading.Lock(), False
 
     def run(
-        self, command: Sequence[str], folder: Path, kernels: Path, limit_s: float
+        self, command: Sequence[str], folder: Path, kernels: Mapping[str, str], limit_s: float
     ) -> tuple[int | None, str, str]:
-        """Run a command in a copy; return its exit status, None if it hung, and its output."""
+        """Run a command in a copy; return its exit status, None if it hung, and its output.
+
+        Args:
+            command: the command.
+            folder: the copy.
+            kernels: environment variables of its kernels.
+            limit_s: when it counts as hanging [s].
+        """
         variables = {
-            "PYTHONPATH": str(folder), "NUMBA_CACHE_DIR": str(kernels), "OMP_NUM_THREADS": "1",
+            "PYTHONPATH": str(folder), "OMP_NUM_THREADS": "1", **kernels,
             "PYTHONDONTWRITEBYTECODE": "1",  # its check of a file's age is too coarse for mutants
         }  # fmt: skip
         with self._lock:
@@ -251,7 +260,11 @@ class Judge:
     def _look(self, mutant: Mutant, copy: Path) -> Notice | None:
         room = CODE[mutant.room]
         hints = tuple(dict.fromkeys(Path(edit.file).stem for edit in mutant.edits))
-        notice = self._changed(mutant, copy, self._play_probes, self.rooms_for(mutant), hints)
+        rooms = self.rooms_for(mutant)
+        notice = self._changed(mutant, copy, self._play_probes, rooms, hints)
+        if notice is None:
+            bounded = tuple(each for each in rooms if each in BOUNDED)
+            notice = self._changed(mutant, copy, self._check_bounds, bounded, hints)
         if notice is None and not self.arguments.without_tests:
             self.require_tests(mutant.room, copy)
             for marks in (FAST, SLOW):
@@ -275,17 +288,25 @@ class Judge:
     def _play_probes(
         self, copy: Path, rooms: tuple[str, ...], hints: tuple[str, ...] = ()
     ) -> Notice | None:
-        return self._call(f"play_probes({rooms!r}, {hints!r})", copy)
+        plain = {"NUMBA_CACHE_DIR": str(self.kernels / "plain")}
+        return self._call(f"play_probes({rooms!r}, {hints!r})", copy, plain)
+
+    def _check_bounds(
+        self, copy: Path, rooms: tuple[str, ...], hints: tuple[str, ...] = ()
+    ) -> Notice | None:
+        bounded = bounds_checked(self.kernels / "bounds")
+        return self._call(f"play_probes({rooms!r}, {hints!r})", copy, bounded)
 
     def _run_tests(self, copy: Path, paths: tuple[str, ...], marks: str) -> Notice | None:
-        return self._call(f"run_tests({paths!r}, {marks!r})", copy)
+        plain = {"NUMBA_CACHE_DIR": str(self.kernels / "plain")}
+        return self._call(f"run_tests({paths!r}, {marks!r})", copy, plain)
 
-    def _call(self, call: str, copy: Path) -> Notice | None:
+    def _call(self, call: str, copy: Path, kernels: Mapping[str, str]) -> Notice | None:
         """Call a function of `mutants.child` in a copy and return its notice."""
         code = f"import sys; from tests.behaviour.mutants import child; sys.exit(child.{call})"
         limit_s = 60.0 * self.arguments.limit_min
         command = [sys.executable, "-c", code]
-        status, output, complaint = self.processes.run(command, copy, self.kernels, limit_s)
+        status, output, complaint = self.processes.run(command, copy, kernels, limit_s)
         if status == ELSEWHERE:
             raise MutantError(f"{copy} was to be imported, and another checkout was.")
         return read_notice(status, output, complaint)
@@ -365,8 +386,9 @@ def main(arguments: Arguments) -> int:
         for copy in copies[1:]:
             shutil.copytree(copies[0], copy)
         kernels = Path(place) / "kernels"
-        if KERNELS.is_dir():
-            shutil.copytree(KERNELS, kernels / "hrc_env")
+        for made, name in ((KERNELS, "plain"), (BOUNDED_KERNELS, "bounds")):
+            if made.is_dir():
+                shutil.copytree(made, kernels / name / "hrc_env")
         checkout = digest_checkout(copies[0], arguments.probes, arguments.without_tests)
         judge = Judge(copies, kernels, checkout, arguments, OUT)
         try:

@@ -6,12 +6,22 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from multiprocessing import get_context
+from pathlib import Path
 
 from rich.console import Console
 from rich.progress import Progress
 
 from tests.behaviour.probe import Difference, RecordingError
 from tests.behaviour.rooms import Placed, check, find
+
+BOUNDED = ("tracker", "emulator", "motion", "shield")
+"""Rooms whose code is compiled kernels for the most part."""
+
+
+def bounds_checked(kernels: Path) -> dict[str, str]:
+    """Return the environment variables with which a kernel raises `IndexError` where it reads or
+    writes past the end of an array; kernels that do so are compiled into a folder of their own."""
+    return {"NUMBA_BOUNDSCHECK": "1", "NUMBA_CACHE_DIR": str(kernels)}
 
 
 @dataclass(frozen=True, slots=True)

@@ -221,7 +221,7 @@ def test_a_line_that_has_moved_is_found_where_there_is_one_such_line():
 def test_a_process_that_hangs_ends(tmp_path):
     command = [sys.executable, "-c", 'import time; print(\'MUTANT {"playing": "a"}\', flush=True)']
     command[-1] += "; time.sleep(60)"
-    status, output, complaint = Processes().run(command, tmp_path, tmp_path, 1.5)
+    status, output, complaint = Processes().run(command, tmp_path, {}, 1.5)
     assert read_notice(status, output, complaint) == Notice(
         "a", "hang", "It took longer than the limit."
     )

@@ -257,6 +257,22 @@ def _one_limb() -> Seen:
     return _only(see(joints), found)
 
 
+def _few_twice(first: int) -> Seen:
+    """One camera sees the whole body from a frame on; of others, each sees so many joints in some
+    frames, none to four by sequence."""
+    seen = see(_walkers(34, speed_m_s=0.5, reach_rad=0.3))
+    found = np.zeros((34, N_SEEDS, 4, 1, N_JOINTS), bool)
+    found[2:, :, 2] = True
+    rng = np.random.default_rng(16)
+    for t in range(2, 34):
+        for s in range(N_SEEDS):
+            if t % 4 == first or t > 29:
+                which = rng.choice(N_JOINTS, (0, 1, 2, 2, 3, 3, 4, 2)[s], replace=False)
+                for n, j in enumerate(which):
+                    found[t, s, (0, 1, 3)[n % 3], 0, j] = True
+    return _only(seen, found)
+
+
 def _mirrored_start() -> Seen:
     return _exchanged(see(_walkers(36)), slice(0, 3), [0, 2])
 
@@ -418,6 +434,8 @@ TREES: dict[str, Kind] = {
     "eager_camera": Kind(make=_one_camera, cameras=(1,), settings=EAGER),
     "one_camera": Kind(make=_one_camera, cameras=(2,)),
     "on_floor": Kind(make=_one_view_start, settings={"stands_std_m": 0.1, "wait_updates": 2}),
+    "few_twice": Kind(make=partial(_few_twice, 2)),
+    "few_twice_eager": Kind(make=partial(_few_twice, 3), settings=EAGER),
     "only_limbs": Kind(make=_one_limb, settings={"mirrored_parts": ("limbs",)}),
     "honest": Kind(make=_plain, settings={"noise_bounds": (2.0, 2.0), "gauss_newton_steps": 3}),
     "white": Kind(make=_outliers, settings={"noise_share": 0.0, "sigma_scale": 1.2}),
@@ -885,6 +903,31 @@ def hide_points(_: Values) -> Played:
     })  # fmt: skip
 
 
+def begin_clouds(_: Values) -> Played:
+    """Play where the paper's clouds begin: cameras round the place, in a line, nearly so, alone."""
+    rng, beliefs = np.random.default_rng(17), []
+    for k in range(24):
+        lengths_m = np.array(
+            [(0.9, 4.0), (1.1, 4.0), (5.0, 0.3), (5.0, 1.7), (0.0, 0.0), (3.0, 2.0)][k % 6]
+        )
+        share = np.sort(rng.random((2 + k % 3, 2)), axis=0)
+        share[0], share[-1] = 0.0, 1.0
+        eyes_m = np.array([2.4, -0.6]) * rng.choice([-1.0, 1.0], 2) + share * lengths_m
+        eyes = np.column_stack([rng.permuted(eyes_m, axis=0), rng.uniform(2.0, 2.6, len(eyes_m))])
+        P = np.stack([hang_camera(eye) for eye in eyes])[: 1 if k == 22 else None]
+        settings = {"n_particles": 40} | BEGUN[k % len(BEGUN)]
+        tracker = doors.Tracker("paper", P, STEP_S, (2, 1), settings, seed=k)
+        beliefs.append(_means_of_joints(tracker.estimate()))
+    return Played({name: each[:, :, 0] for name, each in stack(beliefs).items()})
+
+
+BEGUN: tuple[dict[str, Any], ...] = (
+    {}, {"prior_std_m": 0.3}, {"prior_mean_world": (0.5, 0.7, 1.2), "prior_std_m": 0.8}, {},
+    {"place_m": ((-1.0, 1.5), (-2.0, 2.0), (0.1, 2.0))},
+)  # fmt: skip
+"""Settings with which clouds begin."""
+
+
 def find_ways(_: Values) -> Played:
     """Play ways on floors among footprints, rays along them, and capsules that meet them."""
     rng = np.random.default_rng(12)
@@ -905,6 +948,7 @@ def find_ways(_: Values) -> Played:
 
 BESIDE: tuple[Probe, ...] = (
     Probe(name="planes", play=meet_planes, is_short=True),
+    Probe(name="clouds_begun", play=begin_clouds, is_short=True),
     Probe(name="nearly_parallel", play=meet_nearly_parallel, is_short=True),
     Probe(name="smoother", play=smooth, is_short=True),
     Probe(name="poses_assigned", play=partial(assign_poses, 4), is_short=True),

@@ -48,7 +48,10 @@ class CodeRoom:
         return tuple(dict.fromkeys((*self.own_tests, *SETTINGS)))
 
 
-SETTINGS = ("tests/test_limits.py", "tests/test_env.py", "tests/test_bring_your_own.py")
+SETTINGS = (
+    "tests/test_limits.py", "tests/test_config.py", "tests/test_env.py",
+    "tests/test_bring_your_own.py", "tests/test_refused_values.py",
+)  # fmt: skip
 """Unit tests of what settings, arguments and own things must be like, of all rooms."""
 CODE: dict[str, CodeRoom] = {
     "tasks": CodeRoom(
@@ -62,7 +65,9 @@ CODE: dict[str, CodeRoom] = {
     "perception": CodeRoom(
         "hrc_env/perception", ("emulator", "detector", "env"), ("tests/perception",)
     ),
-    "motion": CodeRoom("hrc_env/motion", ("motion", "env", "importer"), ("tests/motion",)),
+    "motion": CodeRoom(
+        "hrc_env/motion", ("motion", "env", "importer"), ("tests/motion", "tests/mocap")
+    ),
     "geometry": CodeRoom(
         "hrc_env/geometry",
         ("tracker", "shield", "emulator", "detector", "env", "agents", "motion"),
@@ -95,6 +100,7 @@ CODE: dict[str, CodeRoom] = {
         (
             "tests/test_policies.py", "tests/test_recording.py", "tests/test_lagrangian.py",
             "tests/test_training.py", "tests/test_learners.py", "tests/tasks",
+            "tests/test_refused_agents.py",
         ),
     ),
 }  # fmt: skip
