@@ -50,6 +50,18 @@ def record_observations(env_id: str, options: Mapping[str, Any], every: int) -> 
     return {name: np.array([each[name] for each in kept]) for name in kept[0]}
 
 
+def list_recipes(_: Values) -> Played:
+    """Return how every task is learnt by every learner."""
+    values: Values = {}
+    for env_id in doors.ENV_IDS:
+        for algorithm in (None, "ppo", "sac", "ppo_lagrangian"):
+            recipe = doors.recipe_of(env_id, algorithm)
+            values[f"{env_id}/{algorithm}"] = np.array(
+                [f"{name} = {value}" for name, value in recipe.items()]
+            )
+    return Played(values)
+
+
 def _open(env_id: str, options: Mapping[str, Any]) -> doors.Env:
     return doors.Env(env_id, **{"perception": "keypoints", "people": "hurried", **options})
 
@@ -76,6 +88,7 @@ def _make(
 
 PROBES: tuple[Probe, ...] = (
     *(_make(env_id, SCRIPTED) for env_id in doors.ENV_IDS),
+    Probe(name="recipes", play=list_recipes, is_short=True),
     _make("HRCReach-v0", SCRIPTED, "_tool", control="tool"),
     *(_make(each.env_id, (each.name,), "_policy", control=each.control)
       for each in doors.policies()),

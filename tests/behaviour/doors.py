@@ -129,6 +129,7 @@ from hrc_env.tracking.presence import (
     with_presence,
 )
 from hrc_env.tracking.smoother import smooth
+from hrc_env.vector.env import HRCVectorEnv
 from hrc_env.worker import body as bodies
 from hrc_env.worker import props
 
@@ -219,6 +220,24 @@ RENAMED: dict[str, str] = {}
 """Today's names of observation terms, reward terms and infos that the probes know by another."""
 
 
+def _arguments(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return today's arguments of an environment for the probes' options, as `Env` takes them."""
+    arguments: dict[str, Any] = {}
+    config: dict[str, Any] = {}
+    for name, value in options.items():
+        if name in ARGUMENTS:
+            arguments[ARGUMENTS[name]] = value
+        elif name == "faults":
+            arguments["faults"] = [_renamed(each, FAULT_FIELDS) for each in value]
+        elif name == "cameras":
+            arguments["cameras"] = [_renamed(each, CAMERA_FIELDS) for each in value]
+        elif name in ("kept_cameras", "rig"):
+            arguments["cameras"] = value
+        else:
+            _put(config, SETTINGS[name], value)
+    return {**arguments, "config": config}
+
+
 class Env:
     """One environment, with everything that it gives by the probes' names."""
 
@@ -231,22 +250,9 @@ class Env:
                 names of `FAULT_FIELDS` and `CAMERA_FIELDS`; `kept_cameras`, indices of the scene's;
                 `rig`, the name of a rig.
         """
-        arguments: dict[str, Any] = {}
-        config: dict[str, Any] = {}
-        for name, value in options.items():
-            if name in ARGUMENTS:
-                arguments[ARGUMENTS[name]] = value
-            elif name == "faults":
-                arguments["faults"] = [_renamed(each, FAULT_FIELDS) for each in value]
-            elif name == "cameras":
-                arguments["cameras"] = [_renamed(each, CAMERA_FIELDS) for each in value]
-            elif name in ("kept_cameras", "rig"):
-                arguments["cameras"] = value
-            else:
-                _put(config, SETTINGS[name], value)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # a rig of one camera, as it is meant
-            self._env = gymnasium.make(env_id, config=config, disable_env_checker=True, **arguments)
+            self._env = gymnasium.make(env_id, disable_env_checker=True, **_arguments(options))
         base: Any = self._env.unwrapped
         self._slices = base.simulation.layout.slices
         self._simulation = base.simulation
@@ -303,6 +309,12 @@ class Env:
         for field in dataclasses.fields(scene):
             _collect_numbers(getattr(scene, field.name), numbers)
         return {**model, "numbers": np.sort(np.concatenate(numbers))}
+
+    def describe_model(self) -> dict[str, NDArray[np.float64]]:
+        """Return the numbers that shields know of the robot, in their order."""
+        numbers: list[NDArray[np.float64]] = []
+        _collect_numbers(self._simulation.model, numbers)
+        return {"model": np.concatenate(numbers)}
 
     def describe_contacts(self) -> dict[str, NDArray[np.float64]]:
         """Return which bodies may touch, how they look, and the settings of the physics."""
@@ -368,6 +380,51 @@ class Env:
         named |= {f"observation/{k}": v for k, v in parts.items() if k != "observation"}
         named |= {**values, **info}
         return {RENAMED.get(name, name): value for name, value in named.items()}
+
+
+class Batch:
+    """Some environments that are stepped at once, each beginning anew when its episode is over."""
+
+    def __init__(self, env_id: str, n: int, n_steps: int, **options: Any) -> None:
+        """Make n environments with episodes of so many steps; options are those of `Env`."""
+        self._env = HRCVectorEnv(
+            n, task=env_id, max_episode_steps=n_steps, num_threads=1, **_arguments(options)
+        )
+        self.action_shape = self._env.action_space.shape
+
+    def reset(self, seed: int) -> dict[str, NDArray[Any]]:
+        """Start all of them and return everything that is known then, (n, ...)."""
+        observation, info = self._env.reset(seed=seed)
+        return {"observation/all": _flat(observation), **_numeric(info)}
+
+    def step(self, actions: NDArray[np.float32]) -> dict[str, NDArray[Any]]:
+        """Act for one step and return everything that is known then, (n, ...)."""
+        observation, reward, terminated, truncated, info = self._env.step(actions)
+        ends = {"terminated": terminated, "truncated": truncated}
+        return {"observation/all": _flat(observation), "reward": reward, **ends, **_numeric(info)}
+
+    def make_agents(self, name: str) -> list[Callable[[Any], NDArray[np.float32]]]:
+        """Return a policy of an agent for each environment: from observations to actions."""
+        info = env_info(self._env.shards.first)
+        return [make_agent(name, info, seed=k).act for k in range(self._env.num_envs)]
+
+    def close(self) -> None:
+        """Release threads."""
+        self._env.close()
+
+
+def _flat(observation: Any) -> NDArray[np.float32]:
+    if not isinstance(observation, Mapping):
+        return np.asarray(observation)
+    return np.concatenate(list(observation.values()), axis=1)
+
+
+def _numeric(info: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
+    return {
+        name: value
+        for name, value in info.items()
+        if isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and name[0] != "_"
+    }
 
 
 def settings() -> dict[str, str]:
@@ -574,6 +631,23 @@ def learn(
     return values
 
 
+def recipe_of(env_id: str, algorithm: str | None) -> dict[str, str]:
+    """Return how a task is learnt by a learner, or by its own if None, where nothing is asked."""
+    from agents.recipes import filled
+    from hrc_env.cli.train import Train
+
+    run = filled(Train(task=env_id, algorithm=algorithm))
+    return {name: str(getattr(run, field)) for name, field in RECIPE_FIELDS.items()}
+
+
+RECIPE_FIELDS = {
+    name: name
+    for name in (
+        "algorithm", "control", "demonstrations", "timesteps", "proximity", "num_envs", "seed",
+        "perception", "ramp", "episodes", "her", "cost_limit",
+    )
+}  # fmt: skip
+"""Names of the probes for arguments of a training, and today's fields."""
 LEARNT, EXPORTED = "policy.zip", "exported.safetensors"
 
 

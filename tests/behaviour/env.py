@@ -85,6 +85,45 @@ def play_episodes(env_id: str, seed: int, options: Mapping[str, Any], inputs: Va
     return summarize(moments)
 
 
+N_BATCH = 3
+
+
+def play_batch(
+    env_id: str, seed: int, n_steps: int, options: Mapping[str, Any], inputs: Values
+) -> Played:
+    """Play environments that are stepped at once; `n_steps` is how long episodes may last."""
+    env = doors.Batch(env_id, N_BATCH, n_steps, **options)
+    moments = [env.reset(seed), *(env.step(actions) for actions in inputs["actions"])]
+    env.close()
+    names = dict.fromkeys(name for moment in moments for name in moment)
+    absent = {name: np.full_like(moments[1][name], 0) for name in names if name in moments[1]}
+    values = stack([{name: moment.get(name, absent.get(name)) for name in absent}
+                    for moment in moments])  # fmt: skip
+    kept = np.append(np.arange(0, len(moments) - 1, EVERY), len(moments) - 1)
+    starts = np.append(0, kept[:-1] + 1)
+    short = {name: value[kept] for name, value in values.items()}
+    touched = values[TOUCHED].any(axis=1)
+    n_settled = int(np.searchsorted(kept, np.argmax(touched))) if touched.any() else None
+    return Played(short | _blend(values, starts, kept + 1), n_settled)
+
+
+def record_batch(
+    env_id: str, seed: int, n_steps: int, options: Mapping[str, Any], n_moments: int, agent: str
+) -> Values:
+    """Return the actions of an agent in environments that are stepped at once."""
+    env = doors.Batch(env_id, N_BATCH, n_steps, **options)
+    observation, rng, actions = env.reset(seed)["observation/all"], np.random.default_rng(seed), []
+    agents = [] if agent == NOISE else env.make_agents(agent)
+    for _ in range(n_moments):
+        action = rng.uniform(-1, 1, env.action_shape).astype(np.float32)
+        for row, act in enumerate(agents):
+            action[row] = act(observation[row])
+        actions.append(action)
+        observation = env.step(action)["observation/all"]
+    env.close()
+    return {"actions": np.array(actions)}
+
+
 def record_actions(
     env_id: str, seed: int, agent: str, n_steps: int, options: Mapping[str, Any]
 ) -> Values:
@@ -192,6 +231,14 @@ def play_scene(env_id: str, options: Mapping[str, Any], inputs: Values) -> Playe
     values = env.describe_scene()
     env.close()
     return Played({name: value for name, value in values.items() if len(value)})
+
+
+def play_model(env_id: str, options: Mapping[str, Any], inputs: Values) -> Played:
+    """Return what shields know of a robot that is commanded in some way."""
+    env = doors.Env(env_id, **options)
+    values = env.describe_model()
+    env.close()
+    return Played(values)
 
 
 def play_contacts(env_id: str, options: Mapping[str, Any], inputs: Values) -> Played:
@@ -530,6 +577,10 @@ MORE = (
     _make("pick_rush", PICK, 300, RUSH, seed=182, people="headlong", n_workers=3),
     _make("reach_rush", REACH, 250, RUSH, seed=183, people="unaware", n_workers=3, jobs="low_work",
           ends_on_contact=True),
+    # full speed by the tool
+    _make("reach_tool_rush", REACH, 200, RUSH, seed=184, control="tool", n_workers=0),
+    _make("pick_twist_rush", PICK, 200, RUSH, seed=185, control="twist", n_workers=0),
+    _make("drywall_twist_rush", DRYWALL, 200, RUSH, seed=186, control="twist", people="hurried"),
     # again, and from a saved state
     _make("reach_episodes", REACH, 240, seed=132, play=play_episodes, n_workers=(0, 2),
           bodies="any"),
@@ -577,6 +628,29 @@ BOUNDS = tuple(
         ("far", {"forecast_s": (0.9,), "covariance_terms": ("factor",)}),
     )
 )  # fmt: skip
+BATCHES = tuple(
+    Probe(name=f"batch_{name}", subject=env_id, is_short=name == "reach",
+          play=partial(play_batch, env_id, seed, n_steps, options),
+          inputs=partial(record_batch, env_id, seed, n_steps, options, n_moments, agent))
+    for name, env_id, seed, n_steps, n_moments, agent, options in (
+        ("reach", REACH, 300, 60, 150, "scripted",
+         {"n_workers": 2, "shield": "qp", "bodies": "any"}),
+        ("reach_slowed", REACH, 301, 90, 200, "scripted_slowed",
+         {"people": "unaware", "cameras": LATE, "forecast_s": (0.3,), "n_workers": (0, 2)}),
+        ("reach_truth", REACH, 321, 80, 160, "scripted",
+         {"perception": "truth", "people": "unaware", "shield": "pfl", "n_workers": 2}),
+        ("reach_faulty", REACH, 323, 70, 150, "scripted",
+         {"faults": _fault("out_of_step", 3.0), "estimator": "kalman", "shield": "ssm"}),
+        ("reach_particles", REACH, 304, 12, 24, NOISE, {"estimator": "paper_restarts"}),
+        ("reach_triangulated", REACH, 320, 60, 100, NOISE, {"estimator": "triangulation"}),
+        ("pick", PICK, 306, 350, 400, "scripted", {"object_noise_m": 0.004}),
+        ("hand", HAND, 307, 350, 400, "scripted", {"observes_shield": True, "shield": "qp"}),
+        ("drywall", DRYWALL, 308, 350, 400, "scripted", {"people": "hurried"}),
+        ("delivery", DELIVERY, 309, 350, 400, "scripted", {"n_workers": (1, 3)}),
+        ("goals", REACH_GOAL, 321, 50, 120, NOISE, {"n_workers": 2}),
+        ("pick_goals", PICK_GOAL, 311, 60, 120, NOISE, {"scene": "site"}),
+    )
+)  # fmt: skip
 POOR = [
     {"name": f"camera_{k}", "eye_m": eye, "target_m": (2.0, 2.2, 1.0), "field_deg": 45.0}
     for k, eye in enumerate(((2.9, 2.6, 2.45), (-9.0, 2.6, 2.45), (0.1, 0.1, 0.2)))
@@ -588,6 +662,15 @@ RIGS = tuple(
     for name, options in (
         ("lab", {}), ("site", {"scene": "site"}), ("gopro", {"rig": "lab_gopro"}),
         ("one", {"kept_cameras": [2]}), ("poor", {"cameras": POOR}),
+    )
+)  # fmt: skip
+MODELS = tuple(
+    Probe(name=f"model_{name}", subject=env_id, is_short=True,
+          play=partial(play_model, env_id, {"perception": "none", **options}))
+    for name, env_id, options in (
+        ("joint", REACH, {"joint_speed_share": 0.7}), ("tool", REACH, {"control": "tool"}),
+        ("twist", PICK, {"control": "twist"}), ("board", DRYWALL, {}), ("base", DELIVERY, {}),
+        ("gripper", REACH, {"robot": "ur10e_gripper"}),
     )
 )  # fmt: skip
 JUDGED = tuple(
@@ -632,21 +715,26 @@ SCENES = tuple(
     for name, env_id, options in PLACES
 )  # fmt: skip
 PICTURES = tuple(
-    Probe(name=f"picture_{env_id}",
-          play=partial(play_pictures, env_id, {"perception": "keypoints"}),
-          inputs=partial(record_actions, env_id, SEED, "scripted", 3, {"perception": "keypoints"}),
+    Probe(name=f"picture_{env_id}{end}",
+          play=partial(play_pictures, env_id, options),
+          inputs=partial(record_actions, env_id, SEED, "scripted", 3, options),
           subject=env_id, needs_pixels=True, tolerance=0.01)
-    for env_id in (REACH, DELIVERY, DRYWALL)
+    for env_id, end, options in (
+        *((each, "", {"perception": "keypoints"}) for each in (REACH, DELIVERY, DRYWALL)),
+        (REACH, "_pixels", {"perception": "pixels", "n_workers": 2}),
+    )
 )  # fmt: skip
 PROBES: tuple[Probe, ...] = (
     *SCENES,
     *PICTURES,
     *BOUNDS,
     *JUDGED,
+    *MODELS,
     *RIGS,
     *PARTS,
     *WHOLE,
     *COVERING,
     *MORE,
     *PIXELS,
+    *BATCHES,
 )

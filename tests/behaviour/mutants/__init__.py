@@ -76,7 +76,7 @@ CODE: dict[str, CodeRoom] = {
     "scene": CodeRoom("hrc_env/scene", ("env", "emulator", "detector"), ("tests/scene",)),
     "pipeline": CodeRoom(
         "hrc_env/pipeline", ("env", "emulator", "detector"),
-        ("tests/pipeline", "tests/test_unknown.py", "tests/test_truth.py"),
+        ("tests/pipeline", "tests/render", "tests/test_unknown.py", "tests/test_truth.py"),
     ),
     "observations": CodeRoom(
         "hrc_env/observations.py", ("env", "agents"),
