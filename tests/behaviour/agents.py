@@ -14,6 +14,7 @@ EVERY = 17
 N_STEPS = {"HRCReachGoal-v0": 100, "HRCReach-v0": 250}
 SEED = 1049
 SCRIPTED = ("scripted", "scripted_slowed")
+DISTURBED = "_disturbed"
 
 
 def play(
@@ -28,6 +29,33 @@ def play(
         values[name.split("/")[-1]] = np.array([act(each) for each in observations])
     env.close()
     return Played(values)
+
+
+def play_disturbed(
+    env_id: str, agents: tuple[str, ...], options: Mapping[str, Any], inputs: Values
+) -> Played:
+    """Return sums of the actions of some agents for the stored observations, each of which is
+    played many times with an error in three entries that are side by side."""
+    rng, disturbed = np.random.default_rng(SEED), {}
+    for name, value in inputs.items():
+        copies = np.repeat(value, N_ERRORS, axis=0)
+        n, size = copies.shape
+        at = rng.integers(max(size - 3, 1), size=n)[:, None] + np.arange(3)
+        error = np.tile(ERRORS, -(-n // len(ERRORS)))[:n, None] * rng.normal(0, 1, (n, 3))
+        copies[np.arange(n)[:, None], at % size] += error.astype(np.float32)
+        disturbed[name] = copies
+    acts = play(env_id, agents, options, disturbed).values
+    weights = np.cos(1.0 + np.arange(N_ERRORS) ** 1.3)
+    return Played({
+        name: np.tensordot(value.reshape(-1, N_ERRORS, value.shape[-1]), weights, (1, 0))
+        for name, value in acts.items()
+    })  # fmt: skip
+
+
+ERRORS = (0.003, 0.01, 0.03, 0.1, 0.3)
+"""Standard deviations of errors, in units of the observation."""
+N_ERRORS = 60
+"""How often each observation is played."""
 
 
 def record_observations(env_id: str, options: Mapping[str, Any], every: int) -> Values:
@@ -77,9 +105,10 @@ def _split(inputs: Values) -> list[Any]:
 def _make(
     env_id: str, agents: tuple[str, ...], end: str = "", every: int = EVERY, **options: Any
 ) -> Probe:
+    play_how = play_disturbed if end == DISTURBED else play
     return Probe(
         name=f"{env_id}{end}",
-        play=partial(play, env_id, agents, options),
+        play=partial(play_how, env_id, agents, options),
         inputs=partial(record_observations, env_id, options, every),
         subject=env_id,
         is_short=every == EVERY,
@@ -88,6 +117,7 @@ def _make(
 
 PROBES: tuple[Probe, ...] = (
     *(_make(env_id, SCRIPTED) for env_id in doors.ENV_IDS),
+    *(_make(env_id, SCRIPTED, DISTURBED) for env_id in doors.ENV_IDS),
     Probe(name="recipes", play=list_recipes, is_short=True),
     _make("HRCReach-v0", SCRIPTED, "_tool", control="tool"),
     *(_make(each.env_id, (each.name,), "_policy", control=each.control)

@@ -287,6 +287,9 @@ class Env:
         }
         terms["action"] = np.concatenate([np.ravel(self._env.action_space.low),
                                           np.ravel(self._env.action_space.high)])  # fmt: skip
+        spaces = self._env.observation_space
+        for name in ("achieved_goal", "desired_goal") if isinstance(spaces, Mapping) else ():
+            terms[name] = np.concatenate([spaces[name].low, spaces[name].high])
         limit_s = self._env.spec.max_episode_steps * self._simulation.config.ctrl_dt
         return {**terms, "time_limit_s": np.array([float(limit_s)])}
 
@@ -717,11 +720,13 @@ def judge_agent(
     play = evaluate.one_by_one if one_by_one else evaluate.judged
     make = functools.partial(make_agent, agent)
     options = {"task": env_id, "perception": "keypoints", **options}
-    episodes = play(make, n_episodes, evaluate.EVALUATION_SEED, **options)
+    shares: list[float] = []
+    episodes = play(make, n_episodes, evaluate.EVALUATION_SEED, tick=shares.append, **options)
     score = dataclasses.asdict(evaluate.summarise(episodes))
     worth = evaluate.worth(episodes)
     return {
         **_columns(episodes),
+        "progress": np.cumsum(shares),
         **{f"score/{name}": np.array([float(value)]) for name, value in score.items()},
         **{f"worth/{k}": np.array([v.value, v.low, v.high], float) for k, v in worth.items()},
     }
