@@ -144,7 +144,7 @@ STUDIES: dict[str, Study] = {
             "python -m benchmarks.shielded", 6, (*KEYPOINTS, "shield", "agents"), ("shielded",),
         ),
         "price": Command(
-            EXPERIMENT + "price --quick", 39, ALL, ("price", "worth"), {"price.png": "price.png"},
+            EXPERIMENT + "price --quick", 20, ALL, ("price", "worth"), {"price.png": "price.png"},
             quick="--seeds 3",
         ),
         "frontier": Command(
