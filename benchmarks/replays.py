@@ -43,6 +43,8 @@ class Replay:
     """Labels of parts that are trainings; one that ends with a point stands for all that follow."""
     learnt: tuple[str, ...] = ()
     """Words in the labels of parts that want something that a training keeps."""
+    row_words: int = 1
+    """How many words at the beginning of a label name its row."""
 
     def is_training(self, label: str) -> bool:
         """Return whether a part is a training."""
@@ -184,10 +186,16 @@ REPLAYS: dict[str, Replay] = {
     "learners": Replay(_learners, learnt=(".policy.",)),
     "shielded": Replay(_shielded),
     "limited": Replay(_limited, learnt=("",)),
-    "kept": Replay(_kept),
+    "kept": Replay(_kept, row_words=3),
     "ablations": Replay(partial(walk_usual, "ablations")),
     "impact": Replay(_impact, trainings=("ppo",), learnt=("ppo",)),
-    "price": Replay(partial(_price, "price")),
-    "frontier": Replay(partial(_price, "frontier"), trainings=("training.",)),
+    "price": Replay(partial(_price, "price"), row_words=2),
+    "frontier": Replay(partial(_price, "frontier"), trainings=("training.",), row_words=2),
 }
 """By command of a study; one that is not here keeps no parts."""
+
+
+def row_of(name: str, label: str) -> str:
+    """Return the row of a study's part: the first words of its label."""
+    n_words = REPLAYS[name].row_words if name in REPLAYS else 1
+    return ".".join(label.split(".")[:n_words])

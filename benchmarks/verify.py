@@ -1,7 +1,7 @@
 """Whether recorded numbers still come out: python -m benchmarks.verify --share .02
 
 Replays a share of all recorded parts, drawn at random, and at least one of every row of parts
-(those whose labels begin with the same word: a scene, a task, a kind of film), and compares them
+(those whose labels begin with the same words: a scene, a task, a pair of eyes), and compares them
 with what `docs/results/parts/` holds. Of a training the evaluation of its kept policy is replayed,
 where the policy is on this machine. A part that differs makes its study stale:
 `python -m benchmarks.results --list` says so, and the next `make results` makes all of its parts
@@ -29,7 +29,7 @@ from rich.console import Console
 from scipy.stats import hypergeom
 
 from benchmarks import records, results
-from benchmarks.replays import REPLAYS, Replayed
+from benchmarks.replays import REPLAYS, Replayed, row_of
 from benchmarks.studies import COMMANDS, commands_of
 from hrc_env.core.errors import (
     ConfigError,
@@ -245,7 +245,7 @@ def draw(
     picked = {parts[k] for k in rng.permutation(len(parts))[:n_anywhere].tolist()}
     rows: dict[tuple[str, str], list[tuple[str, str]]] = {}
     for name, label in choices:
-        rows.setdefault((name, label.split(".")[0]), []).append((name, label))
+        rows.setdefault((name, row_of(name, label)), []).append((name, label))
     for row in rows.values():
         if picked.isdisjoint(row):
             weights = np.array([1 / (1 + choices[each]) for each in row])

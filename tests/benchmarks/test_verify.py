@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks import records, results, verify
-from benchmarks.replays import Replay, walk_study
+from benchmarks.replays import Replay, row_of, walk_study
 from benchmarks.studies import COMMANDS, Command
 from benchmarks.verify import Arguments, draw, found_share, main
 from docs import tables
@@ -227,3 +227,11 @@ def test_a_summary_forgives_rounding_and_forgets_the_clock():
 def test_arguments_that_cannot_work_are_refused_in_words(given, words):
     with pytest.raises(ConfigError, match=words):
         Arguments(**given)
+
+
+def test_rows_are_those_of_the_tables():
+    assert row_of("site", "one_camera.3") == "one_camera"
+    assert row_of("price", "HRCReach-v0.one_camera.fresh.-1980") == "HRCReach-v0.one_camera"
+    assert row_of("kept", "HRCReach-v0.limited.qp.eb6e") == "HRCReach-v0.limited.qp"
+    recorded = {row_of("kept", label) for label in records.read("kept").parts}
+    assert len(recorded) == len(records.read("kept").parts)
