@@ -344,6 +344,8 @@ SPOILT: tuple[Callable[[Stored], Stored], ...] = (
 )  # fmt: skip
 """What is changed in a file that is a clip."""
 N_TRIALS = 36
+RATES_HZ = (2.0, 4.9, 5.0, 5.5, 60.0, 600.0, 999.0, 1000.0, 1001.0, 3000.0, -25.0, np.nan)
+"""Some that are believed of a recording, and some that are not."""
 
 
 def _is_believed(film: dict[str, Any], k: int) -> bool:
@@ -351,20 +353,7 @@ def _is_believed(film: dict[str, Any], k: int) -> bool:
     made = {name: np.copy(value) if name[:2] != "fp" else value for name, value in film.items()}
     q, size_m = made["controls"], made["size_m"]
     if k < 12:
-        made["fps"] = (
-            2.0,
-            4.9,
-            5.0,
-            5.5,
-            60.0,
-            600.0,
-            999.0,
-            1000.0,
-            1001.0,
-            3000.0,
-            -25.0,
-            np.nan,
-        )[k]
+        made["fps"] = RATES_HZ[k]
         q[:, :2] = 0.0
     elif k < 20:
         q[:, :2] = (0.0, 60.0, 150.0, 199.9, 200.1, 260.0, -150.0, -260.0)[k - 12]

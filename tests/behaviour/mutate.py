@@ -245,7 +245,7 @@ class Judge:
             self._free.put(copy)
         self._passed_path = out / "baseline.json"
         self._passed = self._read_passed()
-        self._lock = threading.Lock()
+        self._lock, self._bounds_lock = threading.Lock(), threading.Lock()
         self._room_locks = {room: threading.Lock() for room in CODE}
 
     def judge(self, mutant: Mutant) -> Result:
@@ -262,8 +262,9 @@ class Judge:
         hints = tuple(dict.fromkeys(Path(edit.file).stem for edit in mutant.edits))
         rooms = self.rooms_for(mutant)
         notice = self._changed(mutant, copy, self._play_probes, rooms, hints)
-        if notice is None:
-            bounded = tuple(each for each in rooms if each in BOUNDED)
+        bounded = tuple(each for each in rooms if each in BOUNDED)
+        if notice is None and bounded:
+            self.require_bounds(bounded, copy)
             notice = self._changed(mutant, copy, self._check_bounds, bounded, hints)
         if notice is None and not self.arguments.without_tests:
             self.require_tests(mutant.room, copy)
@@ -320,6 +321,15 @@ class Judge:
             self._require(f"probes of {room}", lambda: self._play_probes(copy, (room,)))
         finally:
             self._free.put(copy)
+
+    def require_bounds(self, rooms: tuple[str, ...], copy: Path) -> None:
+        """Raise `MutantError` unless the kernels of rooms keep to their arrays in the unchanged
+        code."""
+        with self._bounds_lock:
+            for room in rooms:
+                self._require(
+                    f"bounds of {room}", lambda room=room: self._check_bounds(copy, (room,))
+                )
 
     def require_tests(self, room: str, copy: Path) -> None:
         """Raise `MutantError` unless the tests of a room of the code pass on the unchanged code."""
