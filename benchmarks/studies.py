@@ -93,7 +93,7 @@ STUDIES: dict[str, Study] = {
     }),
     "tracking": Study({
         "tracking": Command(
-            BENCH + "tracking", 20, KEYPOINTS, ("tracking", "tracking_cost"),
+            BENCH + "tracking", 38, KEYPOINTS, ("tracking", "tracking_cost"),
         ),
     }),
     "impact": Study({
@@ -104,7 +104,7 @@ STUDIES: dict[str, Study] = {
     }),
     "lab": Study({
         "lab": Command(
-            EXPERIMENT + "lab --folded heavy", 30, PIXELS, ("lab",),
+            EXPERIMENT + "lab --folded heavy", 12, PIXELS, ("lab",),
             {"lab_figure_6.jpg": "figure_6.png"},
         ),
     }),
