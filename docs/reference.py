@@ -17,6 +17,7 @@ from assets.recordings.clips import AGAIN, CLIPS, Recorded
 from assets.recordings.sources import SOURCES
 from assets.recordings.synthetic import STYLES
 from hrc_env import __main__, observations
+from hrc_env.belief import NEAR_FLOOR_M
 from hrc_env.cli.environment import EnvironmentArguments
 from hrc_env.core.checkout import module_of
 from hrc_env.env import HRCEnv
@@ -182,22 +183,25 @@ about: they are known by their true pose plus noise (`config.objects`).
 ### Who may be there
 | a worker's slot is | while |
 |---|---|
-| tracked | a track follows somebody |
-| unknown | nobody has looked enough yet; a camera shows somebody who has no track; a track was \
-lost; or, for `tracker.lost_after_s`, fewer than two cameras gave images that are not stuck |
-| absent | at least two cameras have looked over their whole images 8 times at `keypoints`, 24 \
-times at `pixels`, all together, and shown nobody else; after a loss only when what was believed \
-is forgotten, 3 times \
-`tracker.forget_s` later |
+| tracked | a track follows somebody, and cameras do not contradict it |
+| unknown | somebody may be within {concern} m of the robot: on floor that was not seen empty, \
+lost, or shown by cameras and not tracked |
+| absent | all floor so near was seen empty |
+
+Floor is seen empty by at least two cameras that would find whoever stood there (they see three of
+five heights of a body), after two looks over whole images each at `keypoints`, six at `pixels`;
+what one of them alone sees is probably empty after three looks. That is forgotten
+`tracker.lost_after_s` after cameras last looked; images that are stuck, dark or of one colour are
+no looks. Who was lost may hide where they were for 3 times `tracker.forget_s`.
+
+People whom several cameras show in several looks in a row and whom no pose explains, as with a
+wrong calibration, make the slots unknown, and `info["perception/miscalibrated"]` names the cameras.
 
 `worker_blind` counts the seconds since cameras last said something: saw the worker, or that nobody
-is there. With four cameras an empty room is known to be empty after two looks at `keypoints`, one
-step after the reset, and six at `pixels`, a second after it, where cameras search every fifth step.
-Of 2,000 workers each was shown by some camera's first image, and 400 of 400 were found by then. One
-camera alone does not see 2 %, so it never says that nobody is there. Somebody who hides from all
-cameras for longer than 6 s is taken for gone. An empty image does not tell whether it is stuck, or
-too dark.
-At level `truth` nobody is unknown; at `none` everybody is who could be there.
+is there. With four cameras an empty room is known to be empty one step after the reset at
+`keypoints`, a second after it at `pixels`, where cameras search every fifth step. Of 2,000 workers
+each was shown by some camera's first image, and 400 of 400 were found by then. At level `truth`
+nobody is unknown; at `none` everybody is who could be there.
 
 A reward counts an unknown worker with closeness `reward.unknown` at least, so that losing sight is
 not rewarded like being alone. `scripted_slowed` is no faster than 0.25 m/s then, or stands still
@@ -270,6 +274,7 @@ def environment() -> str:
         tool=config.control.tool_speed_mps,
         turn=config.control.tool_turn_rad_s,
         far=observations.FAR_SEPARATION_M,
+        concern=NEAR_FLOOR_M,
     )
 
 

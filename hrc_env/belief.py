@@ -1,16 +1,53 @@
 """What a robot believes in one step: itself, its task and the estimate. No truth in here."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from hrc_env.core.records import HandState, ObjectState, PoseEstimate, RobotState
+from hrc_env.core.kernels import kernel
+from hrc_env.core.records import (
+    EMPTY,
+    STATURE_M,
+    HandState,
+    ObjectState,
+    PoseEstimate,
+    RobotState,
+    Vacancy,
+)
 from hrc_env.core.skeleton import SEGMENT_RADIUS_M
-from hrc_env.core.typing import Bools, Floats, JointVelocities
-from hrc_env.geometry.distances import Separation, least_separation, segments
+from hrc_env.core.typing import Bools, Floats, Ints, JointVelocities, Points3
+from hrc_env.geometry.distances import (
+    Separation,
+    closest_parameters,
+    least_separation,
+    segments,
+)
 from hrc_env.safety.robot import RobotModel
+
+NEAR_FLOOR_M = 1.5
+"""Floor farther from a robot than this is of no concern [m]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class UnseenFloor:
+    """The floor on which an undetected person may be, for unknown slots without a last sighting."""
+
+    floor_world: Points3
+    """(N, 3) centres of pieces of floor [m]."""
+    piece_m: float
+    """Distance of a piece's centre from its corners [m]."""
+    level: Ints
+    """(B, N) the state of each piece: `POSSIBLE`, `PROBABLY_EMPTY` or `EMPTY`."""
+    age_s: Floats
+    """(B,) age of the oldest look behind these states [s]."""
+    possible_m: Floats
+    """(B,) distance of the robot's surface from the space above the nearest `POSSIBLE` piece [m];
+    infinite beyond `NEAR_FLOOR_M`."""
+    probable_m: Floats
+    """(B,) the same for the nearest `PROBABLY_EMPTY` piece [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +76,8 @@ class Belief:
     """What the robot knows of itself for good."""
     welcome: Callable[["Belief"], Bools] | None = None
     """Who may come to its hand (`Task.welcome`)."""
+    unseen: UnseenFloor | None = None
+    """Where an undetected person may be; None: anywhere."""
 
 
 def estimated_separation(robot: RobotState, estimate: PoseEstimate) -> Separation:
@@ -52,6 +91,60 @@ def estimated_separation(robot: RobotState, estimate: PoseEstimate) -> Separatio
         robot.capsules_world, robot.capsule_radius_m, bodies, SEGMENT_RADIUS_M
     )
     return replace(nearest, distance_m=np.where(estimate.tracked, nearest.distance_m, np.inf))
+
+
+def unseen_floor(
+    robot: RobotState, estimate: PoseEstimate, vacancy: Vacancy | None
+) -> UnseenFloor | None:
+    """Find the floor that was not seen empty, and its distance from each robot.
+
+    Only unknown slots without a last sighting count; for the others the floor is `EMPTY`. None
+    without cameras that could say.
+    """
+    if vacancy is None:
+        return None
+    coverage = vacancy.coverage
+    asked = estimate.unknown & _never_seen(estimate)
+    level = np.full((len(asked), len(coverage.group)), EMPTY)
+    gaps, age_s = np.full((len(asked), EMPTY), np.inf), np.zeros(len(asked))
+    if asked.any():
+        of_group = np.where(asked[..., None], vacancy.level, EMPTY).min(1)
+        level = of_group[:, coverage.group]
+        age_s = np.where(asked, vacancy.age_s, 0.0).max(1)
+        capsules, radius_m = robot.capsules_world, robot.capsule_radius_m
+        _nearest_floor(capsules, radius_m, coverage.floor_world, coverage.piece_m, level, gaps)
+    return UnseenFloor(coverage.floor_world, coverage.piece_m, level, age_s, gaps[:, 0], gaps[:, 1])
+
+
+def of_concern(estimate: PoseEstimate, unseen: UnseenFloor | None) -> PoseEstimate:
+    """Return the estimate in which slots are unknown only if the undetected person may be near."""
+    if unseen is None:
+        return estimate
+    far = np.isinf(unseen.possible_m) & np.isinf(unseen.probable_m)
+    return replace(estimate, unknown=estimate.unknown & ~(far[:, None] & _never_seen(estimate)))
+
+
+def _never_seen(estimate: PoseEstimate) -> Bools:
+    return np.isnan(estimate.seen_world[..., 0, 0])
+
+
+@kernel(makes_arrays=True)
+def _nearest_floor(capsules, radius, floor, piece_m, level, gaps):
+    """Write the gaps (B, 2) between capsules (B, K, 2, 3) and the floor (N, 3) of each level."""
+    head = np.empty(3)
+    for b in range(len(capsules)):
+        for n in range(len(floor)):
+            now = level[b, n]
+            if now == EMPTY:
+                continue
+            head[0], head[1], head[2] = floor[n, 0], floor[n, 1], floor[n, 2] + STATURE_M
+            for k in range(capsules.shape[1]):
+                squared, _, _ = closest_parameters(
+                    capsules[b, k, 0], capsules[b, k, 1], floor[n], head
+                )
+                gap = math.sqrt(squared) - radius[k] - piece_m
+                if gap < NEAR_FLOOR_M:
+                    gaps[b, now] = min(gaps[b, now], gap)
 
 
 def standard_deviation_m(estimate: PoseEstimate) -> Floats:

@@ -218,7 +218,7 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
     ),
     ObservationTerm(
         "worker_unknown", lambda of: of.workers, "-", "-", 1.0, 1.0,
-        "1 while somebody without a track may be there: lost, or not looked for enough.",
+        "1 while somebody without a track may be near: lost, or on floor not seen empty.",
         lambda now: now.estimate.unknown.astype(float),
     ),
     ObservationTerm(

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from hrc_env import metrics, observations, rewards, room, step
-from hrc_env.belief import Belief, estimated_separation
+from hrc_env.belief import Belief, estimated_separation, of_concern, unseen_floor
 from hrc_env.config import Settings
 from hrc_env.control import joint_command, n_actions
 from hrc_env.core.batching import State, Stateful, picked, rows, write_rows
@@ -309,20 +309,21 @@ class Simulation(Stateful):
 
     def _believed(self, ids: Ints, world: World, estimates: tuple[PoseEstimate, ...]) -> Belief:
         """What the robots of environments `ids` believe; the records are of them only."""
-        estimate, *later = estimates
+        unseen = unseen_floor(world.robot, estimates[0], self.pipeline.vacancy(ids))
         return Belief(
             robot=world.robot,
-            estimate=estimate,
-            separation=estimated_separation(world.robot, estimate),
+            estimate=of_concern(estimates[0], unseen),
+            separation=estimated_separation(world.robot, estimates[0]),
             hand=world.hand,
             objects=None if self.measured is None else rows(self.measured, ids),
             task=self.task.view(self.task_state, ids, self.config.task),
             action=self.action[ids],
-            forecast=tuple(later),
+            forecast=estimates[1:],
             command=self.physics.command[ids],
             shield_change=self.shield_change[ids],
             model=self.model,
             welcome=self.task.welcome,
+            unseen=unseen,
         )
 
     def _observed(self, belief: Belief) -> Observation:

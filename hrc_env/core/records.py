@@ -72,9 +72,9 @@ class PoseEstimate:
     tracked: Bools
     """(B, W) whether there is a track; False: prior or predicting for too long (lost)."""
     unknown: Bools = None  # type: ignore[assignment]
-    """(B, W) whether somebody without a track may be there: lost, not looked for enough, or behind
-    cameras that give no images (`tracking.presence`). Where there is neither track nor this, nobody
-    is there. Not given: nobody has looked, so whoever has no track may be there."""
+    """(B, W) whether a person without a track may be there: lost, not searched for enough, detected
+    but not tracked, or on floor that no two cameras see (`tracking.presence`). A slot that is
+    neither tracked nor unknown is empty. Not given: every slot without a track is unknown."""
     blind_s: Floats = None  # type: ignore[assignment]
     """(B, W) seconds since cameras last said something: saw the worker, or that nobody is there;
     of who was never seen or looked for, since the reset. Not given: the youngest joint's age."""
@@ -90,6 +90,38 @@ class PoseEstimate:
         if self.seen_world is None:
             seen = np.where(self.tracked[..., None, None], self.mean_world, np.nan)
             object.__setattr__(self, "seen_world", seen)
+
+
+POSSIBLE, PROBABLY_EMPTY, EMPTY = 0, 1, 2
+"""States of a piece of floor: a person may be there, one camera alone has seen it empty, or several
+cameras have."""
+STATURE_M = 1.8
+"""Height of the space above a piece of floor that a person may take up [m]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Coverage:
+    """Which cameras of a rig would detect a person on each piece of the floor."""
+
+    floor_world: Points3
+    """(N, 3) centres of pieces all over the walkable floor [m]."""
+    piece_m: float
+    """Distance of a piece's centre from its corners [m]."""
+    group: Ints
+    """(N,) the row of `cameras` that belongs to each piece."""
+    cameras: Bools
+    """(G, C) the sets of cameras that occur."""
+
+
+@dataclass(frozen=True, slots=True)
+class Vacancy:
+    """The state of the floor for workers' slots without a track."""
+
+    coverage: Coverage
+    level: Ints
+    """(B, W, G) `POSSIBLE`, `PROBABLY_EMPTY` or `EMPTY`, by groups of a `Coverage`."""
+    age_s: Floats
+    """(B, W) age of the oldest look behind these states [s]."""
 
 
 @dataclass(frozen=True, slots=True)

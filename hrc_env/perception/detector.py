@@ -30,6 +30,7 @@ from hrc_env.perception.searching import (
     Views,
     apart_from,
     distinct,
+    image_crop,
     people,
     proposals,
     search_jobs,
@@ -129,6 +130,8 @@ class PoseDetector(Stateful):
         network.chosen_runtime(self.config.runtime)
         self.floor_world, self.error = floor_world, error
         self._search = [search_windows(camera, floor_world) for camera in self.cameras]
+        self.blank: frozenset[int] = frozenset()
+        """Cameras whose images were blank in the last search: dark, white, or of one colour."""
         self._looks: dict[int, list[int]] = {}
         self._threads: ThreadPoolExecutor | None = None
 
@@ -170,8 +173,10 @@ class PoseDetector(Stateful):
         first; empty for the others. Both networks are sure of them."""
         which = range(len(self.cameras)) if which is None else which
         jobs = search_jobs(source, self._search, which)
-        found = self._share(lambda nets, job=job: job(nets.detect) for job in jobs)
-        people = distinct([one for some in found for one in some], len(self.cameras))
+        done = self._share(lambda nets, job=job: job(nets.detect) for job in jobs)
+        people = distinct([one for some in done for one in some.found], len(self.cameras))
+        showing = {some.camera for some in done if some.shows}
+        self.blank = frozenset(which) - showing
         asked = [(c, window) for c, windows in enumerate(people) for window in windows]
         sure = replace(self.config, min_presence=self.config.sure_presence)
         joints_of = self._share(
@@ -222,8 +227,7 @@ class PoseDetector(Stateful):
 
     def _crop(self, source: ImageSource, c: int, window: Roi) -> Image:
         """A copy of the crop, black where the camera does not see: renderers go on drawing."""
-        crop, camera = source.crop(c, window), self.cameras[c]
-        check_shape("crop", crop.shape, (SIDE, SIDE, 3), "rows, columns, RGB")
+        crop, camera = image_crop(source, c, window), self.cameras[c]
         mask = _frame_mask(window, camera.width_px, camera.height_px)
         if mask is None:
             return np.array(crop)

@@ -8,10 +8,11 @@ sight to one person's hips meet; those to two people, or to a mistake, rarely do
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Roi
 from hrc_env.core.typing import Floats, Image, Points2, Points3
 from hrc_env.geometry.cameras import (
@@ -23,7 +24,7 @@ from hrc_env.geometry.cameras import (
     rays,
 )
 from hrc_env.perception import blazepose
-from hrc_env.perception.network import PersonDetector
+from hrc_env.perception.network import LANDMARK_SIDE, PersonDetector
 
 SEARCH_RAD = math.radians(75.0)
 """In a wider search window people are too small for the detector stage."""
@@ -37,6 +38,8 @@ SIDE_M = (1.1, 3.6)
 """Sides of the detector stage's window at a person's distance [m]: folded up, tall and reaching."""
 MIN_CROSSING = 0.1
 """Sine of the smallest angle between two lines that fixes a point."""
+LEAST_CONTRAST = 3.0
+"""Least standard deviation of a colour channel over a picture that is not blank."""
 Candidates = Sequence[Sequence[Roi]]
 """(C,) the people found by each camera."""
 Views = list[Roi | None]
@@ -53,17 +56,48 @@ class ImageSource(Protocol):
         ...
 
 
+class Searched(NamedTuple):
+    """The result of one search window."""
+
+    camera: int
+    shows: bool  # whether it has contrast: is not dark, white, or of one colour
+    found: list[Found]
+
+
 def search_jobs(
     source: ImageSource, windows: Sequence[Sequence[Roi]], which: Sequence[int]
-) -> Iterator[Callable[[PersonDetector], list[Found]]]:
+) -> Iterator[Callable[[PersonDetector], Searched]]:
     """Draw one window (C, ...) after the other; each comes with the work that is to be done."""
     for c in which:
         for window in windows[c]:
-            crop = np.array(source.crop(c, window))
-            yield lambda detect, c=c, k=crop, w=window: [
-                (c, person.score, blazepose.person_window(person, w))
-                for person in people(detect, k)
-            ]
+            crop = np.array(image_crop(source, c, window))
+            yield lambda detect, c=c, k=crop, w=window: Searched(
+                c,
+                bool(k.std((0, 1)).max() >= LEAST_CONTRAST),
+                [
+                    (c, person.score, blazepose.person_window(person, w))
+                    for person in people(detect, k)
+                ],
+            )
+
+
+def image_crop(source: ImageSource, c: int, window: Roi) -> Image:
+    """Return a crop of an image source's camera c; `ConfigError` unless it is 8-bit RGB."""
+    crop = source.crop(c, window)
+    if not isinstance(crop, np.ndarray) or crop.dtype != np.uint8:
+        got = f"{crop.dtype} array" if isinstance(crop, np.ndarray) else type(crop).__name__
+        raise ConfigError(
+            f"Image sources must give crops as numpy arrays of uint8, RGB from 0 to 255; camera "
+            f"{c} gave a {got}. Scale floating-point images by 255 and convert them: "
+            "(255 * image).round().astype(numpy.uint8)."
+        )
+    if crop.shape != (LANDMARK_SIDE, LANDMARK_SIDE, 3):
+        raise ConfigError(
+            f"Image sources must give crops of shape {(LANDMARK_SIDE, LANDMARK_SIDE, 3)}: rows, "
+            f"columns, RGB; camera {c} gave {crop.shape}. Repeat the one channel of grey images "
+            "three times: numpy.repeat(image[..., None], 3, axis=-1)."
+        )
+    return crop
 
 
 def people(detect: PersonDetector, crop: Image) -> list[blazepose.Person]:

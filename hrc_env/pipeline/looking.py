@@ -2,14 +2,16 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from hrc_env.core.batching import Stateful
 from hrc_env.core.records import Keypoints, PoseEstimate
-from hrc_env.core.typing import Floats, Image, Points3
+from hrc_env.core.typing import Bools, Floats, Image, Ints, Points3
 from hrc_env.geometry.cameras import PinholeCamera, project, projections
 from hrc_env.perception.detector import Detection, DetectorConfig, PoseDetector
 from hrc_env.perception.noise import ERROR, STANDING
 from hrc_env.perception.outline import is_folded, posture_of
-from hrc_env.perception.searching import ImageSource, Views
+from hrc_env.perception.searching import Candidates, ImageSource, Views, apart_from
 from hrc_env.perception.windows import steady_window, window_from_joints
 from hrc_env.pipeline.reacquisition import ENOUGH, Reacquisition, SearchSchedule
 from hrc_env.pipeline.sensor_input import Windows
@@ -18,7 +20,7 @@ from hrc_env.pipeline.sensor_input import Windows
 class Looking(Stateful):
     """Finds the workers of a batch of environments in a rig's images, wherever these are from."""
 
-    CHANGES = ("detector", "windows", "schedule", "reacquisition")
+    CHANGES = ("detector", "windows", "schedule", "reacquisition", "unexplained")
 
     def __init__(
         self,
@@ -39,6 +41,8 @@ class Looking(Stateful):
         ]
         self.schedule = SearchSchedule(batch, len(self.cameras), config.search_every)
         self.reacquisition = Reacquisition(batch, n_workers, self.cameras)
+        self.unexplained = np.zeros((batch, len(self.cameras)), np.bool_)
+        """(B, C) whether a camera's last search found people beside the workers."""
         self.seen: dict[int, tuple[Views, list[Image | None]]] = {}
         """Windows and crops of each environment's first worker: for pictures, no state."""
 
@@ -71,7 +75,8 @@ class Looking(Stateful):
                 windows = self._followed(source, b, worker, windows, taken, has_image)
             elif people is None:
                 due = self.schedule.due(b, has_image)
-                people = self.schedule.remember(b, due, self.detector.search(source, due))
+                found = self.detector.search(source, due)
+                people = self.schedule.remember(b, due, found, self.detector.blank)
             track = self._track(b, worker)
             folded, posture = _expected_posture(expected, worker)
             seen = self.detector.detect(source, windows, track, taken, people, folded, posture)
@@ -80,11 +85,19 @@ class Looking(Stateful):
             self.reacquisition.saw(b, worker, shown)
             missed |= not any(windows) and shown.sum() < min(ENOUGH, len(shown))
             self._keep(b, worker, seen, has_image, out)
+        if people is not None:
+            self._explain(b, people, taken)
         if missed:
             self.schedule.rest(b)
 
+    def looked(self, ids: Ints) -> Bools:
+        """Return (B, C) the cameras of environments `ids` whose whole images were just searched and
+        are not blank."""
+        return (self.schedule.ages[ids] == 0) & ~self.schedule.blank[ids]
+
     def forget(self, b: int) -> None:
         """Forget whom environment b was following."""
+        self.unexplained[b] = False
         self.schedule.reset(b)
         for worker in range(self.n_workers):
             self.detector.forget(self._track(b, worker))
@@ -96,6 +109,12 @@ class Looking(Stateful):
         windows, crops = self.seen.get(b, ([], []))
         current = self.windows[b][0] if self.windows[b] else []
         return crops if windows == current else [None] * len(current)
+
+    def _explain(self, b: int, people: Candidates, taken: Windows) -> None:
+        """Note the searched cameras that show people (C,) outside of the windows `taken`."""
+        left = apart_from(people, taken)
+        for c in np.flatnonzero(self.schedule.ages[b] == 0).tolist():
+            self.unexplained[b, c] = len(left[c]) > 0
 
     def _keep(
         self, b: int, worker: int, seen: Detection, has_image: Sequence[bool], out: Keypoints

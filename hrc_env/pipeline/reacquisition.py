@@ -5,7 +5,7 @@ shown a tracked worker for some steps, the images of the others are searched; wh
 person, they look there until the estimator follows.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -29,7 +29,7 @@ ENOUGH = 2
 class SearchSchedule(Stateful):
     """When B environments search the images of C cameras, and what these showed lately."""
 
-    CHANGES = ("rests", "ages", "people")
+    CHANGES = ("rests", "ages", "people", "blank")
 
     def __init__(self, batch: int, n_cameras: int, every: int) -> None:
         """A camera is searched again `every` steps after nobody was believed."""
@@ -39,7 +39,9 @@ class SearchSchedule(Stateful):
         self.ages = np.full((batch, n_cameras), REMEMBERED)
         """(B, C) steps since a camera was searched, up to `REMEMBERED`."""
         self.people: list[list[list[Roi]]] = [[[] for _ in range(n_cameras)] for _ in range(batch)]
-        """Whom each camera showed then."""
+        """The people that each camera found then."""
+        self.blank = np.zeros((batch, n_cameras), np.bool_)
+        """(B, C) whether the image was blank."""
 
     def reset(self, b: int) -> None:
         """Begin environment b anew."""
@@ -55,10 +57,14 @@ class SearchSchedule(Stateful):
         """The cameras whose images are to be searched now."""
         return np.flatnonzero(np.array(has_image) & (self.rests[b] == 0)).tolist()
 
-    def remember(self, b: int, cameras: Sequence[int], found: Candidates) -> Candidates:
-        """Keep what these cameras have just shown (C,); give it with what others showed lately."""
+    def remember(
+        self, b: int, cameras: Sequence[int], found: Candidates, blank: Collection[int] = ()
+    ) -> Candidates:
+        """Keep the people (C,) that these cameras have just found, and the `blank` cameras; return
+        them with those of other recent searches."""
         for c in cameras:
             self.people[b][c], self.ages[b, c] = list(found[c]), 0
+            self.blank[b, c] = c in blank
         recent = self.ages[b] < REMEMBERED
         return [people if recent[c] else [] for c, people in enumerate(self.people[b])]
 

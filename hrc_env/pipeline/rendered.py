@@ -86,7 +86,11 @@ class PixelPipeline(PoseTracking):
 
     def looked(self, ids: Ints, age_s: Floats) -> Bools:
         """(B, C) which cameras' whole images have been searched."""
-        return self.looking.schedule.ages[ids] == 0
+        return self.looking.looked(ids)
+
+    def strangers(self, ids: Ints) -> Bools:
+        """Return (B, C) the cameras whose last search found people beside the workers."""
+        return self.looking.unexplained[ids]
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
         """Forget the tracks, and who was followed."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from hrc_env.config import HRCConfig
 from hrc_env.core.batching import Stateful, rows, write_rows
-from hrc_env.core.records import Keypoints, PoseEstimate
+from hrc_env.core.records import Keypoints, PoseEstimate, Vacancy
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Floats, Image, Ints
 from hrc_env.geometry.cameras import projections
@@ -16,7 +16,9 @@ from hrc_env.perception.noise import our_joints
 from hrc_env.pipeline.sensor_input import Generators, Sensor, Windows
 from hrc_env.scene.build import Scene
 from hrc_env.scene.domain_randomization import Look
+from hrc_env.scene.rigs import coverage
 from hrc_env.tracking.calibration_monitor import forget_monitor, make_monitor, monitor
+from hrc_env.tracking.contradiction import find_unexplained
 from hrc_env.tracking.estimators import Estimator
 from hrc_env.tracking.frozen_frames import (
     believed,
@@ -25,7 +27,7 @@ from hrc_env.tracking.frozen_frames import (
     make_frozen,
 )
 from hrc_env.tracking.people.association import associate
-from hrc_env.tracking.presence import IMAGES, forget_presence, make_presence, with_presence
+from hrc_env.tracking.presence import IMAGES, Looks, Presence
 
 
 class PerceptionPipeline(Stateful):
@@ -63,6 +65,11 @@ class PerceptionPipeline(Stateful):
         """(B, C) which cameras of environments `ids` are thought to be miscalibrated."""
         return np.zeros((len(ids), 0), np.bool_)
 
+    def vacancy(self, ids: Ints) -> Vacancy | None:
+        """Return the state of the floor of environments `ids`, by groups of the scene's `coverage`;
+        None without cameras."""
+        return None
+
     def close(self) -> None:
         """Release threads and graphics contexts."""
 
@@ -85,7 +92,7 @@ class PoseTracking(PerceptionPipeline):
         self.keypoints = no_keypoints(batch, len(scene.cameras), scene.n_workers)
         self.frozen = make_frozen(batch, len(scene.cameras))
         self.monitored = make_monitor(batch, len(scene.cameras))
-        self.presence = make_presence(batch, scene.n_workers, len(scene.cameras))
+        self.presence = Presence(batch, scene.n_workers, coverage(scene))
         self.axes = np.array([(*camera.K[:2, 2], camera.K[0, 0]) for camera in scene.cameras])
         """(C, 3) principal point and focal length [px]."""
 
@@ -94,7 +101,7 @@ class PoseTracking(PerceptionPipeline):
         self.tracker.reset(self.state, ids, tracker_rngs)
         forget_monitor(self.monitored, ids)
         forget_frozen(self.frozen, ids)
-        forget_presence(self.presence, ids)
+        self.presence.forget(ids)
         self.sensor.reset(ids, sensor_rngs)
         self.steps[ids] = 0
 
@@ -120,11 +127,22 @@ class PoseTracking(PerceptionPipeline):
         estimate = self.tracker.estimate(state)
         age_s = self._age_s(ids, keypoints)
         monitor(self.monitored, ids, keypoints, age_s, estimate, self.P, self.axes)
-        looked = self.looked(ids, age_s) & believed(self.frozen, ids)
-        return with_presence(
-            self.presence, ids, our_joints(estimate, self.calibration), (found, keypoints),
-            (looked, age_s, self.LOOKS), self.dt_s, self.tracker.config,
-        )  # fmt: skip
+        whole_images = self.looked(ids, age_s) & believed(self.frozen, ids)
+        shown = find_unexplained(keypoints, age_s, estimate, self.P, self.axes[:, 2])
+        shown.unexplained[:] |= whole_images & self.strangers(ids)
+        looks = Looks(whole_images, age_s, self.LOOKS, shown)
+        ours = our_joints(estimate, self.calibration)
+        dt_s, config = self.dt_s, self.tracker.config
+        return self.presence.update(ids, ours, found, keypoints, looks, dt_s, config)
+
+    def strangers(self, ids: Ints) -> Bools:
+        """Return (B, C) the cameras whose last search found people beside the workers; here the
+        keypoints hold all people."""
+        return np.zeros((len(ids), len(self.scene.cameras)), np.bool_)
+
+    def vacancy(self, ids: Ints) -> Vacancy:
+        """Return the state of the floor."""
+        return self.presence.vacancy(ids)
 
     def looked(self, ids: Ints, age_s: Floats) -> Bools:
         """(B, C) which cameras have looked over whole images, of these ages [s]: here, all."""
@@ -151,7 +169,7 @@ class PoseTracking(PerceptionPipeline):
 
     def suspected(self, ids: Ints) -> Bools:
         """(B, C) which cameras of environments `ids` are thought to be miscalibrated."""
-        return self.monitored["suspected"][ids]
+        return self.monitored["suspected"][ids] | self.presence.contradicted(ids)
 
     def _age_s(self, ids: Ints, keypoints: Keypoints) -> Floats:
         """(B, C) how old the images of this update are, as they say [s]; NaN: none."""

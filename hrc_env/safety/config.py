@@ -68,9 +68,9 @@ class ShieldConfig:
     `human_m_s` (None: 1.6); within that the robot comes no nearer to where they were. They are
     unknown, as who has no track: images that are later than this make robots slow."""
     unknown_m_s: float = 0.25
-    """While it is unknown where a worker is, no point of the robot moves faster [m/s], within 1 m
-    of where they were seen less, within 0.25 m not at all; nor for 0.5 s while nobody has looked.
-    0: stop."""
+    """Speed limit of every point of the robot while a worker is lost, lower within 1 m of their
+    last place and 0 within 0.25 m, and near floor that one camera alone has seen empty [m/s].
+    Before any look the robot stands. 0: stop."""
     welcome_m_s: float = 0.25
     """To parts of people that a task lets come to the robot's hand, as to take what it brings
     (`Task.welcome`), the hand and what it carries may come so fast, and no faster than the region

@@ -16,32 +16,27 @@ other parts of theirs, nor how near other links come of themselves but for `stil
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from hrc_env.belief import Belief, estimated_separation
+from hrc_env.belief import Belief
 from hrc_env.core.errors import needed
 from hrc_env.core.kernels import kernel
-from hrc_env.core.records import PoseEstimate
-from hrc_env.core.typing import Bools, Floats, Ints, JointVelocities
+from hrc_env.core.typing import Floats, Ints, JointVelocities
 from hrc_env.geometry import chains
 from hrc_env.geometry.chains import lever
 from hrc_env.geometry.distances import segments
 from hrc_env.safety.config import ShieldConfig
 from hrc_env.safety.contact import SEGMENT_REGIONS, permitted_contact_speed
 from hrc_env.safety.robot import RobotModel
-from hrc_env.safety.rows import ABSENT_M, MOST_ROWS, tightest_rows
+from hrc_env.safety.rows import ABSENT_M, MOST_ROWS, floor_rows, tightest_rows
 from hrc_env.safety.separation import WALKING_M_S
 from hrc_env.safety.solver import exceeded, solve
+from hrc_env.safety.unseen import HAND_M, limit_m_s, unseen
 
 NO_NEARER, AWAY = 1e4, 30.0
 """Weights of a row's excess [m/s], against changes of joint velocities [rad/s]."""
-NEAR_M, FAR_M = 0.25, 1.0
-"""So near to where somebody was who is unseen a robot stands; so near it is slower [m]."""
-FIRST_LOOK_S = 0.5
-"""So long a robot stands at first, unless somebody is seen or nobody is found before [s]."""
 HOLDS_M_S = 1e-6
 """A row that is exceeded by less holds."""
 
@@ -70,7 +65,7 @@ def guarded(
 
     - "least_m" (B,): the least D of pairs that matter [m], NaN where there is none;
     - "slack" (B,): by how much the worst row is exceeded, retreats included [m/s];
-    - "unknown" (B,): 1 while it is not known where a worker is, so that the speed is capped.
+    - "unknown" (B,): 1 while it is not known where a worker is, or not detected lately.
 
     Raises:
         ConfigError: the belief has no `RobotModel` or no command in force.
@@ -81,12 +76,12 @@ def guarded(
     allowed, slack = np.empty_like(wanted), np.empty(len(wanted))
     choose = _scaled if config.kind == "ssm" else _nearest
     choose(tuple(found), wanted, allowed)
-    limit_m_s = _limit_m_s(now, config)
-    _capped((*robot, now.robot.capsules_world), limit_m_s, allowed)
+    _capped((*robot, now.robot.capsules_world), limit_m_s(now, config), allowed)
     _slack(found.J, found.b, found.n_rows, allowed, slack)
     least_m = np.where(np.isinf(found.least_m), np.nan, found.least_m)
-    unknown = np.isfinite(limit_m_s).astype(float)
-    return allowed, {"least_m": least_m, "slack": slack, "unknown": unknown}
+    unknown = now.estimate.unknown | unseen(now.estimate, config.unseen_s)
+    said = {"least_m": least_m, "slack": slack, "unknown": unknown.any(1).astype(float)}
+    return allowed, said
 
 
 def constraints(
@@ -101,36 +96,22 @@ def constraints(
         low, high = _within_reach(model, in_force, dt_s)
     J, b = np.empty((batch, MOST_ROWS, model.chain.n_joints)), np.empty((batch, MOST_ROWS))
     found = Constraints(J, b, np.empty(batch, np.int64), low, high, np.empty(batch))
-    robot = now.robot
-    tightest_rows(
-        (chains.forward(model.chain, robot.q), model.chain.slides, _links(model, now),
-         robot.capsules_world, robot.capsule_radius_m, low, high, model.slew_rad_s2),
-        _bodies(now, model, config), config.record(), (J, b, found.n_rows, found.least_m),
+    robot, rows = now.robot, (J, b, found.n_rows, found.least_m)
+    arm = (
+        chains.forward(model.chain, robot.q), model.chain.slides, _links(model, now),
+        robot.capsules_world, robot.capsule_radius_m, low, high, model.slew_rad_s2,
     )  # fmt: skip
+    tightest_rows(arm, _bodies(now, model, config), config.record(), rows)
+    floor = now.unseen
+    if floor is not None and np.isfinite(floor.possible_m).any():
+        come_m = WALKING_M_S * (floor.age_s + config.reaction_s + config.latency_s)
+        where = floor.floor_world, floor.level, floor.piece_m + HAND_M + come_m
+        floor_rows(arm, where, config.record(), rows)
     return found
 
 
 def _model(now: Belief) -> RobotModel:
     return needed(now.model, "A robot's model (RobotModel), which a built-in shield needs,")
-
-
-def _limit_m_s(now: Belief, config: ShieldConfig) -> Floats:
-    """(B,) how fast any point of a robot may be [m/s]; infinite where everybody is known."""
-    estimate, unseen = now.estimate, _unseen(now.estimate, config.unseen_s)
-    limit_m_s = np.where(np.any(estimate.unknown | unseen, axis=1), config.unknown_m_s, np.inf)
-    not_yet = estimate.unknown & ~unseen & (estimate.blind_s < FIRST_LOOK_S)
-    limit_m_s[np.any(not_yet, axis=1)] = 0.0
-    if unseen.any():
-        there = replace(estimate, mean_world=estimate.seen_world, tracked=unseen)
-        near_m = estimated_separation(now.robot, there).distance_m.min(1)
-        limit_m_s *= np.clip((near_m - NEAR_M) / (FAR_M - NEAR_M), 0.0, 1.0)
-    return limit_m_s
-
-
-def _unseen(estimate: PoseEstimate, unseen_s: float) -> Bools:
-    """(B, W) whom cameras showed once, but not lately."""
-    lately = estimate.tracked & (estimate.blind_s <= unseen_s)
-    return ~lately & np.isfinite(estimate.seen_world[..., 0, 0])
 
 
 def _within_reach(
@@ -151,17 +132,17 @@ def _links(model: RobotModel, now: Belief) -> Ints:
 
 def _bodies(now: Belief, model: RobotModel, config: ShieldConfig) -> tuple[Any, ...]:
     """What `rows` wants to know of the workers."""
-    estimate, unseen = now.estimate, _unseen(now.estimate, config.unseen_s)
+    estimate, lost = now.estimate, unseen(now.estimate, config.unseen_s)
     mean, velocity, cov = estimate.mean_world, estimate.velocity_world, estimate.cov_world
     touch_m_s, most_m_s = _touches(now, model, config)
-    if unseen.any():
-        gone = unseen[..., None, None]
+    if lost.any():
+        gone = lost[..., None, None]
         mean, velocity = np.where(gone, estimate.seen_world, mean), np.where(gone, 0.0, velocity)
         cov, touch_m_s = np.where(gone[..., None], 0.0, cov), np.where(gone[..., 0], 0.0, touch_m_s)
     walking_m_s = WALKING_M_S if config.human_m_s is None else config.human_m_s
-    gone_m = np.where(unseen, walking_m_s * estimate.blind_s, 0.0)
+    gone_m = np.where(lost, walking_m_s * estimate.blind_s, 0.0)
     return (
-        segments(mean), mean, velocity, cov, estimate.age_s, estimate.tracked | unseen, gone_m,
+        segments(mean), mean, velocity, cov, estimate.age_s, estimate.tracked | lost, gone_m,
         touch_m_s, most_m_s,
     )  # fmt: skip
 

@@ -16,7 +16,8 @@ bears in a touch: capsules that may touch it brake within gap - margin - Z_d to 
 together keep below that; of others a point may come at `still_m_s`, where D allows less.
 
 Who has not been seen for a while may be anywhere within a walk of where they were: that is taken
-off D, too, and who may be within D the robot comes no nearer to, nor flees from.
+off D, too, and who may be within D the robot comes no nearer to, nor flees from. The same holds for
+people on floor that no camera has seen empty.
 """
 
 import math
@@ -24,6 +25,7 @@ import math
 import numpy as np
 
 from hrc_env.core.kernels import kernel
+from hrc_env.core.records import POSSIBLE, STATURE_M
 from hrc_env.core.skeleton import HAND_SEGMENTS, SEGMENT_ENDS, SEGMENT_RADIUS_M
 from hrc_env.core.typing import Ints
 from hrc_env.geometry.chains import lever
@@ -98,6 +100,43 @@ def tightest_rows(robot, bodies, settings, rows):
                 left_m_s = touch_m_s[e, w, s] - max(speed, 0.0)
                 if left_m_s > 0.0:
                     bound = max(bound, _touching(near, min(left_m_s, most_m_s[c]), slowing, p))
+                if bound < fastest:
+                    count[e] = _kept(row, bound, J[e], b[e], count[e])
+
+
+@kernel(makes_arrays=True)
+def floor_rows(robot, floor, settings, rows):
+    """Add rows for people on floor that no camera has seen empty: a robot can brake before it.
+
+    Args:
+        robot, settings: as of `tightest_rows`.
+        floor: centres of pieces (N, 3) [m], their states (B, N), and the distance from these at
+            which hands may be (B,) [m].
+        rows: those of `tightest_rows`.
+    """
+    frames, slides, link, capsules, radius, low, high, slew = robot
+    (places, level, reach_m), (J, b, count, least_m) = floor, rows
+    p, body = settings[0], np.empty((2, 3))
+    rod, limb = np.empty(5), np.empty(5)
+    normal, point, row = np.empty(3), np.empty(3), np.empty(len(slides))
+    for e in range(len(capsules)):
+        arm = frames[e], slides, low[e], high[e], slew
+        for c in range(capsules.shape[1]):
+            _bound(capsules[e, c], radius[c], rod)
+            stop_m = _stop_m(arm, link[c], capsules[e, c], p)
+            for n in range(len(places)):
+                if level[e, n] != POSSIBLE:
+                    continue
+                body[0], body[1] = places[n], places[n]
+                body[1, 2] += STATURE_M
+                _bound(body, reach_m[e], limb)
+                if _sphere_gap(rod, limb) > stop_m:
+                    continue
+                distance, _ = _nearest(capsules[e, c], body, point, normal)
+                clear = distance - radius[c] - reach_m[e]
+                least_m[e] = min(least_m[e], clear)
+                fastest, slowing = _closing(arm, link[c], point, normal, row)
+                bound = _allowed(clear, min(slowing, p.deceleration_m_s2), True, p)
                 if bound < fastest:
                     count[e] = _kept(row, bound, J[e], b[e], count[e])
 

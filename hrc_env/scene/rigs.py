@@ -1,14 +1,21 @@
 """Rigs by name, and what a rig sees of the place where people are."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 
-from hrc_env.core.records import Grounds
+from hrc_env.core.records import Coverage, Grounds
 from hrc_env.core.typing import Bools, Floats, Points3
 from hrc_env.geometry.camera_config import CameraConfig, made
-from hrc_env.geometry.cameras import PinholeCamera, image_from_pinhole, inside_image, project
-from hrc_env.geometry.shapes import AXES, BOX, CENTRE, HALF_SIZE, KIND, PLANE, REACH
+from hrc_env.geometry.cameras import (
+    PinholeCamera,
+    image_from_pinhole,
+    inside_image,
+    project,
+    rays,
+)
+from hrc_env.geometry.shapes import AXES, BOX, CENTRE, HALF_SIZE, KIND, PLANE, REACH, WIDTH
 from hrc_env.geometry.sight import hidden, nothing
 from hrc_env.scene.build import Scene
 from hrc_env.scene.places import within
@@ -27,20 +34,63 @@ POOR_SHARE = 0.1
 HEIGHTS_M = (0.2, 0.6, 1.0, 1.4, 1.8)
 """Bodies are between these heights above the floor."""
 SPACING_M = 0.5
+PIECE_M = 0.25
+"""Side of a piece of floor [m]."""
+ASIDE_M = ((0.0, 0.0), (0.2, 0.0), (-0.2, 0.0), (0.0, 0.2), (0.0, -0.2))
+"""Middle and sides of a body, from its axis [m]."""
+LEAST_SEEN = 3
+"""A camera detects a person if it sees this number of the heights."""
+FAR_M, VIEW_POINTS = 8.0, 12
+"""Range within which views are compared [m], and points along each axis."""
 
 
-def floor(grounds: Grounds) -> Points3:
+def floor(grounds: Grounds, spacing_m: float = SPACING_M) -> Points3:
     """(N, 3) points all over the walkable floor [m], without those in the robot or other things."""
-    points = workspace(grounds)
+    points = workspace(grounds, spacing_m)
     points = points[points[:, 2] == HEIGHTS_M[0]] * (1.0, 1.0, 0.0)
     from_robot_m = np.linalg.norm(points[:, :2] - grounds.robot_xy_m, axis=-1)
     return points[~within(points, grounds.blocked) & (from_robot_m > grounds.robot_clearance_m)]
 
 
-def workspace(grounds: Grounds) -> Points3:
+def coverage(scene: Scene) -> Coverage:
+    """Return the cameras of a scene's rig that would detect people on each piece of its floor."""
+    return coverage_of(scene.cameras, scene.obstacles, floor(scene.grounds, PIECE_M))
+
+
+def coverage_of(
+    cameras: tuple[PinholeCamera, ...], still: Floats, floor_world: Points3
+) -> Coverage:
+    """Return the same for cameras among obstacles (G, WIDTH), and pieces of floor whose centres
+    (N, 3) are about `PIECE_M` apart [m]."""
+    body = [(*aside, z) for z in HEIGHTS_M for aside in ASIDE_M]
+    points = (floor_world[:, None] + body).reshape(-1, 3)
+    seen = sees(cameras, still, points)
+    seen = seen.reshape(len(cameras), len(floor_world), len(HEIGHTS_M), len(ASIDE_M)).any(-1)
+    finds, group = np.unique(seen.sum(-1).T >= LEAST_SEEN, axis=0, return_inverse=True)
+    return Coverage(floor_world, PIECE_M / math.sqrt(2.0), group.reshape(-1), finds)
+
+
+def common_views(cameras: tuple[PinholeCamera, ...]) -> Coverage:
+    """Return the sets of two or more cameras whose views overlap within `FAR_M`, or one empty set,
+    without pieces of floor."""
+    share = (np.arange(VIEW_POINTS) + 0.5) / VIEW_POINTS
+    points = []
+    for camera in cameras:
+        px = np.stack(np.meshgrid(share * camera.width_px, share * camera.height_px), -1)
+        along = rays(camera, px.reshape(-1, 2))
+        depths_m = np.linspace(0.0, FAR_M, VIEW_POINTS + 1)[1:, None, None]
+        points.append((camera.eye_world + depths_m * along).reshape(-1, 3))
+    nothing_there = np.zeros((0, WIDTH))
+    sets = np.unique(sees(cameras, nothing_there, np.concatenate(points)).T, axis=0)
+    several = sets[sets.sum(1) > 1]
+    finds = several if len(several) else np.zeros((1, len(cameras)), np.bool_)
+    return Coverage(np.zeros((0, 3)), 0.0, np.zeros(0, np.int64), finds)
+
+
+def workspace(grounds: Grounds, spacing_m: float = SPACING_M) -> Points3:
     """(P, 3) points all over the walkable area, from ankles to heads [m]."""
     (x0, x1), (y0, y1) = grounds.walkable_x_m, grounds.walkable_y_m
-    n_x, n_y = (max(2, round((b - a) / SPACING_M)) for a, b in ((x0, x1), (y0, y1)))
+    n_x, n_y = (max(2, round((b - a) / spacing_m)) for a, b in ((x0, x1), (y0, y1)))
     grid = np.meshgrid(np.linspace(x0, x1, n_x), np.linspace(y0, y1, n_y), HEIGHTS_M)
     return np.stack([axis.ravel() for axis in grid], -1)
 

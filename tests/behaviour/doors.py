@@ -39,6 +39,7 @@ from hrc_env.belief import (
 from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import (
+    Coverage,
     Cue,
     HandState,
     Held,
@@ -109,9 +110,10 @@ from hrc_env.scene.robot import ROBOTS, chain_of
 from hrc_env.simulation import Simulation
 from hrc_env.tasks.spot import Spot, check_spots
 from hrc_env.tasks.task import task_called
-from hrc_env.tracking import oracle
+from hrc_env.tracking import oracle, presence
 from hrc_env.tracking.calibration_monitor import forget_monitor, make_monitor, monitor
 from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.contradiction import Shown
 from hrc_env.tracking.estimators import ESTIMATORS, estimator_called, make_estimator
 from hrc_env.tracking.forecast import forecast
 from hrc_env.tracking.frozen_frames import (
@@ -121,13 +123,6 @@ from hrc_env.tracking.frozen_frames import (
     make_frozen,
 )
 from hrc_env.tracking.people.association import associate
-from hrc_env.tracking.presence import (
-    IMAGES,
-    SEARCHES,
-    forget_presence,
-    make_presence,
-    with_presence,
-)
 from hrc_env.tracking.smoother import smooth
 from hrc_env.vector.env import HRCVectorEnv
 from hrc_env.worker import body as bodies
@@ -1254,22 +1249,23 @@ class Presence:
 
     def __init__(self, shape: tuple[int, int], n_cameras: int, step_s: float) -> None:
         """Begin, before anybody has looked."""
-        self._known, self._step_s = make_presence(*shape, n_cameras), step_s
+        seen = Coverage(np.zeros((1, 3)), 0.1, np.zeros(1, int), np.ones((1, n_cameras), np.bool_))
+        self._known, self._step_s = presence.Presence(*shape, seen), step_s
 
     def forget(self, places: NDArray[np.int64]) -> None:
         """Begin some places anew."""
-        forget_presence(self._known, places)
+        self._known.forget(places)
 
     def look(
         self, belief: Mapping[str, Any], found: Mapping[str, Any], own: Mapping[str, Any],
         looked: NDArray[np.bool_], age_s: NDArray[np.float64], by_search: bool,
     ) -> dict[str, NDArray[Any]]:  # fmt: skip
         """Return the belief with whom is unknown, after one look of every camera."""
-        enough = SEARCHES if by_search else IMAGES
-        said = with_presence(
-            self._known, np.arange(len(looked)), _as_estimate(belief),
-            (_as_keypoints(found), _as_keypoints(own)), (looked, age_s, enough), self._step_s,
-            TrackerConfig(),
+        enough = presence.SEARCHES if by_search else presence.IMAGES
+        nobody = Shown(np.zeros_like(looked), np.zeros_like(looked))
+        said = self._known.update(
+            np.arange(len(looked)), _as_estimate(belief), _as_keypoints(found), _as_keypoints(own),
+            presence.Looks(looked, age_s, enough, nobody), self._step_s, TrackerConfig(),
         )  # fmt: skip
         return _as_values(said)
 

@@ -11,17 +11,26 @@ import hrc_env
 from agents.env_info import env_info
 from agents.registry import make_agent
 from hrc_env import simulation
-from hrc_env.belief import estimated_separation
+from hrc_env.belief import estimated_separation, of_concern, unseen_floor
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.records import WorkerPath
+from hrc_env.core.records import (
+    EMPTY,
+    POSSIBLE,
+    PROBABLY_EMPTY,
+    Coverage,
+    Vacancy,
+    WorkerPath,
+)
 from hrc_env.core.skeleton import JOINT
 from hrc_env.env import HRCEnv
 from hrc_env.geometry import chains
+from hrc_env.geometry.distances import least_separation
 from hrc_env.motion import generator
 from hrc_env.render.overlay import SHIELD
 from hrc_env.safety.config import PRESETS, ShieldConfig
 from hrc_env.safety.guard import guarded
 from hrc_env.safety.incidents import MOVING_M_S
+from hrc_env.safety.unseen import limit_m_s
 
 VELOCITIES = ("velocity_world", "angular_velocity_world")
 NO_DOUBT = {"sigmas": 0.0, "least_sigmas_m": 0.0, "human_m_s": 0.0}
@@ -178,22 +187,95 @@ def fastest_m_s(part, command):
     return np.linalg.norm(moved, axis=-1).max() / 1e-6
 
 
+def never_seen(now, *places, level=POSSIBLE):
+    """A belief in which nobody was ever seen, and floor at these places (x, y) of the tool's was
+    not seen empty; none: anywhere."""
+    somebody = np.ones_like(now.estimate.tracked)
+    nowhere = np.full_like(now.estimate.mean_world, np.nan)
+    estimate = replace(now.estimate, tracked=~somebody, unknown=somebody, seen_world=nowhere)
+    if not places:
+        return replace(now, estimate=estimate)
+    tool = now.robot.tool_world[0] * (1.0, 1.0, 0.0)
+    where = tool + np.array([(*place, 0.0) for place in places])
+    coverage = Coverage(where, 0.0, np.zeros(len(where), int), np.ones((1, 4), bool))
+    levels = np.full((1, estimate.tracked.shape[1], 1), level)
+    floor = unseen_floor(now.robot, estimate, Vacancy(coverage, levels, np.zeros((1, 1))))
+    return replace(now, estimate=of_concern(estimate, floor), unseen=floor)
+
+
+@pytest.mark.parametrize("task", ["HRCReach-v0", "HRCDelivery-v0"])
+def test_where_nobody_has_looked_a_robot_stands(task):
+    part, now = believed(task)
+    allowed, said = guarded(never_seen(now), part.model.fastest_rad_s[None], 0.04, ShieldConfig())
+    assert said["unknown"] == 1.0
+    np.testing.assert_array_equal(allowed, 0.0)
+
+
 @pytest.mark.parametrize("task", ["HRCReach-v0", "HRCDelivery-v0"])
 @pytest.mark.parametrize("limit_m_s", [0.25, 0.0])
-def test_while_a_worker_is_unknown_no_point_is_faster(task, limit_m_s):
+def test_near_floor_that_one_camera_alone_has_seen_empty_no_point_is_faster(task, limit_m_s):
     part, now = believed(task)
-    somewhere = np.ones_like(now.estimate.tracked)
-    never = np.full_like(now.estimate.mean_world, np.nan)
-    never_seen = {"tracked": ~somewhere, "unknown": somewhere, "seen_world": never}
-    now = replace(now, estimate=replace(now.estimate, **never_seen))
-    wanted = part.model.fastest_rad_s[None]
-    waiting, _ = guarded(now, wanted, 0.04, ShieldConfig())
-    np.testing.assert_array_equal(waiting, 0.0)
-    now.estimate.blind_s[:] = 0.5
-    allowed, said = guarded(now, wanted, 0.04, ShieldConfig(unknown_m_s=limit_m_s))
+    wanted, config = part.model.fastest_rad_s[None], ShieldConfig(unknown_m_s=limit_m_s)
+    near = never_seen(now, (0.3, 0.0), level=PROBABLY_EMPTY)
+    allowed, said = guarded(near, wanted, 0.04, config)
     assert said["unknown"] == 1.0
     assert fastest_m_s(part, allowed) == pytest.approx(limit_m_s, abs=1e-4)
     np.testing.assert_allclose(np.cross(allowed[0, :3], wanted[0, :3]), 0.0, atol=1e-12)
+    far = never_seen(now, (3.0, 0.0), level=PROBABLY_EMPTY)
+    allowed, said = guarded(far, wanted, 0.04, config)
+    assert said["unknown"] == 0.0
+    np.testing.assert_array_equal(allowed, wanted)
+
+
+def test_to_floor_that_no_camera_has_seen_a_robot_comes_no_nearer_and_may_leave_it():
+    part, now = believed()
+    now = replace(now, command=np.zeros_like(now.command))
+    moves = np.random.default_rng(0).uniform(-0.3, 0.3, (40, 6))
+    near, empty = (never_seen(now, (0.15, 0.0), level=level) for level in (POSSIBLE, EMPTY))
+    closing = []
+    for wanted in moves:
+        allowed, said = guarded(near, wanted[None], 0.04, ShieldConfig())
+        moved = chains.capsules(part.chain, now.robot.q + 1e-6 * allowed)
+        gaps = [floor_gap_m(near, capsules) for capsules in (now.robot.capsules_world, moved)]
+        closing.append((gaps[0] - gaps[1]) / 1e-6)
+        assert said["unknown"] == 1.0
+        free, said = guarded(empty, wanted[None], 0.04, ShieldConfig())
+        assert said["unknown"] == 0.0
+        np.testing.assert_array_equal(free[0], wanted)
+    assert max(closing) < 2e-3
+    assert min(closing) < -0.05
+
+
+def floor_gap_m(now, capsules):
+    """From capsules to a line above the first piece of floor."""
+    foot = now.unseen.floor_world[:1]
+    line = np.stack([foot, foot + np.array([0.0, 0.0, 1.8])], 1)
+    return least_separation(
+        capsules, now.robot.capsule_radius_m, line[None], np.zeros(1)
+    ).distance_m
+
+
+@pytest.mark.parametrize(
+    ("wide_m", "slow"), [((0.02, 0.08, 0.4), False), ((0.05, 0.15, 0.4), True)]
+)
+def test_hands_that_no_camera_shows_may_be_anywhere_within_an_arm_of_their_shoulders(wide_m, slow):
+    part, now = believed()
+    estimate, wanted = now.estimate, part.model.fastest_rad_s[None]
+    mean, cov = estimate.mean_world.copy(), estimate.cov_world.copy()
+    for side, aside_m in (("left", 0.9), ("right", 0.8)):
+        mean[..., JOINT[f"{side}_shoulder"], :] = now.robot.tool_world[:, None] + (
+            aside_m,
+            0.0,
+            0.2,
+        )
+    mean[..., JOINT["right_wrist"], :] += (3.0, 0.0, 0.0)
+    cov[..., JOINT["right_wrist"], :, :] = np.diag(np.square(wide_m))
+    far = replace(estimate, mean_world=mean, cov_world=cov)
+    limit = limit_m_s(replace(now, estimate=far), ShieldConfig())
+    assert np.isfinite(limit[0]) == slow
+    if slow:
+        allowed, _ = guarded(replace(now, estimate=far), wanted, 0.04, ShieldConfig())
+        assert fastest_m_s(part, allowed) <= limit[0] + 1e-4
 
 
 def unseen(now, away_m, blind_s=0.5, **known):
@@ -228,15 +310,16 @@ def test_towards_where_somebody_unseen_may_be_it_comes_no_nearer_and_elsewhere_i
 
 def test_robots_whose_cameras_all_fail_come_no_nearer_to_where_people_were():
     lost = [{"kind": "lost", "cameras": ["all"], "from_s": 1.0}]
-    gaps_m, blind_s = [], []
+    gaps_m, blind_s, driven = [], [], []
     for _, now in steps(vector(24, "qp", perception="keypoints", faults=lost), 75):
         there = replace(now.estimate, mean_world=now.estimate.seen_world)
         there.tracked[:] = True
         gaps_m.append(estimated_separation(now.robot, there).distance_m[:, 0])
         blind_s.append(now.estimate.blind_s[:, 0])
+        driven.append(now.command.any(1))
     gaps, blind = np.array(gaps_m)[:-1], np.array(blind_s)[:-1]
     narrowed = -np.diff(gaps_m, axis=0)
-    near = (blind > 0.6) & (gaps < 0.5)
+    near = (blind > 0.6) & (gaps < 0.5) & driven[1:]
     assert near.any(0).sum() > 5
     assert narrowed[near].max() < 0.04 * MOVING_M_S
     assert narrowed[(blind == 0.0) & (gaps < 0.5)].max() > 5e-3

@@ -1,0 +1,95 @@
+"""Speed limits for undetected people: lost workers, hidden hands, and floor not seen empty."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from hrc_env.belief import Belief, estimated_separation
+from hrc_env.core.records import PoseEstimate
+from hrc_env.core.skeleton import JOINT
+from hrc_env.core.typing import Bools, Floats
+from hrc_env.geometry.distances import least_separation
+from hrc_env.safety.config import ShieldConfig
+from hrc_env.safety.separation import WALKING_M_S
+
+NEAR_M, FAR_M = 0.25, 1.0
+"""Distances from a lost worker's last place at which a robot stands, and begins to slow [m]."""
+UNLOCATED_M = 0.135
+"""A wrist is hidden if its standard deviation exceeds this along two axes, beyond the growth by
+prediction [m]; one that a camera detects is uncertain in depth only."""
+HAND_M = 0.3
+"""Distance beyond unseen floor at which hands of people there may be unseen as well [m]."""
+ARM_M = 0.75
+"""Length of a stretched arm, from the shoulder to the tip of the hand [m]."""
+WRISTS, SHOULDERS = (
+    [JOINT[f"{side}_{joint}"] for side in ("left", "right")] for joint in ("wrist", "shoulder")
+)
+
+
+def unseen(estimate: PoseEstimate, unseen_s: float) -> Bools:
+    """Return (B, W) the workers that were detected once, but not in the last `unseen_s` [s]."""
+    lately = estimate.tracked & (estimate.blind_s <= unseen_s)
+    return ~lately & np.isfinite(estimate.seen_world[..., 0, 0])
+
+
+def limit_m_s(now: Belief, config: ShieldConfig) -> Floats:
+    """Return (B,) the speed limit of every point of a robot [m/s]; infinite without a reason."""
+    estimate = now.estimate
+    lost = unseen(estimate, config.unseen_s)
+    never_seen = estimate.unknown & ~lost
+    limit = _of_hands(now, config)
+    if lost.any():
+        limit = np.minimum(limit, _of_lost(now, lost, config))
+    if never_seen.any():
+        limit = np.minimum(limit, _of_floor(now, never_seen, config))
+    return limit
+
+
+def _of_lost(now: Belief, lost: Bools, config: ShieldConfig) -> Floats:
+    """Return (B,) the limit by the distance from the last places of lost workers."""
+    there = replace(now.estimate, mean_world=now.estimate.seen_world, tracked=lost)
+    near_m = estimated_separation(now.robot, there).distance_m.min(1)
+    share = np.clip((near_m - NEAR_M) / (FAR_M - NEAR_M), 0.0, 1.0)
+    return np.where(lost.any(1), config.unknown_m_s * share, np.inf)
+
+
+def _of_floor(now: Belief, never_seen: Bools, config: ShieldConfig) -> Floats:
+    """Return (B,) the limit near floor that one camera alone has seen empty; 0 without any look.
+
+    `rows.floor_rows` keeps the distance from floor that no camera has seen.
+    """
+    if now.unseen is None:
+        return np.where(never_seen.any(1), 0.0, np.inf)
+    gap_m = now.unseen.probable_m - WALKING_M_S * now.unseen.age_s
+    return np.maximum(_in_time_m_s(gap_m, config), config.unknown_m_s)
+
+
+def _of_hands(now: Belief, config: ShieldConfig) -> Floats:
+    """Return (B,) the limit for hidden hands of tracked workers.
+
+    They may be anywhere within an arm's length of their shoulders, in any direction.
+    """
+    estimate, limit = now.estimate, np.full(len(now.estimate.tracked), np.inf)
+    cov = estimate.cov_world[:, :, WRISTS]
+    most_m = UNLOCATED_M + config.predicted_m_s * estimate.age_s[:, :, WRISTS]
+    hidden = estimate.tracked[..., None] & (np.trace(cov, axis1=-2, axis2=-1) > 2 * most_m**2)
+    hidden[hidden] = np.linalg.eigvalsh(cov[hidden])[:, 1] > most_m[hidden] ** 2
+    if not hidden.any():
+        return limit
+    shoulders = estimate.mean_world[:, :, SHOULDERS]
+    points = np.repeat(shoulders[..., None, None, :], 2, axis=-2)
+    robot = now.robot.capsules_world, now.robot.capsule_radius_m
+    away_m = least_separation(*robot, points, np.zeros(1)).distance_m
+    variance = np.trace(estimate.cov_world[:, :, SHOULDERS], axis1=-2, axis2=-1) / 3
+    gap_m = away_m - ARM_M - config.sigmas * np.sqrt(variance)
+    return np.where(hidden, _in_time_m_s(gap_m, config), np.inf).min((1, 2))
+
+
+def _in_time_m_s(gap_m: Floats, config: ShieldConfig) -> Floats:
+    """Return the speed from which a robot can stop before a person who walks over this gap is
+    within `NEAR_M` of it: `separation.protective_distance` solved for the robot's speed."""
+    brake, walking = config.deceleration_m_s2, WALKING_M_S
+    reaction_s = config.reaction_s + config.latency_s
+    left_m = np.maximum(gap_m - NEAR_M - walking * reaction_s, 0.0)
+    per_m_s = reaction_s + walking / brake
+    return brake * (np.sqrt(per_m_s**2 + 2.0 * left_m / brake) - per_m_s)
