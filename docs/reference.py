@@ -137,6 +137,10 @@ INFOS = {
         "names", "cameras that contradict the others as if they had been moved, turned or zoomed; "
         "at `pixels` and `keypoints`",
     ),
+    "perception/more_people": (
+        "bool", "cameras detect more people than there are slots for workers, which makes all "
+        "slots unknown; at `pixels` and `keypoints`",
+    ),
 }  # fmt: skip
 """Keys of info but the reward's terms: unit, meaning."""
 

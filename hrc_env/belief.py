@@ -10,9 +10,12 @@ import numpy as np
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import (
     EMPTY,
+    POSSIBLE,
     STATURE_M,
+    Coverage,
     HandState,
     ObjectState,
+    Others,
     PoseEstimate,
     RobotState,
     Vacancy,
@@ -27,13 +30,16 @@ from hrc_env.geometry.distances import (
 )
 from hrc_env.safety.robot import RobotModel
 
+PERSON_M, WALKING_M_S = 0.5, 1.6
+"""Distance of the floor that people take up from their hips [m]; how fast they walk [m/s]."""
 NEAR_FLOOR_M = 1.5
 """Floor farther from a robot than this is of no concern [m]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class UnseenFloor:
-    """The floor on which an undetected person may be, for unknown slots without a last sighting."""
+    """The floor on which a person without a track may be: of unknown slots without a last sighting,
+    and of people beyond the slots."""
 
     floor_world: Points3
     """(N, 3) centres of pieces of floor [m]."""
@@ -103,13 +109,14 @@ def unseen_floor(
     """
     if vacancy is None:
         return None
-    coverage = vacancy.coverage
+    coverage, others = vacancy.coverage, vacancy.others
     asked = estimate.unknown & _never_seen(estimate)
     level = np.full((len(asked), len(coverage.group)), EMPTY)
     gaps, age_s = np.full((len(asked), EMPTY), np.inf), np.zeros(len(asked))
-    if asked.any():
+    if asked.any() or others.any.any():
         of_group = np.where(asked[..., None], vacancy.level, EMPTY).min(1)
         level = of_group[:, coverage.group]
+        level[_reached(others, coverage)] = POSSIBLE
         age_s = np.where(asked, vacancy.age_s, 0.0).max(1)
         capsules, radius_m = robot.capsules_world, robot.capsule_radius_m
         _nearest_floor(capsules, radius_m, coverage.floor_world, coverage.piece_m, level, gaps)
@@ -121,11 +128,19 @@ def of_concern(estimate: PoseEstimate, unseen: UnseenFloor | None) -> PoseEstima
     if unseen is None:
         return estimate
     far = np.isinf(unseen.possible_m) & np.isinf(unseen.probable_m)
-    return replace(estimate, unknown=estimate.unknown & ~(far[:, None] & _never_seen(estimate)))
+    elsewhere = far[:, None] & (_never_seen(estimate) | estimate.tracked)
+    return replace(estimate, unknown=estimate.unknown & ~elsewhere)
 
 
 def _never_seen(estimate: PoseEstimate) -> Bools:
     return np.isnan(estimate.seen_world[..., 0, 0])
+
+
+def _reached(others: Others, coverage: Coverage) -> Bools:
+    """Return (B, N) the pieces of floor where people beyond the slots may be by now."""
+    off_xy_m = coverage.floor_world[:, None, :2] - others.hips_world[:, None, :, :2]
+    reach_m = PERSON_M + WALKING_M_S * np.where(np.isinf(others.age_s), 0.0, others.age_s)
+    return (np.linalg.norm(off_xy_m, axis=-1) < reach_m[:, None]).any(-1)
 
 
 @kernel(makes_arrays=True)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env import metrics
-from hrc_env.core.records import PoseEstimate, RobotState, WorkerTruth
+from hrc_env.core.records import PoseEstimate, RobotState, Vacancy, WorkerTruth
 from hrc_env.core.typing import Bools, Floats, Ints, Records
 from hrc_env.metrics import CostConfig
 from hrc_env.motion import generator
@@ -33,6 +33,8 @@ CONTACT_KIND, CONTACT_REGION = "safety/contact_kind", "safety/contact_region"
 ABSENT = "absent"
 MISCALIBRATED = "perception/miscalibrated"
 """Names of cameras that contradict the others as if they had been moved, turned or zoomed."""
+MORE_PEOPLE = "perception/more_people"
+"""Whether cameras detect more people than there are slots for workers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,12 +132,13 @@ def worker_info(activity: Ints, body: Ints, bodies: tuple[str, ...]) -> Info:
     return {ACTIVITY: _named(activity, generator.activity_names), BODY: _named(worn, bodies)}
 
 
-def miscalibration_info(cameras: tuple[str, ...], suspected: Bools) -> Info:
-    """Which of the cameras (B, C) contradict the others; nothing where there are no cameras."""
-    if not suspected.shape[1]:
+def perception_info(cameras: tuple[str, ...], suspected: Bools, vacancy: Vacancy | None) -> Info:
+    """The cameras (B, C) that contradict the others, and whether there are more people than slots;
+    nothing without cameras."""
+    if vacancy is None:
         return {}
     named = (tuple(compress(cameras, row)) for row in suspected.tolist())
-    return {MISCALIBRATED: np.fromiter(named, object)}
+    return {MISCALIBRATED: np.fromiter(named, object), MORE_PEOPLE: vacancy.others.any}
 
 
 def _named(indices: Ints, names: tuple[str, ...]) -> NDArray[np.object_]:

@@ -73,8 +73,9 @@ class PoseEstimate:
     """(B, W) whether there is a track; False: prior or predicting for too long (lost)."""
     unknown: Bools = None  # type: ignore[assignment]
     """(B, W) whether a person without a track may be there: lost, not searched for enough, detected
-    but not tracked, or on floor that no two cameras see (`tracking.presence`). A slot that is
-    neither tracked nor unknown is empty. Not given: every slot without a track is unknown."""
+    but not tracked, or on floor that no two cameras see (`tracking.presence`); every slot while
+    there are more people than slots. A slot that is neither tracked nor unknown is empty. Not
+    given: every slot without a track is unknown."""
     blind_s: Floats = None  # type: ignore[assignment]
     """(B, W) seconds since cameras last said something: saw the worker, or that nobody is there;
     of who was never seen or looked for, since the reset. Not given: the youngest joint's age."""
@@ -113,6 +114,30 @@ class Coverage:
     """(G, C) the sets of cameras that occur."""
 
 
+MOST_OTHERS = 4
+"""Number of people beyond the workers' slots that are remembered."""
+
+
+@dataclass(frozen=True, slots=True)
+class Others:
+    """Detected people beyond the workers' slots."""
+
+    hips_world: Points3
+    """(B, N, 3) where they were [m]; NaN where there are fewer."""
+    age_s: Floats
+    """(B, N) time since they were detected [s]; infinite where there are fewer."""
+
+    @property
+    def any(self) -> Bools:
+        """(B,) whether there are more people than slots."""
+        return np.asarray(np.isfinite(self.age_s).any(-1))
+
+
+def no_others(batch: int) -> Others:
+    """Return that there are no more people than slots."""
+    return Others(np.full((batch, MOST_OTHERS, 3), np.nan), np.full((batch, MOST_OTHERS), np.inf))
+
+
 @dataclass(frozen=True, slots=True)
 class Vacancy:
     """The state of the floor for workers' slots without a track."""
@@ -122,6 +147,8 @@ class Vacancy:
     """(B, W, G) `POSSIBLE`, `PROBABLY_EMPTY` or `EMPTY`, by groups of a `Coverage`."""
     age_s: Floats
     """(B, W) age of the oldest look behind these states [s]."""
+    others: Others
+    """The detected people beyond the slots."""
 
 
 @dataclass(frozen=True, slots=True)

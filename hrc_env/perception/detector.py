@@ -25,6 +25,7 @@ from hrc_env.perception import blazepose, network
 from hrc_env.perception.believing import is_somebody
 from hrc_env.perception.noise import ERROR, STANDING, sigma_px
 from hrc_env.perception.searching import (
+    STATURE_OF_SIDE,
     Candidates,
     ImageSource,
     Views,
@@ -39,8 +40,6 @@ from hrc_env.perception.searching import (
 from hrc_env.perception.weights import find_weights
 
 SIDE = network.LANDMARK_SIDE
-STATURE_OF_SIDE = 0.75
-"""Stature of an upright worker as a share of the side of BlazePose's window round them."""
 ResultT = TypeVar("ResultT")
 _THREAD = threading.local()
 """Its `networks`: those of one of a detector's two threads."""

@@ -16,7 +16,7 @@ from hrc_env.geometry.lens import lens_row
 from hrc_env.geometry.sight import Surroundings
 from hrc_env.perception import emulator_kernel as kernels
 from hrc_env.perception.calibration import POSTURED, Calibration, changed_ns, read_calibration
-from hrc_env.perception.detector import STATURE_OF_SIDE
+from hrc_env.perception.searching import STATURE_OF_SIDE
 from hrc_env.perception.sightlines import CAMERA, N_LOOK, World, sight_batch
 
 

@@ -30,12 +30,16 @@ SEARCH_RAD = math.radians(75.0)
 """In a wider search window people are too small for the detector stage."""
 STATURE_M = 1.75
 """Of the people for whom a search is laid out [m]."""
+STATURE_OF_SIDE = 0.75
+"""Stature of an upright worker as a share of the side of BlazePose's window round them."""
 ROOM, FITTING = 2.1, (1.25, 2.8)
 """Sides of search windows in heights of a person, and where the detector stage still finds most."""
 MEETING_M = 0.3
 """Lines of sight that pass a point within this distance [m] see the same hips there."""
 SIDE_M = (1.1, 3.6)
 """Sides of the detector stage's window at a person's distance [m]: folded up, tall and reaching."""
+SAME = 0.2
+"""Windows whose middles are nearer than this share of a side show the same person."""
 MIN_CROSSING = 0.1
 """Sine of the smallest angle between two lines that fixes a point."""
 LEAST_CONTRAST = 3.0
@@ -54,6 +58,14 @@ class ImageSource(Protocol):
     def crop(self, camera_index: int, window: Roi) -> Image:
         """The window of a camera's present image, upright, (256, 256, 3) RGB."""
         ...
+
+
+class Sighting(NamedTuple):
+    """A person in whole images."""
+
+    hips_world: Points3  # (3,) [m]; of a camera alone, by the size of an upright person
+    windows: Views  # (C,) the window of each camera that detects them
+    cameras: int  # the number of these
 
 
 class Searched(NamedTuple):
@@ -165,13 +177,41 @@ def agreed_windows(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> 
     the same person, and not too small or large a one: else nobody."""
     if len(cameras) == 1:
         return [found[0] if found else None for found in candidates]
-    best: Views = [None] * len(cameras)
-    best_rank = (1, 0.0)
+    agreed = _agreed(candidates, cameras)
+    return [None] * len(cameras) if agreed is None else agreed.windows
+
+
+def sightings(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> list[Sighting]:
+    """Return the people among candidates (C,): those on whom several cameras agree, best first,
+    then those whom one camera alone detects."""
+    found = []
+    while (agreed := _agreed(candidates, cameras)) is not None:
+        found.append(agreed)
+        candidates = apart_from(candidates, [agreed.windows])
+    for c, (camera, windows) in enumerate(zip(cameras, candidates, strict=True)):
+        for window in windows:
+            alone: Views = [window if k == c else None for k in range(len(cameras))]
+            found.append(Sighting(_by_size(camera, window), alone, 1))
+    return found
+
+
+def _agreed(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Sighting | None:
+    """Return the person on whom most cameras agree best; None unless two do."""
+    best, best_rank = None, (1, 0.0)
     for point in _crossings(candidates, cameras):
         windows, rank = _support(point, candidates, cameras)
         if rank > best_rank:
-            best, best_rank = windows, rank
+            best, best_rank = Sighting(point, windows, rank[0]), rank
     return best
+
+
+def _by_size(camera: PinholeCamera, window: Roi) -> Points3:
+    """Return the place (3,) at which an upright person has a window of this size [m]."""
+    (x, y), half_px = window.centre_px, window.side_px / 2
+    along, edge = rays(camera, np.array([[x, y], [x, y + half_px]]))
+    half_m = STATURE_M / STATURE_OF_SIDE / 2
+    away_m = half_m / math.tan(math.acos(min(float(along @ edge), 1.0 - 1e-9)))
+    return np.asarray(camera.eye_world + away_m * along)
 
 
 def proposals(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Iterator[Views]:
@@ -194,11 +234,12 @@ def apart_from(candidates: Candidates, others: Sequence[Sequence[Roi | None]]) -
     ]
 
 
-def same_person(window: Roi, other: Roi | None) -> bool:
-    """Whether two windows of one camera have their middle, the hips, in nearly one place."""
+def same_person(window: Roi, other: Roi | None, share: float = SAME) -> bool:
+    """Return whether two windows of one camera have their middle, the hips, in nearly one place:
+    within this share of a side."""
     if other is None:
         return False
-    return math.dist(window.centre_px, other.centre_px) < 0.2 * other.side_px
+    return math.dist(window.centre_px, other.centre_px) < share * other.side_px
 
 
 def _crossings(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Iterator[Points3]:

@@ -1,18 +1,20 @@
 """Detects every worker of a scene: windows where they are expected, searches, people missed."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from hrc_env.core.batching import Stateful
 from hrc_env.core.records import Keypoints, PoseEstimate
-from hrc_env.core.typing import Bools, Floats, Image, Ints, Points3
+from hrc_env.core.typing import Bools, Capsules, Floats, Image, Ints, Points3
 from hrc_env.geometry.cameras import PinholeCamera, project, projections
 from hrc_env.perception.detector import Detection, DetectorConfig, PoseDetector
 from hrc_env.perception.noise import ERROR, STANDING
 from hrc_env.perception.outline import is_folded, posture_of
-from hrc_env.perception.searching import Candidates, ImageSource, Views, apart_from
+from hrc_env.perception.searching import Candidates, ImageSource, Sighting, Views
 from hrc_env.perception.windows import steady_window, window_from_joints
+from hrc_env.pipeline.bystanders import HIPS, Bystanders
 from hrc_env.pipeline.reacquisition import ENOUGH, Reacquisition, SearchSchedule
 from hrc_env.pipeline.sensor_input import Windows
 
@@ -20,7 +22,7 @@ from hrc_env.pipeline.sensor_input import Windows
 class Looking(Stateful):
     """Finds the workers of a batch of environments in a rig's images, wherever these are from."""
 
-    CHANGES = ("detector", "windows", "schedule", "reacquisition", "unexplained")
+    CHANGES = ("detector", "windows", "schedule", "reacquisition", "bystanders", "unexplained")
 
     def __init__(
         self,
@@ -41,8 +43,10 @@ class Looking(Stateful):
         ]
         self.schedule = SearchSchedule(batch, len(self.cameras), config.search_every)
         self.reacquisition = Reacquisition(batch, n_workers, self.cameras)
+        self.bystanders = Bystanders(batch, n_workers, self.cameras)
         self.unexplained = np.zeros((batch, len(self.cameras)), np.bool_)
-        """(B, C) whether a camera's last search found people beside the workers."""
+        """(B, C) whether a camera's last search found a person who is neither a worker nor one of
+        the `bystanders`."""
         self.seen: dict[int, tuple[Views, list[Image | None]]] = {}
         """Windows and crops of each environment's first worker: for pictures, no state."""
 
@@ -53,6 +57,7 @@ class Looking(Stateful):
         b: int,
         has_image: Sequence[bool],
         out: Keypoints,
+        robot_world: Capsules | None = None,
     ) -> None:
         """Look for every worker of environment b: those with a window first; one search serves all
         the others. Who is in view of cameras without an image only is not looked for.
@@ -61,11 +66,14 @@ class Looking(Stateful):
             source: the images, of which cameras (C,) that `has_image` have one now.
             expected: where the tracker expects the workers, (W, ...).
             out: (C, W, ...) is filled.
+            robot_world: the robot's capsules (K, 2, 3) [m]: of more people than slots those nearest
+                to it get one. None: those who were followed first.
         """
+        self.schedule.tick(b)
+        self.bystanders.tick(b)
         wanted = [self._windows(expected, w) for w in range(self.n_workers)]
         taken: Windows = []
-        people, missed = None, False
-        self.schedule.tick(b)
+        people, nearest, missed = None, None, False
         for worker in sorted(range(len(wanted)), key=lambda w: not any(wanted[w])):
             steady = list(map(steady_window, self.windows[b][worker], wanted[worker]))
             windows = [w if has else None for w, has in zip(steady, has_image, strict=True)]
@@ -75,20 +83,33 @@ class Looking(Stateful):
                 windows = self._followed(source, b, worker, windows, taken, has_image)
             elif people is None:
                 due = self.schedule.due(b, has_image)
-                found = self.detector.search(source, due)
-                people = self.schedule.remember(b, due, found, self.detector.blank)
+                people = self._search(source, b, due)
+                vacant = self.n_workers - sum(map(any, wanted))
+                nearest = self.bystanders.nearest(people, vacant, robot_world)
             track = self._track(b, worker)
             folded, posture = _expected_posture(expected, worker)
-            seen = self.detector.detect(source, windows, track, taken, people, folded, posture)
+            seen = self.detector.detect(source, windows, track, taken, nearest, folded, posture)
             taken.append(seen.windows)
             shown = seen.confidence.max(-1) > 0.0
             self.reacquisition.saw(b, worker, shown)
             missed |= not any(windows) and shown.sum() < min(ENOUGH, len(shown))
             self._keep(b, worker, seen, has_image, out)
+        if people is None and any(has_image) and self.bystanders.due(b, self.schedule.every):
+            people = self._search(source, b, np.flatnonzero(has_image).tolist())
         if people is not None:
-            self._explain(b, people, taken)
+            hips = np.where(expected.tracked[:, None], expected.mean_world[:, HIPS].mean(1), np.nan)
+            beside = self.bystanders.update(b, people, taken, hips, robot_world)
+            self._explain(b, beside, bool(expected.tracked.all()))
         if missed:
             self.schedule.rest(b)
+
+    def followed(self, ids: Ints, expected: PoseEstimate) -> PoseEstimate:
+        """Return what is expected in environments `ids` without the tracks that are given up to
+        people nearer to the robot."""
+        given_up = self.bystanders.given_up[ids] > 0
+        return (
+            replace(expected, tracked=expected.tracked & ~given_up) if given_up.any() else expected
+        )
 
     def looked(self, ids: Ints) -> Bools:
         """Return (B, C) the cameras of environments `ids` whose whole images were just searched and
@@ -99,6 +120,7 @@ class Looking(Stateful):
         """Forget whom environment b was following."""
         self.unexplained[b] = False
         self.schedule.reset(b)
+        self.bystanders.forget(b)
         for worker in range(self.n_workers):
             self.detector.forget(self._track(b, worker))
             self.reacquisition.reset(b, worker)
@@ -110,11 +132,17 @@ class Looking(Stateful):
         current = self.windows[b][0] if self.windows[b] else []
         return crops if windows == current else [None] * len(current)
 
-    def _explain(self, b: int, people: Candidates, taken: Windows) -> None:
-        """Note the searched cameras that show people (C,) outside of the windows `taken`."""
-        left = apart_from(people, taken)
+    def _search(self, source: ImageSource, b: int, cameras: Sequence[int]) -> Candidates:
+        """Search the images of cameras; return the people (C,) of all recent searches."""
+        found = self.detector.search(source, cameras)
+        return self.schedule.remember(b, cameras, found, self.detector.blank)
+
+    def _explain(self, b: int, beside: Sequence[Sighting], no_vacancy: bool) -> None:
+        """Note the searched cameras that show a person `beside` the workers; with `no_vacancy` only
+        one on whom no other camera agrees."""
         for c in np.flatnonzero(self.schedule.ages[b] == 0).tolist():
-            self.unexplained[b, c] = len(left[c]) > 0
+            shown = [one for one in beside if one.windows[c] is not None]
+            self.unexplained[b, c] = any(one.cameras == 1 or not no_vacancy for one in shown)
 
     def _keep(
         self, b: int, worker: int, seen: Detection, has_image: Sequence[bool], out: Keypoints

@@ -5,19 +5,21 @@ while films.advance():
     estimate = tracker.update(films)
 """
 
+import zlib
 from collections.abc import Sequence
 
 import numpy as np
 
 from hrc_env.core.batching import one
-from hrc_env.core.records import PoseEstimate
-from hrc_env.core.typing import Points3
+from hrc_env.core.errors import needed
+from hrc_env.core.records import PoseEstimate, Roi
+from hrc_env.core.typing import Bools, Capsules, Image, Points3
 from hrc_env.geometry.cameras import PinholeCamera, projections
 from hrc_env.geometry.shapes import WIDTH
 from hrc_env.perception.detector import DetectorConfig
 from hrc_env.perception.lensed import pinhole_keypoints
 from hrc_env.perception.noise import our_joints
-from hrc_env.perception.searching import ImageSource
+from hrc_env.perception.searching import ImageSource, image_crop
 from hrc_env.pipeline.looking import Looking
 from hrc_env.pipeline.tracking import no_keypoints
 from hrc_env.scene.rigs import common_views, coverage_of
@@ -26,6 +28,40 @@ from hrc_env.tracking.contradiction import find_unexplained
 from hrc_env.tracking.estimators import EstimatorChoice, make_estimator
 from hrc_env.tracking.people.association import AssociationConfig, associate
 from hrc_env.tracking.presence import SEARCHES, Looks, Presence
+
+MOST_SUMS = 1000
+"""Number of checksums that are kept: windows move with people."""
+
+
+class _Watched:
+    """An image source, and the cameras whose images repeat bit for bit: they are stuck."""
+
+    def __init__(self) -> None:
+        self.source: ImageSource | None = None
+        self.sums: dict[tuple[int, Roi], int] = {}
+        """Checksums of the crops of each camera and window."""
+        self.repeats: dict[int, bool] = {}
+        """Of the cameras that gave a crop of a former window again, whether it is the same."""
+
+    def show(self, source: ImageSource) -> None:
+        """Begin with the next images."""
+        self.source, self.repeats = source, {}
+        if len(self.sums) > MOST_SUMS:
+            self.sums.clear()
+
+    def crop(self, camera_index: int, window: Roi) -> Image:
+        """Return a crop of the source."""
+        crop = image_crop(needed(self.source, "The image source"), camera_index, window)
+        new, key = zlib.crc32(crop.tobytes()), (camera_index, window)
+        if key in self.sums:
+            same = self.sums[key] == new
+            self.repeats[camera_index] = same and self.repeats.get(camera_index, True)
+        self.sums[key] = new
+        return crop
+
+    def stuck(self, n_cameras: int) -> Bools:
+        """Return (C,) the cameras all of whose crops are the same as before."""
+        return np.array([self.repeats.get(c, False) for c in range(n_cameras)])
 
 
 class PoseTracker:
@@ -64,38 +100,52 @@ class PoseTracker:
             seen = coverage_of(self.cameras, np.zeros((0, WIDTH)), floor_world)
         self.state = self.estimator.init(1, n_workers)
         self.presence = Presence(1, n_workers, seen)
+        self._watched = _Watched()
 
     def update(
         self,
         source: ImageSource,
         dt_s: float | None = None,
         rngs: Sequence[np.random.Generator] = (),
+        robot_world: Capsules | None = None,
     ) -> PoseEstimate:
         """Take the present frames in; workers (1, W, J, ...) in the frame of the cameras' poses.
 
         Args:
-            source: the images of all cameras.
+            source: the images of all cameras. Cameras whose images repeat bit for bit are stuck:
+                they prove no absence.
             dt_s: time since the last frames [s]; None: the usual.
             rngs: one generator, for estimators that draw; none: one with seed 0.
+            robot_world: the robot's capsules (K, 2, 3) [m]: of more people than `n_workers` those
+                nearest to it are followed. None: those who were followed first.
         """
         drawn = list(rngs) or [np.random.default_rng(0)]
         dt_s = self.dt_s if dt_s is None else dt_s
         self.estimator.predict(self.state, dt_s, drawn)
-        expected = self.estimator.estimate(self.state)
+        everyone = np.arange(1)
+        expected = self.looking.followed(everyone, self.estimator.estimate(self.state))
         seen = no_keypoints(1, len(self.cameras), self.n_workers)
         has_image = [True] * len(self.cameras)
-        self.looking.look(source, one(expected, 0), 0, has_image, one(seen, 0))
+        self._watched.show(source)
+        self.looking.look(self._watched, one(expected, 0), 0, has_image, one(seen, 0), robot_world)
         found = keypoints = pinhole_keypoints(seen, self.cameras)
         if self.n_workers > 1:
             keypoints = associate(self.P, found, expected, AssociationConfig()).keypoints
         self.estimator.update(self.state, keypoints, drawn)
-        now, searched = self.estimator.estimate(self.state), self.looking.looked(np.arange(1))
+        now, searched = self.estimator.estimate(self.state), self.looking.looked(everyone)
+        searched &= ~self._watched.stuck(len(self.cameras))
         fresh_s = np.zeros(searched.shape)
         shown = find_unexplained(keypoints, fresh_s, now, self.P, self.focal_px)
         shown.unexplained[:] |= searched & self.looking.unexplained
-        looks = Looks(searched, fresh_s, SEARCHES, shown)
+        others = self.looking.bystanders.others(everyone, self.dt_s)
+        looks = Looks(searched, fresh_s, SEARCHES, shown, others)
         ours, config = our_joints(now), self.estimator.config
-        return self.presence.update(np.arange(1), ours, found, keypoints, looks, dt_s, config)
+        return self.presence.update(everyone, ours, found, keypoints, looks, dt_s, config)
+
+    @property
+    def more_people(self) -> bool:
+        """Whether cameras detect more people than `n_workers`; all are then `unknown` as well."""
+        return bool(self.presence.vacancy(np.arange(1)).others.any[0])
 
     def forget(self) -> None:
         """Nobody is known any more."""

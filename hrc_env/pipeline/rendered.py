@@ -6,8 +6,9 @@ import numpy as np
 
 from hrc_env.config import HRCConfig
 from hrc_env.core.batching import copied, one
-from hrc_env.core.records import Keypoints, PoseEstimate
+from hrc_env.core.records import Keypoints, Others, PoseEstimate
 from hrc_env.core.typing import Bools, Floats, Image, Ints
+from hrc_env.geometry.chains import robot_state
 from hrc_env.perception.faults.camera_film import CameraFilm, Shot
 from hrc_env.perception.faults.schedule import Recent, Schedule
 from hrc_env.perception.lensed import Lensed
@@ -78,10 +79,14 @@ class PixelPipeline(PoseTracking):
         """Landmarks of crops round the expected workers, or of a search where there are none."""
         seen = no_keypoints(len(ids), len(self.scene.cameras), self.scene.n_workers)
         time_s, images = np.zeros(seen.px.shape[:2]), self.cameras.images
+        chain = self.scene.chain
+        q = self.cameras.now.qpos[:, : chain.n_joints]
+        capsules_world = robot_state(chain, q, np.zeros_like(q)).capsules_world
         for row, b in enumerate(ids.tolist()):
             time_s[row] = self.cameras.show(b)
             has_image = np.isfinite(time_s[row]).tolist()
-            self.looking.look(images, one(expected, row), b, has_image, one(seen, row))
+            known, robot_world = one(expected, row), capsules_world[row]
+            self.looking.look(images, known, b, has_image, one(seen, row), robot_world)
         return replace(seen, time_s=None if self.cameras.recent.schedule.is_plain else time_s)
 
     def looked(self, ids: Ints, age_s: Floats) -> Bools:
@@ -91,6 +96,14 @@ class PixelPipeline(PoseTracking):
     def strangers(self, ids: Ints) -> Bools:
         """Return (B, C) the cameras whose last search found people beside the workers."""
         return self.looking.unexplained[ids]
+
+    def followed(self, ids: Ints, expected: PoseEstimate) -> PoseEstimate:
+        """Return what is expected of the workers who are to be followed."""
+        return self.looking.followed(ids, expected)
+
+    def others(self, ids: Ints) -> Others:
+        """Return the people beyond the slots."""
+        return self.looking.bystanders.others(ids, self.dt_s)
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
         """Forget the tracks, and who was followed."""

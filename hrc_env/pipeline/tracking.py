@@ -7,7 +7,7 @@ import numpy as np
 
 from hrc_env.config import HRCConfig
 from hrc_env.core.batching import Stateful, rows, write_rows
-from hrc_env.core.records import Keypoints, PoseEstimate, Vacancy
+from hrc_env.core.records import Keypoints, Others, PoseEstimate, Vacancy, no_others
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Floats, Image, Ints
 from hrc_env.geometry.cameras import projections
@@ -112,7 +112,7 @@ class PoseTracking(PerceptionPipeline):
         whole = len(ids) == len(self.keypoints.px)
         state = self.state if whole else rows(self.state, ids)
         self.tracker.predict(state, self.dt_s, tracker_rngs)
-        expected = self.tracker.estimate(state)
+        expected = self.followed(ids, self.tracker.estimate(state))
         found = pinhole_keypoints(self.detect(ids, expected, sensor_rngs), self.scene.cameras)
         self.steps[ids] += 1
         if found.time_s is not None:
@@ -130,7 +130,7 @@ class PoseTracking(PerceptionPipeline):
         whole_images = self.looked(ids, age_s) & believed(self.frozen, ids)
         shown = find_unexplained(keypoints, age_s, estimate, self.P, self.axes[:, 2])
         shown.unexplained[:] |= whole_images & self.strangers(ids)
-        looks = Looks(whole_images, age_s, self.LOOKS, shown)
+        looks = Looks(whole_images, age_s, self.LOOKS, shown, self.others(ids))
         ours = our_joints(estimate, self.calibration)
         dt_s, config = self.dt_s, self.tracker.config
         return self.presence.update(ids, ours, found, keypoints, looks, dt_s, config)
@@ -139,6 +139,14 @@ class PoseTracking(PerceptionPipeline):
         """Return (B, C) the cameras whose last search found people beside the workers; here the
         keypoints hold all people."""
         return np.zeros((len(ids), len(self.scene.cameras)), np.bool_)
+
+    def followed(self, ids: Ints, expected: PoseEstimate) -> PoseEstimate:
+        """Return what is expected of the workers who are to be followed; here, of all."""
+        return expected
+
+    def others(self, ids: Ints) -> Others:
+        """Return the people beyond the slots; here, there are none."""
+        return no_others(len(ids))
 
     def vacancy(self, ids: Ints) -> Vacancy:
         """Return the state of the floor."""

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hrc_env.core.batching import Stateful
+from hrc_env.core.batching import Stateful, rows, write_rows
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import (
     EMPTY,
@@ -28,8 +28,10 @@ from hrc_env.core.records import (
     PROBABLY_EMPTY,
     Coverage,
     Keypoints,
+    Others,
     PoseEstimate,
     Vacancy,
+    no_others,
 )
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Floats, Ints
@@ -78,12 +80,14 @@ class Looks:
     """The number of looks that prove absence: `IMAGES` or `SEARCHES`."""
     shown: Shown
     """The poses in these images, explained and not."""
+    others: Others
+    """The people beyond the slots."""
 
 
 class Presence(Stateful):
     """The presence of people in the slots of a batch of environments."""
 
-    CHANGES = ("slots", "looks", "levels", "age_s", "strangers", "doubt")
+    CHANGES = ("slots", "looks", "levels", "age_s", "strangers", "doubt", "others")
 
     def __init__(self, batch: int, n_workers: int, coverage: Coverage) -> None:
         """`coverage`: the cameras that see each piece of floor."""
@@ -96,6 +100,7 @@ class Presence(Stateful):
         """(B, C) looks in a row in which a camera showed an unexplained person."""
         self.doubt = np.zeros(batch, np.int64)
         """(B,) updates for which no track will be believed."""
+        self.others = no_others(batch)
         self.forget(np.arange(batch))
 
     def forget(self, ids: Ints) -> None:
@@ -103,10 +108,12 @@ class Presence(Stateful):
         self.slots[ids], self.looks[ids] = (False, False, 0.0, np.nan), (0, np.inf)
         self.levels[ids], self.age_s[ids], self.strangers[ids] = POSSIBLE, 0.0, 0
         self.doubt[ids] = 0
+        write_rows(self.others, ids, no_others(len(ids)))
 
     def vacancy(self, ids: Ints) -> Vacancy:
         """Return the state of the floor."""
-        return Vacancy(self.coverage, self.levels[ids], self.age_s[ids])
+        others = rows(self.others, ids)
+        return Vacancy(self.coverage, self.levels[ids], self.age_s[ids], others)
 
     def contradicted(self, ids: Ints) -> Bools:
         """Return (B, C) the cameras of environments `ids` that contradict the calibration: several
@@ -145,7 +152,8 @@ class Presence(Stateful):
         self.doubt[ids] = np.where(contradicted, AGREED, np.maximum(self.doubt[ids] - 1, 0))
         doubtful = self.doubt[ids] > 0
         estimate = replace(estimate, tracked=estimate.tracked & ~doubtful[:, None])
-        someone = doubtful | ((strange >= REPEATED).sum(1) >= LEAST_CAMERAS)
+        write_rows(self.others, ids, looks.others)
+        someone = looks.others.any | doubtful | ((strange >= REPEATED).sum(1) >= LEAST_CAMERAS)
         shape = estimate.tracked.shape
         unknown, blind_s = np.empty(shape, bool), np.empty(shape)
         seen_world = np.empty_like(estimate.mean_world)
@@ -157,6 +165,7 @@ class Presence(Stateful):
             (dt_s, config.lost_after_s - 1e-9, FORGOTTEN * config.forget_s),
             (unknown, blind_s, seen_world),
         )  # fmt: skip
+        unknown |= looks.others.any[:, None]
         return replace(estimate, unknown=unknown, blind_s=blind_s, seen_world=seen_world)
 
 

@@ -52,6 +52,7 @@ from hrc_env.core.records import (
     WorkerTruth,
     Workplace,
     World,
+    no_others,
 )
 from hrc_env.core.skeleton import JOINTS
 from hrc_env.geometry import cameras, chains, distances, shapes, sight, ways
@@ -1265,7 +1266,8 @@ class Presence:
         nobody = Shown(np.zeros_like(looked), np.zeros_like(looked))
         said = self._known.update(
             np.arange(len(looked)), _as_estimate(belief), _as_keypoints(found), _as_keypoints(own),
-            presence.Looks(looked, age_s, enough, nobody), self._step_s, TrackerConfig(),
+            presence.Looks(looked, age_s, enough, nobody, no_others(len(looked))), self._step_s,
+            TrackerConfig(),
         )  # fmt: skip
         return _as_values(said)
 

@@ -16,7 +16,6 @@ from hrc_env.core.skeleton import JOINT, MIRROR, N_JOINTS
 from hrc_env.geometry.cameras import pinhole, project, projections
 from hrc_env.geometry.sight import Surroundings, nothing
 from hrc_env.perception.calibration import KINDS, SHAPES, read_calibration
-from hrc_env.perception.detector import STATURE_OF_SIDE
 from hrc_env.perception.emulator import (
     EmulatorConfig,
     emulate,
@@ -26,6 +25,7 @@ from hrc_env.perception.emulator import (
 )
 from hrc_env.perception.noise import sigma_px
 from hrc_env.perception.outline import posture_of
+from hrc_env.perception.searching import STATURE_OF_SIDE
 from hrc_env.perception.sightlines import HIDDEN, SEEN, SIDE
 from hrc_env.perception.windows import window_from_joints
 

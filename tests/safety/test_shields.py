@@ -20,6 +20,7 @@ from hrc_env.core.records import (
     Coverage,
     Vacancy,
     WorkerPath,
+    no_others,
 )
 from hrc_env.core.skeleton import JOINT
 from hrc_env.env import HRCEnv
@@ -199,7 +200,8 @@ def never_seen(now, *places, level=POSSIBLE):
     where = tool + np.array([(*place, 0.0) for place in places])
     coverage = Coverage(where, 0.0, np.zeros(len(where), int), np.ones((1, 4), bool))
     levels = np.full((1, estimate.tracked.shape[1], 1), level)
-    floor = unseen_floor(now.robot, estimate, Vacancy(coverage, levels, np.zeros((1, 1))))
+    vacancy = Vacancy(coverage, levels, np.zeros((1, 1)), no_others(1))
+    floor = unseen_floor(now.robot, estimate, vacancy)
     return replace(now, estimate=of_concern(estimate, floor), unseen=floor)
 
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from hrc_env.core.records import Coverage, Vacancy, no_others
 from hrc_env.env import HRCEnv
-from hrc_env.step import MISCALIBRATED, miscalibration_info
+from hrc_env.step import MISCALIBRATED, MORE_PEOPLE, perception_info
 from hrc_env.vector.env import HRCVectorEnv
 
 KNOCKED = ({"kind": "knocked", "cameras": ["camera_3"]},)
@@ -49,9 +50,10 @@ def test_a_vector_names_what_its_environments_would():
     last_info(single, 40)
     for _ in range(40):
         infos = env.step(np.tile(REST, (3, 1)))[-1]
-    suspected = single.simulation.pipeline.suspected(np.array([0]))
+    pipeline, one = single.simulation.pipeline, np.array([0])
+    suspected, vacancy = pipeline.suspected(one), pipeline.vacancy(one)
     cameras = single.simulation.settings["cameras"]
-    assert infos[MISCALIBRATED][1] == miscalibration_info(cameras, suspected)[MISCALIBRATED][0]
+    assert infos[MISCALIBRATED][1] == perception_info(cameras, suspected, vacancy)[MISCALIBRATED][0]
     assert infos[f"_{MISCALIBRATED}"].all()
     one, many = single.simulation.pipeline.monitored, env.shards.parts[0].pipeline.monitored
     np.testing.assert_array_equal(one[0], many[1])
@@ -74,5 +76,9 @@ def test_a_reset_forgets():
 
 def test_cameras_are_named():
     flags = np.array([[False, True], [True, False], [False, False]])
-    assert miscalibration_info(("a", "b"), flags)[MISCALIBRATED].tolist() == [("b",), ("a",), ()]
-    assert miscalibration_info((), flags[:, :0]) == {}
+    coverage = Coverage(np.zeros((0, 3)), 0.1, np.zeros(0, int), np.ones((1, 2), bool))
+    vacancy = Vacancy(coverage, np.zeros((3, 1, 1), int), np.zeros((3, 1)), no_others(3))
+    info = perception_info(("a", "b"), flags, vacancy)
+    assert info[MISCALIBRATED].tolist() == [("b",), ("a",), ()]
+    assert not info[MORE_PEOPLE].any()
+    assert perception_info((), flags[:, :0], None) == {}

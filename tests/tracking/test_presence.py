@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from hrc_env.core.records import EMPTY, POSSIBLE, PROBABLY_EMPTY, Coverage, Keypoints, PoseEstimate
+from hrc_env.core.records import (
+    EMPTY,
+    POSSIBLE,
+    PROBABLY_EMPTY,
+    Coverage,
+    Keypoints,
+    PoseEstimate,
+    no_others,
+)
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.tracking import oracle
 from hrc_env.tracking.config import TrackerConfig
@@ -32,7 +40,8 @@ def looks(whole, age_s=0.0, strangers=None):
     """Of one update: which cameras (B, C) looked, and which of them show strangers."""
     whole = np.asarray(whole, bool)
     strange = np.zeros(whole.shape, bool) if strangers is None else strangers
-    return Looks(whole, np.full(whole.shape, age_s), IMAGES, Shown(np.zeros_like(whole), strange))
+    shown = Shown(np.zeros_like(whole), strange)
+    return Looks(whole, np.full(whole.shape, age_s), IMAGES, shown, no_others(len(whole)))
 
 
 def floor(cameras):
