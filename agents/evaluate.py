@@ -9,7 +9,7 @@ import numpy as np
 
 from hrc_env.core.results import Metric
 from hrc_env.env import HRCEnv
-from hrc_env.experiments.study.intervals import mean_over, ratio_over
+from hrc_env.experiments.study.intervals import goals_over, mean_over, rate_of
 from hrc_env.safety.incidents import KINDS
 from hrc_env.sb3 import ACHIEVED, FAILED, HRCVecEnv
 from hrc_env.tasks import DEFAULT
@@ -148,12 +148,12 @@ def summarise(episodes: list[dict[str, float]]) -> Score:
 
 
 def worth(episodes: list[dict[str, float]]) -> dict[str, Metric]:
-    """Means over episodes with 95 % bootstrap intervals."""
+    """Means over episodes with 95 % intervals: exact ones of contacts, else bootstraps."""
     column = {name: [each[name] for each in episodes] for name in episodes[0]}
     minutes = [seconds / 60 for seconds in column["seconds"]]
     return {
         "return": mean_over(column["r"], "1"),
-        "goals_per_minute": ratio_over(column["goals_reached"], minutes, "1/min"),
+        "goals_per_minute": goals_over(column["goals_reached"], minutes),
         "cost_per_episode": mean_over(column["cost"], "1"),
-        "contacts_per_episode": mean_over(column["contacts"], "1"),
+        "contacts_per_episode": rate_of(column["contacts"], len(episodes), "1"),
     }

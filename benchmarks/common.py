@@ -1,6 +1,5 @@
-"""What the benches share: shares, normalised errors, cells of tables, a way to show results."""
+"""What the benches share: normalised errors, cells of tables, a way to show results."""
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from rich.markdown import Markdown
 
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Covariances3, Floats, Points3
-from hrc_env.experiments.study.report import Metrics, Report
+from hrc_env.experiments.study.report import Metrics, Report, with_interval
 
 CHI2_95_3D = 7.815
 """95 % of a three-dimensional normal variable lies within this squared distance."""
@@ -20,17 +19,6 @@ CHI2_95_3D = 7.815
 def exactly(value: float, unit: str, n: int = 1) -> Metric:
     """A number without a spread."""
     return Metric(float(value), float(value), float(value), unit, n)
-
-
-def share(seen: Sequence[bool]) -> Metric:
-    """A share with Wilson's 95 % interval; NaN of nothing."""
-    n = len(seen)
-    if n == 0:
-        return exactly(math.nan, "share", 0)
-    p, z = float(np.mean(seen)), 1.96
-    middle = (p + z * z / (2 * n)) / (1 + z * z / n)
-    half = z * math.sqrt(p * (1 - p) / n + (z / (2 * n)) ** 2) / (1 + z * z / n)
-    return Metric(p, middle - half, middle + half, "share", n)
 
 
 def normalised_square(offset: Points3, cov: Covariances3) -> Floats:
@@ -47,10 +35,8 @@ def cell(metric: Metric | None, scale: float = 1.0, digits: int = 1, interval: b
     """A number as tables show it, with its interval if asked; nothing of what is not known."""
     if metric is None:
         return ""
-    value, low, high = (
-        f"{scale * each:,.{digits}f}" for each in (metric.value, metric.low, metric.high)
-    )
-    return f"{value} ({low}-{high})" if interval else value
+    ends = (metric.low, metric.high) if interval else (metric.value, metric.value)
+    return with_interval([scale * each for each in (metric.value, *ends)], digits)
 
 
 def publish(

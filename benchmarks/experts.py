@@ -17,13 +17,13 @@ from rich.console import Console
 
 from agents.evaluate import judged
 from agents.registry import make_agent
-from benchmarks.common import publish, share
+from benchmarks.common import publish
 from hrc_env.cli.checks import at_least, writable_folder
 from hrc_env.cli.progress import progress_bar
 from hrc_env.core.errors import check_names
 from hrc_env.core.results import Metric
 from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.intervals import mean_over
+from hrc_env.experiments.study.intervals import mean_over, rate_of, share_of
 from hrc_env.experiments.study.report import Column, Report, table_of
 from hrc_env.experiments.study.versions import key_of
 from hrc_env.tasks import BUILT_IN
@@ -146,13 +146,13 @@ def played(parts: PartCache, arguments: Arguments, task: str, way: str) -> list[
 
 
 def worth(episodes: list[dict[str, float]]) -> dict[str, Metric]:
-    """The share of successes (Wilson's interval) and means (bootstrap) over episodes."""
-    means = {"seconds": "s", "cost": "1", "contacts": "1"}
+    """Return success and contacts with exact intervals, means of time and cost with bootstraps."""
+    column = {name: [each[name] for each in episodes] for name in episodes[0]}
     return {
-        "success": share([bool(each["success"]) for each in episodes]),
-        **{
-            name: mean_over([each[name] for each in episodes], unit) for name, unit in means.items()
-        },
+        "success": share_of([bool(each) for each in column["success"]]),
+        "seconds": mean_over(column["seconds"], "s"),
+        "cost": mean_over(column["cost"], "1"),
+        "contacts": rate_of(column["contacts"], len(episodes), "1"),
     }
 
 

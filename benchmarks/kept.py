@@ -17,12 +17,12 @@ from rich.console import Console
 from agents import policies
 from agents.evaluate import EVALUATION_SEED, judged
 from agents.registry import make_agent
-from benchmarks.common import publish, share
+from benchmarks.common import publish
 from hrc_env.cli.checks import writable_folder
 from hrc_env.cli.progress import progress_bar
 from hrc_env.core.results import Metric
 from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.intervals import mean_over, rate_of, ratio_over
+from hrc_env.experiments.study.intervals import goals_over, mean_over, rate_of, share_of
 from hrc_env.experiments.study.report import Column, Report, table_of
 from hrc_env.experiments.study.versions import key_of
 from hrc_env.sb3 import ACHIEVED, FAILED
@@ -126,8 +126,8 @@ def score(episodes: Episodes) -> dict[str, Metric]:
     n_achieved, n_failed = (int(sum(column[name])) for name in (ACHIEVED, FAILED))
     minutes = [each / 60 for each in column["seconds"]]
     return {
-        "success": share([True] * n_achieved + [False] * n_failed),
-        "goals_per_minute": ratio_over(column[ACHIEVED], minutes, "1/min"),
+        "success": share_of([True] * n_achieved + [False] * n_failed),
+        "goals_per_minute": goals_over(column[ACHIEVED], minutes),
         "cost": mean_over(column["cost"], "1"),
         "contacts": rate_of(column["contacts"], len(episodes), "1"),
         "towards": rate_of(column["contacts_towards"], len(episodes) / 1000, "per 1000"),

@@ -28,7 +28,7 @@ from benchmarks.common import exactly, publish
 from hrc_env.cli.progress import progress_bar
 from hrc_env.core.results import Metric, over
 from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.intervals import ratio_over
+from hrc_env.experiments.study.intervals import rate_of
 from hrc_env.experiments.study.report import Column, Report, table_of
 from hrc_env.experiments.study.versions import key_of
 
@@ -179,7 +179,7 @@ def played(
 def worth_of(name: str, episodes: list[dict[str, float]]) -> dict[str, Metric]:
     """What a policy is worth, from its episodes."""
     towards = [each["contacts_towards"] for each in episodes]
-    found = worth(episodes) | {"towards": ratio_over(towards, [1e-3] * len(towards), "per 1000")}
+    found = worth(episodes) | {"towards": rate_of(towards, len(towards) / 1000, "per 1000")}
     return {f"{name}.{key}": each for key, each in found.items()}
 
 

@@ -24,7 +24,7 @@ from hrc_env.cli.progress import progress_bar
 from hrc_env.core.results import Metric
 from hrc_env.experiments.impact.setups import PerceptionSetup
 from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.intervals import ratio_over
+from hrc_env.experiments.study.intervals import goals_over, mean_over, rate_of, ratio_over
 from hrc_env.experiments.study.report import Column, Report, table_of
 from hrc_env.experiments.study.versions import key_of
 from hrc_env.perception.faults.fault import ALL, FaultConfig
@@ -151,14 +151,13 @@ def counts(episodes: Episodes, bare: Episodes) -> dict[str, Metric]:
         return [each[name] for each in of]
 
     n, minutes = len(episodes), [each["seconds"] / 60 for each in episodes]
-    per = [1e-3] * n
     contacts = {kind: column(f"contacts_{kind}") for kind in KINDS}
     return {
         "share": ratio_over(column("goals_reached"), column("goals_reached", bare[:n]), "share"),
-        "goals_per_minute": ratio_over(column("goals_reached"), minutes, "1/min"),
-        **{kind: ratio_over(each, per, "per 1000") for kind, each in contacts.items()},
-        "all": ratio_over(np.sum(list(contacts.values()), axis=0), per, "per 1000"),
-        "cost": ratio_over(column("cost"), np.ones(n), "1"),
+        "goals_per_minute": goals_over(column("goals_reached"), minutes),
+        **{kind: rate_of(each, n / 1000, "per 1000") for kind, each in contacts.items()},
+        "all": rate_of(np.sum(list(contacts.values()), axis=0), n / 1000, "per 1000"),
+        "cost": mean_over(column("cost"), "1"),
     }
 
 

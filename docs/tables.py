@@ -15,6 +15,7 @@ both may have
   a cell that is empty stays so while the command has no such metric;
 - "factor": from the metric's unit;
 - "plain": its interval is not shown;
+- "counted": it counts rare events, and its interval is shown even where others are not;
 - "form": "count" (the share as "8 of 9"), "n" (how many observations it is made of);
 - "beside": another metric that stands behind it, "85 (190)".
 
@@ -29,6 +30,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from hrc_env.experiments.study.report import with_interval
 from hrc_env.experiments.study.versions import SUBSYSTEMS, versions_of
 
 RESULTS = Path(__file__).parent / "results"
@@ -215,11 +217,10 @@ def _heading(column: Mapping[str, Any]) -> str:
 def _cell(cell: Any, column: Mapping[str, Any], intervals: bool) -> str:
     if cell is None or isinstance(cell, str):
         return cell or ""
-    value, *ends = cell if isinstance(cell, list) else [cell]
-    digits = column.get("digits", 0)
-    if not (ends and intervals) or column.get("plain"):
-        return f"{value:,.{digits}f}"
-    return f"{value:,.{digits}f} ({' to '.join(f'{end:,.{digits}f}' for end in ends)})"
+    three = cell if isinstance(cell, list) else [cell] * 3
+    if not (column.get("counted") or (intervals and not column.get("plain"))):
+        three = [three[0]] * 3
+    return with_interval(three, column.get("digits", 0), to=" to ")
 
 
 def _line(cells: Any) -> str:

@@ -5,14 +5,20 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.common import exactly, share
+from benchmarks.common import exactly
 from benchmarks.perception.crops import STEP_S
 from benchmarks.perception.episodes import Episode, episode_of, some_steps
 from benchmarks.perception.speed import ROUNDS
 from benchmarks.perception.views import FAMILIES, ROWS, View, rows_of
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats, Ints
-from hrc_env.experiments.study.intervals import bootstrap, quantile_over, ratio_over, rmse_over
+from hrc_env.experiments.study.intervals import (
+    bootstrap,
+    quantile_over,
+    ratio_over,
+    rmse_over,
+    share_of,
+)
 
 PIXELS, EMULATED, NO_FAULT = "pixels", "keypoints", "none"
 N_DRAWS = 200
@@ -140,7 +146,7 @@ def _named(start: str, episodes: list[Episode], own: list[int]) -> Metrics:
     first = [float(np.argmax(each)) * STEP_S for each in mine if each.any()]
     steps = [float(len(each.family)) for each in episodes]
     return {
-        f"{start}.named": share([bool(each.any()) for each in mine]),
+        f"{start}.named": share_of([bool(each.any()) for each in mine]),
         f"{start}.after_s": quantile_over([[each] for each in first], 0.5, "s"),
         f"{start}.others": ratio_over([float(each.sum()) for each in wrong], steps, "share"),
     }
@@ -150,7 +156,7 @@ def _views(every: list[View]) -> Metrics:
     metrics: Metrics = {}
     for kind in ROWS:
         for row, views in rows_of(every, kind).items():
-            metrics[f"detected.{kind}.{row}"] = share([view.error is not None for view in views])
+            metrics[f"detected.{kind}.{row}"] = share_of([view.error is not None for view in views])
             errors = [[view.error] for view in views if view.error is not None]
             for name, q in (("median", 0.5), ("p95", 0.95)):
                 key = f"error_share.{kind}.{row}.{name}"

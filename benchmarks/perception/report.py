@@ -10,7 +10,7 @@ from hrc_env.experiments.study.report import Column, Metrics, Report, table_of
 from hrc_env.perception.faults.fault import KINDS
 
 _LEAD = """\
-Shares have Wilson's intervals. Level `pixels` unless it says otherwise; every camera looks in every
+Intervals of shares are exact. Level `pixels` unless it says otherwise; every camera looks in every
 step."""
 _ABOUT_SPEED = """\
 Steps a second are of the median step; the milliseconds of each stage were taken in steps of their

@@ -20,7 +20,7 @@ from hrc_env.experiments.study.cache import PartCache, PartProgress
 from hrc_env.experiments.study.counts import ERRORS_M
 from hrc_env.experiments.study.intervals import counted_quantile_of as quantile_of
 from hrc_env.experiments.study.intervals import counted_quantile_over as quantile_over
-from hrc_env.experiments.study.intervals import mean_over, paired, ratio_over, rmse_over
+from hrc_env.experiments.study.intervals import mean_over, paired, rate_of, ratio_over, rmse_over
 from hrc_env.experiments.study.rigs import DT_S, WARM_UP_S
 from hrc_env.experiments.study.runner import Study, at_least_one, changed
 from hrc_env.experiments.study.versions import key_of
@@ -121,7 +121,7 @@ def metrics_of(played: Played) -> dict[str, Metric]:
             metrics[f"lost.{key}"] = ratio_over(sums["lost"], sums["frames"], "share")
             if "idf1" in sums:
                 minutes = np.array(sums["frames"]) * DT_S / 60
-                metrics[f"id_switches.{key}"] = ratio_over(sums["id_switches"], minutes, "1/min")
+                metrics[f"id_switches.{key}"] = rate_of(sums["id_switches"], minutes, "1/min")
                 metrics[f"idf1.{key}"] = mean_over(sums["idf1"], "share")
         for each, word in product(ABLATIONS[name].settings, ("median", "p95")):
             pair = each.name, ABLATIONS[name].reference(each)

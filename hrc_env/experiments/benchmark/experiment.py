@@ -15,7 +15,7 @@ from hrc_env.experiments.benchmark.conditions import CONDITIONS, SEED, VERSION
 from hrc_env.experiments.benchmark.entries import Entry, enter, entries, regret
 from hrc_env.experiments.benchmark.report import report
 from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.intervals import ratio_over
+from hrc_env.experiments.study.intervals import goals_over, rate_of, ratio_over, success_over
 from hrc_env.experiments.study.runner import Study, at_least_one
 from hrc_env.experiments.study.versions import key_of
 from hrc_env.safety.incidents import KINDS
@@ -106,11 +106,11 @@ def worth(episodes: Episodes) -> dict[str, Metric]:
     tries = [a + b for a, b in zip(achieved, missed, strict=True)]
     touches = [sum(each[f"contacts_{kind}"] for kind in KINDS) for each in episodes]
     return {
-        "goals_per_minute": ratio_over(achieved, minutes, "1/min"),
-        "success": ratio_over(achieved, tries, "1"),
+        "goals_per_minute": goals_over(achieved, minutes),
+        "success": success_over(achieved, tries),
         "cost_per_minute": ratio_over(column["cost"], minutes, "1/min"),
-        "contacts_per_hour": ratio_over(touches, hours, "1/h"),
-        **{f"{kind}_per_hour": ratio_over(column[f"contacts_{kind}"], hours, "1/h")
+        "contacts_per_hour": rate_of(touches, hours, "1/h"),
+        **{f"{kind}_per_hour": rate_of(column[f"contacts_{kind}"], hours, "1/h")
            for kind in KINDS},
     }  # fmt: skip
 

@@ -21,7 +21,7 @@ from hrc_env.experiments.impact.policies import SLOWED, Policy
 from hrc_env.experiments.impact.setups import LATE, REFERENCE, PerceptionSetup, setup_called
 from hrc_env.experiments.study import intervals
 from hrc_env.experiments.study.counts import ERRORS_M, GAPS_M, SPEEDS_MPS
-from hrc_env.experiments.study.intervals import paired, ratio_of, ratio_over
+from hrc_env.experiments.study.intervals import paired, rate_of, ratio_of, ratio_over
 from hrc_env.experiments.study.report import Metrics
 
 Row = Mapping[str, list[Any]]
@@ -30,10 +30,9 @@ Table = Mapping[tuple[str, str], Row]
 NOMINAL_MPS = 1.6
 """A worker's approach where it is not measured (ISO 13855, as in Marvel and Norcross 2017,
 PMC5117641; verify against the standard before certification) [m/s]."""
-A_MINUTE = {
-    "goals_per_min": "goals",
-    **{name: name for name in ("contacts_towards", "contacts_standing", "contacts_fleeing")},
-}
+CONTACTS = ("contacts_towards", "contacts_standing", "contacts_fleeing")
+"""What is counted a minute and is rare."""
+A_MINUTE = {"goals_per_min": "goals", **{name: name for name in CONTACTS}}
 """What is counted a minute, and from which sum."""
 PER_1000 = (
     "missed_stops", "false_stops", "called_stops", "missed_slowings", "false_slowings",
@@ -87,6 +86,9 @@ def _differences(name: str, row: Row, reference: Row) -> Metrics:
         (above, below, unit), (above_1, below_1, _) = ours[what], theirs[what]
         ratio = ratio_of([*above, *above_1[:n]], [*below, *below_1[:n]])
         found |= paired(f"{name}.{what}", ratio, n, unit, 2000)
+        if what in CONTACTS:
+            rates = rate_of(above, below, unit), rate_of(above_1[:n], below_1[:n], unit)
+            found[f"difference.{name}.{what}"] = intervals.excess_of(*rates)
     bins, counted, q, unit = QUANTILES["z_d_m"]
     counts = [*row[f"{counted}_counts"], *reference[f"{counted}_counts"][:n]]
     both = intervals.counted_quantile_of(bins, counts, q)
@@ -95,7 +97,9 @@ def _differences(name: str, row: Row, reference: Row) -> Metrics:
 
 def _of_row(row: Row) -> dict[str, Metric]:
     """What the episodes of a row came to."""
-    found = {what: ratio_over(*ratio) for what, ratio in _ratios(row).items()}
+    ratios = _ratios(row)
+    found = {what: (rate_of if what in CONTACTS else ratio_over)(*ratios[what]) for what in ratios}
+    found["goals_per_min"] = intervals.goals_over(*ratios["goals_per_min"][:2])
     found["separation_min_m"] = intervals.iqm_over(row["separation_min_m"], "m")
     for what, (bins, name, q, unit) in QUANTILES.items():
         found[what] = intervals.counted_quantile_over(bins, row[f"{name}_counts"], q, unit)

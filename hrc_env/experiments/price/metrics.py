@@ -15,7 +15,7 @@ from hrc_env.experiments.impact.episodes import Rows
 from hrc_env.experiments.price.episodes import CONTACTS
 from hrc_env.experiments.price.eyes import ELSEWHERE, FOUR, ONE, TRUTH
 from hrc_env.experiments.price.search import Tried, draws, falling
-from hrc_env.experiments.study.intervals import crossing, ratio_over
+from hrc_env.experiments.study.intervals import crossing, goals_over, rate_of, ratio_over
 from hrc_env.experiments.study.report import Metrics
 
 N_DRAWS = 1000
@@ -122,18 +122,17 @@ def metrics_of(
 def _rates(rows: Rows) -> Metrics:
     """What is counted in episodes."""
     per = np.array(rows["minutes"]) / PER
-    contacts = {kind: ratio_over(rows[kind], per, UNIT) for kind in CONTACTS}
-    goals = ratio_over(rows["achieved"], rows["minutes"], "1/min")
+    contacts = {kind: rate_of(rows[kind], per, UNIT) for kind in CONTACTS}
     return {
         **contacts,
-        "goals_per_min": goals,
+        "goals_per_min": goals_over(rows["achieved"], rows["minutes"]),
         "cost": ratio_over(rows["cost"], 1000 * per, "per episode of 10 s"),
     }
 
 
 def _of_row(row: Row, drawn: Floats, share: Floats, truth: Floats | None) -> Metrics:
-    """Of one pair of eyes: draws at the level, and shares of the throughput, of its own and of
-    perfect sight's."""
+    """Return the numbers of one pair of eyes: draws at the level, and shares of the throughput
+    of an unshielded robot and of one that is given true joints."""
     n, margin_m = len(row.fresh["minutes"]), row.margin_m
     of_truth = {} if truth is None else {"of_truth": _metric(_ratio(share, truth), "share", n)}
     return {

@@ -1,6 +1,8 @@
 """Numbers with 95 % intervals: one bootstrap over seeds, of which frames are no independent part.
 
-Rows that share their seeds are compared seed by seed (`paired`).
+Rows that share their seeds are compared seed by seed (`paired`). Events that are rare and shares of
+trials have exact intervals (`rate_of`, `share_of`): draws of zeros are zeros, and would say that
+an event that did not happen cannot happen.
 """
 
 from collections.abc import Callable, Sequence
@@ -89,14 +91,58 @@ def ratio_over(above: Numbers, below: Numbers, unit: str) -> Metric:
     return bootstrap(ratio_of(x, y), len(x), unit)
 
 
-def rate_of(counts: Numbers, exposure: float, unit: str) -> Metric:
-    """How often something happened, of its counts a seed, with the exact interval of their sum: of
-    what never happened it says how often it may (Garwood 1936, doi:10.2307/2333958)."""
-    total = float(np.sum(counts))
-    low = stats.chi2.ppf(0.025, 2 * total) / 2 if total else 0.0
-    high = stats.chi2.ppf(0.975, 2 * total + 2) / 2
-    value, low, high = (float(each) / exposure for each in (total, low, high))
+def rate_of(counts: Numbers, exposure: Numbers | float, unit: str) -> Metric:
+    """How often something rare happened, with the exact interval of a Poisson count: it says how
+    often an event that did not happen still may (Garwood 1936, doi:10.2307/2333958).
+
+    Args:
+        counts: (n,) how often it happened with each seed.
+        exposure: in how much it was counted, with each seed (n,) or with all together.
+        unit: of a count over an exposure.
+    """
+    total, over = float(np.sum(counts)), float(np.sum(exposure))
+    if not over:
+        return Metric(np.nan, np.nan, np.nan, unit, len(counts))
+    low = stats.gamma.ppf(0.025, total) if total else 0.0
+    value, low, high = (
+        float(each) / over for each in (total, low, stats.gamma.ppf(0.975, total + 1))
+    )
     return Metric(value, low, high, unit, len(counts))
+
+
+def share_of(seen: Sequence[bool]) -> Metric:
+    """The share of trials in which something was seen, with its exact binomial interval (Clopper
+    and Pearson 1934, doi:10.1093/biomet/26.4.404); NaN of no trials."""
+    n = len(seen)
+    if n == 0:
+        return Metric(np.nan, np.nan, np.nan, "share", 0)
+    found = stats.binomtest(sum(seen), n).proportion_ci(0.95, method="exact")
+    return Metric(sum(seen) / n, float(found.low), float(found.high), "share", n)
+
+
+def goals_over(goals: Numbers, minutes: Numbers) -> Metric:
+    """Goals a minute: they come so regularly that a bootstrap is narrower than the interval of a
+    Poisson count, which stands where no goal was reached."""
+    return (ratio_over if np.any(goals) else rate_of)(goals, minutes, "1/min")
+
+
+def success_over(achieved: Numbers, tries: Numbers) -> Metric:
+    """The share of tries that succeeded; where all or none did, its interval is the exact one of
+    as many trials as there are seeds, as tries with one seed are alike."""
+    found = ratio_over(achieved, tries, "1")
+    if found.value not in (0.0, 1.0):
+        return found
+    exact = share_of([bool(found.value)] * found.n)
+    return replace(found, low=exact.low, high=exact.high)
+
+
+def excess_of(ours: Metric, theirs: Metric) -> Metric:
+    """One rate less another, with the interval that follows from both of theirs (Zou and Donner
+    2008, doi:10.1002/sim.3095): also where both are zero it has a width."""
+    less = ours.value - theirs.value
+    low = less - np.hypot(ours.value - ours.low, theirs.high - theirs.value)
+    high = less + np.hypot(ours.high - ours.value, theirs.value - theirs.low)
+    return Metric(less, float(low), float(high), ours.unit, ours.n)
 
 
 def mean_over(values: Numbers, unit: str) -> Metric:

@@ -35,12 +35,19 @@ class Column:
     digits: int = 1
     scale: float = 1.0
     signed: bool = False
-    """Whether it is a difference; one whose interval leaves out zero has a dot."""
+    """Whether it is a difference."""
+    marked: bool = True
+    """Whether a difference has a dot where its interval leaves out zero."""
 
     def cell(self, metrics: Metrics, row: str) -> str:
         """The number with its interval; a dash where there is none."""
         metric = metrics.get(self.key.format(row))
-        return "-" if metric is None else said(metric, self.scale, self.digits, self.signed)
+        return "-" if metric is None else self._said(metric)
+
+    def _said(self, metric: Metric) -> str:
+        is_told_apart = self.signed and (metric.low > 0 or metric.high < 0)
+        dot = " ●" if self.marked and is_told_apart else ""
+        return said(metric, self.scale, self.digits, self.signed) + dot
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,13 +104,22 @@ def said(metric: Metric, scale: float = 1.0, digits: int = 1, signed: bool = Fal
     """A number with its interval, as tables show it."""
     if metric.value != metric.value:
         return "-"
-    sign, to = ("+", " to ") if signed else ("", "-")
-    value, low, high = (
-        f"{scale * each:{sign},.{digits}f}" for each in (metric.value, metric.low, metric.high)
-    )
-    interval = "" if low == high else f" ({low}{to}{high})"
-    dot = " ●" if signed and (metric.low > 0 or metric.high < 0) else ""
-    return value + interval + dot
+    three = [scale * each for each in (metric.value, metric.low, metric.high)]
+    return with_interval(three, digits, *(("+", " to ") if signed else ()))
+
+
+def with_interval(three: Sequence[float], digits: int, sign: str = "", to: str = "-") -> str:
+    """Return a value with the ends of its interval in brackets, which are left out where the digits
+    show no width: such an interval would say more than it knows.
+
+    Args:
+        three: value, low end, high end.
+        digits: how many stand behind the point.
+        sign: "+" puts one before positive numbers, too.
+        to: stands between the ends.
+    """
+    value, low, high = (f"{each:{sign}z,.{digits}f}" for each in three)
+    return value if value == low == high else f"{value} ({low}{to}{high})"
 
 
 def _embedded(out: Path, source: str) -> str:
