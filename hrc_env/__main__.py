@@ -59,7 +59,8 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     "experiment": (
         "hrc_env.cli.experiment", "Experiment",
         "The paper's two experiments (site, lab), what perception is worth in safety (impact), "
-        "what sight costs at equal safety (price), ablations of rigs and estimators (ablations).",
+        "what sight costs at one rate of contacts (price), ablations of rigs and estimators "
+        "(ablations).",
     ),
     "benchmark": (
         "hrc_env.cli.benchmark", "Benchmark",

@@ -82,7 +82,7 @@ class ImpactExperiment(AnyExperiment):
 
 @dataclass(frozen=True)
 class PriceExperiment(AnyExperiment):
-    """What sight costs at equal safety: every pair of eyes with the shield margin it needs."""
+    """What sight costs at one rate of contacts: every pair of eyes has the margin that it needs."""
 
     name = "price"
     out: Path = Path("out/price")
@@ -114,7 +114,7 @@ class AblationsExperiment(AnyExperiment):
 @dataclass(frozen=True)
 class Experiment:
     """The paper's two experiments (site, lab), what perception is worth in safety (impact), what
-    sight costs at equal safety (price), ablations of rigs and estimators (ablations).
+    sight costs at one rate of contacts (price), ablations of rigs and estimators (ablations).
 
     Each takes --quick (minutes) and --out DIR, where it writes report.html, results.json and
     figures; it keeps what is finished when it is stopped, and goes on there.

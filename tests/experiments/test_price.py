@@ -1,4 +1,4 @@
-"""What sight costs at equal safety: the search, its intervals, who is compared, what is written."""
+"""What sight costs at one rate of contacts: the search, its intervals, who is compared, what is written."""
 
 import json
 import signal
@@ -231,7 +231,7 @@ def test_every_row_says_everything(end_to_end):
         assert -1.2 <= margin.low <= margin.value <= margin.high <= 1.2
     assert metrics["HRCReach-v0.truth.of_truth"] == Metric(1.0, 1.0, 1.0, "share", 6)
     text = (out / "report.md").read_text()
-    assert "perfect sight" in text
+    assert "true joints" in text
     assert (out / "figures" / "price.png").exists()
     written = json.loads((out / "results.json").read_text())
     assert set(written["metrics"]) == set(metrics)

@@ -1,1 +1,1 @@
-"""What sight costs at equal safety: every pair of eyes with the shield margin that it needs."""
+"""What sight costs at one rate of contacts: every pair of eyes has the margin that it needs."""

@@ -1,4 +1,4 @@
-"""What sight costs at equal safety: every pair of eyes with the shield margin that it needs."""
+"""What sight costs at one rate of contacts: every pair of eyes has the margin that it needs."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
@@ -202,9 +202,10 @@ def _part(
 ) -> Rows:
     """Episodes with one margin, from the cache or anew."""
     eyes = stage.eyes
+    sight = {name: each for name, each in asdict(eyes).items() if name not in ("words", "group")}
     made_of = {
         "people": PEOPLE, "task": stage.task, "seeds": seeds, "n_steps": stage.n_steps,
-        "eyes": asdict(eyes), "margin_m": margin_m, "shield": SHIELD if stage.is_shielded else "",
+        "eyes": sight, "margin_m": margin_m, "shield": SHIELD if stage.is_shielded else "",
         "estimator": source_digest(estimator_called(eyes.setup.estimator).make),
     }  # fmt: skip
     which = {FIRST_SEED: "searched", FIRST_FRESH: "fresh", FIRST_PIXELS: "pixels"}[seeds[0]]

@@ -41,7 +41,7 @@ class Eyes:
 
 
 GROUPS = {
-    "truth": "perfect sight", "estimator": "estimators", "cameras": "fewer cameras",
+    "truth": "true joints", "estimator": "estimators", "cameras": "fewer cameras",
     "latency": "late images", "calibration": "cameras that hang or look otherwise than told",
     "covariance": "covariances that say too much or too little", "fault": "faults",
 }  # fmt: skip
@@ -95,7 +95,7 @@ def all_eyes() -> dict[str, Eyes]:
         )
     )
     found = (
-        Eyes(TRUTH, "perfect sight", "truth", PerceptionSetup("truth")),
+        Eyes(TRUTH, "true joints", "truth", PerceptionSetup("truth")),
         *estimators,
         Eyes("three_cameras", "three cameras", "cameras", PerceptionSetup(n_cameras=3)),
         Eyes("two_cameras", "two cameras", "cameras", PerceptionSetup(n_cameras=2)),

@@ -1,4 +1,4 @@
-"""The report: bars that say what sight costs, the margins behind them, questions, blindness."""
+"""The report: bars of the work that is left, the margins behind them, questions, blindness."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 
 from hrc_env.experiments.price.blindness import MEASURED, WORDS, Learnt
 from hrc_env.experiments.price.eyes import ELSEWHERE, FOUR, GROUPS, QUICK, Eyes, all_eyes
-from hrc_env.experiments.price.metrics import Row
+from hrc_env.experiments.price.metrics import PER, Row
 from hrc_env.experiments.price.trainings import TRUE
 from hrc_env.experiments.study.plots import ends, label, new_figure, save
 from hrc_env.experiments.study.report import Column, Metrics, Report, picture, table_of
@@ -17,7 +17,7 @@ COLUMNS = {
     "margin_m": ("margin [m]", 3, 1.0),
     "goals_per_min": ("goals / min", 1, 1.0),
     "share": ("of unshielded [%]", 0, 100.0),
-    "of_truth": ("of perfect sight's [%]", 0, 100.0),
+    "of_truth": ("of true joints' [%]", 0, 100.0),
     "confirmed.margin_m": ("played with [m]", 4, 1.0),
     "confirmed.towards": ("contacts towards", 0, 1.0),
     "confirmed.standing": ("standing", 0, 1.0),
@@ -38,7 +38,7 @@ QUESTIONS = {
     "half_covariance": "covariances that are not half as large",
     "twice_covariance": "not twice as large",
     "honesty_of_one": "with one camera: not half as large",
-    "truth": "perfect sight rather than four cameras",
+    "truth": "true joints rather than four cameras",
     "calibration_over_accuracy": "calibrated cameras more than a better estimator "
     "(triangulation less cameras turned by 1 degree)",
 }  # fmt: skip
@@ -50,24 +50,27 @@ COLOURS = {
 ASKED = """\
 Eyes that see less need more distance, and distance costs work. Every pair of eyes gets the shield
 margin with which the robot touches a worker while moving towards them {level:g} times in 1,000
-episodes of 10 s: all are equally safe then, and the goals that are left are the price of sight. The
-margin is added to all protective distances of the `{shield}` shield and may be negative: the
-shield as it comes is much safer than that. It is found by bisection on {n_seeds} episodes, the same
-for everybody, and confirmed on {n_fresh} others: what these say of the level is in the intervals,
-as is the uncertainty of the margin. The robot is the scripted one, the workers take no notice of
-it; a touch is called by what the robot did in the step before, and touches within half a second of
-each other are one. In tasks with longer episodes there are fewer, and a thousand episodes are as
-much time."""
+episodes of 10 s, {hourly:.1f} times an hour; the goals that are left are compared. The margin is
+added to all protective distances of the `{shield}` shield and may be negative: the shield as it
+comes is much safer than that. It is found by bisection on {n_seeds} episodes, the same for all
+eyes, and confirmed on {n_fresh} others: the uncertainty of the level and of the margin is in the
+intervals. The robot is the scripted one, the workers take no notice of it; a touch is called by
+what the robot did in the step before, and touches within half a second of each other are one. In
+tasks with longer episodes there are fewer, and a thousand episodes are as much time.
+
+This is one level, one shield and one body of the worker, and detections are emulated. Other touches
+are not made equal. With true joints the shield still has its own model of the body around them. At
+a stricter level, or with another shield, the order may be another one."""
 
 
 def report(figures: Path, config: Any, played: Mapping[str, Any], metrics: Metrics) -> Report:
     """Draw the figures; the tables beside them."""
     task, table = config.task, played["table"]
     eyes = [all_eyes()[name] for name in table[task]]
-    draw_price(figures / "price.png", metrics, task, eyes)
+    draw_price(figures / "price.png", metrics, task, eyes, config.level)
     parts = [
-        picture(figures / "price.png", "Goals that are left at equal safety, in per cent of those "
-                "of a robot without a shield; whiskers are 95 % intervals."),
+        picture(figures / "price.png", "Goals that are left at that rate of contacts, in per cent "
+                "of those of a robot without a shield; whiskers are 95 % intervals."),
         _table(task, eyes, metrics), _open_ended(task, table[task], metrics), _worth(metrics),
     ]  # fmt: skip
     if config.others:
@@ -85,9 +88,15 @@ def report(figures: Path, config: Any, played: Mapping[str, Any], metrics: Metri
     if "trainings" in played:
         parts += blind(figures, played["trainings"], metrics)
     asked = ASKED.format(
-        level=config.level, shield="qp", n_seeds=config.n_seeds, n_fresh=config.n_fresh
-    )
-    return Report("What sight costs at equal safety", asked, [part for part in parts if part])
+        level=config.level, hourly=an_hour(config.level), shield="qp", n_seeds=config.n_seeds,
+        n_fresh=config.n_fresh,
+    )  # fmt: skip
+    return Report("What sight costs at one rate of contacts", asked, [*filter(None, parts)])
+
+
+def an_hour(level: float) -> float:
+    """Return contacts in an hour, of those in 1,000 episodes of 10 s."""
+    return 60 * level / PER
 
 
 def _table(task: str, eyes: Sequence[Eyes], metrics: Metrics) -> str:
@@ -116,9 +125,9 @@ def _worth(metrics: Metrics) -> str:
         return ""
     column = Column("worth.{}", "of unshielded throughput [%]", 1, 100.0, signed=True)
     return (
-        "## What it is worth\n\nThroughput at equal safety that is lost without it, on the same "
-        "seeds; a dot where the interval leaves out zero.\n\n"
-        + table_of("", asked, [column], metrics)
+        "## What it is worth\n\nThroughput at that rate of contacts that is lost without it, on "
+        "the same seeds; a dot where the interval leaves out zero, which is not corrected for the "
+        "number of rows.\n\n" + table_of("", asked, [column], metrics)
     )
 
 
@@ -131,13 +140,21 @@ def _other(task: str, metrics: Metrics) -> str:
         return text
     holds = metrics[f"{task}.ranking"].value
     return (
-        f"{text}\n\nPerfect sight keeps as much as four cameras, and these as much as one, in "
-        f"{holds:.0%} of the draws."
+        f"{text}\n\nA robot with true joints keeps as much as one with four cameras, and that as "
+        f"much as one with one camera, in {holds:.0%} of the draws."
     )
 
 
-def draw_price(path: Path, metrics: Metrics, task: str, eyes: Sequence[Eyes]) -> None:
-    """A bar for each pair of eyes, the best above; of many only those that everybody asks for."""
+def draw_price(path: Path, metrics: Metrics, task: str, eyes: Sequence[Eyes], level: float) -> None:
+    """Draw a bar for each pair of eyes, the longest above; of many only `QUICK`.
+
+    Args:
+        path: file of the picture.
+        metrics: of the study.
+        task: id of the environment.
+        eyes: of which the task has metrics.
+        level: contacts in 1,000 episodes of 10 s at which they are compared.
+    """
     shown = [each for each in eyes if len(eyes) <= len(QUICK) or each.name in QUICK]
     shares = {each.name: metrics[f"{task}.{each.name}.share"] for each in shown}
     shown = sorted(shown, key=lambda each: shares[each.name].value)
@@ -153,7 +170,10 @@ def draw_price(path: Path, metrics: Metrics, task: str, eyes: Sequence[Eyes]) ->
     bars: list[Any] = [axis.barh(0, 0, color=COLOURS[name]) for name in used]
     words = [GROUPS[name] for name in used]
     figure.legend(bars, words, loc="outside lower center", ncols=2, fontsize=10)
-    figure.suptitle("What sight costs when all robots touch people equally rarely", fontsize=15)
+    figure.suptitle(
+        f"Work that is left where a robot drives into people {an_hour(level):.1f} times an hour\n"
+        "emulated detections, one body, the margin of one shield", fontsize=13,
+    )  # fmt: skip
     save(figure, path)
 
 
