@@ -14,8 +14,10 @@ and attentive people with four cameras; beside unaware people with the truth, wi
 200 ms late and say so, and with one camera that is left after a second; each without a shield and
 with `qp`. Contacts and cost are counted on the truth.
 
-Here: unaware people, four cameras, without a shield and with it; numbers with 95 % intervals over
-episodes. All of them are in `hrc_env/experiments/benchmark/entries/`.
+Here: unaware people, four cameras, without a shield and with it, sorted by goals with it. Numbers
+have 95 % intervals, of contacts exact ones, which show how little so few episodes tell of rare
+contacts; a cost of 0.0 without one was 0 in every episode. Entries stand as they were sent and are
+not played again. All numbers are in `hrc_env/experiments/benchmark/entries/`.
 
 ## How to enter
 
@@ -46,8 +48,9 @@ def _section(task: str, everybody: list[Entry]) -> str:
         return f"## {task}\n\nNobody has entered yet.\n"
     rows = [
         (each.name if k == 0 else "", CONDITIONS[MAIN[k]].shield or "none",
+         str(each.scores[f"{key}.goals_per_minute"].n),
          *(said(each.scores[f"{key}.{what}"], digits=2 if what == "success" else 1)
            for what in PER))
         for each in here for k, key in enumerate(keys)
     ]  # fmt: skip
-    return f"## {task}\n\n{table(('policy', 'shield', *PER.values()), rows)}\n"
+    return f"## {task}\n\n{table(('policy', 'shield', 'episodes', *PER.values()), rows)}\n"

@@ -18,6 +18,7 @@ from hrc_env.tasks import BUILT_IN
 
 ROOT = Path(__file__).resolve().parent.parent
 README = ROOT / "README.md"
+LEADERBOARD = ROOT / "docs" / "reference" / "leaderboard.md"
 WRITTEN = [*generate.PAGES, ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"]
 PAGES = [*WRITTEN, *generate.REFERENCE]
 PYTHON = re.compile(r"(<!-- not run: [^>]*-->\n)?```python\n(.*?)```", re.S)
@@ -131,6 +132,38 @@ def test_cells_are_intervals_counts_and_pairs():
     table = {"title": "T", "columns": columns, "rows": [row]}
     shown = "| 25.0 (20.0 to 50.0) | 0.25 | -0.2 (-0.5 to -0.2) | 2 of 8 | 8 | 25 (25) |  |"
     assert shown in tables.markdown(table)
+
+
+INTERVAL = re.compile(r"\((-?[\d,.]+)(?: to |-)(-?[\d,.]+)\)")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_no_interval_has_no_width(page):
+    """Zero contacts in some minutes do not say that there are none."""
+    lines = page.read_text().splitlines()
+    wrong = [line for line in lines for low, high in INTERVAL.findall(line) if low == high]
+    assert wrong == []
+
+
+def test_counts_stand_with_their_intervals():
+    counted = [
+        (name, column, cell)
+        for name in FILES
+        for k, column in enumerate(tables.read(name)["columns"])
+        for cell in (row[k] for row in tables.read(name)["rows"])
+        if "contact" in column["name"] or column.get("unit") == "in 1,000"
+    ]
+    assert len({name for name, _, _ in counted}) >= 7
+    for name, column, cell in counted:
+        assert column["counted"], (name, column)
+        assert INTERVAL.search(tables._cell(cell, column, intervals=False)), (name, cell)
+
+
+def test_the_leaderboard_shows_no_count_without_its_interval():
+    rows = [line for line in generate.REFERENCE[LEADERBOARD]().splitlines() if "| 64 |" in line]
+    assert len(rows) > 30
+    for row in rows:
+        assert all(INTERVAL.search(cell) for cell in row.split("|")[-3:-1]), row
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -269,7 +302,8 @@ MEASURED_LOOKING = re.compile(
     rf"{AMOUNT} ?{UNIT}|{AMOUNT} of (?:the )?{ONE}|factor of {ONE}|{AMOUNT} \({ONE} to"
 )
 SETTINGS = {
-    "README.md": "1.1 GB, 2.0 GB, 5.8 GB",  # other people's packages
+    # Other people's packages; the rate of contacts that was asked for (PriceConfig.level).
+    "README.md": "1.1 GB, 2.0 GB, 5.8 GB, 30 times, 1,000 episodes, 10.8 times",
     "third_party_perception.md": "41 MB, 59 MB, 180 MB",
     "architecture.md": "1 s",
     "conventions.md": "0.04 s",

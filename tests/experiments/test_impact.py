@@ -13,7 +13,7 @@ from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.experiments.impact import policies
 from hrc_env.experiments.impact.episodes import STEP, Stage, sums_of
 from hrc_env.experiments.impact.experiment import STUDY, ImpactConfig, check_walks, config_for, play
-from hrc_env.experiments.impact.metrics import COMPARED, margin_needed
+from hrc_env.experiments.impact.metrics import COMPARED, margin_needed, metrics_of
 from hrc_env.experiments.impact.policies import Policy, maker, trained
 from hrc_env.experiments.impact.report import report
 from hrc_env.experiments.impact.setups import (
@@ -256,6 +256,34 @@ def test_a_report_is_made_without_the_policy_that_yields(end_to_end, tmp_path):
     found = report(tmp_path / "figures", table, metrics)
     assert (tmp_path / "figures" / "tradeoff.png").exists()
     assert "scripted_slowed" not in str(found.parts[1])
+
+
+def test_a_quick_run_says_so_and_marks_nothing(tmp_path):
+    assert not config_for().is_quick
+    for quick in (config_for(quick=True), config_for(quick=True, seeds=90), config_for(seeds=8)):
+        assert quick.is_quick
+    config = replace(
+        config_for(quick=True),
+        n_seeds=3,
+        policies=("scripted_slowed",),
+        setups=("truth", REFERENCE),
+    )
+    table = {}
+    for name, reached in ((REFERENCE, 1.0), ("truth", 9.0)):
+        episode = sums((0.3, 0.3, 0.1, 0.0), (0.2, 0.2, 0.1, 0.0)) | {"walk": "", "goals": reached}
+        table["scripted_slowed", name] = {what: [each] * 3 for what, each in episode.items()}
+    metrics = metrics_of(table, ())
+    assert metrics["difference.scripted_slowed.truth.goals_per_min"].low > 0
+    STUDY.report(config, table, metrics, tmp_path / "figures").write(tmp_path, {}, [0], metrics)
+    for page in ("report.md", "report.html"):
+        text = (tmp_path / page).read_text()
+        assert "This run was quick: 3 episodes of 4 s a row" in text
+        assert "not enough to compare estimators" in text
+        assert "●" not in text
+        assert "a dot" not in text
+    whole = STUDY.report(config_for(), table, metrics, tmp_path / "figures")
+    assert "quick" not in whole.title + whole.asked
+    assert "●" in str(whole.parts)
 
 
 def test_an_estimator_that_a_file_registers_is_compared(tmp_path, process, brought):

@@ -1,4 +1,4 @@
-"""What sight costs at one rate of contacts: the search, its intervals, who is compared, what is written."""
+"""What sight costs at one rate of contacts: search, intervals, eyes, what is written."""
 
 import json
 import signal

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.core.results import Metric, write_results, write_whole
@@ -87,6 +88,63 @@ def test_a_rate_of_what_never_happened_says_how_often_it_may():
     assert none.high == pytest.approx(-np.log(0.025) / 0.05)
     assert (some.value, some.n) == (1000.0, 50)
     assert (some.low, some.high) == pytest.approx((742.2, 1318.4), abs=0.1)  # tables: 37.11, 65.92
+
+
+@pytest.mark.parametrize(
+    ("count", "low", "high"),  # Garwood's table
+    [(0, 0.0, 3.6889), (1, 0.0253, 5.5716), (2, 0.2422, 7.2247), (10, 4.7954, 18.3904)],
+)
+def test_a_rate_has_the_exact_interval_of_a_poisson_count(count, low, high):
+    found = intervals.rate_of([0, count], [1.0, 1.0], "1/h")
+    assert (2 * found.value, 2 * found.low, 2 * found.high) == pytest.approx(
+        (count, low, high), abs=1e-4
+    )
+
+
+def test_a_rate_in_no_time_is_not_known():
+    assert np.isnan(intervals.rate_of([0.0], 0.0, "1/h").value)
+
+
+@pytest.mark.parametrize(("k", "n"), [(0, 1), (0, 64), (3, 10), (64, 64)])
+def test_a_share_has_the_exact_interval_of_a_binomial_count(k, n):
+    found = intervals.share_of([True] * k + [False] * (n - k))
+    exact = stats.binomtest(k, n).proportion_ci(0.95, method="exact")
+    assert (found.value, found.low, found.high, found.n) == (k / n, exact.low, exact.high, n)
+
+
+def test_what_always_succeeded_may_fail_as_often_as_seeds_allow():
+    found = intervals.success_over([3.0] * 64, [3.0] * 64)
+    assert (found.value, found.high, found.n) == (1.0, 1.0, 64)
+    assert found.low == pytest.approx(0.025 ** (1 / 64))
+    mixed = intervals.success_over([3.0, 1.0], [3.0, 3.0])
+    assert (mixed.value, mixed.low) == (2 / 3, 1 / 3)
+
+
+def test_goals_that_were_never_reached_have_a_bound():
+    none, some = (intervals.goals_over([k] * 30, [1.0] * 30) for k in (0.0, 5.0))
+    assert none.high == pytest.approx(3.6889 / 30, abs=1e-4)
+    assert (some.low, some.high) == (5.0, 5.0)
+
+
+def test_one_rate_less_another_has_a_width_also_where_both_are_zero():
+    zero, five = (intervals.rate_of([k], 15.0, "1/min") for k in (0, 5))
+    same, more = intervals.excess_of(zero, zero), intervals.excess_of(five, zero)
+    assert (same.value, -same.low) == (0.0, same.high)
+    assert same.high == pytest.approx(3.6889 / 15, abs=1e-4)
+    assert more.low < 0.0 < more.value  # five against none is no difference yet: p = 1/16
+    assert more.high == pytest.approx(five.high)
+
+
+@pytest.mark.parametrize("exposure", [1.0, 0.64])
+def test_a_zero_of_a_count_is_shown_with_its_bound(exposure):
+    zero = intervals.rate_of([0] * 64, exposure, "1/h")
+    assert report.said(zero) == f"0.0 (0.0-{3.6889 / exposure:.1f})"
+    assert not report.said(intervals.excess_of(zero, zero), signed=True).endswith("+0.0")
+
+
+def test_an_interval_without_a_visible_width_is_not_shown():
+    assert report.with_interval([1.0, 0.999, 1.001], 2) == "1.00"
+    assert report.with_interval([-1e-9, -1.0, 1.0], 1, "+", " to ") == "+0.0 (-1.0 to +1.0)"
 
 
 def test_intervals_hold_the_truth_as_often_as_they_say():

@@ -20,6 +20,7 @@ from hrc_env.experiments.impact.setups import (
     usual_setups,
 )
 from hrc_env.experiments.study.cache import PartCache
+from hrc_env.experiments.study.rigs import DT_S
 from hrc_env.experiments.study.runner import Study, at_least_one, changed
 from hrc_env.experiments.study.versions import key_of, source_digest
 from hrc_env.safety.shield import shield_called
@@ -72,6 +73,23 @@ class ImpactConfig:
         """One an episode."""
         n = min(self.n_seeds, self.n_pixels) if level == "pixels" else self.n_seeds
         return [FIRST_SEED + k for k in range(n)]
+
+    @property
+    def is_quick(self) -> bool:
+        """Whether the episodes or the learning are too few to compare anything."""
+        return any(getattr(self, each) <= QUICK[each] for each in ("n_seeds", "learning_steps"))
+
+    @property
+    def warning(self) -> str:
+        """What the report of a quick run says of itself; "" of others."""
+        if not self.is_quick:
+            return ""
+        played = f"{self.n_seeds} episodes of {self.n_steps * DT_S:g} s a row"
+        learnt = f", and `{PPO}` has learnt for {self.learning_steps:,} steps only"
+        return (
+            f"This run was quick: {played}{learnt if PPO in self.policies else ''}. That is not "
+            "enough to compare estimators, cameras or delays; nothing is marked as a difference."
+        )
 
     def rows(self) -> Iterator[tuple[PerceptionSetup, list[Policy]]]:
         """Every setup, and who is played with it; late ones and the reference with all margins."""
@@ -155,5 +173,5 @@ STUDY = Study(
     ),
     play=play,
     metrics=lambda config, table: metrics_of(table, config.margins_m),
-    report=lambda config, table, metrics, figures: report(figures, table, metrics),
+    report=lambda config, table, metrics, figures: report(figures, table, metrics, config.warning),
 )

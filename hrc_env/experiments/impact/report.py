@@ -62,11 +62,18 @@ ACROSS = {
 }
 
 
-def report(figures: Path, table: Table, metrics: Metrics) -> Report:
-    """Draw the figure; the tables beside it."""
+def report(figures: Path, table: Table, metrics: Metrics, warning: str = "") -> Report:
+    """Draw the figure, and put the tables beside it.
+
+    Args:
+        figures: folder of the figure.
+        table: what was played.
+        metrics: numbers of it.
+        warning: what stands above all where too little was played: no difference is marked then.
+    """
     policies = [name for name in POLICIES if (name, REFERENCE) in table]
     setups = {name: setup_called(name).words for _, name in table}
-    draw_tradeoff(figures / "tradeoff.png", metrics, policies, list(setups))
+    draw_tradeoff(figures / "tradeoff.png", metrics, policies, list(setups), bool(warning))
     caption = (
         "A point for each setup, placed by its paired difference from the reference, whose 95 % "
         "interval are the bars: up is more goals, left is safer. Below: approaches instead of "
@@ -76,24 +83,40 @@ def report(figures: Path, table: Table, metrics: Metrics) -> Report:
     for policy in policies:
         columns = [Column(f"{policy}.{{}}.{what}", *words) for what, words in WORDS.items()]
         parts.append(table_of(policy, setups, columns, metrics))
-    parts.append(f"Less {setups[REFERENCE]}, paired; a dot where the interval leaves out zero.")
+    marks = "" if warning else "; a dot where the interval leaves out zero"
+    parts.append(f"Less {setups[REFERENCE]}, paired{marks}.")
     others = {name: words for name, words in setups.items() if name != REFERENCE}
     for policy in policies:
         key = f"difference.{policy}.{{}}."
-        columns = [Column(key + what, *WORDS[what], signed=True) for what in (*COMPARED, "z_d_m")]
+        columns = [
+            Column(key + what, *WORDS[what], signed=True, marked=not warning)
+            for what in (*COMPARED, "z_d_m")
+        ]
         parts.append(table_of(policy, others, columns, metrics))
     late = {each.name: each.words for each in LATE if (SLOWED, each.name) in table}
     columns = [Column(f"lateness.{{}}.{how}", words, 3) for how, words in LATENESS]
     parts.append(table_of(f"extra metres of lateness, `{SLOWED}`", late, columns, metrics))
-    return Report("What perception is worth in safety", ASKED, parts)
+    title = f"What perception is worth in safety{', a quick run' if warning else ''}"
+    return Report(title, f"{warning}\n\n{ASKED}".strip(), parts)
 
 
 def draw_tradeoff(
-    path: Path, metrics: Metrics, policies: Sequence[str], setups: Sequence[str]
+    path: Path,
+    metrics: Metrics,
+    policies: Sequence[str],
+    setups: Sequence[str],
+    is_quick: bool = False,
 ) -> None:
-    """Goals a minute against true cost while the robot moves towards the worker: a column for each
-    policy, a point for each setup; below against approaches, without setups that track nobody and
-    the policy that does not look."""
+    """Draw goals a minute against true cost while the robot moves towards the worker, and below
+    against approaches, without setups that track nobody and without the policy that does not look.
+
+    Args:
+        path: file of the picture.
+        metrics: of the study.
+        policies: names, each has a column.
+        setups: names, each has a point.
+        is_quick: whether the picture says that these are too few episodes to compare.
+    """
     figure = new_figure(5.4 * len(policies) + 1, 12)
     axes = figure.subplots(2, len(policies), squeeze=False)
     seeing = [name for name in setups if setup_called(name).level != "none"]
@@ -103,6 +126,8 @@ def draw_tradeoff(
             below.set_axis_off()
         else:
             _panel(below, metrics, policy, seeing, "approaches")
+    if is_quick:
+        figure.suptitle("A quick run: too few episodes to compare anything", fontsize=15)
     handles, labels = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=12)
     save(figure, path)
