@@ -317,7 +317,7 @@ def test_the_best_eyes_stand_above(tmp_path, monkeypatch):
         for k, name in enumerate(("truth", "one_camera", "particle"))
     }
     eyes = eyes_called(["truth", "particle", "one_camera"])
-    report.draw_price(tmp_path / "price.png", metrics, "HRCReach-v0", eyes)
+    report.draw_price(tmp_path / "price.png", metrics, "HRCReach-v0", eyes, 30.0)
     assert [each.name for each in shown[0]] == ["truth", "one_camera", "particle"]
 
 
