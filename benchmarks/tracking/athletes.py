@@ -1,4 +1,4 @@
-"""People who run, turn over and fall: motions that no setting of the estimators was chosen on.
+"""People who run, spin, turn over and fall: motions that estimators do not expect.
 
 Bodies are those of `walks`; who turns over or falls is turned about the middle of the hips.
 """
@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from benchmarks.tracking.rigs import DT_S
-from benchmarks.tracking.walks import Gait, bodies_along, steer, walk
+from benchmarks.tracking.walks import Gait, Path, bodies_along, steer, walk
 from hrc_env.core.skeleton import JOINT
 from hrc_env.core.typing import Floats, Points3
 from hrc_env.geometry.rotations import about_axis
@@ -21,6 +21,9 @@ _PAUSE_S, _TRICK_S = (0.5, 1.5), (1.0, 1.4)
 _LIES_PACE, _ROLL_RAD, _ROLL_S = 0.4, 1.5, (2.5, 5.0)
 """Limbs of who lies go on so much slower; they roll over so far to either side, in such a time."""
 _LIES_LOWER_M = 0.75
+SPINS_S, _EASED_S, _SPIN_RAD_S, _STEPS_HZ = 1.2, 0.4, (4.0, 8.0), 1.5
+"""When people begin to spin, how long until they do, how fast, and their steps."""
+_ON_THE_SPOT = Gait((0.1, 0.3, 0.5), thigh_rad=0.15, knee_rad=0.2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,11 +39,14 @@ class Turns:
 
 def run(walk_m: tuple[float, float], seeds: list[int], n_frames: int, speed_m_s: float) -> Points3:
     """Joints (T, S, J, 3) [m] of runners; wrists and feet have 30 m/s2 and more."""
-    gait = Gait(
+    return walk(walk_m, seeds, n_frames, _runs(speed_m_s))
+
+
+def _runs(speed_m_s: float) -> Gait:
+    return Gait(
         (speed_m_s - 0.3, speed_m_s, speed_m_s + 0.3), cycles_per_m=1.45 / speed_m_s,
         thigh_rad=0.55, knee_rad=0.4, arm_rad=0.7, elbow_rad=1.4, bounce_m=0.04,
     )  # fmt: skip
-    return walk(walk_m, seeds, n_frames, gait)
 
 
 def tumble(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
@@ -69,6 +75,42 @@ def fall(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points
     roll = _ROLL_RAD * lying * np.sin(2 * np.pi * np.maximum(time_s - LIES_S, 0.0) / period_s)
     low = np.broadcast_to(-_LIES_LOWER_M * lying, roll.shape)
     return turned(bodies_along(path), Turns(down * np.cos(way), down * np.sin(way), roll, low))
+
+
+def spin(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
+    """Joints (T, S, J, 3) [m] of people who stand, and from `SPINS_S` on spin on the spot at 4 to
+    8 rad/s while they gesture."""
+    rngs = [np.random.default_rng([seed, 21]) for seed in seeds]
+    rate, begin, x, y = np.array([
+        (rng.uniform(*_SPIN_RAD_S) * rng.choice([-1, 1]), rng.uniform(-np.pi, np.pi),
+         *rng.uniform(-0.5, 0.5, 2) * walk_m)
+        for rng in rngs
+    ]).T  # fmt: skip
+    time_s = DT_S * np.arange(n_frames, dtype=float)[:, None]
+    heading = begin + DT_S * np.cumsum(_eased((time_s - SPINS_S) / _EASED_S) * rate, 0)
+    ground = np.broadcast_to(np.stack([x, y], -1), (*heading.shape, 2))
+    gesture = np.clip(0.6 + 0.4 * np.sin(np.pi * time_s + begin), 0.0, 1.0)
+    stride = np.broadcast_to(2 * np.pi * _STEPS_HZ * time_s, heading.shape)
+    lean = np.full(heading.shape, 0.08)
+    gestures = np.stack([gesture, gesture], -1)
+    return bodies_along(Path(ground, heading, stride, lean, gestures, _ON_THE_SPOT))
+
+
+def circle(
+    walk_m: tuple[float, float], seeds: list[int], n_frames: int, radius_m: float, speed_m_s: float
+) -> Points3:
+    """Joints (T, S, J, 3) [m] of people who run in a circle near the middle, either way round."""
+    rngs = [np.random.default_rng([seed, 22]) for seed in seeds]
+    way = np.array([rng.choice([-1.0, 1.0]) for rng in rngs])
+    begin = np.array([rng.uniform(-np.pi, np.pi) for rng in rngs])
+    middle = np.stack([rng.uniform(-0.3, 0.3, 2) for rng in rngs])
+    gait = _runs(speed_m_s)
+    way_m = speed_m_s * DT_S * np.arange(n_frames, dtype=float)[:, None]
+    angle = begin + way * way_m / radius_m
+    ground = middle + radius_m * np.stack([np.cos(angle), np.sin(angle)], -1)
+    stride = np.broadcast_to(2 * np.pi * gait.cycles_per_m * way_m, angle.shape)
+    lean, still = np.full(angle.shape, 0.2), np.zeros((*angle.shape, 2))
+    return bodies_along(Path(ground, angle + way * np.pi / 2, stride, lean, still, gait))
 
 
 def turned(joints: Points3, turns: Turns) -> Points3:

@@ -50,7 +50,14 @@ SURPRISES: dict[str, Damage] = {
     **dict.fromkeys(
         ("fallen_one_camera", "worker_falls_one_camera"), Damage(alone_s=(FALLS_S, 6.0))
     ),
-}
+    **dict.fromkeys(
+        (
+            "acrobat_one_camera", "spins_one_camera", "circles_one_camera",
+            "small_circles_one_camera",
+        ),
+        Damage(alone_s=(1.0, 6.0)),
+    ),
+}  # fmt: skip
 """Damage by the conditions of `tests/properties/test_sudden_motions.py`."""
 
 

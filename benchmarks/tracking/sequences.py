@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from benchmarks.tracking.arrivals import LONGEST_DELAY_S, delivered
-from benchmarks.tracking.athletes import fall, run, tumble
+from benchmarks.tracking.athletes import circle, fall, run, spin, tumble
 from benchmarks.tracking.bound import posterior_bound
 from benchmarks.tracking.couples import couples, detect_couples, shuffles
 from benchmarks.tracking.detections import CONDITIONS, SURPRISES, Damage, detect
@@ -31,6 +31,10 @@ MOTIONS: dict[str, Callable[[tuple[float, float], list[int], int], Points3]] = {
     "acrobat": tumble,
     "fallen": fall,
     "fallen_one_camera": fall,
+    "acrobat_one_camera": tumble,
+    "spins_one_camera": spin,
+    "circles_one_camera": partial(circle, radius_m=1.4, speed_m_s=2.8),
+    "small_circles_one_camera": partial(circle, radius_m=0.7, speed_m_s=2.2),
     "worker_runs": run_to_and_fro,
     "worker_falls": fall_and_get_up,
     "worker_falls_one_camera": fall_and_get_up,
@@ -57,6 +61,15 @@ WINDOWS: dict[str, dict[str, tuple[int, int]]] = {
     **{name: {name: (25, 200)} for name in ("running", "running_fast", "acrobat")},
     "fallen": {"fallen": (50, 200)},
     **{name: {name: (25, 200)} for name in ("worker_runs", "worker_falls")},
+    **{
+        name: {name: (40, 150)}
+        for name in (
+            "acrobat_one_camera",
+            "spins_one_camera",
+            "circles_one_camera",
+            "small_circles_one_camera",
+        )
+    },
     "worker_falls_one_camera": {"worker_falls_one_camera": (50, 150)},
     "fallen_one_camera": {"fallen_one_camera": (50, 150), "fallen_after_return": (160, 200)},
 }

@@ -37,6 +37,9 @@ ALONE = 3
 """Searches in a row in which one camera alone detects a person before that person counts."""
 MISSES = 12
 """Searches in a row without a person after which that person is forgotten."""
+BESIDE = 0.4
+"""A person detected by one camera alone within this share of the side of a worker's window may be
+that worker."""
 NEARER_M = 0.3
 """A person gets the slot of a worker who is farther from the robot by more than this [m]."""
 GIVEN_UP = 6
@@ -156,7 +159,7 @@ class Bystanders(Stateful):
                 if window is not None
                 for windows in taken
             ]
-            return any(same_person(window, other, 0.5) for window, other in pairs)
+            return any(same_person(window, other, BESIDE) for window, other in pairs)
         return robot_world is not None and _away_m(one.hips_world, robot_world) < ROBOT_M
 
     def _hand_over(self, b: int, hips_world: Points3, robot_world: Capsules) -> None:

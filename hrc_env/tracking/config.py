@@ -88,7 +88,7 @@ class ParticleConfig(TrackerConfig):
     camera leaves open runs to the lens, the whole of it overshoots a little."""
     one_view_inflation: float = 1.21
     """Factor on the reported covariance of a worker whom one camera alone has seen for a while."""
-    lying_inflation: float = 7.0
+    lying_inflation: float = 4.5
     """Further factor if the body lies: its depth is told by how people stand."""
     n_hypotheses: int = 8
     """Most hypotheses about one worker; one is a Gaussian (estimator="kalman")."""

@@ -19,6 +19,7 @@ from hrc_env.tracking.config import ParticleConfig
 from hrc_env.tracking.forecast import forecast, mixed
 from hrc_env.tracking.hypotheses.filter import predict_all, update_all
 from hrc_env.tracking.hypotheses.mixture import estimate_all
+from hrc_env.tracking.hypotheses.pace import PACE
 from hrc_env.tracking.hypotheses.slots import Hypotheses
 from hrc_env.tracking.measurements import arrays_of
 from hrc_env.tracking.models.noise import noise_model
@@ -53,6 +54,7 @@ class ParticleEstimator:
             noise=np.zeros((*lead, N_JOINTS, n_cameras), NOISE),
             n_alive=np.ones((batch, n_workers), np.int64),
             waited_s=np.zeros((batch, n_workers)),
+            pace=np.zeros((batch, n_workers), PACE),
         )
         self.reset(state, np.arange(batch), [])
         return state
@@ -61,6 +63,7 @@ class ParticleEstimator:
         """Forget environments `ids`; draws nothing."""
         forget_trees(state.trees, state.views, state.noise, ids, self.config)
         state.n_alive[ids], state.waited_s[ids] = 1, 0.0
+        state.pace[ids] = np.zeros((), PACE)
 
     def predict(self, state: Hypotheses, dt_s: float, rngs: Rngs) -> None:
         """Move every hypothesis by its motion model; draws nothing."""

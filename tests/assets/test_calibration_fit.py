@@ -5,7 +5,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
 
 from assets.emulator.clips import FAMILIES, TIMES, fit_clips, unseen_clips
 from assets.emulator.fit.fit import fit as fit_of
@@ -182,7 +181,7 @@ def told_clips(error_m, new_m):
         )  # fmt: skip
 
 
-def test_what_is_told_of_new_poses_covers_their_errors():
+def test_what_is_told_of_new_poses_is_as_large_as_their_errors():
     zero = {"offset_m", "wander_m", "between_m"}
     known = replace(
         read_calibration(), poses=np.repeat(pose_of(STANDING_BODY)[..., None], N_POSES, -1),
@@ -194,8 +193,9 @@ def test_what_is_told_of_new_poses_covers_their_errors():
         0.01**2 + (novel[KIND] * new_of(wrong[0].tracker_mean_world, known)[:, None] ** 2) ** 2
     )
     error_m = wrong[0].tracker_mean_world - wrong[0].joints_world
-    squared = (error_m**2).sum(-1) / variance_m2
-    assert 0.88 < (squared < chi2.ppf(0.95, 3)).mean() < 0.96
+    told_m2, squared_m2 = 3 * variance_m2.mean(), (error_m**2).sum(-1).mean()
+    assert 0.8 < told_m2 / squared_m2 < 1.25
+    assert novel.min() > 2.0
     assert novel_of(known, list(told_clips(0.008, 0.1))).max() < 0.5
 
 

@@ -19,27 +19,36 @@ from benchmarks.tracking.rigs import RIGS, make_rig
 from benchmarks.tracking.sequences import make_sequences
 
 SEEDS = list(range(491_000, 491_150))
-"""Bounds come from seeds 30000 to 30199 and 490000 to 490049; settings from 7000 to 7199."""
-LEAST_COVERAGE = {"fallen_one_camera": 0.75, "worker_falls_one_camera": 0.75, "acrobat": 0.8}
+"""Bounds come from seeds 30000 to 30199 and 490000 to 490049; settings from 1000 to 1023
+and 7000 to 7199."""
+LEAST_COVERAGE = {
+    "fallen_one_camera": 0.8, "worker_falls_one_camera": 0.85, "acrobat": 0.8,
+    "acrobat_one_camera": 0.7, "small_circles_one_camera": 0.85,
+}  # fmt: skip
 """Of the reported 95 % region, by window, where it is not 0.9."""
 ACROBAT_ON_SITE = 0.75
-MOST_OVER_DLT = {"fallen_one_camera": 1.3}
+HONEST = (0.6, 1.6)
+"""Reported standard deviation over RMSE while one camera is left."""
+MOST_OVER_DLT = {"fallen_one_camera": 1.3, "acrobat_one_camera": np.inf}
 """RMSE over that of plain triangulation, which stays where it was when one view is left."""
 
 
 def track(rig_name: str, condition: str, seeds: list[int]) -> dict[str, dict[str, Any]]:
-    """Return, by window: the RMSE over that of plain triangulation, the coverage, and how many
-    sequences have the body facing the wrong way in any frame."""
+    """Return, by window: the RMSE over that of plain triangulation, the coverage, the reported
+    deviation over the RMSE, and how many sequences have the body facing the wrong way in any
+    frame."""
     rig, found = make_rig(rig_name), {}
     given = make_sequences(rig, condition, seeds)
     ours, plain = (run_cell(name, rig, given, seeds, lambda _: None) for name in (DEFAULT, DLT))
     _, rmse = STATISTICS["rmse_m"]
     _, coverage = STATISTICS["coverage95"]
+    _, deviation = STATISTICS["std_over_rmse"]
     for window, sums in ours.items():
         drawn = drawn_sums(sums)
         found[window] = {
             "over_dlt": metric(rmse(drawn) / rmse(drawn_sums(plain[window])), "-", drawn),
             "coverage": metric(coverage(drawn), "share", drawn),
+            "deviation": metric(deviation(drawn), "-", drawn),
             "n_mirrored": int(np.count_nonzero(sums["wrong_way"])),
         }
     return found
@@ -65,6 +74,8 @@ def test_what_is_not_expected_is_tracked(rig, condition, figures):
         most = MOST_OVER_DLT.get(window, 1.0)
         bounded.append(Figure(f"{name}.over_dlt", found["over_dlt"], most=most))
         bounded.append(Figure(f"{name}.coverage", found["coverage"], least=least))
+        if window.endswith("one_camera") and condition != "acrobat_one_camera":
+            bounded.append(Figure(f"{name}.deviation", found["deviation"], *HONEST))
         if condition == "mirrored_start":
             mirrored = count(found["n_mirrored"], len(SEEDS))
             bounded.append(Figure(f"{name}.mirrored", mirrored, most=0.03))

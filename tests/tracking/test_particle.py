@@ -47,7 +47,9 @@ def followed(px, config=None):
 
 def slots(state):
     """The first worker's hypotheses alone."""
-    return Hypotheses(*(array[0, 0] for array in state[:3]), state.n_alive[0], state.waited_s[0])
+    return Hypotheses(
+        *(array[0, 0] for array in state[:3]), state.n_alive[0], state.waited_s[0], state.pace[0]
+    )
 
 
 def standing(heading_rad=0.0, place=(0.5, 0.2, 0.0)):

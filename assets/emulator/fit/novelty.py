@@ -15,20 +15,13 @@ from assets.emulator.clips import WARM_UP
 from assets.emulator.watch import Watched
 from hrc_env.core.records import PoseEstimate
 from hrc_env.core.skeleton import MIRROR
-from hrc_env.core.typing import Bools, Floats
+from hrc_env.core.typing import Floats
 from hrc_env.perception.calibration import KIND, KINDS, N_POSES, Calibration
 from hrc_env.perception.noise import FARTHEST_M, our_joints
 from hrc_env.perception.outline import novelty_m, pose_of
 
 EVERY = 3
 """Frames of a clip of which one is taken."""
-COVERED, SHORT, CHI2_95_3D = 0.95, 0.02, 7.815
-"""Share of the errors that the reported region is to hold, how much less it may be on average over
-distances, and its squared size."""
-FEW = 200
-"""Joints of a kind, in a class of distances, that tell something."""
-CLASS_M = 0.03
-"""Width of a class of distances [m]."""
 MOST = 20.0
 """No joint is less certain than by so many times the square of the distance [1/m]."""
 
@@ -45,22 +38,17 @@ def poses_of(clips: Sequence[Watched]) -> tuple[Floats, float]:
 
 
 def novel_of(draft: Calibration, clips: Sequence[Watched]) -> Floats:
-    """(K,) what times the square of how much further than `near_m` an estimate is from known poses
-    is to be added to deviations [1/m]: the least with which the region holds what it claims, on
-    average over distances. The square is likelier of the fit's clips than the distance itself."""
-    parts = [_told(replace(draft, novel=np.zeros(len(KINDS))), clip) for clip in clips]
-    error, cov, new_m = (np.concatenate(each) for each in zip(*parts, strict=True))
-    novel = np.zeros(len(KINDS))
-    for kind in range(len(KINDS)):
-        mine = np.flatnonzero(kind == KIND)
-        low, high = 0.0, MOST
-        for _ in range(20):
-            middle = 0.5 * (low + high)
-            grown = cov[:, mine] + ((middle * new_m**2) ** 2)[:, None, None, None] * np.eye(3)
-            enough = _coverage(_inside(error[:, mine], grown), new_m) >= COVERED - SHORT
-            low, high = (low, middle) if enough else (middle, high)
-        novel[kind] = high
-    return novel
+    """(K,) the factor on the square of how much further than `near_m` an estimate is from known
+    poses, which is added to deviations [1/m]: with it these are as large as the errors, as root
+    mean squares over the frames that are further away."""
+    parts = [_reported(replace(draft, novel=np.zeros(len(KINDS))), clip) for clip in clips]
+    squared, variance, new_m = (np.concatenate(each) for each in zip(*parts, strict=True))
+    far = new_m > 0.0
+    if not far.any():
+        return np.zeros(len(KINDS))
+    missing_m2 = (squared - variance)[far].mean(0)
+    of_kind = np.array([missing_m2[kind == KIND].mean() for kind in range(len(KINDS))])
+    return np.minimum(np.sqrt(np.maximum(of_kind, 0.0) / (3.0 * np.mean(new_m[far] ** 4))), MOST)
 
 
 def new_of(bodies: Floats, known: Calibration) -> Floats:
@@ -69,9 +57,9 @@ def new_of(bodies: Floats, known: Calibration) -> Floats:
     return np.clip(away_m - known.near_m, 0.0, FARTHEST_M)
 
 
-def _told(known: Calibration, clip: Watched) -> tuple[Floats, Floats, Floats]:
-    """Of the frames (N) in which somebody was tracked: errors of joints, covariances that are told,
-    and how much further than `near_m` the body is from known poses [m]."""
+def _reported(known: Calibration, clip: Watched) -> tuple[Floats, Floats, Floats]:
+    """Of the frames (N) in which somebody was tracked: squares of the joints' errors and reported
+    variances (N, J) [m^2], and how much further than `near_m` the body is from known poses [m]."""
     rows = np.flatnonzero(clip.tracked[WARM_UP:]) + WARM_UP
     mean, cov, velocity = (
         each[rows, None]
@@ -81,20 +69,6 @@ def _told(known: Calibration, clip: Watched) -> tuple[Floats, Floats, Floats]:
     nobody = np.zeros(mean.shape[:-1])
     tracked = np.ones(mean.shape[:2], np.bool_)
     belief = our_joints(PoseEstimate(mean, cov, velocity, nobody, tracked), known)
-    return belief.mean_world[:, 0] - clip.joints_world[rows], belief.cov_world[:, 0], new_m
-
-
-def _inside(error: Floats, cov: Floats) -> Bools:
-    squared = np.einsum("nji,njik,njk->nj", error, np.linalg.inv(cov), error)
-    return squared < CHI2_95_3D
-
-
-def _coverage(inside: Bools, new_m: Floats) -> float:
-    """Mean over classes of distances, at most `COVERED` of each."""
-    class_ = (new_m / CLASS_M).astype(int)
-    shares = [
-        min(float(inside[class_ == k].mean()), COVERED)
-        for k in np.unique(class_[new_m > 0])
-        if (class_ == k).sum() * inside.shape[1] >= FEW
-    ]
-    return float(np.mean(shares)) if shares else COVERED
+    error = belief.mean_world[:, 0] - clip.joints_world[rows]
+    variance = np.trace(belief.cov_world[:, 0], axis1=-2, axis2=-1)
+    return np.sum(error**2, -1), variance, new_m

@@ -10,6 +10,7 @@ from hrc_env.core.kernels import kernel
 from hrc_env.tracking.hypotheses.anatomy import anatomy
 from hrc_env.tracking.hypotheses.branching import branch, is_ambiguous
 from hrc_env.tracking.hypotheses.one_view import begin_from_one
+from hrc_env.tracking.hypotheses.pace import forget_pace, update_pace
 from hrc_env.tracking.hypotheses.sides import agree_on_sides
 from hrc_env.tracking.hypotheses.slots import Hypotheses, drop, merge, normalise, worker_slots
 from hrc_env.tracking.measurements import make_seen, read_worker
@@ -48,6 +49,7 @@ def predict_all(state, model, dt, s, works):
             own = worker_slots(state, b, w)
             if own.trees[0].tracked:
                 own.waited_s[0] += dt
+                own.pace[0].since_s += dt
                 _move(own, model, dt, s, works[0])
             _grow_older(own, dt, s)
 
@@ -129,7 +131,16 @@ def update_all(state, P, measured, s, noise, works, prior):
                 _follow(own, h, look and h == 0, seen, s, noise, (work, prior))
             if own.n_alive[0] > 1:
                 _tidy(own, s, work)
+            _keep_pace(own)
             _doubt_cameras(own, P, seen, s)
+
+
+@kernel
+def _keep_pace(own):
+    """Note how the heaviest hypothesis has moved since the last update."""
+    pace = own.pace[0]
+    update_pace(pace, own.trees[0].body, pace.since_s)
+    pace.since_s = 0.0
 
 
 @kernel(makes_arrays=True)
@@ -140,6 +151,7 @@ def _begin(own, seen, s):
         return False
     tree.slope[:], tree.waited, tree.size_std, own.n_alive[0] = 0.0, 0, 0.0, 1
     tree.log_weight, tree.pose_log_prior, tree.pair.waited = 0.0, 0.0, 0
+    forget_pace(own.pace[0])
     return True
 
 

@@ -3,6 +3,7 @@
 import math
 
 from hrc_env.core.kernels import kernel
+from hrc_env.tracking.hypotheses.pace import MOST, widening
 from hrc_env.tracking.hypotheses.slots import Hypotheses
 from hrc_env.tracking.models.axes import leaning
 from hrc_env.tracking.settings import Settings
@@ -24,9 +25,10 @@ def estimate_all(state, s, out):
             n_views = 0
             for c in range(state.views.shape[3]):
                 n_views += state.views[b, w, 0, c].blind <= _FORGOTTEN_UPDATES
-            if best.tracked and n_views == 1:  # the errors have heavier tails than a Gaussian's,
-                lies, _ = leaning(mean[b, w])  # and far heavier ones off the feet
-                _widen(cov[b, w], s.one_view_inflation * s.lying_inflation**lies)
+            if best.tracked and n_views == 1:  # the errors have heavier tails than a Gaussian's
+                lies, _ = leaning(mean[b, w])
+                moves = min(s.lying_inflation**lies * widening(state.pace[b, w]), MOST)
+                _widen(cov[b, w], s.one_view_inflation * moves)
             bound(cov[b, w], s.min_std_m, s.prior_std_m)
             for j in range(age.shape[2]):
                 age[b, w, j] = best.age_s[j]

@@ -26,15 +26,16 @@ class Hypotheses(NamedTuple):
     """(B, W) slots in use, at least one."""
     waited_s: Floats
     """(B, W) time since other hypotheses were looked for [s]."""
+    pace: Any
+    """(B, W) records of `pace.PACE`."""
 
 
 @kernel(makes_arrays=True)
 def worker_slots(state, b, w):
-    """Worker w of environment b alone: views (H, ...), `n_alive` and `waited_s` (1,)."""
+    """Worker w of environment b alone: views (H, ...); `n_alive`, `waited_s` and `pace` (1,)."""
     trees, views, noise = state.trees[b, w], state.views[b, w], state.noise[b, w]
-    return Hypotheses(
-        trees, views, noise, state.n_alive[b, w : w + 1], state.waited_s[b, w : w + 1]
-    )
+    n_alive, waited_s = state.n_alive[b, w : w + 1], state.waited_s[b, w : w + 1]
+    return Hypotheses(trees, views, noise, n_alive, waited_s, state.pace[b, w : w + 1])
 
 
 @kernel(makes_arrays=True)
