@@ -257,6 +257,17 @@ def floor_gap_m(now, capsules):
     ).distance_m
 
 
+@pytest.mark.parametrize(("depth_m", "slow"), [(0.2, False), (0.3, True)])
+def test_where_shoulders_are_hardly_known_hands_are_not_either(depth_m, slow):
+    _, now = believed()
+    mean, cov = now.estimate.mean_world.copy(), now.estimate.cov_world.copy()
+    mean[...] += now.robot.tool_world[:, None] + np.array([0.9, 0.0, 0.2]) - mean[:, :, 1:2]
+    cov[..., JOINT["left_shoulder"], :, :] = np.diag(np.square((0.04, 0.05, depth_m)))
+    vague = replace(now.estimate, mean_world=mean, cov_world=cov)
+    limit = limit_m_s(replace(now, estimate=vague), ShieldConfig())
+    assert np.isfinite(limit[0]) == slow
+
+
 @pytest.mark.parametrize(
     ("wide_m", "slow"), [((0.02, 0.08, 0.4), False), ((0.05, 0.15, 0.4), True)]
 )
