@@ -18,7 +18,8 @@ UNLOCATED_M = 0.135
 """A wrist is hidden if its standard deviation exceeds this along two axes, beyond the growth by
 prediction [m]; one that a camera detects is uncertain in depth only."""
 VAGUE_M = 0.25
-"""Hands are hidden, too, if a shoulder's standard deviation exceeds this along some axis [m]."""
+"""Hands are hidden, too, if a shoulder's standard deviation exceeds this along some axis, beyond
+the growth by prediction [m]."""
 HAND_M = 0.6
 """Distance beyond unseen floor at which hands of people there may be unseen as well [m]."""
 ARM_M = 0.75
@@ -76,7 +77,7 @@ def _of_hands(now: Belief, config: ShieldConfig) -> Floats:
     most_m = UNLOCATED_M + config.predicted_m_s * estimate.age_s[:, :, WRISTS]
     hidden = estimate.tracked[..., None] & (np.trace(cov, axis1=-2, axis2=-1) > 2 * most_m**2)
     hidden[hidden] = np.linalg.eigvalsh(cov[hidden])[:, 1] > most_m[hidden] ** 2
-    hidden |= _is_vague(estimate)[..., None]
+    hidden |= _is_vague(estimate, config)[..., None]
     if not hidden.any():
         return limit
     shoulders = estimate.mean_world[:, :, SHOULDERS]
@@ -88,11 +89,12 @@ def _of_hands(now: Belief, config: ShieldConfig) -> Floats:
     return np.where(hidden, _in_time_m_s(gap_m, config), np.inf).min((1, 2))
 
 
-def _is_vague(estimate: PoseEstimate) -> Bools:
+def _is_vague(estimate: PoseEstimate, config: ShieldConfig) -> Bools:
     """Return (B, W) the tracked workers whose shoulders are hardly located along some axis."""
     cov = estimate.cov_world[:, :, SHOULDERS]
-    vague = estimate.tracked[..., None] & (np.trace(cov, axis1=-2, axis2=-1) > VAGUE_M**2)
-    vague[vague] = np.linalg.eigvalsh(cov[vague])[:, 2] > VAGUE_M**2
+    most_m = VAGUE_M + config.predicted_m_s * estimate.age_s[:, :, SHOULDERS]
+    vague = estimate.tracked[..., None] & (np.trace(cov, axis1=-2, axis2=-1) > most_m**2)
+    vague[vague] = np.linalg.eigvalsh(cov[vague])[:, 2] > most_m[vague] ** 2
     return np.asarray(vague.any(-1))
 
 
