@@ -23,6 +23,7 @@ from hrc_env.core.typing import Floats, Image, Points2, Points3
 from hrc_env.geometry.cameras import PinholeCamera, inside_image
 from hrc_env.perception import blazepose, network
 from hrc_env.perception.believing import is_somebody
+from hrc_env.perception.exposure import Developed, develop
 from hrc_env.perception.noise import ERROR, STANDING, sigma_px
 from hrc_env.perception.searching import (
     STATURE_OF_SIDE,
@@ -179,7 +180,7 @@ class PoseDetector(Stateful):
         asked = [(c, window) for c, windows in enumerate(people) for window in windows]
         sure = replace(self.config, min_presence=self.config.sure_presence)
         joints_of = self._share(
-            functools.partial(_joints, self._crop(source, *one), one[1], True, False, sure)
+            functools.partial(_joints, self._crop(source, *one).picture, one[1], True, False, sure)
             for one in asked
         )
         known = [one for one, joints in zip(asked, joints_of, strict=True) if joints is not None]
@@ -209,10 +210,11 @@ class PoseDetector(Stateful):
         """One worker's joints in these windows."""
         looks = self._looks.setdefault(track, [0] * len(self.cameras))
         used = [(c, window) for c, window in enumerate(windows) if window is not None]
-        sight = _nobody(windows)
+        sight, doubts = _nobody(windows), [1.0] * len(windows)
 
         def job(c: int, window: Roi) -> Callable[[_Networks], Floats | None]:
-            crop = sight.crops[c] = self._crop(source, c, window)
+            crop, doubts[c] = self._crop(source, c, window)
+            sight.crops[c] = crop
             ask = self._is_turn(looks[c], c)
             return functools.partial(_joints, crop, window, ask, folded, self.config)
 
@@ -222,15 +224,18 @@ class PoseDetector(Stateful):
             if joints is not None:
                 looks[c] = before[c] + 1
                 self._write(sight, c, window, joints, posture)
+                sight.sigma_px[c] *= doubts[c]
         return sight
 
-    def _crop(self, source: ImageSource, c: int, window: Roi) -> Image:
-        """A copy of the crop, black where the camera does not see: renderers go on drawing."""
+    def _crop(self, source: ImageSource, c: int, window: Roi) -> Developed:
+        """A developed copy of the crop, black where the camera does not see: renderers go on
+        drawing."""
         crop, camera = image_crop(source, c, window), self.cameras[c]
         mask = _frame_mask(window, camera.width_px, camera.height_px)
-        if mask is None:
-            return np.array(crop)
-        return np.asarray(cv2.bitwise_and(crop, crop, mask=mask), np.uint8)
+        picture, doubt = develop(crop, mask)
+        if mask is not None:
+            picture = np.asarray(cv2.bitwise_and(picture, picture, mask=mask), np.uint8)
+        return Developed(np.array(picture) if picture is crop else picture, doubt)
 
     def _is_turn(self, looks: int, camera: int) -> bool:
         """Whether the detector stage is due; the cameras take turns to spread its cost."""

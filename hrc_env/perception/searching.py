@@ -24,6 +24,7 @@ from hrc_env.geometry.cameras import (
     rays,
 )
 from hrc_env.perception import blazepose
+from hrc_env.perception.exposure import develop, is_blank
 from hrc_env.perception.network import LANDMARK_SIDE, PersonDetector
 
 SEARCH_RAD = math.radians(75.0)
@@ -42,8 +43,6 @@ SAME = 0.2
 """Windows whose middles are nearer than this share of a side show the same person."""
 MIN_CROSSING = 0.1
 """Sine of the smallest angle between two lines that fixes a point."""
-LEAST_CONTRAST = 3.0
-"""Least standard deviation of a colour channel over a picture that is not blank."""
 Candidates = Sequence[Sequence[Roi]]
 """(C,) the people found by each camera."""
 Views = list[Roi | None]
@@ -85,10 +84,10 @@ def search_jobs(
             crop = np.array(image_crop(source, c, window))
             yield lambda detect, c=c, k=crop, w=window: Searched(
                 c,
-                bool(k.std((0, 1)).max() >= LEAST_CONTRAST),
+                not is_blank(k),
                 [
                     (c, person.score, blazepose.person_window(person, w))
-                    for person in people(detect, k)
+                    for person in people(detect, develop(k).picture)
                 ],
             )
 
