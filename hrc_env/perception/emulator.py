@@ -16,6 +16,7 @@ from hrc_env.geometry.lens import lens_row
 from hrc_env.geometry.sight import Surroundings
 from hrc_env.perception import emulator_kernel as kernels
 from hrc_env.perception.calibration import POSTURED, Calibration, changed_ns, read_calibration
+from hrc_env.perception.dimness import Quality
 from hrc_env.perception.searching import STATURE_OF_SIDE
 from hrc_env.perception.sightlines import CAMERA, N_LOOK, World, sight_batch
 
@@ -95,6 +96,7 @@ def emulate(
     cameras: tuple[PinholeCamera, ...],
     config: EmulatorConfig,
     expected: PoseEstimate | None = None,
+    dim: Quality | None = None,
 ) -> Keypoints:
     """What the detector would report of the workers in one image of every camera, in its pixels;
     NaN, 0 and infinity of a worker who is not seen.
@@ -106,6 +108,7 @@ def emulate(
         config: as given to `make_state`.
         expected: (B, W, ...) what the tracker predicts, which decides what is told of errors; None,
             and where there is no track near: what a search assumes, somebody who stands.
+        dim: (B, C) how well the pictures show who is in them; None: as in usual light.
     """
     batch, n_cameras, n_workers = state.errors.shape
     shape = (batch, n_cameras, n_workers, N_JOINTS)
@@ -120,7 +123,9 @@ def emulate(
     out = kernels.Report(np.empty((*shape, 2)), np.empty(shape), np.empty(shape))
     world, rig = _world(truth, surroundings), _rig(cameras)
     known = _known(expected, truth.joints_world.shape)
-    kernels.emulate_batch(state.errors, state.wander, normals, world, known, rig, calibration, out)
+    shows = _shows(dim, (batch, n_cameras))
+    state_of = state.errors, state.wander, normals
+    kernels.emulate_batch(*state_of, world, known, rig, shows, calibration, out)
     return Keypoints(*out)
 
 
@@ -130,6 +135,13 @@ def _known(expected: PoseEstimate | None, shape: tuple[int, ...]) -> kernels.Exp
         return kernels.Expected(nowhere, nowhere, np.zeros(shape[:2], np.bool_))
     joints, velocity = map(np.ascontiguousarray, (expected.mean_world, expected.velocity_world))
     return kernels.Expected(joints, velocity, np.ascontiguousarray(expected.tracked))
+
+
+def _shows(dim: Quality | None, shape: tuple[int, int]) -> Floats:
+    shows = np.zeros((*shape, 2))
+    shows[..., kernels.DOUBT] = 1.0 if dim is None else dim.doubt
+    shows[..., kernels.OVERLOOKED] = 0.0 if dim is None else dim.missed
+    return shows
 
 
 def lines_of_sight(

@@ -37,6 +37,8 @@ N_NORMALS = 6
 """Normal variables of a joint in an image: two of lasting errors, two of new ones, size, doubt."""
 SWAPPED, CROSSED, MISSED = range(3)
 """What may happen: left and right of all joints exchanged, of the legs alone, nobody found."""
+DOUBT, OVERLOOKED = range(2)
+"""Of a picture: the factor on errors and what is told of them, the share of more misses."""
 N_OF_BODY = 4
 """Normal variables of a worker in an image: one for the errors' size, one for each happening."""
 FOLLOWED_M = 0.5
@@ -95,12 +97,12 @@ class Expected(NamedTuple):
 
 
 @kernel(makes_arrays=True)
-def emulate_batch(errors, wander, normals, world, expected, rig, calibration, report):
+def emulate_batch(errors, wander, normals, world, expected, rig, dim, calibration, report):
     """Advance errors (B, C, W; `ERRORS`) and wander (B, W, J, 3; the same in every camera) by one
     image, and write a `Report`.
 
     normals (B, N) are of bodies, then of images; world is a `World`, expected an `Expected`, rig
-    (C,) `CAMERA`, calibration a pair: (P, N) the numbers of a `POSTURE` each, (1,) `SETTINGS`.
+    (C,) `CAMERA`, dim (B, C, 2) the cameras' `DOUBT` and `OVERLOOKED`, calibration a pair: (P, N) the numbers of a `POSTURE` each, (1,) `SETTINGS`.
     """
     batch, n_cameras, n_workers = errors.shape
     postures, settings = calibration
@@ -127,13 +129,14 @@ def emulate_batch(errors, wander, normals, world, expected, rig, calibration, re
                 seen.look[VIEW] = seen_from(joints, front[0], front[1], rig[c].eye)
                 first = 3 * N_JOINTS * n_workers + (c * n_workers + w) * n_image
                 drawn = normals[b, first : first + n_image]
-                happens = _happen(mine, drawn, n_seen, seen.look, here, common)
+                happens = _happen(mine, drawn, n_seen, seen.look, here, common, dim[b, c])
                 _errors(mine, drawn, keep, seen.look, common, off)
-                _write(report, (b, c, w), mine, seen, off, here, common, happens)
+                factor = dim[b, c, DOUBT]
+                _write(report, (b, c, w), mine, seen, off, here, common, happens, factor)
                 side = seen.look[SIDE]  # a search's window is round whom the image shows
                 if track >= 0:
                     side, _ = frame(rig[c], expected.joints[b, track], room[1].uv, room[1].depth)
-                stature_px = common.stature_of_side * side
+                stature_px = common.stature_of_side * side * factor
                 _say(report.confidence[b, c, w], stature_px, mixed[1], report.sigma_px[b, c, w])
 
 
@@ -183,7 +186,7 @@ def _wander(wander, normals, joints, front, keep, here, common, meant):
 
 
 @kernel
-def _happen(mine, normals, n_seen, look_of, here, common):
+def _happen(mine, normals, n_seen, look_of, here, common, dim):
     """Whether left and right of all joints and of the legs are exchanged, and the worker is found;
     each happens while a slow normal variable is in its lower tail, as large as its share of time.
     """
@@ -193,7 +196,9 @@ def _happen(mine, normals, n_seen, look_of, here, common):
     cross = _lerp(share[low, 1], share[high, 1], part)
     swapped = _goes_on(mine, SWAPPED, normals, common.keep) < swap
     crossed = _goes_on(mine, CROSSED, normals, common.keep) < cross
-    missed = _goes_on(mine, MISSED, normals, common.keep) < here.miss_share[n_seen]
+    miss = here.miss_share[n_seen]
+    miss += dim[OVERLOOKED] * (1.0 - miss)
+    missed = _goes_on(mine, MISSED, normals, common.keep) < miss
     return swapped, crossed, n_seen >= common.min_joints and not missed
 
 
@@ -233,7 +238,7 @@ def _errors(mine, normals, keep, look_of, common, off):
 
 
 @kernel
-def _write(report, at, mine, seen, off, here, common, happens):
+def _write(report, at, mine, seen, off, here, common, happens, factor):
     """What is reported of each joint of the worker in the image `at` (b, c, w)."""
     px, confidence = report.px[at], report.confidence[at]
     swapped, crossed, found = happens
@@ -256,7 +261,7 @@ def _write(report, at, mine, seen, off, here, common, happens):
         x += HAND[j] * _lerp(bias[low, kind, 0], bias[high, kind, 0], part)
         y += _lerp(bias[low, kind, 1], bias[high, kind, 1], part)
         length = max(math.sqrt(x * x + y * y), 1e-12)
-        shrink = side * common.error_scale * min(1.0, common.max_error / length)
+        shrink = side * common.error_scale * min(factor, common.max_error / length)
         px[label, 0] = seen.uv[j, 0] + shrink * (turn_cos * x - turn_sin * y)
         px[label, 1] = seen.uv[j, 1] + shrink * (turn_sin * x + turn_cos * y)
         follows = common.follows[sight, kind]

@@ -8,42 +8,55 @@ import numpy as np
 from hrc_env.config import HRCConfig
 from hrc_env.core.batching import one, rows, write_rows
 from hrc_env.core.records import Keypoints, PoseEstimate
-from hrc_env.core.typing import Ints
+from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.perception import emulator
+from hrc_env.perception.dimness import Quality, quality_of
+from hrc_env.perception.faults.fault import IMAGE
 from hrc_env.perception.faults.schedule import Recent, Schedule
 from hrc_env.pipeline.sensor_input import Generators, TrueSensorInput, TrueState, with_truth
 from hrc_env.pipeline.tracking import PoseTracking, no_keypoints
 from hrc_env.scene.build import Scene
+from hrc_env.scene.domain_randomization import AS_BUILT, draw_look
 from hrc_env.tracking.estimators import Estimator
 
 
 class _Look(NamedTuple):
     now: TrueSensorInput
     expected: PoseEstimate
+    dim: Quality | None
 
 
 class EmulatedCameras(TrueState):
     """Cameras and detector in one: what is true goes in, keypoints come out."""
 
-    CHANGES = ("recent", "emulator")
+    CHANGES = ("recent", "emulator", "light", "blank")
 
     def __init__(self, scene: Scene, batch: int, config: HRCConfig, schedule: Schedule) -> None:
         self.scene, self.config, self._batch = scene, config.emulator, batch
         self.recent = None if schedule.is_plain else Recent(batch, schedule)
+        self.appearance, self.schedule = config.appearance, schedule
+        self.light = np.ones(batch)
+        """(B,) the strength of the light in each environment's episode; 1 as it was built."""
+        self.blank = np.zeros((batch, len(scene.cameras)), np.bool_)
+        """(B, C) the cameras whose pictures show nothing now."""
         self.emulator = emulator.make_state(
             batch, len(scene.cameras), scene.n_workers, config.ctrl_dt, config.emulator
         )
 
     def reset(self, ids: Ints, rngs: Generators) -> None:
-        """Forget images; draw faults and the detector's slow errors."""
+        """Forget images; draw faults, the light and the detector's slow errors."""
         if self.recent is not None:
             self.recent.reset(ids, rngs)
+        if self.appearance != AS_BUILT:
+            for b in ids:
+                self.light[b] = draw_look(self.appearance, self.scene.n_workers, rngs[b]).light
         emulator.reset(self.emulator, ids, rngs)
 
     def keypoints(self, expected: PoseEstimate, rngs: Generators) -> Keypoints:
         """What is reported of the scene; room, robot and bodies stand in the lines of sight."""
-        ids, look = self.now.ids, _Look(with_truth(self.now), expected)
+        ids = self.now.ids
+        look = _Look(with_truth(self.now), expected, self._dim(ids))
         whole = len(ids) == self._batch
         state = self.emulator if whole else rows(self.emulator, ids)
         if self.recent is None:
@@ -60,10 +73,27 @@ class EmulatedCameras(TrueState):
         """What cameras show now; `state` of the errors goes on."""
         now, config = look.now, self.config
         around = self.scene.surroundings(now.qpos, now.motion.held)
-        keypoints = emulator.emulate(state, rngs, now.truth, around, cameras, config, look.expected)
+        told = look.expected, look.dim
+        keypoints = emulator.emulate(state, rngs, now.truth, around, cameras, config, *told)
         if self.scene.n_workers < 2:
             return keypoints
         return emulator.without_names(keypoints, rngs)
+
+    def _dim(self, ids: Ints) -> Quality | None:
+        """How well the pictures that are taken now show who is in them, (B, C)."""
+        if self.appearance == AS_BUILT and not any(f.group == IMAGE for f in self.schedule.faults):
+            return None
+        steps = np.zeros(len(ids), int) if self.recent is None else self.recent.steps[ids] + 1
+        shape = (len(ids), len(self.scene.cameras))
+        dim = Quality(np.ones(shape), np.zeros(shape), np.zeros(shape, np.bool_))
+        for row, (light, step) in enumerate(zip(self.light[ids], steps.tolist(), strict=True)):
+            for c in range(shape[1]):
+                faults = self.schedule.of(IMAGE, c, step)
+                picture = quality_of(float(light), [fault.how_much for _, fault in faults])
+                for whole, part in zip(dim, picture, strict=True):
+                    whole[row, c] = part
+        self.blank[ids] = dim.blank
+        return dim
 
     def _arrived(self, look: _Look, state: Any, rngs: Generators, recent: Recent) -> Keypoints:
         """What has come of every camera: images of now, older ones, or none."""
@@ -97,6 +127,10 @@ class EmulatorPipeline(PoseTracking):
     ) -> None:
         self.cameras = EmulatedCameras(scene, batch, config, schedule)
         super().__init__(batch, scene, tracker, config, self.cameras)
+
+    def looked(self, ids: Ints, age_s: Floats) -> Bools:
+        """(B, C) which cameras have looked over whole images that show something."""
+        return super().looked(ids, age_s) & ~self.cameras.blank[ids]
 
     def detect(self, ids: Ints, expected: PoseEstimate, sensor_rngs: Generators) -> Keypoints:
         """What the emulated cameras report of the environments that they were shown."""

@@ -23,7 +23,7 @@ from hrc_env.pipeline.rendered import PixelPipeline
 from hrc_env.pipeline.sensor_input import Generators, Sensor, TrueState, with_truth
 from hrc_env.pipeline.tracking import PerceptionPipeline
 from hrc_env.scene.build import Scene
-from hrc_env.scene.domain_randomization import AS_BUILT
+from hrc_env.scene.domain_randomization import AS_BUILT, AppearanceConfig
 from hrc_env.tracking import oracle
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import EstimatorChoice, make_estimator
@@ -32,6 +32,8 @@ from hrc_env.tracking.forecast import forecast
 LEVELS = ("pixels", "keypoints", "truth", "none")
 CAMERA_LEVELS = LEVELS[:2]
 """Those that have cameras."""
+EMULATED = ("darkness",)
+"""The faults of images that `keypoints` knows."""
 
 
 def make_pipeline(
@@ -42,10 +44,11 @@ def make_pipeline(
     """
     if level not in LEVELS:
         raise unknown("perception", level, LEVELS)
-    if level != "pixels" and config.appearance != AS_BUILT:
+    if not _knows(level, config.appearance):
         raise ConfigError(
             f"Looks are of images, and perception={level!r} has none: leave appearance out, or use "
-            "perception='pixels'."
+            "perception='pixels'. perception='keypoints' knows the strength of the light alone: "
+            'appearance={"light": (0.15, 0.5)}.'
         )
     schedule = _schedule(scene, level, config)
     memory_s = max(config.tracker.longest_delay_s, min(schedule.longest_delay_s, 1.0))
@@ -61,6 +64,13 @@ def make_pipeline(
     return PixelPipeline(scene, batch, tracker, config, schedule)
 
 
+def _knows(level: str, appearance: AppearanceConfig) -> bool:
+    """Whether a perception level can show this appearance."""
+    if level == "keypoints":
+        appearance = replace(appearance, light=AS_BUILT.light)
+    return level == "pixels" or appearance == AS_BUILT
+
+
 def _schedule(scene: Scene, level: str, config: HRCConfig) -> Schedule:
     """What the cameras do over an episode; refuses faults that a level does not know."""
     faults = config.faults
@@ -69,12 +79,13 @@ def _schedule(scene: Scene, level: str, config: HRCConfig) -> Schedule:
             f"Faults are of cameras; perception={level!r} has none. Leave them out, or use one of "
             f"{', '.join(map(repr, CAMERA_LEVELS))}."
         )
-    images = sorted({fault.kind for fault in faults if fault.group == IMAGE})
+    images = sorted({f.kind for f in faults if f.group == IMAGE} - {*EMULATED})
     if images and level == "keypoints":
         raise ConfigError(
             f'Faults of images ({", ".join(images)}) need images: use perception="pixels". What '
             'they do to the detector is not emulated; perception="keypoints" knows '
-            f"{', '.join(kind for kind, each in KINDS.items() if each.group != IMAGE)}."
+            f"{', '.join(kind for kind, each in KINDS.items() if each.group != IMAGE)}, "
+            f"{', '.join(EMULATED)}."
         )
     return Schedule(scene.rig, faults, config.ctrl_dt)
 

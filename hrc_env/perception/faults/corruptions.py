@@ -41,6 +41,11 @@ class Shown(NamedTuple):
     seeds: tuple[int, ...]  # the numbers of episode, fault, camera and step
 
 
+def darkness_noise(share: float) -> float:
+    """Standard deviation of the noise [grey levels] of an image with a share of the light."""
+    return DARK_NOISE * math.sqrt(max(1.0 - share, 0.0) / 0.95)
+
+
 def spoil(shown: Shown, fault: FaultConfig) -> Image:
     """A crop with one fault of the group `IMAGE`; motion blur is made as the image is taken."""
     return _SPOIL[fault.kind](shown, fault.how_much)
@@ -90,8 +95,7 @@ def _exposed(shown: Shown, stops: float) -> Image:
 
 
 def _dark(shown: Shown, share: float) -> Image:
-    levels = DARK_NOISE * math.sqrt(max(1.0 - share, 0.0) / 0.95)
-    return _noisy(shown._replace(crop=_exposed(shown, math.log2(share))), levels)
+    return _noisy(shown._replace(crop=_exposed(shown, math.log2(share))), darkness_noise(share))
 
 
 def _glaring(shown: Shown, share: float) -> Image:

@@ -1,0 +1,155 @@
+"""What dark and dull pictures cost the pose network: python -m benchmarks.perception.dim
+
+The same moments are drawn in usual light and with each of `PICTURES`, and all cameras look at the
+worker as if for the first time. `hrc_env.perception.exposure` has its law of deviations from this
+table, and `hrc_env.perception.dimness` the misses of the emulator.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import tyro
+
+from benchmarks.perception.crops import Instant, instants
+from benchmarks.perception.views import in_turns
+from hrc_env.core.batching import one
+from hrc_env.core.records import Roi
+from hrc_env.core.typing import Floats, Image
+from hrc_env.geometry.cameras import image_from_pinhole, project, projections
+from hrc_env.perception.detector import Detection, PoseDetector
+from hrc_env.perception.faults.corruptions import Shown, spoil
+from hrc_env.perception.faults.fault import FaultConfig
+from hrc_env.perception.lensed import Lensed
+from hrc_env.perception.searching import Views
+from hrc_env.perception.windows import window_from_joints
+from hrc_env.scene.build import Scene, SceneConfig, build
+from hrc_env.scene.domain_randomization import AppearanceConfig, draw_look
+from hrc_env.scene.render import CropRenderer
+from hrc_env.worker.body import load_body, worker_truth
+
+GROSS = 8.0
+"""An error counts as at most so many deviations: what is further off is somebody else's joint."""
+
+
+class Picture(NamedTuple):
+    """What is done to pictures."""
+
+    light: float = 1.0
+    """As of `AppearanceConfig`."""
+    darkness: float = 1.0
+    """Amount of the fault."""
+    contrast: float = 1.0
+    """Distance from a middle grey is multiplied by it."""
+
+
+PICTURES: dict[str, Picture] = {
+    "usual": Picture(),
+    **{f"light {light:g}": Picture(light=light) for light in (0.3, 0.15, 0.1, 0.07)},
+    **{f"contrast {share:g}": Picture(contrast=share) for share in (0.5, 0.35, 0.2, 0.1)},
+    **{f"darkness {share:g}": Picture(darkness=share) for share in (0.1, 0.05, 0.02, 0.01)},
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Arguments:
+    """How much is looked at."""
+
+    moments: int = 40
+    """Of each body in each scene."""
+    bodies: tuple[str, ...] = ("worker_1", "worker_3")
+    scenes: tuple[str, ...] = ("lab", "site")
+    seed: int = 1
+
+
+class _Seen(NamedTuple):
+    """One crop."""
+
+    error_px: Floats  # (J,) of each joint; NaN: missed
+    sigma_px: Floats  # (J,) as told
+
+
+class _Spoilt:
+    """An image source whose pictures have been spoilt."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene, self.renderer = scene, CropRenderer(scene)
+        self.source = Lensed(self.renderer, scene.cameras)
+        self.picture, self.count = Picture(), 0
+
+    def crop(self, camera_index: int, window: Roi) -> Image:
+        """The window of a camera's image."""
+        image, kind = self.source.crop(camera_index, window), self.picture
+        self.count += 1
+        if kind.contrast < 1.0:
+            image = np.round(128.0 + kind.contrast * (image - 128.0)).astype(np.uint8)
+        if kind.darkness < 1.0:
+            shown = Shown(image, self.scene.cameras[camera_index], window, (0, 0, 0, self.count))
+            image = spoil(shown, FaultConfig("darkness", ("all",), kind.darkness))
+        return image
+
+    def show(self, now: Instant, picture: Picture, seed: Sequence[int]) -> None:
+        """Draw a moment so from now on."""
+        light = AppearanceConfig(light=(picture.light, picture.light))
+        self.picture = picture
+        self.renderer.randomize(draw_look(light, 1, np.random.default_rng(seed)))
+        self.renderer.pose(now.q, one(now.motion, 0))
+
+
+def look(name: str, body: str, asked: Arguments) -> dict[str, list[_Seen]]:
+    """Crops by what was done to them; the same moments and cameras in the same order."""
+    scene = build(SceneConfig(), name, 1, body)
+    spoilt, detector = _Spoilt(scene), PoseDetector(scene.cameras)
+    seen: dict[str, list[_Seen]] = {kind: [] for kind in PICTURES}
+    rng = np.random.default_rng(asked.seed)
+    for k, now in enumerate(instants(scene, asked.moments, rng, in_turns())):
+        joints = worker_truth(load_body(body), now.motion).joints_world[0]
+        px, depth_m = (values[0] for values in project(projections(scene.cameras), joints))
+        views = zip(px, depth_m, scene.cameras, strict=True)
+        windows: Views = [window_from_joints(*view) for view in views]
+        true_px = np.stack([image_from_pinhole(c, p) for c, p in zip(scene.cameras, px)])
+        for kind, picture in PICTURES.items() if any(windows) else ():
+            spoilt.show(now, picture, [asked.seed, k])
+            detector.forget(0)
+            found = detector.detect(spoilt, windows)
+            seen[kind] += _compared(found, windows, true_px)
+    detector.close()
+    spoilt.renderer.close()
+    return seen
+
+
+def _compared(found: Detection, windows: Views, true_px: Floats) -> list[_Seen]:
+    off = np.linalg.norm(found.px - true_px, axis=-1)
+    return [_Seen(off[c], found.sigma_px[c]) for c, w in enumerate(windows) if w is not None]
+
+
+def row_of(usual: Sequence[_Seen], dim: Sequence[_Seen]) -> tuple[int, int, float, float]:
+    """How many crops showed the worker in usual light, and in this picture too; of these the median
+    error and that in deviations (root mean square), as factors on those in usual light."""
+    known = [pair for pair in zip(usual, dim, strict=True) if np.isfinite(pair[0].error_px).all()]
+    both = [pair for pair in known if np.isfinite(pair[1].error_px).all()]
+
+    def median(which: int) -> float:
+        return float(np.median([pair[which].error_px for pair in both]))
+
+    def spread(which: int) -> float:
+        share = np.array([pair[which].error_px / pair[which].sigma_px for pair in both])
+        return float(np.sqrt(np.mean(np.minimum(share, GROSS) ** 2)))
+
+    return len(known), len(both), median(1) / median(0), spread(1) / spread(0)
+
+
+def main(asked: Arguments, say: Callable[[str], None] = print) -> None:
+    """Look, and print a table a scene."""
+    for name in asked.scenes:
+        parts = [look(name, body, asked) for body in asked.bodies]
+        seen = {kind: [view for part in parts for view in part[kind]] for kind in PICTURES}
+        say(f"\n| {name} | found | of | error | error / deviation |\n|---|---:|---:|---:|---:|")
+        for kind in PICTURES:
+            known, both, error, spread = row_of(seen["usual"], seen[kind])
+            say(f"| {kind} | {both} | {known} | {error:.2f} | {spread:.2f} |")
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Arguments))
