@@ -61,10 +61,10 @@ def test_what_a_dark_room_shows_is_spread_although_its_windows_shine():
     scene = build(name="lab", n_workers=0)
     look = draw_look(AppearanceConfig(light=(0.15, 0.15)), 1, np.random.default_rng(0))
     dark = [crop for crop in crops(scene, look) if not is_blank(crop)]
-    bright = [crop.max() > 130 for crop in dark]
-    assert 4 <= sum(bright)
-    for crop in dark:
-        assert np.median(develop(crop).picture) > 2.0 * np.median(crop)
+    shines = np.array([np.percentile(crop, 99) > 100 for crop in dark])
+    brighter = np.array([np.median(develop(c).picture) > 2.0 * np.median(c) for c in dark])
+    assert brighter[~shines].all()
+    assert brighter[shines].sum() >= 2
 
 
 @pytest.mark.parametrize(("share", "base"), [(0.15, 0.0), (0.2, 80.0), (0.2, 190.0), (0.3, 5.0)])
