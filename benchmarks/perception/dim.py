@@ -1,8 +1,8 @@
-"""What dark and dull pictures cost the pose network: python -m benchmarks.perception.dim
+"""The pose network on dark and dull pictures: python -m benchmarks.perception.dim
 
-The same moments are drawn in usual light and with each of `PICTURES`, and all cameras look at the
-worker as if for the first time. `hrc_env.perception.exposure` has its law of deviations from this
-table, and `hrc_env.perception.dimness` the misses of the emulator.
+The same moments are drawn in usual light and with each of `PICTURES`, and every camera sees the
+worker as if for the first time. The deviations of `hrc_env.perception.exposure` were fitted to this
+table.
 """
 
 from collections.abc import Callable, Sequence
@@ -30,11 +30,11 @@ from hrc_env.scene.render import CropRenderer
 from hrc_env.worker.body import load_body, worker_truth
 
 GROSS = 8.0
-"""An error counts as at most so many deviations: what is further off is somebody else's joint."""
+"""Errors count as at most this number of deviations, so that single gross ones do not decide."""
 
 
 class Picture(NamedTuple):
-    """What is done to pictures."""
+    """A way to spoil pictures."""
 
     light: float = 1.0
     """As of `AppearanceConfig`."""
@@ -54,7 +54,7 @@ PICTURES: dict[str, Picture] = {
 
 @dataclass(frozen=True, slots=True)
 class Arguments:
-    """How much is looked at."""
+    """Settings of the measurement."""
 
     moments: int = 40
     """Of each body in each scene."""
@@ -71,7 +71,7 @@ class _Seen(NamedTuple):
 
 
 class _Spoilt:
-    """An image source whose pictures have been spoilt."""
+    """An image source with spoilt pictures."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.renderer = scene, CropRenderer(scene)
@@ -90,7 +90,7 @@ class _Spoilt:
         return image
 
     def show(self, now: Instant, picture: Picture, seed: Sequence[int]) -> None:
-        """Draw a moment so from now on."""
+        """Draw a moment from now on, with a picture's light and faults."""
         light = AppearanceConfig(light=(picture.light, picture.light))
         self.picture = picture
         self.renderer.randomize(draw_look(light, 1, np.random.default_rng(seed)))
@@ -98,7 +98,7 @@ class _Spoilt:
 
 
 def look(name: str, body: str, asked: Arguments) -> dict[str, list[_Seen]]:
-    """Crops by what was done to them; the same moments and cameras in the same order."""
+    """Return the crops by the names of `PICTURES`, the same moments and cameras in each list."""
     scene = build(SceneConfig(), name, 1, body)
     spoilt, detector = _Spoilt(scene), PoseDetector(scene.cameras)
     seen: dict[str, list[_Seen]] = {kind: [] for kind in PICTURES}
@@ -108,7 +108,9 @@ def look(name: str, body: str, asked: Arguments) -> dict[str, list[_Seen]]:
         px, depth_m = (values[0] for values in project(projections(scene.cameras), joints))
         views = zip(px, depth_m, scene.cameras, strict=True)
         windows: Views = [window_from_joints(*view) for view in views]
-        true_px = np.stack([image_from_pinhole(c, p) for c, p in zip(scene.cameras, px)])
+        true_px = np.stack(
+            [image_from_pinhole(c, p) for c, p in zip(scene.cameras, px, strict=True)]
+        )
         for kind, picture in PICTURES.items() if any(windows) else ():
             spoilt.show(now, picture, [asked.seed, k])
             detector.forget(0)
@@ -125,8 +127,9 @@ def _compared(found: Detection, windows: Views, true_px: Floats) -> list[_Seen]:
 
 
 def row_of(usual: Sequence[_Seen], dim: Sequence[_Seen]) -> tuple[int, int, float, float]:
-    """How many crops showed the worker in usual light, and in this picture too; of these the median
-    error and that in deviations (root mean square), as factors on those in usual light."""
+    """Return the number of crops that showed the worker in usual light, and in this picture too; of
+    the latter the median error, and the root mean square of error over deviation, both as factors
+    on those in usual light."""
     known = [pair for pair in zip(usual, dim, strict=True) if np.isfinite(pair[0].error_px).all()]
     both = [pair for pair in known if np.isfinite(pair[1].error_px).all()]
 
@@ -141,7 +144,7 @@ def row_of(usual: Sequence[_Seen], dim: Sequence[_Seen]) -> tuple[int, int, floa
 
 
 def main(asked: Arguments, say: Callable[[str], None] = print) -> None:
-    """Look, and print a table a scene."""
+    """Measure, and print a table for each scene."""
     for name in asked.scenes:
         parts = [look(name, body, asked) for body in asked.bodies]
         seen = {kind: [view for part in parts for view in part[kind]] for kind in PICTURES}

@@ -228,7 +228,7 @@ class PoseDetector(Stateful):
         return sight
 
     def _crop(self, source: ImageSource, c: int, window: Roi) -> Developed:
-        """A developed copy of the crop, black where the camera does not see: renderers go on
+        """Return a developed copy of the crop, black outside of the camera's image: renderers go on
         drawing."""
         crop, camera = image_crop(source, c, window), self.cameras[c]
         mask = _frame_mask(window, camera.width_px, camera.height_px)

@@ -1,7 +1,7 @@
-"""What is known of pictures without drawing them: how well they show who is in them.
+"""How well dark pictures show people: a model of the detector on developed pictures (`exposure`).
 
-The emulator is told by this what dark pictures cost the detector, which develops them first
-(`exposure`). `python -m benchmarks.perception.dim` measures both on crops, and prints them.
+The emulator uses it, as it has no pictures. `python -m benchmarks.perception.dim` prints the errors
+of crops to which it was fitted.
 """
 
 import math
@@ -19,31 +19,34 @@ SPAN = 166.0
 OF_GREY = 0.67
 """Noise of the grey levels as a share of that of the colours: it is each colour's own."""
 TEXTURE = 0.04
-"""Share of the span that fine patterns of the scene add to what is measured as noise."""
+"""Fine patterns of the scene are measured as noise of this share of the span."""
 CONTRAST = 0.21
 """Coarse contrast (`exposure.is_blank`) as a share of the span."""
 SPREAD = 0.25
-"""Parts of a picture have as much more or less contrast: some are blank before all are."""
+"""Relative spread of the contrast between the parts of a picture, some of which are blank first."""
 NOISE: Floats = np.array([0.06, 0.09, 0.13, 0.16, 0.18, 0.20])
 MISSED: Floats = np.array([0.0, 0.05, 0.10, 0.22, 0.35, 0.55])
-"""Share of the time that a camera misses who is in its picture, by the share of the span that is
-noise; beside the misses in usual light."""
+"""Additional share of the time in which a camera misses people, by noise as a share of the span."""
 
 
 class Quality(NamedTuple):
-    """How well pictures show who is in them, each (...)."""
+    """How well pictures show people; arrays of one shape."""
 
     doubt: Floats
-    """Factor on the errors of joints, and on the deviations that are told."""
+    """Factor on the errors of joints and on their reported deviations."""
     missed: Floats
-    """Share of the time that people are missed, beside what is usual."""
+    """Additional share of the time in which people are missed."""
     blank: Bools
-    """Whether they show nothing, and prove nothing."""
+    """Whether the pictures show nothing, and hence do not prove absence."""
 
 
 def quality_of(light: float, darkness: Sequence[float] = ()) -> Quality:
-    """Quality of a picture in light of a strength (1 as built), with faults of the kind `darkness`
-    of these amounts one after the other."""
+    """Return the quality of pictures in some light.
+
+    Args:
+        light: strength of all light, as of `AppearanceConfig`; 1 is as the scene was built.
+        darkness: amounts of the faults `darkness` of the camera, which follow each other.
+    """
     span, noise = SPAN * light, 0.0
     for share in darkness:
         left = share ** (1.0 / GAMMA)

@@ -108,7 +108,7 @@ def emulate(
         config: as given to `make_state`.
         expected: (B, W, ...) what the tracker predicts, which decides what is told of errors; None,
             and where there is no track near: what a search assumes, somebody who stands.
-        dim: (B, C) how well the pictures show who is in them; None: as in usual light.
+        dim: (B, C) how well the pictures show people; None: as in usual light.
     """
     batch, n_cameras, n_workers = state.errors.shape
     shape = (batch, n_cameras, n_workers, N_JOINTS)

@@ -38,7 +38,7 @@ N_NORMALS = 6
 SWAPPED, CROSSED, MISSED = range(3)
 """What may happen: left and right of all joints exchanged, of the legs alone, nobody found."""
 DOUBT, OVERLOOKED = range(2)
-"""Of a picture: the factor on errors and what is told of them, the share of more misses."""
+"""Numbers of a dim picture: factor on errors and deviations, additional share of misses."""
 N_OF_BODY = 4
 """Normal variables of a worker in an image: one for the errors' size, one for each happening."""
 FOLLOWED_M = 0.5
@@ -102,7 +102,8 @@ def emulate_batch(errors, wander, normals, world, expected, rig, dim, calibratio
     image, and write a `Report`.
 
     normals (B, N) are of bodies, then of images; world is a `World`, expected an `Expected`, rig
-    (C,) `CAMERA`, dim (B, C, 2) the cameras' `DOUBT` and `OVERLOOKED`, calibration a pair: (P, N) the numbers of a `POSTURE` each, (1,) `SETTINGS`.
+    (C,) `CAMERA`, dim (B, C, 2) `DOUBT` and `OVERLOOKED` of pictures, calibration a pair: (P, N)
+    the numbers of a `POSTURE` each, (1,) `SETTINGS`.
     """
     batch, n_cameras, n_workers = errors.shape
     postures, settings = calibration

@@ -1,8 +1,8 @@
-"""Dark and dull pictures are developed before the networks see them, as a photographer would.
+"""Dark and dull pictures are developed before the networks see them.
 
-Grey levels between the darkest and the brightest parts are spread, and noise is smoothed. Pictures
-of usual contrast stay as they are, bit for bit, and so do those that show nothing: noise alone is
-never made to look like a person.
+Grey levels between the dark and the bright parts are spread, and noise is smoothed. Pictures of
+usual contrast are returned unchanged, bit for bit. Blank pictures are returned unchanged as well:
+their noise must not be amplified into the shape of a person.
 """
 
 import math
@@ -17,30 +17,32 @@ from hrc_env.core.typing import Floats, Image
 LEAST_CONTRAST = 3.0
 """Least standard deviation of a colour channel of a picture that is not blank, in `COARSE_PX`."""
 COARSE_PX = 32
-"""Noise of single pixels averages out in a picture of so many rows and columns."""
+"""Contrast is measured on a picture of this size [px]: the noise of pixels averages out."""
 DULL, DULLEST = 75.0, 60.0
-"""Grey levels are spread in pictures that span fewer, and wholly in those that span as few."""
+"""Pictures that span fewer grey levels than the first number are spread, and those below the second
+in full."""
 SPAN = 150.0
-"""So many grey levels lie between dark and bright parts then; 166 in the lab as it was built."""
+"""Grey levels between the dark and bright parts of a picture that was spread in full; the lab as it
+was built has 166."""
 ENDS = (0.01, 0.75, 0.99)
-"""Shares of pixels that are darker than the dark parts, the usual ones and the bright ones."""
+"""Quantiles of the grey levels that count as dark, usual and bright."""
 GLARE = 2.0
-"""What is brighter than so many times the usual parts shines by itself: a window, a lamp."""
+"""Parts brighter than the usual level times this number are windows and lamps, which saturate."""
 MOST_NOISE = 20.0
-"""Noise is not made stronger than this [grey levels], with which the networks cope."""
+"""Noise is amplified to at most this standard deviation [grey levels]."""
 SMOOTHED = (4.0, 10.0)
-"""Noise [grey levels] from which a picture is smoothed, and from which wholly."""
+"""Noise at which smoothing begins, and at which it is complete [grey levels]."""
 ROUNDING = math.sqrt(1.0 / 12.0)
-"""Standard deviation of what rounding to whole grey levels adds."""
+"""Standard deviation of the error of rounding to whole grey levels."""
 UNEVEN: NDArray[np.float32] = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)
-"""Noise passes this filter six times as strong; edges and slopes do not pass (Immerkaer 1996)."""
+"""This filter amplifies noise six times and removes edges and slopes (Immerkaer 1996)."""
 NOISE_STEP = 4
-"""Noise is measured in a picture that is so many times smaller."""
+"""Noise is measured on a picture reduced by this factor."""
 OF_NORMAL = 0.6745
 """Median of the absolute value of a standard normal variable."""
 DOUBT, MOST_DOUBT = 7.0, 3.0
-"""Noise that is a share of a dull picture's span adds so many times that share of the usual errors
-to these, as variances add; and the greatest factor. Fitted to crops (docs/emulator.md)."""
+"""Noise as a share of a dull picture's span, times the first number, is an independent error in
+units of the usual one; the second number bounds the factor. Fitted to crops (docs/emulator.md)."""
 SIGMA_PX = 0.6
 """Of the Gaussian by which noise is smoothed [pixels of a crop]."""
 
@@ -65,8 +67,12 @@ class _Tones(NamedTuple):
 
 
 def is_blank(crop: Image, mask: Image | None = None) -> bool:
-    """Whether a crop (n, n, 3) shows nothing: is dark, white, of one colour, or mere noise. The
-    mask (n, n) is 0 where the camera does not see."""
+    """Return whether a crop is dark, white, of one colour, or mere noise.
+
+    Args:
+        crop: (n, n, 3) RGB.
+        mask: (n, n), 0 outside of the camera's image; None: the crop is inside.
+    """
     size = (COARSE_PX, COARSE_PX)
     coarse = cv2.resize(crop, size, interpolation=cv2.INTER_AREA)
     seen = None if mask is None else cv2.resize(mask, size, interpolation=cv2.INTER_NEAREST)
@@ -75,8 +81,12 @@ def is_blank(crop: Image, mask: Image | None = None) -> bool:
 
 
 def develop(crop: Image, mask: Image | None = None) -> Developed:
-    """Spread the grey levels of a crop (n, n, 3) whose contrast is less than usual, and smooth
-    what noise that shows; the mask (n, n) is 0 where the camera does not see."""
+    """Spread the grey levels of a crop with less than the usual contrast, and smooth its noise.
+
+    Args:
+        crop: (n, n, 3) RGB; it is not changed.
+        mask: (n, n), 0 outside of the camera's image; None: the crop is inside.
+    """
     tones = _tones(crop, mask)
     if tones.span >= DULL or is_blank(crop, mask):
         return Developed(crop, 1.0)
@@ -87,8 +97,8 @@ def develop(crop: Image, mask: Image | None = None) -> Developed:
 
 
 def noise_of(grey: Image) -> float:
-    """Standard deviation of the noise [grey levels] of a picture (n, n), by how uneven most of it
-    is after `NOISE_STEP` pixels have become one: noise of enlarged pictures is as coarse."""
+    """Return the standard deviation of the noise of a picture (n, n) [grey levels], from its median
+    unevenness at a reduced size: enlarged pictures have coarse noise."""
     n = len(grey) // NOISE_STEP
     small = cv2.resize(grey.astype(np.float32), (n, n), interpolation=cv2.INTER_AREA)
     uneven = np.abs(cv2.filter2D(small, cv2.CV_32F, UNEVEN))
@@ -96,13 +106,14 @@ def noise_of(grey: Image) -> float:
 
 
 def doubt_of(noise: float, span: float) -> float:
-    """Factor on the deviations of joints in a picture with so much noise and contrast [levels]."""
+    """Return the factor on the deviations of joints in a picture of this noise and span [grey
+    levels]."""
     added = _ramp(span, DULL, DULLEST) * DOUBT * noise / max(span, 1.0)
     return min(math.hypot(1.0, added), MOST_DOUBT)
 
 
 def _tones(crop: Image, mask: Image | None) -> _Tones:
-    """The grey levels of what is dark and of what is bright and does not shine."""
+    """Return the grey levels of the dark and of the bright parts, without windows and lamps."""
     grey = np.asarray(cv2.cvtColor(crop, cv2.COLOR_RGB2GRAY), np.uint8)
     count: Floats = cv2.calcHist([grey], [0], mask, [256], [0, 256])[:, 0].cumsum()
     dark, usual, bright = np.searchsorted(count, np.array(ENDS) * count[-1]).tolist()
@@ -110,7 +121,7 @@ def _tones(crop: Image, mask: Image | None) -> _Tones:
 
 
 def _spread(crop: Image, tones: _Tones, gain: float) -> Image:
-    """Stretch grey levels about one that stays: as far from black in the span as in all levels."""
+    """Stretch grey levels; the span keeps its place between black and white."""
     added = (gain - 1.0) * tones.span
     first = tones.dark - added * tones.dark / max(255.0 - tones.span, 1.0)
     levels = first + gain * (np.arange(256) - tones.dark)
@@ -126,6 +137,6 @@ def _smooth(picture: Image, noise: float) -> Image:
 
 
 def _ramp(value: float, none: float, whole: float) -> float:
-    """From 0 at `none` smoothly to 1 at `whole`."""
+    """Return a share that rises smoothly from 0 at `none` to 1 at `whole`."""
     share = min(max((value - none) / (whole - none), 0.0), 1.0)
     return share * share * (3.0 - 2.0 * share)

@@ -39,7 +39,7 @@ class EmulatedCameras(TrueState):
         self.light = np.ones(batch)
         """(B,) the strength of the light in each environment's episode; 1 as it was built."""
         self.blank = np.zeros((batch, len(scene.cameras)), np.bool_)
-        """(B, C) the cameras whose pictures show nothing now."""
+        """(B, C) whether a camera's picture is blank now."""
         self.emulator = emulator.make_state(
             batch, len(scene.cameras), scene.n_workers, config.ctrl_dt, config.emulator
         )
@@ -80,7 +80,7 @@ class EmulatedCameras(TrueState):
         return emulator.without_names(keypoints, rngs)
 
     def _dim(self, ids: Ints) -> Quality | None:
-        """How well the pictures that are taken now show who is in them, (B, C)."""
+        """Return how well the pictures taken now show people, (B, C); None: as in usual light."""
         if self.appearance == AS_BUILT and not any(f.group == IMAGE for f in self.schedule.faults):
             return None
         steps = np.zeros(len(ids), int) if self.recent is None else self.recent.steps[ids] + 1
@@ -129,7 +129,7 @@ class EmulatorPipeline(PoseTracking):
         super().__init__(batch, scene, tracker, config, self.cameras)
 
     def looked(self, ids: Ints, age_s: Floats) -> Bools:
-        """(B, C) which cameras have looked over whole images that show something."""
+        """Return (B, C) the cameras whose images have come and are not blank."""
         return super().looked(ids, age_s) & ~self.cameras.blank[ids]
 
     def detect(self, ids: Ints, expected: PoseEstimate, sensor_rngs: Generators) -> Keypoints:

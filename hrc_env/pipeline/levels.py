@@ -33,7 +33,7 @@ LEVELS = ("pixels", "keypoints", "truth", "none")
 CAMERA_LEVELS = LEVELS[:2]
 """Those that have cameras."""
 EMULATED = ("darkness",)
-"""The faults of images that `keypoints` knows."""
+"""Faults of images that level `keypoints` emulates."""
 
 
 def make_pipeline(
@@ -65,7 +65,7 @@ def make_pipeline(
 
 
 def _knows(level: str, appearance: AppearanceConfig) -> bool:
-    """Whether a perception level can show this appearance."""
+    """Return whether a perception level can show this appearance."""
     if level == "keypoints":
         appearance = replace(appearance, light=AS_BUILT.light)
     return level == "pixels" or appearance == AS_BUILT
