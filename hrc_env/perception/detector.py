@@ -131,7 +131,7 @@ class PoseDetector(Stateful):
         self.floor_world, self.error = floor_world, error
         self._search = [search_windows(camera, floor_world) for camera in self.cameras]
         self.blank: frozenset[int] = frozenset()
-        """Cameras whose images were blank in the last search: dark, white, or of one colour."""
+        """Cameras whose images were blank in the last search: dark, white, of one colour, noise."""
         self._looks: dict[int, list[int]] = {}
         self._threads: ThreadPoolExecutor | None = None
 
@@ -213,7 +213,7 @@ class PoseDetector(Stateful):
         sight, doubts = _nobody(windows), [1.0] * len(windows)
 
         def job(c: int, window: Roi) -> Callable[[_Networks], Floats | None]:
-            crop, doubts[c] = self._crop(source, c, window)
+            crop, doubts[c], _ = self._crop(source, c, window)
             sight.crops[c] = crop
             ask = self._is_turn(looks[c], c)
             return functools.partial(_joints, crop, window, ask, folded, self.config)
@@ -232,10 +232,11 @@ class PoseDetector(Stateful):
         drawing."""
         crop, camera = image_crop(source, c, window), self.cameras[c]
         mask = _frame_mask(window, camera.width_px, camera.height_px)
-        picture, doubt = develop(crop, mask)
+        developed = develop(crop, mask)
+        picture = np.array(developed.picture)
         if mask is not None:
             picture = np.asarray(cv2.bitwise_and(picture, picture, mask=mask), np.uint8)
-        return Developed(np.array(picture) if picture is crop else picture, doubt)
+        return developed._replace(picture=picture)
 
     def _is_turn(self, looks: int, camera: int) -> bool:
         """Whether the detector stage is due; the cameras take turns to spread its cost."""

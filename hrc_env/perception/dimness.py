@@ -22,11 +22,14 @@ TEXTURE = 0.04
 """Fine patterns of the scene are measured as noise of this share of the span."""
 CONTRAST = 0.21
 """Coarse contrast (`exposure.is_blank`) as a share of the span."""
-SPREAD = 0.25
-"""Relative spread of the contrast between the parts of a picture, some of which are blank first."""
-NOISE: Floats = np.array([0.06, 0.09, 0.13, 0.16, 0.18, 0.20])
-MISSED: Floats = np.array([0.0, 0.05, 0.10, 0.22, 0.35, 0.55])
-"""Additional share of the time in which a camera misses people, by noise as a share of the span."""
+BLANK = (0.59, 0.92)
+"""Contrast in units of `LEAST_CONTRAST` at which all parts of a picture are blank, and none."""
+USELESS = 0.18
+"""The limit of the same name in `exposure`, by the noise as it is modelled here."""
+NOISE: Floats = np.array([0.160, 0.170, 0.200, 0.230, 0.260])
+MISSED: Floats = np.array([0.0, 0.015, 0.2, 0.8, 1.0])
+"""Additional share of the time in which a camera misses people, by noise as a share of the span:
+of ten episodes with the fault `darkness` each, of amounts 0.01 to 0.003."""
 
 
 class Quality(NamedTuple):
@@ -53,6 +56,7 @@ def quality_of(light: float, darkness: Sequence[float] = ()) -> Quality:
         span, noise = span * left, math.hypot(noise * left, OF_GREY * darkness_noise(share))
     seen = math.hypot(noise, TEXTURE * span, ROUNDING)
     contrast = CONTRAST * span / LEAST_CONTRAST
-    blank = min(max((1.0 + SPREAD - contrast) / (2.0 * SPREAD), 0.0), 1.0)
+    blank = float(np.interp(contrast, BLANK, (1.0, 0.0)))
     missed = max(blank, float(np.interp(seen / max(span, 1.0), NOISE, MISSED)))
-    return Quality(np.array(doubt_of(seen, span)), np.array(missed), np.array(blank == 1.0))
+    is_blank = blank == 1.0 or seen > USELESS * span
+    return Quality(np.array(doubt_of(seen, span)), np.array(missed), np.array(is_blank))

@@ -43,6 +43,8 @@ OF_NORMAL = 0.6745
 DOUBT, MOST_DOUBT = 7.0, 3.0
 """Noise as a share of a dull picture's span, times the first number, is an independent error in
 units of the usual one; the second number bounds the factor. Fitted to crops (docs/emulator.md)."""
+USELESS = 0.165
+"""From this share of noise in the span on, people are missed in dull pictures."""
 SIGMA_PX = 0.6
 """Of the Gaussian by which noise is smoothed [pixels of a crop]."""
 
@@ -52,8 +54,10 @@ class Developed(NamedTuple):
 
     picture: Image
     """The crop itself, or a new one."""
-    doubt: float
+    doubt: float = 1.0
     """Factor on the deviations of joints that are found in it; 1 in pictures of usual contrast."""
+    shows: bool = True
+    """Whether people would be found in it: it is neither blank nor mostly noise."""
 
 
 class _Tones(NamedTuple):
@@ -88,12 +92,15 @@ def develop(crop: Image, mask: Image | None = None) -> Developed:
         mask: (n, n), 0 outside of the camera's image; None: the crop is inside.
     """
     tones = _tones(crop, mask)
-    if tones.span >= DULL or is_blank(crop, mask):
-        return Developed(crop, 1.0)
+    if is_blank(crop, mask):
+        return Developed(crop, shows=False)
+    if tones.span >= DULL:
+        return Developed(crop)
     noise = math.hypot(noise_of(tones.grey), ROUNDING)
     wanted = tones.span + _ramp(tones.span, DULL, DULLEST) * (SPAN - tones.span)
     gain = max(min(wanted / tones.span, MOST_NOISE / noise), 1.0)
-    return Developed(_smooth(_spread(crop, tones, gain), gain * noise), doubt_of(noise, tones.span))
+    picture = _smooth(_spread(crop, tones, gain), gain * noise)
+    return Developed(picture, doubt_of(noise, tones.span), noise < USELESS * tones.span)
 
 
 def noise_of(grey: Image) -> float:

@@ -24,7 +24,7 @@ from hrc_env.geometry.cameras import (
     rays,
 )
 from hrc_env.perception import blazepose
-from hrc_env.perception.exposure import develop, is_blank
+from hrc_env.perception.exposure import develop
 from hrc_env.perception.network import LANDMARK_SIDE, PersonDetector
 
 SEARCH_RAD = math.radians(75.0)
@@ -71,7 +71,7 @@ class Searched(NamedTuple):
     """The result of one search window."""
 
     camera: int
-    shows: bool  # whether it has contrast: is not dark, white, or of one colour
+    shows: bool  # whether people would be found in it (`exposure.Developed`)
     found: list[Found]
 
 
@@ -82,14 +82,15 @@ def search_jobs(
     for c in which:
         for window in windows[c]:
             crop = np.array(image_crop(source, c, window))
-            yield lambda detect, c=c, k=crop, w=window: Searched(
-                c,
-                not is_blank(k),
-                [
-                    (c, person.score, blazepose.person_window(person, w))
-                    for person in people(detect, develop(k).picture)
-                ],
-            )
+            yield lambda detect, c=c, k=crop, w=window: _searched(detect, c, k, w)
+
+
+def _searched(detect: PersonDetector, c: int, crop: Image, window: Roi) -> Searched:
+    picture, _, shows = develop(crop)
+    found = people(detect, picture)
+    windows = [blazepose.person_window(person, window) for person in found]
+    scores = [person.score for person in found]
+    return Searched(c, shows, [(c, *one) for one in zip(scores, windows, strict=True)])
 
 
 def image_crop(source: ImageSource, c: int, window: Roi) -> Image:

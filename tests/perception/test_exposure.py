@@ -50,9 +50,9 @@ def crops(scene, look=None):
 def test_usual_pictures_pass_bit_for_bit(pictures):
     for crop in (*pictures.values(), *crops(build(name="lab", n_workers=0))):
         before = crop.copy()
-        picture, doubt = develop(crop)
+        picture, doubt, shows = develop(crop)
         assert picture is crop
-        assert doubt == 1.0
+        assert (doubt, shows) == (1.0, True)
         np.testing.assert_array_equal(crop, before)
 
 
@@ -71,9 +71,10 @@ def test_what_a_dark_room_shows_is_spread_although_its_windows_shine():
 def test_dull_pictures_span_as_much_as_usual_ones(pictures, share, base):
     for crop in pictures.values():
         dull = darker(crop, share, base=base)
-        picture, doubt = develop(dull)
+        picture, doubt, shows = develop(dull)
         assert span(dull) < 60 < 0.7 * SPAN < span(picture)
         assert 1.0 < doubt < 1.5
+        assert shows
 
 
 def test_contrast_is_given_back_little_by_little(pictures):
@@ -87,9 +88,15 @@ def test_contrast_is_given_back_little_by_little(pictures):
 def test_noise_alone_is_blank_and_stays_as_it_is(base, noise):
     crop = darker(np.zeros((256, 256, 3)), 1.0, noise, base)
     assert is_blank(crop)
-    picture, doubt = develop(crop)
+    picture, doubt, shows = develop(crop)
     assert picture is crop
-    assert doubt == 1.0
+    assert (doubt, shows) == (1.0, False)
+
+
+@pytest.mark.parametrize(("share", "shows"), [(0.2, True), (0.12, True), (0.05, False)])
+def test_pictures_in_which_noise_hides_people_show_nothing(pictures, share, shows):
+    for crop in pictures.values():
+        assert develop(darker(crop, share, noise=3.0)).shows == shows
 
 
 def test_what_lies_outside_the_image_does_not_count(pictures):

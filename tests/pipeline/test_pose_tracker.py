@@ -68,6 +68,17 @@ def test_pictures_that_show_nothing_say_nothing(colour):
     assert unknown(np.clip(np.array(colour) + noise, 0, 255).astype(np.uint8))
 
 
+@pytest.mark.parametrize("base", [0, 20, 128])
+def test_noise_alone_says_nothing(base):
+    """Its standard deviation is that of a picture."""
+    noise = np.random.default_rng(1).normal(base, 6.0, (256, 256, 3))
+    assert unknown(np.clip(noise, 0, 255).astype(np.uint8))
+
+
+def test_a_dull_picture_of_nobody_shows_that_nobody_is_there():
+    assert not unknown(np.round(40 + 0.2 * ROOM).astype(np.uint8))
+
+
 @pytest.mark.parametrize(
     ("picture", "says"),
     [
