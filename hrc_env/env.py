@@ -116,7 +116,8 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
             (docs/perception_and_estimators.md); None for those of the config (none).
         appearance: how scene and workers look, drawn for every episode: "varied" or another of
             `hrc_env.scene.domain_randomization.APPEARANCES`, an `AppearanceConfig` or a mapping;
-            None for that of the config (as built). Level "pixels" only.
+            None for that of the config (as built). Level "pixels"; "keypoints" knows the strength
+            of the light.
         control: "joint" (joint velocities), "tool" (tool velocity) or "twist" (that and the
             tool's turn rate); a robot with a hand has one entry more, -1 open to 1 closed.
         shield: what may change a command before the arm gets it: "qp", "ssm", "pfl", a

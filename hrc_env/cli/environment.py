@@ -42,8 +42,8 @@ class EnvironmentArguments:
     """What goes wrong with cameras, each a JSON object:
     '{"kind": "late", "cameras": ["camera_1"], "amount": 0.2}'."""
     appearance: str | None = None
-    """as_built, varied, lights, surfaces or people (pixels only); --config appearance.FIELD=VALUE
-    for more."""
+    """as_built, varied, lights, surfaces or people (pixels only; keypoints knows
+    appearance.light); --config appearance.FIELD=VALUE for more."""
     control: str | None = None
     """What actions are: joint, velocities of the joints, if not given; tool, of the tool; or twist,
     which turns the tool, too."""

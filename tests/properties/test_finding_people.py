@@ -20,6 +20,14 @@ REACH = {"still": 0.0, "moving": 1.0}
 """Random actions of the arm in empty scenes."""
 
 
+DARK = {
+    "dark_lab": ("lab", {"appearance": {"light": (0.15, 0.15)}}),
+    "dark_site": ("site", {"appearance": {"light": (0.15, 0.15)}}),
+    "dark_noise": ("lab", {"faults": [{"kind": "darkness", "cameras": ["all"], "amount": 0.05}]}),
+}
+"""Scenes in little light, and before cameras that are noisy then."""
+
+
 def count_looks(env: HRCEnv, seed: int) -> int:
     """Return the number of looks until the worker is tracked; `LOOKS` + 1: in none of them."""
     env.reset(seed=seed)
@@ -68,6 +76,33 @@ def test_workers_are_found_within_six_looks(scene, figures, pixels):
         Figure(f"finding.{scene}.at_once", count(at_once, len(looks)), least=0.8),
         Figure(f"finding.{scene}.missed_in_six", count(missed, len(looks)), most=0.1),
     )
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("look", DARK)
+def test_workers_are_found_in_the_dark(look, figures, pixels):
+    scene, changes = DARK[look]
+    env = HRCEnv(perception="pixels", scene=scene, **changes)
+    looks = [count_looks(env, seed) for seed in SEEDS[scene][:40]]
+    env.close()
+    at_once, missed = (sum(map(where, looks)) for where in ((1).__eq__, LOOKS.__lt__))
+    figures.hold(
+        Figure(f"finding.{look}.at_once", count(at_once, len(looks)), least=0.8),
+        Figure(f"finding.{look}.missed_in_six", count(missed, len(looks)), most=0.1),
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("look", DARK)
+def test_a_worker_in_the_dark_is_found_and_followed(look, pixels):
+    scene, changes = DARK[look]
+    env = HRCEnv(perception="pixels", scene=scene, **changes)
+    for seed in SEEDS[scene][:3]:
+        _, info = env.reset(seed=seed)
+        for _ in range(LOOKS):
+            *_, info = env.step(np.zeros(6, np.float32))
+        assert info["tracking/mpjpe_m"] < 0.15
+    env.close()
 
 
 @pytest.mark.long
