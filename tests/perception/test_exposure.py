@@ -93,10 +93,14 @@ def test_noise_alone_is_blank_and_stays_as_it_is(base, noise):
     assert (doubt, shows) == (1.0, False)
 
 
-@pytest.mark.parametrize(("share", "shows"), [(0.2, True), (0.12, True), (0.05, False)])
-def test_pictures_in_which_noise_hides_people_show_nothing(pictures, share, shows):
+@pytest.mark.parametrize(
+    ("share", "noise", "shows"), [(0.2, 3.0, True), (0.12, 5.0, True), (0.14, 12.0, False)]
+)
+def test_pictures_in_which_noise_hides_people_show_nothing(pictures, share, noise, shows):
     for crop in pictures.values():
-        assert develop(darker(crop, share, noise=3.0)).shows == shows
+        dull = darker(crop, share, noise, base=40.0)
+        assert not is_blank(dull)
+        assert develop(dull).shows == shows
 
 
 def test_what_lies_outside_the_image_does_not_count(pictures):
