@@ -42,7 +42,8 @@ OF_NORMAL = 0.6745
 """Median of the absolute value of a standard normal variable."""
 DOUBT, MOST_DOUBT = 7.0, 3.0
 """Noise as a share of a dull picture's span, times the first number, is an independent error in
-units of the usual one; the second number bounds the factor. Fitted to crops (docs/emulator.md)."""
+units of the usual one; the second number bounds the factor. Fitted to crops
+(`benchmarks.perception.dim`)."""
 USELESS = 0.165
 """From this share of noise in the span on, people are missed in dull pictures."""
 SIGMA_PX = 0.6
