@@ -8,20 +8,10 @@ from typing import Any
 import numpy as np
 
 from hrc_env.core.kernels import kernel
-from hrc_env.core.records import (
-    EMPTY,
-    POSSIBLE,
-    STATURE_M,
-    Coverage,
-    HandState,
-    ObjectState,
-    Others,
-    PoseEstimate,
-    RobotState,
-    Vacancy,
-)
+from hrc_env.core.records import HandState, ObjectState, PoseEstimate, RobotState
 from hrc_env.core.skeleton import SEGMENT_RADIUS_M
 from hrc_env.core.typing import Bools, Floats, Ints, JointVelocities, Points3
+from hrc_env.core.vacancy import EMPTY, POSSIBLE, STATURE_M, Coverage, Others, Vacancy
 from hrc_env.geometry.distances import (
     Separation,
     closest_parameters,

@@ -342,11 +342,9 @@ class Simulation(Stateful):
     def _episode_info(self, ids: Ints, activity: Ints) -> Info:
         """What the episodes of environments `ids` have come to so far, and who is there."""
         tally = {"episode_cost": self.episode_cost, **self.task.info(self.task_state)}
-        body, cameras = self.motion.workers["body"], self.settings["cameras"]
+        body, cameras, seen = self.motion.workers["body"], self.settings["cameras"], self.pipeline
         return {
             **{name: value[ids] for name, value in tally.items()},
             **step.worker_info(activity[ids], body[ids], self.bodies.names),
-            **step.perception_info(
-                cameras, self.pipeline.suspected(ids), self.pipeline.vacancy(ids)
-            ),
+            **step.perception_info(cameras, seen.suspected(ids), seen.vacancy(ids)),
         }

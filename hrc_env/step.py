@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env import metrics
-from hrc_env.core.records import PoseEstimate, RobotState, Vacancy, WorkerTruth
+from hrc_env.core.records import PoseEstimate, RobotState, WorkerTruth
 from hrc_env.core.typing import Bools, Floats, Ints, Records
+from hrc_env.core.vacancy import Vacancy
 from hrc_env.metrics import CostConfig
 from hrc_env.motion import generator
 from hrc_env.safety import incidents

@@ -10,7 +10,7 @@ import hrc_env  # noqa: F401
 from agents.env_info import env_info
 from agents.registry import make_agent
 from hrc_env import observations
-from hrc_env.core.records import EMPTY, POSSIBLE
+from hrc_env.core.vacancy import EMPTY, POSSIBLE
 from hrc_env.env import HRCEnv
 
 EYES = ((2.9, 2.6, 2.4), (-2.9, 2.6, 2.4))

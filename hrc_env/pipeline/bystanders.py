@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hrc_env.core.batching import Stateful
-from hrc_env.core.records import MOST_OTHERS, Others, no_others
 from hrc_env.core.skeleton import JOINT
 from hrc_env.core.typing import Capsules, Ints, Points3
+from hrc_env.core.vacancy import MOST_OTHERS, Others, no_others
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.geometry.distances import least_separation
 from hrc_env.perception.searching import (

@@ -6,8 +6,9 @@ import numpy as np
 
 from hrc_env.config import HRCConfig
 from hrc_env.core.batching import copied, one
-from hrc_env.core.records import Keypoints, Others, PoseEstimate
-from hrc_env.core.typing import Bools, Floats, Image, Ints
+from hrc_env.core.records import Keypoints, PoseEstimate
+from hrc_env.core.typing import Bools, Capsules, Floats, Image, Ints
+from hrc_env.core.vacancy import Others
 from hrc_env.geometry.chains import robot_state
 from hrc_env.perception.faults.camera_film import CameraFilm, Shot
 from hrc_env.perception.faults.schedule import Recent, Schedule
@@ -46,6 +47,12 @@ class RenderedCameras(Sensor):
             for b in ids:
                 self.worn[b] = draw_look(self.appearance, self.scene.n_workers, rngs[b])
 
+    def robot_world(self) -> Capsules:
+        """Return (B, K, 2, 3) the robots' capsules by their encoders [m]."""
+        chain = self.scene.chain
+        q = self.now.qpos[:, : chain.n_joints]
+        return robot_state(chain, q, np.zeros_like(q)).capsules_world
+
     def show(self, b: int) -> Floats:
         """Make the images present that have come of environment b. (C,) when each was taken [s], by
         the clock of `Keypoints.time_s`; NaN: there is none."""
@@ -79,9 +86,7 @@ class PixelPipeline(PoseTracking):
         """Landmarks of crops round the expected workers, or of a search where there are none."""
         seen = no_keypoints(len(ids), len(self.scene.cameras), self.scene.n_workers)
         time_s, images = np.zeros(seen.px.shape[:2]), self.cameras.images
-        chain = self.scene.chain
-        q = self.cameras.now.qpos[:, : chain.n_joints]
-        capsules_world = robot_state(chain, q, np.zeros_like(q)).capsules_world
+        capsules_world = self.cameras.robot_world()
         for row, b in enumerate(ids.tolist()):
             time_s[row] = self.cameras.show(b)
             has_image = np.isfinite(time_s[row]).tolist()

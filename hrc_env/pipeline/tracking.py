@@ -7,9 +7,10 @@ import numpy as np
 
 from hrc_env.config import HRCConfig
 from hrc_env.core.batching import Stateful, rows, write_rows
-from hrc_env.core.records import Keypoints, Others, PoseEstimate, Vacancy, no_others
+from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Floats, Image, Ints
+from hrc_env.core.vacancy import Others, Vacancy, no_others
 from hrc_env.geometry.cameras import projections
 from hrc_env.perception.lensed import pinhole_keypoints
 from hrc_env.perception.noise import our_joints

@@ -25,9 +25,9 @@ import math
 import numpy as np
 
 from hrc_env.core.kernels import kernel
-from hrc_env.core.records import POSSIBLE, STATURE_M
 from hrc_env.core.skeleton import HAND_SEGMENTS, SEGMENT_ENDS, SEGMENT_RADIUS_M
 from hrc_env.core.typing import Ints
+from hrc_env.core.vacancy import POSSIBLE, STATURE_M
 from hrc_env.geometry.chains import lever
 from hrc_env.geometry.distances import closest_parameters
 

@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from hrc_env.core.records import Coverage, Grounds
+from hrc_env.core.records import Grounds
 from hrc_env.core.typing import Bools, Floats, Points3
+from hrc_env.core.vacancy import Coverage
 from hrc_env.geometry.camera_config import CameraConfig, made
 from hrc_env.geometry.cameras import (
     PinholeCamera,

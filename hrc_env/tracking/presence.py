@@ -22,19 +22,18 @@ import numpy as np
 
 from hrc_env.core.batching import Stateful, rows, write_rows
 from hrc_env.core.kernels import kernel
-from hrc_env.core.records import (
+from hrc_env.core.records import Keypoints, PoseEstimate
+from hrc_env.core.skeleton import N_JOINTS
+from hrc_env.core.typing import Bools, Floats, Ints
+from hrc_env.core.vacancy import (
     EMPTY,
     POSSIBLE,
     PROBABLY_EMPTY,
     Coverage,
-    Keypoints,
     Others,
-    PoseEstimate,
     Vacancy,
     no_others,
 )
-from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.contradiction import Shown
 

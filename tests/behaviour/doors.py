@@ -39,7 +39,6 @@ from hrc_env.belief import (
 from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import (
-    Coverage,
     Cue,
     HandState,
     Held,
@@ -52,9 +51,9 @@ from hrc_env.core.records import (
     WorkerTruth,
     Workplace,
     World,
-    no_others,
 )
 from hrc_env.core.skeleton import JOINTS
+from hrc_env.core.vacancy import Coverage, no_others
 from hrc_env.geometry import cameras, chains, distances, shapes, sight, ways
 from hrc_env.geometry import lines_of_sight as lines
 from hrc_env.geometry import rotations as turns

@@ -13,16 +13,9 @@ from agents.registry import make_agent
 from hrc_env import simulation
 from hrc_env.belief import estimated_separation, of_concern, unseen_floor
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.records import (
-    EMPTY,
-    POSSIBLE,
-    PROBABLY_EMPTY,
-    Coverage,
-    Vacancy,
-    WorkerPath,
-    no_others,
-)
+from hrc_env.core.records import WorkerPath
 from hrc_env.core.skeleton import JOINT
+from hrc_env.core.vacancy import EMPTY, POSSIBLE, PROBABLY_EMPTY, Coverage, Vacancy, no_others
 from hrc_env.env import HRCEnv
 from hrc_env.geometry import chains
 from hrc_env.geometry.distances import least_separation

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hrc_env.core.records import Coverage, Vacancy, no_others
+from hrc_env.core.vacancy import Coverage, Vacancy, no_others
 from hrc_env.env import HRCEnv
 from hrc_env.step import MISCALIBRATED, MORE_PEOPLE, perception_info
 from hrc_env.vector.env import HRCVectorEnv

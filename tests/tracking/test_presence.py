@@ -3,16 +3,9 @@
 import numpy as np
 import pytest
 
-from hrc_env.core.records import (
-    EMPTY,
-    POSSIBLE,
-    PROBABLY_EMPTY,
-    Coverage,
-    Keypoints,
-    PoseEstimate,
-    no_others,
-)
+from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
+from hrc_env.core.vacancy import EMPTY, POSSIBLE, PROBABLY_EMPTY, Coverage, no_others
 from hrc_env.tracking import oracle
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.contradiction import Shown
