@@ -1,5 +1,8 @@
 """Detected people that no track explains: wrong calibrations, exchanged cameras, mirrored images.
 
+A track of a body that is far too small or too large for a person explains no pose: with a
+calibration in other units, or by a board of another size, all cameras agree on such a body.
+
 A camera contradicts a track if most of its confident detections are farther from the track's joints
 than the detector's errors. One camera does for a moment after a swap of left and right or while a
 track restarts; several cameras that go on are not placed as the calibration has it.
@@ -12,6 +15,7 @@ import numpy as np
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Keypoints, PoseEstimate
+from hrc_env.core.skeleton import JOINT
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.geometry.triangulation import pixel_of
 
@@ -22,6 +26,12 @@ EXPLAINED_M = 0.15
 SIGMAS = 4.0
 """A detection belongs to a track's joint within this distance across the line of sight [m], or
 within this number of its standard deviations."""
+
+SMALLEST_M, LARGEST_M = 0.95, 1.8
+"""Length of trunk, thigh and shank of the smallest and of the largest person [m]; of adults of
+1.5 to 2 m it is 1.15 to 1.55."""
+CHAIN = tuple(JOINT[f"left_{name}"] for name in ("shoulder", "hip", "knee", "ankle"))
+"""Joints of the left side; those of the right are the next."""
 
 
 class Shown(NamedTuple):
@@ -60,6 +70,7 @@ def _find(seen, believed, P, focal_px, shown):
         for c in range(len(P)):
             for w in range(tracked.shape[1]):
                 n, off = 0, 0
+                fits = tracked[b, w] and SMALLEST_M < _length_m(mean[b, w]) < LARGEST_M
                 for j in range(confidence.shape[3]):
                     if confidence[b, c, w, j] >= SEEN_WELL:
                         (x, y, z), (vx, vy, vz), ago = mean[b, w, j], velocity[b, w, j], age_s[b, c]
@@ -71,4 +82,16 @@ def _find(seen, believed, P, focal_px, shown):
                         n += 1
                 if n >= LEAST_JOINTS:
                     shown.poses[b, c] = True
-                    shown.unexplained[b, c] |= not tracked[b, w] or 2 * off > n
+                    shown.unexplained[b, c] |= not fits or 2 * off > n
+
+
+@kernel
+def _length_m(body):
+    """Length of trunk, thigh and shank of a body (J, 3), the mean of both sides [m]."""
+    total = 0.0
+    for side in range(2):
+        for k in range(3):
+            a, b = body[CHAIN[k] + side], body[CHAIN[k + 1] + side]
+            x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
+            total += 0.5 * math.sqrt(x * x + y * y + z * z)
+    return total

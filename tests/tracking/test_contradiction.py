@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hrc_env.core.records import Keypoints, PoseEstimate
-from hrc_env.core.skeleton import N_JOINTS
+from hrc_env.core.skeleton import JOINT, N_JOINTS
 from hrc_env.geometry.cameras import pinhole, project, projections
 from hrc_env.tracking.contradiction import (
     EXPLAINED_M,
@@ -21,10 +21,14 @@ CAMERAS = tuple(
 P, FOCAL_PX = projections(CAMERAS), np.array([camera.K[0, 0] for camera in CAMERAS])
 
 
-def people(n_workers=1, tracked=True, velocity=(0.0, 0.0, 0.0)):
+def people(n_workers=1, tracked=True, velocity=(0.0, 0.0, 0.0), size=1.0):
     """A belief of people near each other, and what two cameras show of them."""
     rng = np.random.default_rng(0)
     mean = rng.uniform((-0.3, -0.3, 0.2), (0.3, 0.3, 1.7), (1, n_workers, N_JOINTS, 3))
+    for name, height_m in (("shoulder", 1.4), ("hip", 0.9), ("knee", 0.48), ("ankle", 0.07)):
+        both = [JOINT[f"{side}_{name}"] for side in ("left", "right")]
+        mean[:, :, both] = mean[:, :, :1] * (1.0, 1.0, 0.0) + (0.0, 0.0, height_m)
+    mean *= size
     estimate = PoseEstimate(
         mean, np.tile(np.eye(3) * 1e-4, (*mean.shape[:3], 1, 1)), np.full(mean.shape, velocity),
         np.zeros(mean.shape[:3]), np.full((1, n_workers), tracked),
@@ -55,6 +59,13 @@ def test_a_pose_is_explained_up_to_a_distance_across_the_line_of_sight(worker):
         assert told(estimate, moved)[1] == [False, expected]
         moved.sigma_px[:] = 1.05 * off_px / SIGMAS
         assert told(estimate, moved)[1] == [False, False]
+
+
+@pytest.mark.parametrize(
+    ("size", "strange"), [(0.65, True), (0.86, False), (1.2, False), (1.45, True)]
+)
+def test_a_body_of_no_persons_size_explains_nothing(size, strange):
+    assert told(*people(size=size))[1] == [strange, strange]
 
 
 def test_what_nobody_is_tracked_for_is_not_explained():
