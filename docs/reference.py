@@ -138,7 +138,7 @@ INFOS = {
         "at `pixels` and `keypoints`",
     ),
     "perception/more_people": (
-        "bool", "cameras detect more people than there are slots for workers, which makes all "
+        "0 or 1", "cameras detect more people than there are slots for workers, which makes all "
         "slots unknown; at `pixels` and `keypoints`",
     ),
 }  # fmt: skip

@@ -35,7 +35,7 @@ ABSENT = "absent"
 MISCALIBRATED = "perception/miscalibrated"
 """Names of cameras that contradict the others as if they had been moved, turned or zoomed."""
 MORE_PEOPLE = "perception/more_people"
-"""Whether cameras detect more people than there are slots for workers."""
+"""1 while cameras detect more people than there are slots for workers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +139,10 @@ def perception_info(cameras: tuple[str, ...], suspected: Bools, vacancy: Vacancy
     if vacancy is None:
         return {}
     named = (tuple(compress(cameras, row)) for row in suspected.tolist())
-    return {MISCALIBRATED: np.fromiter(named, object), MORE_PEOPLE: vacancy.others.any}
+    return {
+        MISCALIBRATED: np.fromiter(named, object),
+        MORE_PEOPLE: vacancy.others.any.astype(float),
+    }
 
 
 def _named(indices: Ints, names: tuple[str, ...]) -> NDArray[np.object_]:

@@ -12,7 +12,7 @@ from hrc_env.geometry.cameras import PinholeCamera, project, projections
 from hrc_env.perception.detector import Detection, DetectorConfig, PoseDetector
 from hrc_env.perception.noise import ERROR, STANDING
 from hrc_env.perception.outline import is_folded, posture_of
-from hrc_env.perception.searching import Candidates, ImageSource, Sighting, Views
+from hrc_env.perception.searching import Candidates, ImageSource, Sighting, Views, apart_from
 from hrc_env.perception.windows import steady_window, window_from_joints
 from hrc_env.pipeline.bystanders import HIPS, Bystanders
 from hrc_env.pipeline.reacquisition import ENOUGH, Reacquisition, SearchSchedule
@@ -85,7 +85,8 @@ class Looking(Stateful):
                 due = self.schedule.due(b, has_image)
                 people = self._search(source, b, due)
                 vacant = self.n_workers - sum(map(any, wanted))
-                nearest = self.bystanders.nearest(people, vacant, robot_world)
+                others = apart_from(people, taken)
+                nearest = self.bystanders.nearest(others, vacant, robot_world)
             track = self._track(b, worker)
             folded, posture = _expected_posture(expected, worker)
             seen = self.detector.detect(source, windows, track, taken, nearest, folded, posture)

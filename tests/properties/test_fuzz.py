@@ -8,27 +8,25 @@ from figures import Figure, count
 FRESH = range(490_000, 490_300)
 """Cases that nothing was chosen on; bounds come from cases 0 to 1999."""
 
-CURED = (189, 208, 223, 241, 306, 335, 387, 460, 605, 775, 995, 1120, 1132)
+CURED = (189, 208, 223, 241, 306, 335, 387, 460, 605, 775, 995, 1120, 1132,
+         1521)  # fmt: skip
 """Cases of the first 100,000 sequences in which much was surely wrong, or not recovered: rigs of
 two cameras (387: of six) of which one hangs askew. `fuzzed.judge(605)` draws one again."""
 KNOWN: dict[int, dict[str, set[int]]] = {
     118: {"surely_wrong": {33}},
-    917: {"surely_wrong": {33}, "not_recovered": {10}},
-    1521: {"surely_wrong": {49}},
     **{
         case: {"not_recovered": set(sequences)}
         for case, sequences in {
             446: (3, 19, 21, 23), 467: (12,), 480: (36,), 581: (36,), 670: (2,), 705: (21,),
-            910: (1, 31), 962: (22, 31), 1085: (19,), 1146: (4, 25), 1201: (22,), 1240: (16,),
-            1428: (24,), 1567: (49,), 1581: (22,), 1671: (35,), 1848: (16, 40), 1945: (44,),
+            910: (1, 31), 917: (10,), 962: (22, 31), 1085: (19,), 1146: (4, 25), 1201: (22,),
+            1240: (16,), 1428: (24,), 1567: (49,), 1581: (22,),
+            1671: (35,), 1848: (16, 40), 1945: (44,),
         }.items()
     },
 }  # fmt: skip
 """What is still wrong in the same 100,000: surely, where for more than a second one camera alone
 that hangs askew shows somebody; not recovered, mostly where one of two others is believed with it.
 """
-STRICT = (917, 1521)
-"""Wrong by so much that they are found on any machine: to be struck off when they are cured."""
 
 
 def test_a_case_is_reproduced_and_nothing_is_wrong_with_it():
@@ -48,14 +46,12 @@ def test_nothing_is_wrong_any_more_with_a_case_that_was_found(case):
     assert _found(case) == {}
 
 
-@pytest.mark.parametrize(
-    "case", [pytest.param(k, marks=[] if k in STRICT else pytest.mark.long) for k in KNOWN]
-)
-def test_what_is_known_to_be_wrong_does_not_grow_and_is_struck_off_when_it_is_cured(case):
+@pytest.mark.long
+@pytest.mark.parametrize("case", KNOWN)
+def test_what_is_known_to_be_wrong_does_not_grow(case):
     found, known = _found(case), KNOWN[case]
     assert found.keys() <= known.keys()
     assert all(found[kind] <= known[kind] for kind in found)
-    assert case not in STRICT or found["surely_wrong"] == known["surely_wrong"]
 
 
 def test_people_are_shaken_by_what_is_said_at_most():
