@@ -25,12 +25,14 @@ from hrc_env.perception.searching import (
 )
 from hrc_env.pipeline.sensor_input import Windows
 
-EVERY = 25
+EVERY = 12
 """Steps between searches while all workers are tracked."""
 APART_M = 0.35
 """Hips nearer than this to those of a tracked worker are theirs [m]."""
 ROBOT_M = 0.15
 """No person's hips are nearer than this to the axis of a robot's link [m]."""
+TAKEN_M = 0.45
+"""A person who is not found again, with a worker's track within this distance, is that worker [m]."""
 SAME_M, WALKED_M = 0.7, 0.07
 """A person is found again within this distance, and this more a step [m]."""
 ALONE = 3
@@ -183,7 +185,7 @@ def _seen_again(person: Bystander, left: list[Sighting], hips_world: Points3) ->
         counts = person.counts or one.cameras > 1 or person.seen + 1 >= ALONE
         return Bystander(one.hips_world, 0, person.seen + 1, 0, counts)
     away_m = np.linalg.norm((hips_world - person.hips_world)[:, :2], axis=-1)
-    if (away_m < SAME_M).any() or not person.counts or person.missed + 1 >= MISSES:
+    if (away_m < TAKEN_M).any() or not person.counts or person.missed + 1 >= MISSES:
         return None
     return replace(person, seen=0, missed=person.missed + 1)
 
