@@ -32,7 +32,7 @@ APART_M = 0.35
 ROBOT_M = 0.15
 """No person's hips are nearer than this to the axis of a robot's link [m]."""
 TAKEN_M = 0.45
-"""A person who is not found again, with a worker's track within this distance, is that worker [m]."""
+"""A person who is not found again is the worker whose track is nearer than this [m]."""
 SAME_M, WALKED_M = 0.7, 0.07
 """A person is found again within this distance, and this more a step [m]."""
 ALONE = 3
