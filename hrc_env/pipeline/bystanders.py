@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hrc_env.core.batching import Stateful
+from hrc_env.core.errors import needed
 from hrc_env.core.skeleton import JOINT
 from hrc_env.core.typing import Capsules, Ints, Points3
 from hrc_env.core.vacancy import MOST_OTHERS, Others, no_others
@@ -39,6 +40,8 @@ ALONE = 3
 """Searches in a row in which one camera alone detects a person before that person counts."""
 MISSES = 12
 """Searches in a row without a person after which that person is forgotten."""
+HIGHEST_M = 1.6
+"""No person's hips are higher above the floor [m]."""
 BESIDE = 0.4
 """A person detected by one camera alone within this share of the side of a worker's window may be
 that worker."""
@@ -107,8 +110,8 @@ class Bystanders(Stateful):
     def nearest(self, found: Candidates, slots: int, robot_world: Capsules | None) -> Candidates:
         """Return people (C,), of more than there are free slots only those nearest to the robot's
         capsules (K, 2, 3)."""
-        needed = min(2, len(self.cameras))
-        several = [one for one in sightings(found, self.cameras) if one.cameras >= needed]
+        least = min(2, len(self.cameras))
+        several = [one for one in sightings(found, self.cameras) if one.cameras >= least]
         if robot_world is None or len(several) <= slots:
             return found
         several.sort(key=lambda one: _away_m(one.hips_world, robot_world))
@@ -135,7 +138,7 @@ class Bystanders(Stateful):
         beside = [
             one
             for one in sightings(apart_from(found, taken), self.cameras)
-            if not self._is_known(one, taken, hips_world, robot_world)
+            if not self._is_known(one, found, taken, hips_world, robot_world)
         ]
         left = list(beside)
         known = [_seen_again(person, left, hips_world) for person in self.people[b]]
@@ -148,20 +151,27 @@ class Bystanders(Stateful):
         return beside
 
     def _is_known(
-        self, one: Sighting, taken: Windows, hips_world: Points3, robot_world: Capsules | None
+        self,
+        one: Sighting,
+        found: Candidates,
+        taken: Windows,
+        hips_world: Points3,
+        robot_world: Capsules | None,
     ) -> bool:
-        """Return whether a sighting is of a worker or of the robot."""
+        """Return whether a sighting is of a worker, of the robot, or of no person. A camera alone that detects the
+        worker as well, in another window, shows two people."""
         away_m = np.linalg.norm((hips_world - one.hips_world)[:, :2], axis=-1)
         if (away_m < APART_M).any():
             return True
         if one.cameras == 1 < len(self.cameras):
-            pairs = [
-                (window, windows[c])
-                for c, window in enumerate(one.windows)
-                if window is not None
-                for windows in taken
-            ]
-            return any(same_person(window, other, BESIDE) for window, other in pairs)
+            if not 0.0 < one.hips_world[2] < HIGHEST_M:
+                return True
+            c = next(k for k, window in enumerate(one.windows) if window is not None)
+            windows = [each[c] for each in taken]
+            if any(same_person(other, window) for other in found[c] for window in windows):
+                return False
+            mine = needed(one.windows[c], "A window")
+            return any(same_person(mine, window, BESIDE) for window in windows)
         return robot_world is not None and _away_m(one.hips_world, robot_world) < ROBOT_M
 
     def _hand_over(self, b: int, hips_world: Points3, robot_world: Capsules) -> None:
