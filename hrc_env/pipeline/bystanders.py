@@ -158,8 +158,10 @@ class Bystanders(Stateful):
         hips_world: Points3,
         robot_world: Capsules | None,
     ) -> bool:
-        """Return whether a sighting is of a worker, of the robot, or of no person. A camera alone that detects the
-        worker as well, in another window, shows two people."""
+        """Return whether a sighting is of a worker, of the robot, or of no person.
+
+        A camera alone that detects the worker as well, in another window, shows two people.
+        """
         away_m = np.linalg.norm((hips_world - one.hips_world)[:, :2], axis=-1)
         if (away_m < APART_M).any():
             return True
