@@ -19,9 +19,10 @@ from hrc_env.geometry.distances import (
     segments,
 )
 from hrc_env.safety.robot import RobotModel
+from hrc_env.safety.separation import WALKING_M_S
 
-PERSON_M, WALKING_M_S = 0.5, 1.6
-"""Distance of the floor that people take up from their hips [m]; how fast they walk [m/s]."""
+PERSON_M = 0.5
+"""Distance of the floor that people take up from their hips [m]."""
 NEAR_FLOOR_M = 1.5
 """Floor farther from a robot than this is of no concern [m]."""
 

@@ -30,7 +30,6 @@ MOST_RAD_S = 15.0
 TURNS, TIPS, TRAVELS = (2.3, 1.1), (0.52, 5.0), (1.63, 1.1)
 """Rates up to which the model is right, and the logarithm of the factor on the covariance for every
 unit above them [1/(rad/s)], [1/(m/s)]; fitted to people who walk, spin, fall, tumble and run."""
-
 MOST_MOVING, MOST = 10.5, 25.0
 """Greatest factor for the movement, and together with that for a body that lies."""
 
