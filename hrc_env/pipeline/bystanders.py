@@ -20,7 +20,6 @@ from hrc_env.geometry.distances import least_separation
 from hrc_env.perception.searching import (
     Candidates,
     Sighting,
-    apart_from,
     same_person,
     sightings,
 )
@@ -33,13 +32,14 @@ APART_M = 0.35
 ROBOT_M = 0.15
 """No person's hips are nearer than this to the axis of a robot's link [m]."""
 TAKEN_M = 0.45
-"""A person who is not found again is the worker whose track is nearer than this [m]."""
+"""A person who counted and is not found again is the worker whose track is nearer than this [m]."""
 SAME_M, WALKED_M = 0.7, 0.07
 """A person is found again within this distance, and this more a step [m]."""
 ALONE = 3
-"""Searches in a row in which one camera alone detects a person before that person counts."""
-MISSES = 12
-"""Searches in a row without a person after which that person is forgotten."""
+"""Searches in which one camera alone detects a person before that person counts."""
+MISSES, MISSES_ALONE = 12, 4
+"""Searches in a row without a person after which that person is forgotten, if they count and if
+they do not."""
 HIGHEST_M = 1.6
 """No person's hips are higher above the floor [m]."""
 BESIDE = 0.4
@@ -62,7 +62,7 @@ class Bystander:
     age: int
     """Steps since they were detected."""
     seen: int
-    """Searches in a row that showed them."""
+    """Searches that showed them."""
     missed: int
     """Searches in a row that did not."""
     counts: bool
@@ -137,7 +137,7 @@ class Bystanders(Stateful):
         """
         beside = [
             one
-            for one in sightings(apart_from(found, taken), self.cameras)
+            for one in sightings(_beside(found, taken), self.cameras)
             if not self._is_known(one, found, taken, hips_world, robot_world)
         ]
         left = list(beside)
@@ -188,6 +188,17 @@ class Bystanders(Stateful):
             self.given_up[b, int(np.argmax(away))] = GIVEN_UP
 
 
+def _beside(found: Candidates, taken: Windows) -> Candidates:
+    """Return the people (C,) beside the workers, each of whom is one detection in a camera."""
+    beside = [list(windows) for windows in found]
+    for c, windows in enumerate(beside):
+        for mine in (each[c] for each in taken):
+            near = [window for window in windows if same_person(window, mine)]
+            if mine is not None and near:
+                windows.remove(min(near, key=lambda one: math.dist(one.centre_px, mine.centre_px)))
+    return beside
+
+
 def _seen_again(person: Bystander, left: list[Sighting], hips_world: Points3) -> Bystander | None:
     """Find a remembered person among the sightings that are left, which loses theirs; None once the
     person is forgotten, or tracked: near the hips (W, 3) of a worker."""
@@ -197,9 +208,10 @@ def _seen_again(person: Bystander, left: list[Sighting], hips_world: Points3) ->
         counts = person.counts or one.cameras > 1 or person.seen + 1 >= ALONE
         return Bystander(one.hips_world, 0, person.seen + 1, 0, counts)
     away_m = np.linalg.norm((hips_world - person.hips_world)[:, :2], axis=-1)
-    if (away_m < TAKEN_M).any() or not person.counts or person.missed + 1 >= MISSES:
+    most, near_m = (MISSES, TAKEN_M) if person.counts else (MISSES_ALONE, APART_M)
+    if (away_m < near_m).any() or person.missed + 1 >= most:
         return None
-    return replace(person, seen=0, missed=person.missed + 1)
+    return replace(person, missed=person.missed + 1)
 
 
 def _away_m(hips_world: Points3, robot_world: Capsules) -> float:

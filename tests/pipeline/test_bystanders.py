@@ -64,6 +64,23 @@ def test_whom_one_camera_alone_shows_counts_once_it_goes_on():
     assert counts == [0] * (ALONE - 1) + [1]
 
 
+def test_one_camera_need_not_show_them_in_every_search():
+    bystanders, nobody = Bystanders(1, 1, RIG), shown(NEAR, cameras=[0, 2])
+    counts = []
+    for k in range(2 * ALONE):
+        found = shown(FAR, cameras=[1]) if k % 2 == 0 else nobody
+        counts.append(len(searched(bystanders, found, [windows(NEAR)], NEAR[None])))
+    assert counts[2 * ALONE - 2] == 1
+    assert not any(counts[: 2 * ALONE - 2])
+
+
+def test_two_people_shoulder_to_shoulder_are_two():
+    bystanders, beside = Bystanders(1, 1, RIG), NEAR + np.array([0.0, 0.4, 0.0])
+    found = searched(bystanders, shown(NEAR, beside), [windows(NEAR)], NEAR[None])
+    assert len(found) == 1
+    assert np.linalg.norm(found[0] - beside) < 0.05
+
+
 @pytest.mark.parametrize("whom", ["worker", "robot"])
 def test_the_workers_themselves_and_the_robot_are_nobody_else(whom):
     hips = NEAR if whom == "worker" else np.array([0.05, 0.0, 0.8])
