@@ -35,6 +35,7 @@ from hrc_env.belief import (
     deviation_towards_robot_m,
     estimated_separation,
     standard_deviation_m,
+    unseen_floor,
 )
 from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError
@@ -53,7 +54,7 @@ from hrc_env.core.records import (
     World,
 )
 from hrc_env.core.skeleton import JOINTS
-from hrc_env.core.vacancy import Coverage, no_others
+from hrc_env.core.vacancy import Coverage, Others, Vacancy, no_others
 from hrc_env.geometry import cameras, chains, distances, shapes, sight, ways
 from hrc_env.geometry import lines_of_sight as lines
 from hrc_env.geometry import rotations as turns
@@ -91,6 +92,7 @@ from hrc_env.perception.faults import camera_film, corruptions
 from hrc_env.perception.faults import fault as faults
 from hrc_env.perception.faults import schedule as fault_schedule
 from hrc_env.pipeline import reacquisition
+from hrc_env.pipeline.bystanders import Bystanders
 from hrc_env.pipeline.pose_tracker import PoseTracker
 from hrc_env.safety import contact, incidents, separation, solver, starts
 from hrc_env.safety.config import PRESETS, ShieldConfig
@@ -113,7 +115,7 @@ from hrc_env.tasks.task import task_called
 from hrc_env.tracking import oracle, presence
 from hrc_env.tracking.calibration_monitor import forget_monitor, make_monitor, monitor
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.contradiction import Shown
+from hrc_env.tracking.contradiction import Shown, find_unexplained
 from hrc_env.tracking.estimators import ESTIMATORS, estimator_called, make_estimator
 from hrc_env.tracking.forecast import forecast
 from hrc_env.tracking.frozen_frames import (
@@ -1211,6 +1213,15 @@ def _as_estimate(belief: Mapping[str, Any]) -> PoseEstimate:
     return PoseEstimate(*(belief.get(name) for name in names))
 
 
+def find_unexplained_people(
+    P: NDArray[np.float64], focal_px: NDArray[np.float64], seen: Mapping[str, Any],
+    age_s: NDArray[np.float64], belief: Mapping[str, Any],
+) -> dict[str, NDArray[np.bool_]]:  # fmt: skip
+    """Return the cameras (B, C) that show people, and people whom no track explains."""
+    found = find_unexplained(_as_keypoints(seen), age_s, _as_estimate(belief), P, focal_px)
+    return {"poses": found.poses, "unexplained": found.unexplained}
+
+
 def associate_people(
     P: NDArray[np.float64], belief: Mapping[str, Any], seen: Mapping[str, Any]
 ) -> NDArray[np.int64]:
@@ -1247,9 +1258,15 @@ def believe_prior(shape: tuple[int, int]) -> dict[str, Any]:
 class Presence:
     """What is known of slots without a track, for several places."""
 
-    def __init__(self, shape: tuple[int, int], n_cameras: int, step_s: float) -> None:
-        """Begin, before anybody has looked."""
-        seen = Coverage(np.zeros((1, 3)), 0.1, np.zeros(1, int), np.ones((1, n_cameras), np.bool_))
+    def __init__(
+        self, shape: tuple[int, int], n_cameras: int, step_s: float,
+        sees: NDArray[np.bool_] | None = None,
+    ) -> None:  # fmt: skip
+        """Begin, before anybody has looked; `sees` (G, C) are the cameras of each piece of floor,
+        all of one piece if it is not given."""
+        sees = np.ones((1, n_cameras), np.bool_) if sees is None else sees
+        n = len(sees)
+        seen = Coverage(np.zeros((n, 3)), 0.1, np.arange(n), sees)
         self._known, self._step_s = presence.Presence(*shape, seen), step_s
 
     def forget(self, places: NDArray[np.int64]) -> None:
@@ -1259,16 +1276,33 @@ class Presence:
     def look(
         self, belief: Mapping[str, Any], found: Mapping[str, Any], own: Mapping[str, Any],
         looked: NDArray[np.bool_], age_s: NDArray[np.float64], by_search: bool,
+        shown: NDArray[np.bool_] | None = None, unexplained: NDArray[np.bool_] | None = None,
+        others_m: NDArray[np.float64] | None = None,
     ) -> dict[str, NDArray[Any]]:  # fmt: skip
-        """Return the belief with whom is unknown, after one look of every camera."""
+        """Return the belief with whom is unknown, after one look of every camera.
+
+        Cameras (B, C) may show people whom a track explains or not; people beyond the slots are
+        at `others_m` (B, N, 3), NaN where there are fewer.
+        """
         enough = presence.SEARCHES if by_search else presence.IMAGES
-        nobody = Shown(np.zeros_like(looked), np.zeros_like(looked))
+        nobody = np.zeros_like(looked)
+        poses = Shown(*(nobody if each is None else each for each in (shown, unexplained)))
+        others = no_others(len(looked))
+        if others_m is not None:
+            others = Others(others_m, np.where(np.isnan(others_m[..., 0]), np.inf, 0.0))
         said = self._known.update(
             np.arange(len(looked)), _as_estimate(belief), _as_keypoints(found), _as_keypoints(own),
-            presence.Looks(looked, age_s, enough, nobody, no_others(len(looked))), self._step_s,
-            TrackerConfig(),
+            presence.Looks(looked, age_s, enough, poses, others), self._step_s, TrackerConfig(),
         )  # fmt: skip
         return _as_values(said)
+
+    def describe_floor(self) -> dict[str, NDArray[Any]]:
+        """Return the level (B, W, G) of each piece of floor, the age of its looks, and the cameras
+        (B, C) that contradict the calibration."""
+        ids = np.arange(len(self._known.doubt))
+        floor = self._known.vacancy(ids)
+        return {"level": floor.level, "level_age_s": floor.age_s,
+                "contradicted": self._known.contradicted(ids)}  # fmt: skip
 
 
 class Watchers:
@@ -1587,11 +1621,56 @@ class Rig:
         qpos[:, : q.shape[1]] = q
         return self.scene.surroundings(qpos, Held(*at, np.asarray(held["held_turn"], float)))
 
+    def cover_floor(self) -> Arrays:
+        """Return pieces of floor (N, 3) and the cameras (N, C) that would detect people there."""
+        found = rigs.coverage(self.scene)
+        return {"floor_m": found.floor_world, "finds": found.cameras[found.group],
+                "piece_m": np.atleast_1d(found.piece_m)}  # fmt: skip
+
     def see_lines(self, people: Arrays, q: NDArray[np.float64]) -> Arrays:
         """Return how cameras see joints (B, C, W, J) and people (B, C, W, ...), without errors."""
         around = self.surround(q, people)
         sight, look = keypoint_emulator.lines_of_sight(_truth_of(people), around, self.cameras)
         return {"sight": sight, "look": look}
+
+
+class Crowd:
+    """People beyond the slots of workers, as searches of whole images show them."""
+
+    def __init__(self, rig: Rig, n_workers: int) -> None:
+        """Begin with nobody."""
+        self._known = Bystanders(1, n_workers, rig.cameras)
+
+    def search(
+        self, found: Any, taken: Any, hips_m: NDArray[np.float64],
+        robot_m: NDArray[np.float64] | None, n_steps: int,
+    ) -> dict[str, NDArray[Any]]:  # fmt: skip
+        """Return whom is known of, after a search.
+
+        Args:
+            found: (C,) windows (x, y, side) [px] of each camera.
+            taken: (W, C) those of the workers, None where a camera does not see them.
+            hips_m: (W, 3) of the workers; NaN without a track.
+            robot_m: (K, 2, 3) capsules.
+            n_steps: steps since the last search.
+        """
+        for _ in range(n_steps):
+            self._known.tick(0)
+        people = [[_upright(each) for each in windows] for windows in found]
+        mine = [[None if each is None else _upright(each) for each in row] for row in taken]
+        beside = self._known.update(0, people, mine, hips_m, robot_m)
+        now, n = self._known.others(np.arange(1), 0.04), len(self._known.people[0])
+        return {
+            "hips_m": np.nan_to_num(now.hips_world[0], nan=9.0),
+            "age_s": np.minimum(now.age_s[0], 9.0), "remembered": np.array(n),
+            "beside": np.array(sum(each.cameras for each in beside)),
+            "given_up": self._known.given_up[0].copy(),
+        }  # fmt: skip
+
+
+def _upright(place: Sequence[float]) -> Roi:
+    x, y, side = place
+    return Roi((x, y), side, 0.0)
 
 
 def _truth_of(people: Arrays) -> WorkerTruth:
@@ -2255,6 +2334,21 @@ class Guarded:
             objects=ObjectState(nowhere, turn, nowhere, nowhere, now["held"]),
             welcome=None if welcome is None else lambda _: welcome,
         )  # fmt: skip
+        if "floor_m" in now:
+            floor = Coverage(now["floor_m"], now["piece_m"], np.arange(len(now["floor_m"])),
+                             np.ones((len(now["floor_m"]), 1), bool))  # fmt: skip
+            others = Others(now["others_m"], now["others_age_s"])
+            vacancy = Vacancy(floor, now["level"], now["level_age_s"], others)
+            unseen = unseen_floor(robot, estimate, vacancy)
+            self._now = dataclasses.replace(self._now, unseen=unseen)
+
+    def measure_floor(self) -> dict[str, NDArray[np.float64]]:
+        """Return how near the floor is on which undetected people may be."""
+        unseen = self._now.unseen
+        assert unseen is not None, "These beliefs say something of the floor."
+        return {"level": unseen.level, "level_age_s": unseen.age_s,
+                "possible_m": np.minimum(unseen.possible_m, 9.0),
+                "probable_m": np.minimum(unseen.probable_m, 9.0)}  # fmt: skip
 
     def guard(
         self, wanted: NDArray[np.float64], step_s: float, settings: str | Mapping[str, Any]
