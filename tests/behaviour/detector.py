@@ -150,6 +150,66 @@ def _seen(rig: doors.Rig, c: int, joints: Any, rng: np.random.Generator) -> Wind
     return x + off[0], y + off[1], side * rng.choice([0.4, 0.8, 1.0, 1.2, 2.0]), turn
 
 
+WALL = tuple(
+    {"name": f"c{k}", "eye_m": eye, "target_m": (0.0, 2.2, 1.0), "field_deg": 60.0}
+    for k, eye in enumerate(((2.9, 2.6, 2.4), (-2.9, 2.6, 2.4)))
+)
+"""Cameras that see a part of the floor."""
+
+
+def play_coverage(inputs: Values) -> Played:
+    """Find out which cameras would detect people on the floor of scenes and rigs."""
+    values = Values()
+    for place, name, cameras in (("lab", "own", ()), ("site", "own", ()), ("lab", "part", WALL),
+                                 ("site", "near", NEIGHBOURS)):  # fmt: skip
+        found = doors.Rig(place, cameras).cover_floor()
+        values |= {f"{place} {name}/{key}": each for key, each in found.items()}
+    return Played(values)
+
+
+def play_crowd(inputs: Values) -> Played:
+    """Find out whom searches show beside one worker: nobody, one or two people near or far, people
+    in one camera alone, and the robot."""
+    rng, rig, moments = np.random.default_rng(21), doors.Rig("lab"), []
+    crowd = doors.Crowd(rig, 1)
+    robot_m = np.array([[[-0.7, 0.0, 0.5], [-0.3, 0.1, 0.9]], [[-0.3, 0.1, 0.9], [0.1, 0.2, 0.8]]])
+    for k in range(150):
+        worker_m = np.array([1.2 + 0.3 * np.sin(k / 9), 0.8 * np.cos(k / 12), 0.9])
+        people = [(worker_m, 0.9)]
+        if 20 <= k < 60:
+            people.append((np.array([-0.2 + 0.02 * k, -1.2 + 0.02 * k, 0.95]), 0.7))
+        if 75 <= k < 100:
+            people.append((worker_m + np.array([0.45, 0.3, 0.0]), 0.4))
+        if 110 <= k < 118:
+            people += [(np.array([0.2, 1.4, 0.9]), 1.0), (np.array([0.4, -1.4, 0.9]), 1.0)]
+        shown = [[rng.random() < share for _, share in people] for _ in rig.cameras]
+        if 64 <= k < 70:
+            people, shown = [*people, (robot_m[0, 1], 1.0)], [[*each, True] for each in shown]
+        found = [
+            [_round_hips(rig, c, at, rng) for (at, _), is_shown in zip(people, row, strict=True)
+             if is_shown]
+            for c, row in enumerate(shown)
+        ]  # fmt: skip
+        if 100 <= k < 108 and k % 3 < 2:  # one camera alone
+            found[1].append(_round_hips(rig, 1, np.array([-0.8, 0.7, 0.9]), rng))
+        mine = [[row[0] if shows[0] else None for row, shows in zip(found, shown, strict=True)]]
+        hips_m = worker_m[None] + rng.normal(0, 0.02, (1, 3))
+        if k % 40 == 39:
+            hips_m, mine = np.full((1, 3), np.nan), []
+        known = None if k % 50 > 45 else robot_m
+        moments.append(crowd.search(found, mine, hips_m, known, 1 + k % 5))
+    return Played(stack(moments))
+
+
+def _round_hips(rig: doors.Rig, c: int, hips_m: Any, rng: np.random.Generator) -> Any:
+    """Return the window (x, y, side) of somebody upright with these hips, a little off."""
+    described = rig.describe()
+    at = described["projection"][c] @ np.append(hips_m, 1.0)
+    side = 1.25 * 1.75 * 960.0 / at[2]
+    x, y, side = np.append(at[:2] / at[2], side) + rng.normal(0, [4.0, 4.0, 10.0])
+    return float(x), float(y), float(side)
+
+
 def play_close(inputs: Values) -> Played:
     """Find out whom several cameras agree on who is near one of them, or behind it."""
     rng, values = np.random.default_rng(15), Values()
@@ -560,6 +620,8 @@ PROBES = (
     Probe(name="tensors", play=play_tensors, is_short=True),
     Probe(name="search", play=play_search, is_short=True),
     Probe(name="search_close", play=play_close, is_short=True),
+    Probe(name="coverage", play=play_coverage, is_short=True),
+    Probe(name="crowd", play=play_crowd, is_short=True),
     Probe(name="searches", play=play_searches, is_short=True),
     Probe(name="lenses", play=play_lenses, is_short=True),
     Probe(name="images", play=play_images, tolerance=IMAGE_TOLERANCE, is_short=True),

@@ -102,6 +102,33 @@ def make_beliefs(kind: str, n: int) -> Beliefs:
     return Beliefs(doors.Guarded(robot.chain, robot.numbers, now), wanted)
 
 
+@cache
+def make_floors(kind: str, n: int) -> Beliefs:
+    """Return n seeded beliefs in nobody who is tracked, on floor some of which was seen empty."""
+    rng = np.random.default_rng([n, len(kind), 7])
+    robot, n_workers = make_robot(kind == "base"), 2
+    q = rng.uniform(-2.5, 2.5, (n, robot.n_joints))
+    command = rng.uniform(-1.2, 1.2, q.shape) * robot.numbers["fastest"]
+    wanted = rng.uniform(-1.5, 1.5, q.shape)
+    tool = robot.chain.pose(q)["tool"][:, :3, 3]
+    side_m = np.arange(-2.2, 2.21, 0.4)
+    floor = np.stack([*np.meshgrid(side_m, side_m), np.zeros((12, 12))], -1).reshape(-1, 3)
+    middle_m = rng.uniform(-2.2, 2.2, (n, n_workers, 1, 2)) + tool[:, None, None, :2]
+    away_m = np.linalg.norm(floor[:, :2] - middle_m, axis=-1)
+    level = np.select([away_m < 0.7, away_m < 1.4], [0, 1], 2) * (rng.random((n, 2, 1)) < 0.9)
+    others_m = np.where(rng.random((n, 4, 1)) < 0.15, rng.uniform(-2, 2, (n, 4, 3)), np.nan)
+    others_age_s = np.where(np.isnan(others_m[..., 0]), np.inf, rng.uniform(0, 0.5, (n, 4)))
+    none, now = np.zeros((n, 2), bool), _people(rng, tool, n_workers, touching=False)
+    now |= {"tracked": none, "unknown": rng.random((n, 2)) < 0.9,
+            "seen_world": np.full_like(now["seen_world"], np.nan)}  # fmt: skip
+    now |= {"q": q, "qd": command, "command": command, "held": none, "welcome": None,
+            "load_capsules": np.full((n, 2, 2, 3), 9e3), "load_radius_m": np.array([0.05, 0.09]),
+            "floor_m": floor, "piece_m": 0.28, "level": level.astype(int),
+            "level_age_s": rng.uniform(0, 0.4, (n, 2)), "others_m": others_m,
+            "others_age_s": others_age_s}  # fmt: skip
+    return Beliefs(doors.Guarded(robot.chain, robot.numbers, now), wanted)
+
+
 def _people(
     rng: np.random.Generator, tool_m: Floats, n_workers: int, touching: bool
 ) -> dict[str, Any]:
@@ -185,6 +212,22 @@ def guard_varied(group: str, _: Values) -> Played:
         values[f"{name}/row"] = rows["b"].reshape(-1, 4).sum(1)
     slow = beliefs.robots.guard(beliefs.wanted, 5 * STEP_S, {"kind": "qp"})
     return Played({**values, "slow": slow["allowed"] @ joints})
+
+
+def guard_floor(group: str, _: Values) -> Played:
+    """Play shields near floor on which undetected people may be."""
+    beliefs = make_floors(group, 160)
+    values = beliefs.robots.measure_floor()
+    values["level"] = values["level"][::4]
+    joints = np.cos(np.arange(beliefs.wanted.shape[1]))
+    for k, settings in enumerate(({}, {"unknown_m_s": 0.0}, {"human_m_s": 1.6}, {"sigmas": 3.0})):
+        kind = {"kind": ("qp", "ssm")[k % 2]}
+        given = _plain(beliefs.robots.guard(beliefs.wanted, STEP_S, kind | settings))
+        rows = beliefs.robots.constrain(beliefs.wanted, STEP_S, kind | settings)
+        values |= {f"{k}/allowed": given["allowed"] @ joints, f"{k}/least_m": rows["least_m"],
+                   f"{k}/n_rows": rows["n_rows"], f"{k}/b": rows["b"],
+                   f"{k}/J": rows["J"] @ joints}  # fmt: skip
+    return Played(values)
 
 
 def _plain(values: dict[str, Any]) -> Values:
@@ -302,9 +345,14 @@ def _probes() -> tuple[Probe, ...]:
     ]
     varied = [Probe(name=f"varied_{group}", play=partial(guard_varied, group),
                     is_short=group == "arm") for group in GROUPS]  # fmt: skip
+    floors = [
+        Probe(name=f"floor_{group}", play=partial(guard_floor, group), is_short=group == "arm")
+        for group in ("arm", "base")
+    ]
     return (
         *guards,
         *varied,
+        *floors,
         Probe(name="beliefs", play=measure_beliefs, is_short=True),
         Probe(name="rows_solved", play=solve, is_short=True),
         Probe(name="regions", play=bear, is_short=True),

@@ -635,6 +635,74 @@ def look_for_people(by_search: bool, _: Values) -> Played:
     return Played({"unknown": values["unknown"], **numbers})
 
 
+LOOKS = np.ones((8, 3))
+"""How often each of three cameras searches its whole image, in eight places."""
+LOOKS[1, 2] = LOOKS[2, 1] = LOOKS[2, 2] = LOOKS[6] = 0.0
+LOOKS[3] = 0.5
+
+
+def look_over_floor(_: Values) -> Played:
+    """Play what is known of floor that different cameras see, with people beyond the slots and
+    people whom no track explains."""
+    rng, shape, n_cameras = np.random.default_rng(16), (8, 2), 3
+    sees = np.array([[1, 1, 1], [1, 1, 0], [0, 1, 1], [1, 0, 0], [0, 0, 0]], bool)
+    presence = doors.Presence(shape, n_cameras, STEP_S, sees)
+    tracked, lost_s = np.zeros(shape, bool), np.zeros(shape)
+    moments: list[dict[str, Any]] = []
+    for t in range(300):
+        if t in (70, 180):
+            tracked = rng.random(shape) < 0.4
+        if t in (100, 220):
+            tracked[:] = False
+        lost_s = np.where(tracked, 0.0, lost_s + STEP_S)
+        belief = {
+            "mean_world": np.zeros((*shape, N_JOINTS, 3)),
+            "cov_world": np.tile(0.01 * np.eye(3), (*shape, N_JOINTS, 1, 1)),
+            "velocity_world": np.zeros((*shape, N_JOINTS, 3)), "tracked": tracked,
+            "age_s": np.minimum(lost_s, 5.0)[..., None] + np.zeros(N_JOINTS),
+        }  # fmt: skip
+        own = np.repeat(tracked[:, None], n_cameras, 1)
+        looked = rng.random((8, n_cameras)) < LOOKS
+        stranger = np.zeros((8, n_cameras), bool)
+        stranger[4, :2], stranger[5, 2] = 40 <= t < 48, 30 <= t % 90 < 34
+        stranger[7] = rng.random(n_cameras) < 0.3
+        others_m = np.full((8, 4, 3), np.nan)
+        if 130 <= t < 150:
+            others_m[3, 0] = 0.3
+        said = presence.look(
+            belief, _shown(own), _shown(own), looked, np.zeros((8, n_cameras)), False,
+            own.any(-1) | stranger, stranger, others_m,
+        )  # fmt: skip
+        moments.append({"unknown": said["unknown"], "tracked": said["tracked"],
+                        **presence.describe_floor()})  # fmt: skip
+    values = stack(moments)
+    return Played({**values, "level_age_s": values["level_age_s"][::5]})
+
+
+def explain_people(_: Values) -> Played:
+    """Play whom a track explains: bodies of all sizes, near it or far off, with many joints or few,
+    before cameras some of which are turned."""
+    rng, n = np.random.default_rng(18), 240
+    bodies = np.concatenate([walk(seed, 30, size=0.95 + 0.01 * seed) for seed in SEEDS])
+    joints = bodies[rng.integers(0, len(bodies), (n, 1))]
+    joints = joints * rng.choice([0.5, 0.7, 1.0, 1.0, 1.2, 1.6], (n, 1, 1, 1))
+    velocity = rng.normal(0, 0.6, (n, 1, 1, 3)) + np.zeros_like(joints)
+    off_m = rng.normal(size=(n, 1, 1, 3)) * rng.choice([0.0, 0.05, 0.1, 0.2, 0.6], (n, 1, 1, 1))
+    age_s = rng.choice([0.0, 0.1, 0.3, np.nan], (n, 4))
+    seen = see(joints[None], P=RIG)
+    wrong = see(joints[None], P=ASKEW)
+    px = np.where(rng.random((n, 1, 1, 1, 1)) < 0.3, wrong.px[0], seen.px[0])
+    few = rng.random(seen.confidence.shape[1:]) < rng.choice([0.1, 0.7, 0.9], (n, 4, 1, 1))
+    sigma_px = rng.choice([3.0, 10.0, 40.0], (n, 4, 1, 1)) + np.zeros(N_JOINTS)
+    frame = {"px": px, "confidence": np.where(few, 0.2, 0.9), "sigma_px": sigma_px}
+    belief = {
+        "mean_world": joints + off_m, "velocity_world": velocity,
+        "cov_world": np.tile(1e-4 * np.eye(3), (n, 1, N_JOINTS, 1, 1)),
+        "age_s": np.zeros((n, 1, N_JOINTS)), "tracked": rng.random((n, 1)) < 0.9,
+    }  # fmt: skip
+    return Played(doors.find_unexplained_people(RIG, np.full(4, 960.0), frame, age_s, belief))
+
+
 def _shown(who: NDArray[np.bool_]) -> dict[str, Any]:
     """Return frames in which cameras show some people (B, C, W), by one joint at least."""
     confidence = np.zeros((*who.shape, N_JOINTS))
@@ -956,6 +1024,8 @@ BESIDE: tuple[Probe, ...] = (
     Probe(name="poses_of_two_cameras", play=partial(assign_poses, 2), is_short=True),
     Probe(name="presence_images", play=partial(look_for_people, False), is_short=True),
     Probe(name="presence_searches", play=partial(look_for_people, True)),
+    Probe(name="presence_floor", play=look_over_floor, is_short=True),
+    Probe(name="unexplained", play=explain_people, is_short=True),
     Probe(name="watched_cameras", play=watch_cameras, is_short=True),
     Probe(name="without_cameras", play=believe_without_cameras, is_short=True),
     Probe(name="lenses", play=look_through_lenses, is_short=True),
