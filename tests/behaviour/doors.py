@@ -39,6 +39,7 @@ from hrc_env.belief import (
 )
 from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError
+from hrc_env.core.infos import ENTRIES
 from hrc_env.core.records import (
     Cue,
     HandState,
@@ -258,13 +259,13 @@ class Env:
     def reset(self, seed: int | None) -> dict[str, Any]:
         """Start an episode and return everything that is known of it then."""
         self.observation, info = self._env.reset(seed=seed)
-        return self._name_values({}, info)
+        return self._name_values({}, _of_reset(self._as_named(info)))
 
     def step(self, action: NDArray[np.float32]) -> tuple[dict[str, Any], bool]:
         """Act for one step and return everything that is known then, and whether it is over."""
         self.observation, reward, terminated, truncated, info = self._env.step(action)
         values = {"reward": reward, "terminated": terminated, "truncated": truncated}
-        return self._name_values(values, info), bool(terminated or truncated)
+        return self._name_values(values, self._as_named(info)), bool(terminated or truncated)
 
     def save(self) -> Any:
         """Return a copy of everything that changes in an episode."""
@@ -373,6 +374,16 @@ class Env:
         """Release threads and graphics contexts."""
         self._env.close()
 
+    def _as_named(self, info: dict[str, Any]) -> dict[str, Any]:
+        """Return the numbers that were measured, and words instead of their indices."""
+        named = {name: value.item() for name, value in info.items()
+                 if _is_plain(name) and _are_measured(info, name)}  # fmt: skip
+        named["is_success"] = bool(named["is_success"])
+        named |= self._env.unwrapped.words(info)
+        if "perception/more_people" not in info:
+            del named["perception/miscalibrated"]
+        return named
+
     def _name_values(self, values: dict[str, Any], info: dict[str, Any]) -> dict[str, Any]:
         parts = self.observation if isinstance(self.observation, dict) else {}
         flat = parts.get("observation", self.observation)
@@ -395,13 +406,18 @@ class Batch:
     def reset(self, seed: int) -> dict[str, NDArray[Any]]:
         """Start all of them and return everything that is known then, (n, ...)."""
         observation, info = self._env.reset(seed=seed)
-        return {"observation/all": _flat(observation), **_numeric(info)}
+        self._over = np.zeros(self._env.num_envs, bool)
+        return {"observation/all": _flat(observation), **_of_reset(_numeric(info))}
 
     def step(self, actions: NDArray[np.float32]) -> dict[str, NDArray[Any]]:
         """Act for one step and return everything that is known then, (n, ...)."""
         observation, reward, terminated, truncated, info = self._env.step(actions)
         ends = {"terminated": terminated, "truncated": truncated}
-        return {"observation/all": _flat(observation), "reward": reward, **ends, **_numeric(info)}
+        numbers = _numeric(info)
+        for name in {*numbers} - {*_of_reset(numbers)}:
+            numbers[name] = np.where(self._over, 0.0, numbers[name])
+        self._over = terminated | truncated
+        return {"observation/all": _flat(observation), "reward": reward, **ends, **numbers}
 
     def make_agents(self, name: str) -> list[Callable[[Any], NDArray[np.float32]]]:
         """Return a policy of an agent for each environment: from observations to actions."""
@@ -419,12 +435,43 @@ def _flat(observation: Any) -> NDArray[np.float32]:
     return np.concatenate(list(observation.values()), axis=1)
 
 
-def _numeric(info: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
-    return {
-        name: value
-        for name, value in info.items()
-        if isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and name[0] != "_"
-    }
+def _numeric(infos: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
+    """Return the numbers that some environment has measured, 0 for the others."""
+    plain = [name for name in infos if name[0] != "_" and _is_plain(name)]
+    known = {name: infos[f"_{name}"] & _are_measured(infos, name) for name in plain}
+    named = {name: np.where(known[name], infos[name], 0.0) for name in plain if known[name].any()}
+    if "is_success" in named:
+        named["is_success"] = named["is_success"].astype(bool)
+    return named
+
+
+FLAGS_OF = {name: entry.flag for name, entry in ENTRIES.items() if entry.flag}
+"""The flags that say whether a number was measured."""
+
+
+def _is_plain(name: str) -> bool:
+    """Return whether a number stands neither for a word nor for the presence of another number."""
+    words = name.startswith("worker_") or name.startswith("perception/miscalibrated")
+    return not words and name not in FLAGS_OF.values()
+
+
+def _are_measured(infos: Mapping[str, Any], name: str) -> Any:
+    """Return of which environments a number is one that was measured."""
+    known = np.isfinite(infos[name])
+    if name in ("safety/contact_came_m_s", "safety/contact_closing_m_s",
+                "safety/contact_force_ratio"):  # fmt: skip
+        return known & (infos["safety/contact_severity"] > 0)
+    if name == "task/largest_n":
+        return known & (infos[name] > 0)
+    return known & (infos[FLAGS_OF[name]] > 0) if name in FLAGS_OF else known
+
+
+def _of_reset(info: dict[str, Any]) -> dict[str, Any]:
+    """Return what was known of resets at first: neither rewards nor what happens in a step."""
+    later = ("reward/", "shield/", "safety/contact_", "safety/min_", "safety/robot_",
+             "safety/worker_", "safety/too_", "safety/time_")  # fmt: skip
+    kept = ("safety/contact_kind", "safety/contact_region")
+    return {name: each for name, each in info.items() if name in kept or not name.startswith(later)}
 
 
 def settings() -> dict[str, str]:
