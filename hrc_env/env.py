@@ -21,6 +21,7 @@ from hrc_env.config import ConfigChoice, Settings, settle
 from hrc_env.control import checked_action
 from hrc_env.core.batching import Stateful, one
 from hrc_env.core.errors import ConfigError, unknown, whole
+from hrc_env.core.infos import Words, worded
 from hrc_env.core.mapping import plain
 from hrc_env.core.typing import Floats
 from hrc_env.motion.generator import Clip, PeopleConfig
@@ -31,7 +32,7 @@ from hrc_env.safety.shield import ShieldChoice
 from hrc_env.scene.domain_randomization import AppearanceConfig
 from hrc_env.scene.robot import Robot
 from hrc_env.simulation import Simulation
-from hrc_env.step import Observation
+from hrc_env.step import Observation, words_of
 from hrc_env.tasks import DEFAULT, goal
 from hrc_env.tasks.task import Task, goal_of
 from hrc_env.tracking.estimators import EstimatorChoice
@@ -202,6 +203,10 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
             self._steps_left <= 0,  # the time limit itself is gymnasium's TimeLimit
             result.info_of(0),
         )
+
+    def words(self, info: Mapping[str, Any]) -> Words:
+        """Return in words what an info says of workers, contacts and cameras: `infos.worded`."""
+        return worded(info, words_of(self.simulation.bodies.names))
 
     def set_reward(self, weights: RewardConfig) -> None:
         """Weigh the reward's terms so from the next step on."""

@@ -209,8 +209,4 @@ def of_step(infos: Mapping[str, Any], name: str, num_envs: int) -> Floats:
 
 def _info_of(infos: Mapping[str, Any], b: int) -> dict[str, Any]:
     """What a vector environment's infos say about environment `b`."""
-    return {
-        name: infos[name].item(b)
-        for name in infos
-        if not name.startswith(("_", "final_")) and infos[f"_{name}"][b]
-    }
+    return {name: infos[name][b] for name in infos if not name.startswith(("_", "final_"))}

@@ -18,10 +18,11 @@ from hrc_env.config import Settings
 from hrc_env.control import joint_command, n_actions
 from hrc_env.core.batching import State, Stateful, picked, rows, write_rows
 from hrc_env.core.errors import ConfigError, check_shape
+from hrc_env.core.infos import Info
 from hrc_env.core.kernels import ahead
 from hrc_env.core.records import PoseEstimate, WorkerMotion, WorkerTruth, World
 from hrc_env.core.streams import children
-from hrc_env.core.typing import Bools, Floats, Ints, JointVelocities, Points3
+from hrc_env.core.typing import Bools, Floats, Ints, JointVelocities, Points3, Records
 from hrc_env.geometry import chains
 from hrc_env.motion import generator
 from hrc_env.motion.activities.pieces import NoRoomError
@@ -36,7 +37,7 @@ from hrc_env.scene import handling
 from hrc_env.scene.build import build
 from hrc_env.scene.physics import Physics
 from hrc_env.scene.rigs import findings
-from hrc_env.step import Info, Observation, StepResult
+from hrc_env.step import Observation, StepResult
 from hrc_env.tasks import goal
 from hrc_env.tracking import oracle
 from hrc_env.worker.body import pool, stack, worker_capsules, worker_truth
@@ -135,20 +136,19 @@ class Simulation(Stateful):
         world = handling.world_of(self.physics, ids, robot)
         self._measure(ids, world)
         self.pipeline.reset(ids, streams["sensor"], streams["tracker"])
-        motion = generator.current(self.motion, ids)
-        truth = worker_truth(self.bodies, motion)
+        truth = worker_truth(self.bodies, motion := generator.current(self.motion, ids))
         self._expose(ids, motion, truth)
-        estimates = self._perceive(ids)
-        belief = self._believed(ids, world, estimates)
+        belief = self._believed(ids, world, estimates := self._perceive(ids))
         identities = metrics.no_identities(*self.present[ids].shape)
+        present, terms = self.present[ids], (*task.own_rewards, *rewards.SHARED_TERMS)
         info = {
-            **step.nothing_happened(len(ids), self.config.cost),
-            **step.tracking_info(estimates[0], truth, self.present[ids], identities),
-            **self._episode_info(ids, generator.activity(self.motion)),
+            **step.reset_info(robot, truth, present, terms, self.config.cost),
+            **step.tracking_info(estimates[0], truth, present, identities),
+            **shielded(self.shield, belief, np.zeros_like(q), self.config.ctrl_dt)[1],
+            **self._episode_info(ids, generator.activity(self.motion), None),
         }
         write_rows(self.identities, ids, identities)
-        seen, reward = self._observed(belief), np.zeros(len(ids))
-        return StepResult(seen, reward, reward > 0, info)
+        return StepResult(self._observed(belief), nothing := np.zeros(len(ids)), nothing > 0, info)
 
     def step(self, action: Floats) -> StepResult:
         """One control step of every environment; action (B, A) in [-1, 1]."""
@@ -197,7 +197,7 @@ class Simulation(Stateful):
             **step.incident_info(happened, self.watch, robot),
             **step.tracking_info(estimates[0], truth, present, self.identities),
             **shield_info,
-            **self._episode_info(self._everyone, activity),
+            **self._episode_info(self._everyone, activity, happened),
         }
         over = (cost.contact > 0) & config.cost.contact_terminates
         if self.task.over is not None:
@@ -339,12 +339,12 @@ class Simulation(Stateful):
             **rewards.evaluated(shared, belief, progress, previous, self.reward_weights),
         }
 
-    def _episode_info(self, ids: Ints, activity: Ints) -> Info:
+    def _episode_info(self, ids: Ints, activity: Ints, happened: Records | None) -> Info:
         """What the episodes of environments `ids` have come to so far, and who is there."""
         tally = {"episode_cost": self.episode_cost, **self.task.info(self.task_state)}
         body, cameras, seen = self.motion.workers["body"], self.settings["cameras"], self.pipeline
         return {
             **{name: value[ids] for name, value in tally.items()},
-            **step.worker_info(activity[ids], body[ids], self.bodies.names),
+            **step.worker_info(activity[ids], body[ids], happened),
             **step.perception_info(cameras, seen.suspected(ids), seen.vacancy(ids)),
         }

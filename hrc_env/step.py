@@ -2,40 +2,25 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
-from itertools import compress
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env import metrics
+from hrc_env.core.infos import MISCALIBRATED, MORE_PEOPLE, Info, of_workers, published
 from hrc_env.core.records import PoseEstimate, RobotState, WorkerTruth
 from hrc_env.core.typing import Bools, Floats, Ints, Records
 from hrc_env.core.vacancy import Vacancy
+from hrc_env.geometry.distances import least_separation
 from hrc_env.metrics import CostConfig
 from hrc_env.motion import generator
+from hrc_env.rewards import RewardTerm
 from hrc_env.safety import incidents
 from hrc_env.safety.watch import Watch
 
-Info = dict[str, NDArray[Any]]
-"""Named values (B,): numbers, NaN where an environment has none in this step; or tuples of words,
-as objects."""
 Observation = NDArray[np.float32] | dict[str, NDArray[np.float32]]
 """(B, n), or such arrays by name where goals stand apart (`hrc_env.tasks.goal`)."""
-FLAGS = ("is_success",)
-"""Values that are true or false."""
-ACTIVITY = "worker/activity"
-"""What each worker is doing, by name; `ABSENT` of who is not in the episode."""
-BODY = "worker/body"
-"""Which baked body each worker has in this episode; likewise."""
-CONTACT_KIND, CONTACT_REGION = "safety/contact_kind", "safety/contact_region"
-"""Of contacts that begin in a step: what the robot did, and where they are."""
-ABSENT = "absent"
-MISCALIBRATED = "perception/miscalibrated"
-"""Names of cameras that contradict the others as if they had been moved, turned or zoomed."""
-MORE_PEOPLE = "perception/more_people"
-"""1 while cameras detect more people than there are slots for workers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,12 +35,8 @@ class StepResult:
     info: Info
 
     def info_of(self, b: int) -> dict[str, Any]:
-        """The info of one environment: absent values are left out, flags are bool."""
-        values = {name: value.item(b) for name, value in self.info.items()}
-        known = {name: value for name, value in values.items() if value == value}
-        for name in FLAGS:
-            known[name] = bool(known[name])
-        return known
+        """Return the info of one environment, as NumPy scalars."""
+        return {name: value[b] for name, value in published(self.info).items()}
 
 
 def joined(results: Sequence[StepResult]) -> StepResult:
@@ -89,15 +70,24 @@ def cost_info(cost: metrics.Cost, happened: Records, present: Bools, config: Cos
     }
 
 
-def nothing_happened(n: int, config: CostConfig) -> Info:
-    """What `n` resets say of cost and incidents: none."""
-    names = ("", "_sum", *(f"_{name}" for name in ("proximity", "contact", *config.components)))
-    counts = (*(f"contacts_{kind}" for kind in incidents.KINDS), "near_misses")
-    nothing = np.full((n, 0), -1)
+def reset_info(
+    robot: RobotState, truth: WorkerTruth, present: Bools, terms: Sequence[RewardTerm],
+    config: CostConfig,
+) -> Info:  # fmt: skip
+    """What resets say of reward, cost and incidents: nothing but the separation of first poses."""
+    n = len(present)
+    capsules = robot.capsules_world, robot.capsule_radius_m
+    gaps_m = least_separation(*capsules, truth.capsules_world, truth.capsule_radius_m).distance_m
+    costs = ("", "_sum", *(f"_{name}" for name in ("proximity", "contact", *config.components)))
+    happened = dict.fromkeys(incidents.SUMMARY.names or (), 0.0)
+    happened |= dict.fromkeys(incidents.AT_TIMES, np.nan)
+    nearest_m = gaps_m.min(1, initial=np.inf, where=present)
     return {
-        **{f"cost{name}": np.zeros(n) for name in names},
-        **{f"safety/{name}": np.zeros(n) for name in counts},
-        **{name: _begun(nothing, ()) for name in (CONTACT_KIND, CONTACT_REGION)},
+        **{f"reward/{term.name}": np.zeros(n) for term in terms},
+        **{f"cost{name}": np.zeros(n) for name in costs},
+        **{f"safety/{name}": np.full(n, value) for name, value in happened.items()},
+        "safety/min_separation_m": np.where(present.any(1), nearest_m, np.nan),
+        "safety/time_to_stop_s": np.zeros(n),
     }
 
 
@@ -107,15 +97,7 @@ def incident_info(happened: Records, watch: Watch, robot: RobotState) -> Info:
     return {
         **{f"safety/{name}": told[name] for name in incidents.SUMMARY.names or ()},
         "safety/time_to_stop_s": watch.stop_s(robot),
-        CONTACT_KIND: _begun(happened["kind"], incidents.KINDS),
-        CONTACT_REGION: _begun(happened["region"], incidents.REGION_NAMES),
     }
-
-
-def _begun(indices: Ints, names: tuple[str, ...]) -> NDArray[np.object_]:
-    """(B,) tuples of the names of indices (B, W) that are not -1."""
-    rows = (tuple(names[k] for k in row if k >= 0) for row in indices.tolist())
-    return np.fromiter(rows, object)
 
 
 def tracking_info(
@@ -127,10 +109,13 @@ def tracking_info(
     return {f"tracking/{name}": found[name] for name in metrics.TRACKING.names or ()}
 
 
-def worker_info(activity: Ints, body: Ints, bodies: tuple[str, ...]) -> Info:
-    """What workers (B, W) do, and which of the `bodies` (B, W) they have, by name."""
-    worn = np.where(activity == generator.ABSENT, generator.ABSENT, body)
-    return {ACTIVITY: _named(activity, generator.activity_names), BODY: _named(worn, bodies)}
+def worker_info(activity: Ints, body: Ints, happened: Records | None) -> Info:
+    """What each worker (B, W) does, which body they have, and the contacts that begin: of a step,
+    or none in a reset."""
+    none = np.full(activity.shape, -1)
+    kind, region = (none, none) if happened is None else (happened["kind"], happened["region"])
+    worn = np.where(activity == generator.ABSENT, -1, body)
+    return of_workers(activity=activity, body=worn, contact_kind=kind, contact_region=region)
 
 
 def perception_info(cameras: tuple[str, ...], suspected: Bools, vacancy: Vacancy | None) -> Info:
@@ -138,18 +123,19 @@ def perception_info(cameras: tuple[str, ...], suspected: Bools, vacancy: Vacancy
     nothing without cameras."""
     if vacancy is None:
         return {}
-    named = (tuple(compress(cameras, row)) for row in suspected.tolist())
+    flags = suspected.astype(float)
     return {
-        MISCALIBRATED: np.fromiter(named, object),
+        MISCALIBRATED: flags.sum(1),
+        **{f"{MISCALIBRATED}_{name}": flags[:, c] for c, name in enumerate(cameras)},
         MORE_PEOPLE: vacancy.others.any.astype(float),
     }
 
 
-def _named(indices: Ints, names: tuple[str, ...]) -> NDArray[np.object_]:
-    """(B,) tuples of the names of indices (B, W); `ABSENT` for `generator.ABSENT`, which is -1."""
-    return np.fromiter(map(tuple, _table(names)[indices].tolist()), object)
-
-
-@cache
-def _table(names: tuple[str, ...]) -> NDArray[np.object_]:
-    return np.array([*names, ABSENT], object)
+def words_of(bodies: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
+    """Return the words for the indices in infos; `bodies` are the names of baked bodies."""
+    return {
+        "activity": generator.activity_names,
+        "body": bodies,
+        "contact_kind": incidents.KINDS,
+        "contact_region": incidents.REGION_NAMES,
+    }

@@ -25,7 +25,7 @@ from hrc_env.safety import starts
 from hrc_env.simulation import Simulation
 from hrc_env.worker.body import worker_capsules, worker_truth
 
-ON_THE_TRUTH = ("cost", "episode_cost", "safety/", "tracking/", "worker/")
+ON_THE_TRUTH = ("cost", "episode_cost", "safety/", "tracking/", "worker_")
 """Infos that are counted on the truth, or tell it."""
 Patch = Callable[[pytest.MonkeyPatch], None]
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hrc_env.core.infos import MORE_PEOPLE
 from hrc_env.core.records import Held, WorkerMotion
 from hrc_env.core.vacancy import EMPTY, POSSIBLE
 from hrc_env.env import HRCEnv
@@ -12,7 +13,6 @@ from hrc_env.motion import generator
 from hrc_env.pipeline.pose_tracker import PoseTracker
 from hrc_env.pipeline.rendered import RenderedCameras
 from hrc_env.scene.build import build
-from hrc_env.step import MORE_PEOPLE
 
 REST = np.zeros(6, np.float32)
 NEAR_SEED, FAR_SEED = 10, 27

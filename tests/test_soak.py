@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from benchmarks import soak
-from hrc_env.step import MISCALIBRATED
 
 
 def test_a_soak_of_several_workers_says_how_well_they_are_told_apart(tmp_path):
@@ -40,8 +39,6 @@ def test_what_is_no_number_and_what_is_lacking_is_counted():
         "_tracking/lost": everyone,
         "tracking/mpjpe_m": np.zeros(3),
         "_tracking/mpjpe_m": np.array([True, False, False]),
-        MISCALIBRATED: np.array([("camera_1",), (), ()], object),
-        f"_{MISCALIBRATED}": np.array([True, False, False]),
     }
     assert soak.lacking(infos, everyone) == 3
     assert soak.lacking(infos, np.array([True, True, False])) == 2

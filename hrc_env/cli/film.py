@@ -107,7 +107,7 @@ def _limit(env: HRCEnv) -> int:
 
 def _closest_m(env: HRCEnv, make: Make, seed: int, n_steps: int) -> float:
     played = begun(env, make, seed, n_steps)
-    return min(float(info.get("safety/min_separation_m", np.inf)) for _, info in played)
+    return min(float(info["safety/min_separation_m"]) for _, info in played)
 
 
 def _filmed(
@@ -132,8 +132,8 @@ def _filmed(
         after.callback(lambda: thread.submit(env.views.close).result())  # where they were made
         for step, (_, info) in enumerate(track(played, "filming", n_steps)):
             believed = env.simulation.belief.separation.distance_m
-            true_m = info.get("safety/min_separation_m", np.inf)
-            error_m = info.get("tracking/mpjpe_m", np.nan)
+            true_m = info["safety/min_separation_m"]
+            error_m = info["tracking/mpjpe_m"] if info["tracking/mpjpe_measured"] else np.nan
             diary[step] = true_m, believed.min(initial=np.inf), error_m, info["cost"]
             counts = env.simulation.task.counts(info)
             if step % STEPS_PER_FRAME == 0:

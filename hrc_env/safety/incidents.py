@@ -86,6 +86,11 @@ SUMMARY = np.dtype(
     align=True,
 )  # fmt: skip
 """What happened in one environment's step, NaN where there is nothing to say."""
+AT_TIMES = (
+    "robot_towards_m_s", "worker_towards_m_s", "contact_came_m_s", "contact_closing_m_s",
+    "contact_force_ratio",
+)  # fmt: skip
+"""What there is not always something to say of."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from hrc_env.belief import Belief
-from hrc_env.core.errors import ConfigError, check_shape, unknown
+from hrc_env.core.brought import check_arguments, described, numbers_of
+from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.core.mapping import from_mapping
 from hrc_env.core.typing import Floats, JointVelocities
 from hrc_env.safety.config import PRESETS, ShieldConfig
@@ -41,11 +42,13 @@ def shield_called(shield: ShieldChoice) -> Shield | None:
             "shield must be a name, a ShieldConfig or a mapping of its fields, a function or None, "
             f"got {shield!r}."
         )
+    if shield is not None:
+        check_arguments("A shield", shield, "belief", "velocities", "dt_s")
     return shield
 
 
 def shielded(
-    shield: Shield, now: Belief, command: JointVelocities, dt_s: float
+    shield: Shield | None, now: Belief, command: JointVelocities, dt_s: float
 ) -> tuple[JointVelocities, dict[str, Floats]]:
     """What a shield makes of a command, and what there is to say by its name in info: what the
     shield says, and of any shield
@@ -54,15 +57,26 @@ def shielded(
     - "shield/active": 1 where that is more than `ACTIVE_RAD_S`;
     - "shield/scale": what is left of the command along itself, 1 for all of it.
 
+    Without a shield the command goes to the arm as it is, and there is nothing to say.
+
     Raises:
         ConfigError: the velocities have another shape or are no finite numbers.
     """
-    allowed, said = shield(now, command.copy(), dt_s)
-    check_shape("A shield's velocities", np.shape(allowed), command.shape, "B, joints")
-    if not np.isfinite(allowed).all():
-        raise ConfigError(f"A shield's velocities must be finite [rad/s], got {allowed}.")
-    for name, value in said.items():
-        check_shape(f"A shield's {name!r}", np.shape(value), (len(command),), "B")
+    if shield is None:
+        return command, {}
+    given = shield(now, command.copy(), dt_s)
+    if not (isinstance(given, tuple) and len(given) == 2 and isinstance(given[1], Mapping)):
+        raise ConfigError(
+            "A shield must return two things, the velocities that it allows (B, joints) and a "
+            f"mapping of what it says (B,) by name, {{}} for nothing; got {described(given)}."
+        )
+    allowed = numbers_of("A shield's velocities", given[0], command.shape, "B, joints")
+    said: dict[str, Floats] = {}
+    for name, value in given[1].items():
+        if not isinstance(name, str):
+            raise ConfigError(f"What a shield says must have names, got {name!r}.")
+        words = f"A shield's {name!r}"
+        said[name] = numbers_of(words, value, (len(command),), "B", finite=False)
     change = np.sqrt(np.square(allowed - command).sum(-1))
     asked = np.square(command).sum(-1)
     scale = np.where(asked > 0, (allowed * command).sum(-1), 1.0) / np.where(asked > 0, asked, 1.0)

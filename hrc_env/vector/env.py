@@ -23,13 +23,14 @@ from hrc_env.config import settle
 from hrc_env.control import checked_action
 from hrc_env.core.batching import copied, mapped, one, write_rows
 from hrc_env.core.errors import ConfigError, whole
+from hrc_env.core.infos import worded
 from hrc_env.core.machine import n_cores
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.env import EnvBase, spaces
 from hrc_env.render.views import PICTURE_SIZE, Views
 from hrc_env.rewards import RewardConfig
 from hrc_env.simulation import Simulation
-from hrc_env.step import Observation, StepResult
+from hrc_env.step import Observation, StepResult, words_of
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import task_called
 from hrc_env.vector.infos import InfoTable, table
@@ -161,6 +162,17 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         self._observation, self._ended = observation, ended
         infos = {**finals, **info.arrays(np.ones_like(ended))}
         return copied(observation), reward, terminated, truncated, infos
+
+    def words(self, infos: Mapping[str, Any]) -> dict[str, NDArray[np.object_]]:
+        """Return in words what infos say of workers, contacts and cameras, (num_envs,) tuples each:
+        see `hrc_env.core.infos.worded`."""
+        words = words_of(self.shards.first.bodies.names)
+        numbers = {name: infos[name] for name in infos if not name.startswith(("_", "final_"))}
+        said = [
+            worded({name: values[b] for name, values in numbers.items()}, words)
+            for b in range(self.num_envs)
+        ]
+        return {name: np.fromiter((each[name] for each in said), object) for name in said[0]}
 
     def set_reward(self, weights: RewardConfig) -> None:
         """Weigh the reward's terms so from the next step on, in every environment."""

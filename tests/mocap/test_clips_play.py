@@ -44,7 +44,7 @@ def plays(clip, scene, worker="worker_1"):
     still = np.zeros(env.action_space.shape, np.float32)
     for _ in range(PATIENCE_S * 25):
         *_, info = env.step(still)
-        if info["worker/activity"] == ("clip",):
+        if env.unwrapped.words(info)["worker/activity"] == ("clip",):
             env.close()
             return True
     env.close()

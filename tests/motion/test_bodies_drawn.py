@@ -10,13 +10,13 @@ from assets.workers.poses import rest_motion
 from hrc_env.config import settle
 from hrc_env.core.batching import mapped, one
 from hrc_env.core.errors import ConfigError
+from hrc_env.core.infos import ABSENT, ACTIVITY, BODY
 from hrc_env.core.records import Roi, WorkerPath
 from hrc_env.env import HRCEnv
 from hrc_env.motion import generator
 from hrc_env.scene.build import build
 from hrc_env.scene.physics import Physics
 from hrc_env.scene.render import CropRenderer
-from hrc_env.step import ABSENT, ACTIVITY, BODY
 from hrc_env.vector.env import HRCVectorEnv
 from hrc_env.worker.body import SEGMENT, load_body, worker_names
 
@@ -29,28 +29,33 @@ def made(n_workers=3, perception="truth", config=ANY):
     return HRCEnv(perception=perception, n_workers=n_workers, config=config)
 
 
+def bodies(env, info):
+    """The names of the workers' bodies."""
+    return env.words(info)[BODY]
+
+
 def test_every_worker_of_an_episode_is_somebody_else():
     env, seen = made(), set()
     for seed in range(12):
-        names = env.reset(seed=seed)[1][BODY]
+        names = bodies(env, env.reset(seed=seed)[1])
         assert len(set(names)) == 3
-        assert env.step(PUSH)[-1][BODY] == names
+        assert bodies(env, env.step(PUSH)[-1]) == names
         seen |= set(names)
     assert seen == set(worker_names())
-    assert env.reset(seed=4)[1][BODY] == env.reset(seed=4)[1][BODY]
+    assert bodies(env, env.reset(seed=4)[1]) == bodies(env, env.reset(seed=4)[1])
 
 
 def test_who_is_not_there_has_no_body():
     env = made((1, 3))
     for seed in range(6):
-        info = env.reset(seed=seed)[1]
-        absent = [name == ABSENT for name in info[BODY]]
-        assert absent == [name == ABSENT for name in info[ACTIVITY]]
+        words = env.words(env.reset(seed=seed)[1])
+        absent = [name == ABSENT for name in words[BODY]]
+        assert absent == [name == ABSENT for name in words[ACTIVITY]]
 
 
 def test_of_fewer_bodies_than_workers_each_is_there_equally_often():
     env = made(5, config={"worker": ["worker_2", "worker_5"]})
-    names = env.reset(seed=0)[1][BODY]
+    names = bodies(env, env.reset(seed=0)[1])
     assert sorted(names.count(name) for name in ("worker_2", "worker_5")) == [2, 3]
 
 
@@ -59,14 +64,14 @@ def test_one_name_is_the_same_however_it_is_written():
     envs = [made(2, "keypoints", {"worker": w}) for w in ("worker_3", ("worker_3",), "any")]
     first = [env.reset(seed=3) for env in envs]
     np.testing.assert_array_equal(first[0][0], first[1][0])
-    assert len({info[ACTIVITY] for _, info in first}) == 1
+    assert len({tuple(info[f"worker_{w}/activity"] for w in range(2)) for _, info in first}) == 1
     for _ in range(20):
         np.testing.assert_array_equal(envs[0].step(PUSH)[0], envs[1].step(PUSH)[0])
 
 
 def test_the_truth_has_the_measures_of_the_body():
     env = made()
-    names = env.reset(seed=1)[1][BODY]
+    names = bodies(env, env.reset(seed=1)[1])
     sensor, looks = env.simulation.pipeline.sensor, []
     expose = sensor.expose
     sensor.expose = lambda now: looks.append(now.truth) or expose(now)
@@ -84,7 +89,7 @@ def test_the_truth_has_the_measures_of_the_body():
 def test_bones_of_every_body_move_as_they_are():
     """The shank that walks about is as long as the shank that was baked."""
     env = made()
-    names = env.reset(seed=2)[1][BODY]
+    names = bodies(env, env.reset(seed=2)[1])
     for _ in range(5):
         env.step(PUSH)
     place = generator.current(env.simulation.motion).position_world[0]
@@ -130,8 +135,7 @@ def test_many_environments_with_bodies_are_single_ones_bit_for_bit(n_threads):
     for step in range(1, 20):
         for k, (observation, *_, info) in enumerate(alone):
             np.testing.assert_array_equal(batch[k], observation)
-            for name in (BODY, ACTIVITY):
-                assert infos[name][k] == info[name]
+            assert {name: infos[name][k] for name in info} == info
         batch, *_, infos = many.step(np.tile(PUSH, (6, 1)))
         alone = [env.reset() if step % 8 == 0 else env.step(PUSH) for env in ones]
     many.close()

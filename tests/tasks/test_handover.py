@@ -121,7 +121,7 @@ def test_nobody_comes_for_a_tool_that_stands_in_its_stand():
     env.reset(seed=0)
     for _ in range(50):
         *_, info = env.step(np.append(np.zeros(6), -1.0).astype(np.float32))
-        assert info["worker/activity"] == ("stand",)
+        assert env.unwrapped.words(info)["worker/activity"] == ("stand",)
     at = env.unwrapped.simulation.scene.objects.poses(env.unwrapped.simulation.physics.qpos)
     np.testing.assert_allclose(at[0, 0, :3], [-0.45, -0.62, 0.85], atol=2e-3)
     env.close()

@@ -62,10 +62,9 @@ def test_the_other_levels_too_with_episodes_that_end_by_contact(level):
 
 
 def test_nobody_there_is_the_same_too():
-    """Names that no environment has are left out of infos."""
     envs = identity.vectors(2, (2,), AutoresetMode.NEXT_STEP, n_workers=0, perception="keypoints")
     assert identity.compare(envs, 5, seed=0) == [0]
-    assert "safety/min_separation_m" not in envs[1].step(actions(1, 2)[0])[4]
+    assert np.isinf(envs[1].step(actions(1, 2)[0])[4]["safety/min_separation_m"]).all()
 
 
 def test_differences_are_counted():
@@ -158,7 +157,8 @@ def test_next_step_starts_anew_in_the_step_after_and_ignores_the_action():
     observation, reward, terminated, truncated, infos = env.step(np.full((2, 6), np.nan))
     assert not np.array_equal(observation, last[0])
     assert not np.any([reward, terminated, truncated])
-    assert not any(name.startswith(("final_", "reward/")) for name in infos)
+    assert not any(name.startswith("final_") for name in infos)
+    assert not np.any([infos[name] for name in infos if name.startswith("reward/")])
     assert infos["tracking/lost"].tolist() == [0.0, 0.0]
 
 
@@ -177,7 +177,8 @@ def test_same_step_gives_the_last_observation_and_info_beside_the_first_of_the_n
     assert reward.all()
     final = infos["final_info"]
     assert final["_reward/progress"].tolist() == [True, False]
-    assert infos["_reward/progress"].tolist() == [False, True]
+    assert infos["_reward/progress"].tolist() == [True, True]
+    assert infos["reward/progress"][0] == 0.0 != infos["reward/progress"][1]
     assert infos["_episode_cost"].tolist() == [True, True]
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from hrc_env.config import settle
 from hrc_env.control import checked_action
+from hrc_env.core.infos import Info
 from hrc_env.core.machine import n_cores
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Ints
@@ -28,7 +29,6 @@ from hrc_env.geometry.distances import least_separation
 from hrc_env.motion import generator
 from hrc_env.safety.incidents import KINDS, MOVING_M_S
 from hrc_env.simulation import Simulation
-from hrc_env.step import Info
 from hrc_env.tasks import DEFAULT
 from hrc_env.vector.shards import Shards
 from hrc_env.worker.body import worker_truth

@@ -135,7 +135,7 @@ def test_wrong_calibrations_are_as_large_as_said_and_drawn_for_the_episode():
 def test_a_fault_changes_what_is_seen_and_nothing_of_the_world(kind):
     plain = rolled()
     spoilt = rolled(faults=[{"kind": kind, "cameras": ["camera_1"], "from_s": 0.4}])
-    for name in ("safety/min_separation_m", "worker/activity", "task/goals_reached"):
+    for name in ("safety/min_separation_m", "worker_0/activity", "task/goals_reached"):
         assert [info.get(name) for info in plain] == [info.get(name) for info in spoilt]
     error = [[info.get("tracking/mpjpe_m") for info in each] for each in (plain, spoilt)]
     assert error[0][:9] == error[1][:9]

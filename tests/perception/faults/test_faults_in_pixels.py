@@ -64,7 +64,7 @@ def test_a_frozen_lost_or_late_camera_leaves_the_others_tracking():
         FaultConfig("lost", ("camera_3",), None, 0.2),
     ]
     plain, spoilt = rolled(12), rolled(12, *faults)
-    for name in ("safety/min_separation_m", "worker/activity"):
+    for name in ("safety/min_separation_m", "worker_0/activity"):
         assert [info.get(name) for info in plain] == [info.get(name) for info in spoilt]
     assert spoilt[-1]["tracking/mpjpe_m"] < 0.15
 

@@ -1,0 +1,112 @@
+"""Checks of what users bring: functions by their arguments, results by kind, shape and values."""
+
+import inspect
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hrc_env.core.errors import ConfigError, check_shape
+
+LONGEST = 80
+"""Characters of a value that an error shows."""
+
+
+def described(value: object) -> str:
+    """Return what a value is, in a few words."""
+    if isinstance(value, np.ndarray):
+        return f"an array of {value.dtype} with shape {value.shape}"
+    if isinstance(value, tuple | list):
+        parts = ", ".join(described(each) for each in value[:4])
+        more = ", ..." if len(value) > 4 else ""
+        return f"a {type(value).__name__} of {len(value)} ({parts}{more})"
+    text = repr(value)
+    text = text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
+    return text if value is None else f"{type(value).__name__} {text}"
+
+
+def check_arguments(what: str, function: Callable[..., Any], *names: str) -> None:
+    """Raise `ConfigError` unless a function can be called with so many arguments by position."""
+    try:
+        signature = inspect.signature(function)
+    except (ValueError, TypeError):  # of functions written in C there is none
+        return
+    try:
+        signature.bind(*names)
+    except TypeError as error:
+        raise ConfigError(
+            f"{what} must be a function of ({', '.join(names)}), got one of {signature}: {error}."
+        ) from error
+
+
+def numbers_of(
+    what: str, value: object, shape: tuple[int, ...], meaning: str, finite: bool = True
+) -> NDArray[np.float64]:
+    """Return a value as an array of its own, float64 and contiguous.
+
+    Args:
+        what: what it is, with its unit, as errors say it.
+        value: an array, or what NumPy makes one of.
+        shape: the expected one.
+        meaning: what its axes are.
+        finite: whether NaN and infinite numbers are refused.
+
+    Raises:
+        ConfigError: it is not of real numbers, has another shape, or is not finite.
+    """
+    try:
+        array = np.asarray(value)
+    except (ValueError, TypeError) as error:  # lists of unlike lengths, broken __array__
+        raise ConfigError(f"{what} must be an array, got {described(value)}: {error}") from error
+    if array.dtype.kind not in "fiub":
+        raise ConfigError(
+            f"{what} must be real numbers of shape {shape} ({meaning}), got {described(value)}."
+        )
+    check_shape(what, array.shape, shape, meaning)
+    numbers = np.array(array, np.float64, order="C")
+    if finite and not np.isfinite(numbers).all():
+        n = int(np.size(numbers) - np.isfinite(numbers).sum())
+        raise ConfigError(
+            f"{what} must be finite ({meaning}), got {n} of {numbers.size} numbers that are not."
+        )
+    return numbers
+
+
+def flags_of(what: str, value: object, shape: tuple[int, ...], meaning: str) -> NDArray[np.bool_]:
+    """Return a value as an array of truth values; `ConfigError` if it is none of this shape."""
+    numbers = numbers_of(what, value, shape, meaning)
+    if not np.isin(numbers, (0.0, 1.0)).all():
+        raise ConfigError(f"{what} must be true or false, got other numbers.")
+    return numbers > 0
+
+
+def points_of(what: str, value: object) -> NDArray[np.float64]:
+    """Return a value as points (N, 3), at least one; `ConfigError` if it is none."""
+    n = len(value) if isinstance(value, list | tuple | np.ndarray) and np.size(value) else 1
+    return numbers_of(what, value, (n, 3), "points, xyz")
+
+
+def positive(what: str, value: object, unit: str) -> float:
+    """Return a positive finite number, or raise `ConfigError`."""
+    is_number = isinstance(value, int | float | np.integer | np.floating)
+    if not is_number or isinstance(value, bool) or not 0 < float(value) < np.inf:  # type: ignore[arg-type]
+        raise ConfigError(f"{what} must be positive and finite [{unit}], got {described(value)}.")
+    return float(value)  # type: ignore[arg-type]
+
+
+def check_kind(what: str, value: object, *kinds: type | None) -> None:
+    """Raise `ConfigError` for a value that is of none of these kinds; None stands for None."""
+    if not any(value is None if kind is None else isinstance(value, kind) for kind in kinds):
+        names = " or ".join("None" if kind is None else kind.__name__ for kind in kinds)
+        raise ConfigError(f"{what} must be a {names}, got {described(value)}.")
+
+
+def check_kinds(what: str, values: object, kind: type) -> None:
+    """Raise `ConfigError` unless there is a sequence of at least one value of this kind."""
+    if not isinstance(values, list | tuple) or not values:
+        raise ConfigError(
+            f"{what} must be a list of at least one {kind.__name__}, got {described(values)}."
+        )
+    for k, value in enumerate(values):
+        check_kind(f"{what}[{k}]", value, kind)
