@@ -53,10 +53,15 @@ def register_estimator(spec: "EstimatorSpec") -> None:
 
 
 def register_robot(robot: "Robot") -> None:
-    """Make a robot known by its name: wherever `robot=` or `--robot` is taken."""
-    from hrc_env.scene.robot import ROBOTS, check_robot
+    """Make a robot known by its name: wherever `robot=` or `--robot` is taken. A warning says where
+    what cameras see of it and what distances count differ."""
+    from hrc_env.scene.robot import ROBOTS, Robot, robot_called
+    from hrc_env.scene.robot_looks import warn_of_looks
 
-    check_robot(robot)
+    if not isinstance(robot, Robot):
+        raise ConfigError(f"A robot must be a Robot, got {type(robot).__name__}.")
+    robot = robot_called(robot)
+    warn_of_looks(robot)
     _add(ROBOTS, "robot", robot.name, robot)
 
 

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from hrc_env.core.errors import ConfigError
 from hrc_env.core.typing import (
     Bools,
     Capsules,
@@ -84,6 +85,16 @@ class PoseEstimate:
     whom none has, or where it is known since that nobody is. Not given: the mean of a track."""
 
     def __post_init__(self) -> None:
+        try:
+            self._complete()
+        except (AttributeError, TypeError, ValueError, IndexError) as error:
+            shapes = {name: np.shape(getattr(self, name)) for name in ("mean_world", "tracked")}
+            raise ConfigError(
+                "A PoseEstimate must be of arrays: mean_world (B, W, J, 3), age_s (B, W, J), "
+                f"tracked (B, W) true or false; got {shapes}: {error}"
+            ) from error
+
+    def _complete(self) -> None:
         if self.unknown is None:
             object.__setattr__(self, "unknown", ~self.tracked)
         if self.blind_s is None:

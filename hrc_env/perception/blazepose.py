@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from hrc_env.core.errors import ConfigError
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Roi
 from hrc_env.core.typing import Floats, Image, Points2, Tensor
@@ -65,7 +66,13 @@ def window_from_points(centre_px: Points2, rim_px: Points2) -> Roi:
 
 def sample_window(image: Image, window: Roi, side: int = LANDMARK_SIDE) -> Image:
     """The turned square of an image as an upright (side, side, 3) picture, bilinear, corner to
-    corner; the image's border is continued outside, as MediaPipe does."""
+    corner; the image's border is continued outside, as MediaPipe does. `ConfigError` for an image
+    that is not of uint8."""
+    if image.dtype != np.uint8:
+        raise ConfigError(
+            f"An image must be of uint8, 0 to 255, got {image.dtype}. Scale it and convert it: "
+            "(255 * image).round().astype(numpy.uint8) of numbers up to 1."
+        )
     matrix = image_from_crop(window, side)
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     crop = cv2.warpAffine(image, matrix, (side, side), flags=flags, borderMode=cv2.BORDER_REPLICATE)

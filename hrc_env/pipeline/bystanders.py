@@ -195,7 +195,8 @@ def _beside(found: Candidates, taken: Windows) -> Candidates:
         for mine in (each[c] for each in taken):
             near = [window for window in windows if same_person(window, mine)]
             if mine is not None and near:
-                windows.remove(min(near, key=lambda one: math.dist(one.centre_px, mine.centre_px)))
+                off_px = [math.dist(window.centre_px, mine.centre_px) for window in near]
+                windows.remove(near[int(np.argmin(off_px))])
     return beside
 
 

@@ -1,22 +1,25 @@
 """Images to poses without a simulator: recorded films, live cameras, anybody's renderer.
 
 tracker = PoseTracker(cameras)
-while films.advance():
-    estimate = tracker.update(films)
+for images in films:
+    estimate = tracker.update(images)
 """
 
 import zlib
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from hrc_env.core.batching import one
-from hrc_env.core.errors import needed
+from hrc_env.core.brought import check_kind, check_kinds, numbers_of, points_of, positive
+from hrc_env.core.errors import needed, whole
 from hrc_env.core.records import PoseEstimate, Roi
 from hrc_env.core.typing import Bools, Capsules, Image, Points3
 from hrc_env.geometry.cameras import PinholeCamera, projections
 from hrc_env.geometry.shapes import WIDTH
 from hrc_env.perception.detector import DetectorConfig
+from hrc_env.perception.frames import Frames
 from hrc_env.perception.lensed import pinhole_keypoints
 from hrc_env.perception.noise import our_joints
 from hrc_env.perception.searching import ImageSource, image_crop
@@ -29,6 +32,8 @@ from hrc_env.tracking.estimators import EstimatorChoice, make_estimator
 from hrc_env.tracking.people.association import AssociationConfig, associate
 from hrc_env.tracking.presence import SEARCHES, Looks, Presence
 
+MOST_WORKERS = 16
+"""The most people that one tracker follows."""
 MOST_SUMS = 1000
 """Number of checksums that are kept: windows move with people."""
 
@@ -88,6 +93,14 @@ class PoseTracker:
         detector: DetectorConfig | None = None,
         floor_world: Points3 | None = None,
     ) -> None:
+        """Raise `ConfigError` for arguments that cannot work."""
+        check_kinds("cameras", cameras, PinholeCamera)
+        check_kind("tracker", tracker, TrackerConfig, None)
+        check_kind("detector", detector, DetectorConfig, None)
+        n_workers = whole("n_workers", n_workers, 1, MOST_WORKERS)
+        dt_s = positive("dt_s", dt_s, "s")
+        if floor_world is not None:
+            floor_world = points_of("floor_world [m]", floor_world)
         self.cameras, self.n_workers, self.dt_s = tuple(cameras), n_workers, dt_s
         self.P = projections(self.cameras)
         self.focal_px = np.array([camera.K[0, 0] for camera in self.cameras])
@@ -104,7 +117,7 @@ class PoseTracker:
 
     def update(
         self,
-        source: ImageSource,
+        source: ImageSource | Sequence[Image],
         dt_s: float | None = None,
         rngs: Sequence[np.random.Generator] = (),
         robot_world: Capsules | None = None,
@@ -112,21 +125,27 @@ class PoseTracker:
         """Take the present frames in; workers (1, W, J, ...) in the frame of the cameras' poses.
 
         Args:
-            source: the images of all cameras. Cameras whose images repeat bit for bit are stuck:
-                they prove no absence.
+            source: the images of all cameras, (H, W, 3) RGB of uint8 each, or what gives windows of
+                them. Cameras whose images repeat bit for bit are stuck: they prove no absence.
             dt_s: time since the last frames [s]; None: the usual.
             rngs: one generator, for estimators that draw; none: one with seed 0.
             robot_world: the robot's capsules (K, 2, 3) [m]: of more people than `n_workers` those
                 nearest to it are followed. None: those who were followed first.
         """
         drawn = list(rngs) or [np.random.default_rng(0)]
-        dt_s = self.dt_s if dt_s is None else dt_s
+        check_kinds("rngs", drawn, np.random.Generator)
+        dt_s = self.dt_s if dt_s is None else positive("dt_s", dt_s, "s")
+        if robot_world is not None:
+            shape = (*np.shape(robot_world)[:1], 2, 3)
+            robot_world = numbers_of("robot_world [m]", robot_world, shape, "K capsules, ends, xyz")
+        given: Any = source
+        shown = given if hasattr(given, "crop") else Frames(self.cameras, given)
         self.estimator.predict(self.state, dt_s, drawn)
         everyone = np.arange(1)
         expected = self.looking.followed(everyone, self.estimator.estimate(self.state))
         seen = no_keypoints(1, len(self.cameras), self.n_workers)
         has_image = [True] * len(self.cameras)
-        self._watched.show(source)
+        self._watched.show(shown)
         self.looking.look(self._watched, one(expected, 0), 0, has_image, one(seen, 0), robot_world)
         found = keypoints = pinhole_keypoints(seen, self.cameras)
         if self.n_workers > 1:
@@ -135,10 +154,10 @@ class PoseTracker:
         now, searched = self.estimator.estimate(self.state), self.looking.looked(everyone)
         searched &= ~self._watched.stuck(len(self.cameras))
         fresh_s = np.zeros(searched.shape)
-        shown = find_unexplained(keypoints, fresh_s, now, self.P, self.focal_px)
-        shown.unexplained[:] |= searched & self.looking.unexplained
+        poses = find_unexplained(keypoints, fresh_s, now, self.P, self.focal_px)
+        poses.unexplained[:] |= searched & self.looking.unexplained
         others = self.looking.bystanders.others(everyone, self.dt_s)
-        looks = Looks(searched, fresh_s, SEARCHES, shown, others)
+        looks = Looks(searched, fresh_s, SEARCHES, poses, others)
         ours, config = our_joints(now), self.estimator.config
         return self.presence.update(everyone, ours, found, keypoints, looks, dt_s, config)
 

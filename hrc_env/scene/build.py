@@ -30,10 +30,10 @@ from hrc_env.scene.robot import (
     add_robot,
     chain_of,
     grip_of,
-    reach_m,
     robot_called,
     servo_lead_s,
 )
+from hrc_env.scene.robot_chain import reach_m
 from hrc_env.scene.worker import add_worker, capsule_geom_ids, mocap_ids
 from hrc_env.scene.worker_visuals import WorkerVisuals, add_props, add_visuals, visuals_of
 from hrc_env.worker.body import assets_dir, load_body, pool

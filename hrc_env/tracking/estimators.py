@@ -20,10 +20,12 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError, check_shape, unknown
+from hrc_env.core.brought import check_arguments
+from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Ints, Rngs
+from hrc_env.tracking.checked import CheckedEstimator
 from hrc_env.tracking.config import (
     PaperConfig,
     ParticleConfig,
@@ -119,6 +121,8 @@ ESTIMATORS: dict[str, EstimatorSpec] = {
     )
 }
 """By name: those of this package, and those that were registered."""
+BUILT_IN = frozenset(ESTIMATORS.values())
+"""Those of this package; what others give is checked (`checked.CheckedEstimator`)."""
 OFFLINE = {"smoother": "hrc_env.tracking.smoother.smooth(P, clip, dt_s)"}
 """What needs the future, and the function that gives it a whole clip."""
 
@@ -132,6 +136,7 @@ def estimator_called(estimator: EstimatorChoice) -> EstimatorSpec:
     if isinstance(estimator, EstimatorSpec):
         return estimator
     if callable(estimator):
+        check_arguments("An estimator", estimator, "P", "ctrl_dt", "config")
         return EstimatorSpec(getattr(estimator, "__name__", type(estimator).__name__), estimator)
     if estimator in OFFLINE:
         raise ConfigError(
@@ -162,12 +167,13 @@ def make_estimator(
         raise ConfigError(f"ctrl_dt must be positive, got {ctrl_dt}.")
     settings = of_kind(config, spec.config)
     made = spec.make(P, ctrl_dt, settings)
+    if spec not in BUILT_IN:
+        made = CheckedEstimator(spec.name, made)
     if settings.longest_delay_s > 0:
         return OutOfSequence(made, len(P), ctrl_dt, settings.longest_delay_s, spec.needs_pairs)
     return made
 
 
-_METHODS = ("init", "reset", "predict", "update", "estimate", "forecast")
 _DT_S = 0.04
 _P = np.array([[[900.0, 640, 0, 0], [0, 360, -900, 0], [0, 1, 0, 3]],
                [[640.0, -900, 0, 0], [360, 0, -900, 0], [1, 0, 0, 3]]])  # fmt: skip
@@ -184,37 +190,11 @@ def check_estimator(spec: EstimatorSpec) -> None:
     if not (isinstance(spec.config, type) and issubclass(spec.config, TrackerConfig)):
         raise ConfigError(f"{spec.name}: config must be a kind of TrackerConfig.")
     made = make_estimator(spec, _P, _DT_S)
-    missing = [name for name in _METHODS if not callable(getattr(made, name, None))]
-    if missing:
-        raise ConfigError(
-            f"{spec.name}: the estimator lacks {', '.join(missing)}; "
-            "hrc_env.tracking.estimators.Estimator says what each does."
-        )
-    shape = (3, 2, N_JOINTS)
-    state, rngs = made.init(*shape[:2]), [np.random.default_rng(b) for b in range(3)]
+    state, rngs = made.init(3, 2), [np.random.default_rng(b) for b in range(3)]
     made.reset(state, np.arange(3), rngs)
     seen = (3, len(_P), 2, N_JOINTS)
     nothing = Keypoints(np.full((*seen, 2), np.nan), np.zeros(seen), np.full(seen, np.inf))
     made.predict(state, _DT_S, rngs)
     made.update(state, nothing, rngs)
-    _check_estimate(spec.name, "estimate", made.estimate(state), shape)
-    _check_estimate(spec.name, "forecast", made.forecast(state, 0.2), shape)
-
-
-def _check_estimate(name: str, what: str, estimate: Any, shape: tuple[int, int, int]) -> None:
-    if not isinstance(estimate, PoseEstimate):
-        raise ConfigError(
-            f"{name}: {what} must give a PoseEstimate, got {type(estimate).__name__}."
-        )
-    point, matrix = (*shape, 3), (*shape, 3, 3)
-    shapes = {"mean_world": point, "cov_world": matrix, "velocity_world": point, "age_s": shape}
-    for field, expected in (shapes | {"tracked": shape[:2]}).items():
-        value = np.asarray(getattr(estimate, field))
-        check_shape(f"{name}: {what}.{field}", value.shape, expected, "B, W, J, ...")
-        if not np.isfinite(value).all():
-            raise ConfigError(
-                f"{name}: {what}.{field} must be finite, also of whom nobody has seen: give the "
-                "prior (TrackerConfig.prior_mean_world, prior_std_m)."
-            )
-    if np.linalg.eigvalsh(estimate.cov_world).min() <= 0:
-        raise ConfigError(f"{name}: {what}.cov_world must be positive definite.")
+    made.estimate(state)
+    made.forecast(state, 0.2)

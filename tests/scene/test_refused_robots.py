@@ -1,7 +1,7 @@
 """A robot whose MJCF or record is wrong in one thing only is refused, and is taken without it."""
 
 import re
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import mujoco
 import numpy as np
@@ -187,7 +187,8 @@ def test_what_is_neither_a_name_nor_a_robot_is_none(robot):
 
 
 def test_a_robot_is_called_by_its_name_or_itself():
-    assert robot_called(ARM) is ARM
+    assert robot_called(ARM) == ARM
+    assert robot_called(asdict(ARM)) == ARM
     assert robot_called("ur10e_like") is ROBOTS["ur10e_like"]
 
 

@@ -8,7 +8,7 @@ from hrc_env.geometry.chains import capsules
 from hrc_env.scene.build import SceneConfig, build, drawing_model
 from hrc_env.scene.places import SCENES
 from hrc_env.scene.rig import CameraConfig
-from hrc_env.scene.robot import reach_m
+from hrc_env.scene.robot_chain import reach_m
 
 SITE = build(name="site")
 EYES = np.stack([camera.eye_world for camera in SITE.cameras])

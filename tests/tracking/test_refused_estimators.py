@@ -1,7 +1,7 @@
 """What an estimator is given, lacks or says that is wrong in one thing only is refused."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -48,6 +48,7 @@ class Told:
 
     now: Any
     later: Any
+    config: TrackerConfig = field(default_factory=TrackerConfig)
 
     def init(self, batch: int, n_workers: int) -> None:
         """Have no state."""

@@ -1,0 +1,39 @@
+"""Whole images of a calibrated rig as an `ImageSource`."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hrc_env.core.brought import described
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.records import Roi
+from hrc_env.core.typing import Image
+from hrc_env.geometry.cameras import PinholeCamera
+from hrc_env.perception.blazepose import sample_window
+
+
+class Frames:
+    """The present images of all cameras."""
+
+    def __init__(self, cameras: Sequence[PinholeCamera], images: Sequence[Image]) -> None:
+        """Check that there is an image for each camera, (H, W, 3) RGB of uint8, of the size for
+        which the camera is calibrated; `ConfigError` says of which one it is not so."""
+        if not isinstance(images, list | tuple | np.ndarray) or len(images) != len(cameras):
+            raise ConfigError(
+                f"There must be one image for each of {len(cameras)} cameras, or an object with "
+                f"crop(camera_index, window), got {described(images)}."
+            )
+        for c, (camera, image) in enumerate(zip(cameras, images, strict=True)):
+            size = (camera.height_px, camera.width_px, 3)
+            right = isinstance(image, np.ndarray) and image.dtype == np.uint8
+            if not right or image.shape != size:
+                raise ConfigError(
+                    f"The image of camera {c} must be an array of uint8 with shape {size}, as the "
+                    f"camera is calibrated: rows, columns, RGB from 0 to 255; got "
+                    f"{described(image)}. Convert the image, or calibrate for its size."
+                )
+        self.images = list(images)
+
+    def crop(self, camera_index: int, window: Roi) -> Image:
+        """Return a window of a camera's image, (256, 256, 3)."""
+        return sample_window(self.images[camera_index], window)

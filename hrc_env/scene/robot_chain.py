@@ -1,0 +1,146 @@
+"""What an MJCF file says of a robot: its links, joints, servos and capsules."""
+
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import mujoco
+import numpy as np
+
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.typing import Floats, Ints, Transforms
+from hrc_env.geometry.chains import SerialChain
+
+if TYPE_CHECKING:
+    from hrc_env.scene.robot import Hand, Robot
+
+
+@lru_cache(maxsize=8)
+def chain_of(robot: "Robot", mount_world: tuple[float, float, float]) -> SerialChain:
+    """A robot's numbers as a chain of joints. Raises `ConfigError` where something that `Robot`
+    names is missing in the MJCF or of another kind."""
+    try:
+        return _chain(robot, mount_world)
+    except ConfigError as error:
+        raise ConfigError(f"{robot.name}: {error}") from error
+    except ValueError as error:
+        raise ConfigError(f"{robot.name}: its MJCF cannot be used: {error}") from error
+
+
+def reach_m(chain: SerialChain) -> Floats:
+    """(K,) no point of a capsule is ever farther from the robot's foot than this [m]."""
+    ways = np.where(chain.slides, np.abs(chain.range_rad).max(-1), 0.0)
+    before = np.cumsum(np.linalg.norm(chain.parent_from_joint[:, :3, 3], axis=-1) + ways)
+    own = np.linalg.norm(chain.capsule_ends, axis=-1).max(-1)
+    return before[chain.capsule_link] + own + chain.capsule_radius_m
+
+
+def parsed(robot: "Robot") -> Any:
+    """Return the MJCF of a robot as a specification that can be changed."""
+    text = str(robot.mjcf)
+    read = mujoco.MjSpec.from_string if text.lstrip().startswith("<") else mujoco.MjSpec.from_file
+    return read(text)
+
+
+def _chain(robot: "Robot", mount_world: tuple[float, float, float]) -> SerialChain:
+    model, n = parsed(robot).compile(), len(robot.joints)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)  # all joints at 0
+    joints = [id_of(model, "joint", name) for name in robot.joints]
+    _check_servos(model, joints, robot.hand)
+    bodies = model.jnt_bodyid[joints].tolist()
+    parents = model.body_parentid[bodies].tolist()
+    if [link_of(model, bodies, parent) for parent in parents] != list(range(-1, n - 1)):
+        raise ConfigError("its joints must be a single chain.")
+    site = id_of(model, "site", robot.tool_site)
+    if link_of(model, bodies, model.site_bodyid[site]) != n - 1:
+        raise ConfigError(f"site {robot.tool_site!r} must be on the last link.")
+    foot = _pose(data.xpos[parents[0]], data.xmat[parents[0]])
+    links = np.stack([_joint_frame(model, data, joint) for joint in joints])
+    carriers, ends, radius_m = _capsules(model, data, bodies, links, robot)
+    return SerialChain(
+        T_world_from_base=_pose(mount_world, np.eye(3)) @ foot,
+        parent_from_joint=np.linalg.inv([foot, *links[:-1]]) @ links,
+        link_from_tool=np.linalg.inv(links[-1]) @ _pose(data.site_xpos[site], data.site_xmat[site]),
+        range_rad=model.jnt_range[joints],
+        velocity_limit_rad_s=model.actuator_ctrlrange[n : 2 * n, 1].copy(),
+        slides=model.jnt_type[joints] == mujoco.mjtJoint.mjJNT_SLIDE,
+        capsule_link=carriers,
+        capsule_ends=ends,
+        capsule_radius_m=radius_m,
+    )
+
+
+def id_of(model: mujoco.MjModel, kind: str, name: str) -> int:
+    """Return the number of something by its kind and name; `ConfigError` if it is missing."""
+    number = mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), name)
+    if number < 0:
+        raise ConfigError(f"its MJCF has no {kind} {name!r}.")
+    return number
+
+
+def _check_servos(model: mujoco.MjModel, joints: list[int], hand: "Hand | None") -> None:
+    """Only hinges and slides with ranges, and their servos in order; then the hand's slides and
+    motor."""
+    n, fingers = len(joints), [id_of(model, "joint", each) for each in hand.joints] if hand else []
+    kinds = {mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE}
+    own = kinds.issuperset(model.jnt_type[:n].tolist()) and model.jnt_limited.all()
+    slides = (model.jnt_type[n:] == mujoco.mjtJoint.mjJNT_SLIDE).all()
+    if joints + fingers != list(range(model.njnt)) or not (own and slides):
+        raise ConfigError(
+            "joints must be all of its MJCF, in its order: hinges and slides with a range; then "
+            "its hand's: slides with a range."
+        )
+    motors = [id_of(model, "actuator", hand.motor)] if hand else []
+    integrates = model.actuator_dyntype == mujoco.mjtDyn.mjDYN_INTEGRATOR
+    if not (
+        model.actuator_trnid[: 2 * n, 0].tolist() == 2 * joints
+        and integrates.tolist() == [True] * n + [False] * (n + len(motors))
+        and motors == list(range(2 * n, model.nu))
+        and model.actuator_ctrllimited.all()
+    ):
+        raise ConfigError(
+            "needs an <intvelocity> for every joint in order, then a <velocity> for every joint, "
+            "each with a ctrlrange [rad/s, of slides m/s]; then its hand's <position> with one [m]."
+        )
+
+
+def link_of(model: mujoco.MjModel, bodies: list[int], body: int) -> int:
+    """Which of the links, whose bodies are given, carries a body; -1: none."""
+    while body and body not in bodies:
+        body = model.body_parentid[body]
+    return bodies.index(body) if body in bodies else -1
+
+
+def _pose(pos: Any, rotation: Floats) -> Transforms:
+    """(4, 4) of a place (3,) and a rotation of 9 numbers."""
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = rotation.reshape(3, 3), pos
+    return T
+
+
+def _joint_frame(model: mujoco.MjModel, data: mujoco.MjData, joint: int) -> Transforms:
+    """(4, 4) in the world: z is the axis."""
+    quaternion, turn = np.zeros(4), np.zeros(9)
+    mujoco.mju_quatZ2Vec(quaternion, model.jnt_axis[joint])
+    mujoco.mju_quat2Mat(turn, quaternion)
+    body = data.xmat[model.jnt_bodyid[joint]].reshape(3, 3)
+    return _pose(data.xanchor[joint], body @ turn.reshape(3, 3))
+
+
+def _capsules(
+    model: mujoco.MjModel, data: mujoco.MjData, bodies: list[int], links: Transforms, robot: "Robot"
+) -> tuple[Ints, Floats, Floats]:
+    """Links (K,), ends (K, 2, 3) and radii (K,) of the capsules."""
+    geoms = [id_of(model, "geom", name) for name in robot.capsules]
+    carriers = [link_of(model, bodies, model.geom_bodyid[geom]) for geom in geoms]
+    ends = np.empty((len(geoms), 2, 3))
+    for k, (name, geom, link) in enumerate(zip(robot.capsules, geoms, carriers, strict=True)):
+        if model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_CAPSULE:
+            raise ConfigError(f"geom {name!r} must be a capsule.")
+        if link < 0:
+            raise ConfigError(f"geom {name!r} is on no link.")
+        T = np.linalg.inv(links[link]) @ _pose(data.geom_xpos[geom], data.geom_xmat[geom])
+        along = T[:3, 2] * model.geom_size[geom, 1]
+        ends[k] = T[:3, 3] - along, T[:3, 3] + along
+    # As the MJCF's quaternions are rounded.
+    return np.array(carriers), np.round(ends, 12), model.geom_size[geoms, 0].copy()

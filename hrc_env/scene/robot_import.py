@@ -1,0 +1,298 @@
+"""A `Robot` from the MJCF of somebody's arm, whatever its servos, looks and collision shapes are.
+
+robot = robot_from_mjcf("ur5e/robot.xml", home_q=(0, -1.6, 1.9, -1.9, -1.6, 0))
+env = gymnasium.make("HRCReach-v0", robot=robot)
+
+Its actuators are replaced by two servos a joint on one velocity command (`scene.robot`), with
+gains by the inertia that each moves; gravity is compensated, as robot controllers do. What is drawn
+stays; shapes that collide go where others are drawn, and capsules are fitted to what is drawn of
+each link.
+"""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from hrc_env.core.brought import check_kind, positive
+from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.typing import Floats
+from hrc_env.scene.capsule_fit import Rod, fit_rods
+from hrc_env.scene.primitives import capsule
+from hrc_env.scene.robot import Robot
+from hrc_env.scene.robot_looks import surface_of
+
+DAMPING_1_S, STIFFNESS_1_S2 = 100.0, 1600.0
+"""Gains of the servos per inertia: an eigenfrequency of 40 rad/s, more than critically damped."""
+POSES = 64
+"""Number of poses over which the greatest inertia of each joint is looked for."""
+LEAST_ARMATURE = 0.1
+"""Least share of that inertia which is the motor's own, so that light joints do not jump."""
+TURN = 2 * np.pi
+"""Range of a joint without one, to both sides [rad]."""
+HINGE, SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
+
+
+def robot_from_mjcf(
+    mjcf: str | Path,
+    name: str = "",
+    *,
+    home_q: Sequence[float] = (),
+    spread_rad: Sequence[float] | float = 0.3,
+    fastest_rad_s: Sequence[float] | float = 2.0,
+    tool_site: str = "",
+) -> Robot:
+    """Return a robot of an arm's MJCF.
+
+    Args:
+        mjcf: the file's path, or the text.
+        name: by which `robot=` is to know it; "": the model's own.
+        home_q: the pose at rest, one angle a joint [rad]; (): its first keyframe, or the middle of
+            the joints' ranges.
+        spread_rad: at reset each joint is drawn within so much of `home_q` [rad].
+        fastest_rad_s: greatest speed of each joint [rad/s], of slides [m/s].
+        tool_site: the site at the tool point; "": the last one on the last link, or that link's
+            origin.
+
+    Raises:
+        ConfigError: the MJCF cannot be read, or is not that of one serial arm of hinges and slides.
+    """
+    check_kind("mjcf", mjcf, str, Path)
+    spec = _read(mjcf)
+    model = _compiled(spec)
+    name = name or spec.modelname or "imported"
+    joints, links = _chain(model, name)
+    n = len(joints)
+    fastest = _each("fastest_rad_s", fastest_rad_s, n)
+    for each in fastest:
+        positive("fastest_rad_s", each, "rad/s")
+    home = tuple(home_q) or _home(model, n)
+    _keep_files(spec)
+    _keep_inertia(spec, model)
+    _drop_colliding(spec)
+    _replace_servos(spec, model, joints, fastest)
+    site = _tool(spec, model, links[-1], tool_site)
+    capsules = _add_capsules(spec, links)
+    names = [each for link in links for each in capsules[link]]
+    watched = [each for link in links[n // 2 :] for each in capsules[link]]
+    return Robot(
+        name=name,
+        mjcf=spec.to_xml(),
+        joints=tuple(joints),
+        capsules=tuple(names),
+        watched=tuple(watched or names),
+        tool_site=site,
+        home_q=home,
+        spread_rad=_within(_each("spread_rad", spread_rad, n), spec, joints),
+    )
+
+
+def _read(mjcf: str | Path) -> Any:
+    is_text = isinstance(mjcf, str) and mjcf.lstrip().startswith("<")
+    try:
+        if is_text:
+            return mujoco.MjSpec.from_string(str(mjcf))
+        return mujoco.MjSpec.from_file(str(mjcf))
+    except ValueError as error:
+        what = "This text" if is_text else f"The file {mjcf}"
+        raise ConfigError(f"{what} must be an MJCF that MuJoCo reads: {error}") from error
+
+
+def _compiled(spec: Any) -> mujoco.MjModel:
+    try:
+        return spec.compile()
+    except ValueError as error:
+        raise ConfigError(f"The MJCF must compile: {error}") from error
+
+
+def _chain(model: mujoco.MjModel, name: str) -> tuple[list[str], list[str]]:
+    """Return the names of joints and of their bodies; `ConfigError` unless they are one chain."""
+    kinds = {int(kind) for kind in model.jnt_type}
+    if not model.njnt or not kinds <= {HINGE, SLIDE}:
+        raise ConfigError(
+            f"{name}: an arm has hinges and slides only, with its foot fixed; this MJCF has "
+            f"{model.njnt} joints, {sorted(kinds - {HINGE, SLIDE})} of them of other kinds "
+            "(0: free, 1: ball). Take free joints out, and a gripper or a second arm."
+        )
+    bodies = model.jnt_bodyid.tolist()
+    for before, body in pairwise(bodies):
+        up = int(model.body_parentid[body])
+        while up and up not in bodies:
+            up = int(model.body_parentid[up])
+        if up != before or body == before:
+            raise ConfigError(
+                f"{name}: the joints must be a single chain with one joint a body; "
+                f"{model.joint(bodies.index(body)).name!r} does not follow the joint before it. "
+                "Take a gripper or a second arm out of the MJCF."
+            )
+    names = [model.joint(k).name for k in range(model.njnt)]
+    links = [model.body(body).name for body in bodies]
+    if not all(names) or not all(links):
+        raise ConfigError(f"{name}: joints and the bodies that they move need names.")
+    return names, links
+
+
+def _each(what: str, value: Sequence[float] | float, n: int) -> tuple[float, ...]:
+    values = (float(value),) * n if isinstance(value, int | float) else tuple(value)
+    if len(values) != n:
+        raise ConfigError(f"{what} must be one number, or one of each of {n} joints, got {value}.")
+    return values
+
+
+def _home(model: mujoco.MjModel, n: int) -> tuple[float, ...]:
+    if model.nkey:
+        return tuple(model.key_qpos[0, :n].tolist())
+    limited = model.jnt_limited[:n].astype(bool)
+    return tuple(np.where(limited, model.jnt_range[:n].mean(-1), 0.0).tolist())
+
+
+def _within(spread: tuple[float, ...], spec: Any, joints: list[str]) -> tuple[float, ...]:
+    widths = (float(np.ptp(spec.joint(each).range)) for each in joints)
+    return tuple(min(each, width) for each, width in zip(spread, widths, strict=True))
+
+
+def _keep_files(spec: Any) -> None:
+    """Name the files of meshes and textures by whole paths: the text has no folder."""
+    folder = Path(spec.modelfiledir or ".")
+    for parts, own in ((spec.meshes, spec.meshdir), (spec.textures, spec.texturedir)):
+        for part in parts:
+            if part.file:
+                part.file = str((folder / own / part.file).resolve())
+    spec.meshdir = spec.texturedir = ""
+
+
+def _keep_inertia(spec: Any, model: mujoco.MjModel) -> None:
+    """Write down the masses of links, which shapes that go may have made."""
+    for body in spec.bodies[1:]:
+        k = model.body(body.name).id if body.name else body.id
+        body.mass, body.ipos, body.iquat = (
+            float(model.body_mass[k]), model.body_ipos[k], model.body_iquat[k],
+        )  # fmt: skip
+        body.inertia, body.explicitinertial, body.gravcomp = model.body_inertia[k], True, 1.0
+
+
+def _drop_colliding(spec: Any) -> None:
+    """Delete shapes that collide on bodies where others are only drawn; keep the rest as looks."""
+    for body in spec.bodies:
+        geoms = list(body.geoms)
+        drawn = [each for each in geoms if not (each.contype or each.conaffinity)]
+        for each in geoms:
+            if drawn and each not in drawn:
+                spec.delete(each)
+            else:
+                each.mass = 0.0
+
+
+def _replace_servos(
+    spec: Any, model: mujoco.MjModel, joints: list[str], fastest: tuple[float, ...]
+) -> None:
+    """Put the two servos of each joint in place of all actuators."""
+    most_n = _forces(model)
+    inertia = _inertia(model)
+    for each in [*spec.actuators, *spec.sensors, *spec.keys, *spec.tendons]:
+        spec.delete(each)
+    for k, name in enumerate(joints):
+        joint = spec.joint(name)
+        if not model.jnt_limited[k]:
+            joint.range = [-TURN, TURN]
+        joint.limited = mujoco.mjtLimited.mjLIMITED_TRUE
+        joint.armature = max(float(model.dof_armature[k]), LEAST_ARMATURE * inertia[k])
+        if np.isfinite(most_n[k]):
+            joint.actfrclimited = mujoco.mjtLimited.mjLIMITED_TRUE
+            joint.actfrcrange = [-most_n[k], most_n[k]]
+    for kind in ("hold", "rate"):
+        for k, name in enumerate(joints):
+            servo = spec.add_actuator(name=f"{name}_{kind}", target=name)
+            servo.trntype = mujoco.mjtTrn.mjTRN_JOINT
+            if kind == "hold":
+                servo.set_to_intvelocity(kp=STIFFNESS_1_S2 * inertia[k])
+                servo.actrange = spec.joint(name).range
+                servo.actlimited = mujoco.mjtLimited.mjLIMITED_TRUE
+            else:
+                servo.set_to_velocity(kv=DAMPING_1_S * inertia[k])
+            servo.ctrlrange = [-fastest[k], fastest[k]]
+            servo.ctrllimited = mujoco.mjtLimited.mjLIMITED_TRUE
+
+
+def _inertia(model: mujoco.MjModel) -> Floats:
+    """Return the greatest inertia that each joint moves, over seeded poses."""
+    rng, data = np.random.default_rng(0), mujoco.MjData(model)
+    limited = model.jnt_limited.astype(bool)[:, None]
+    low, high = np.where(limited, model.jnt_range, [-TURN, TURN]).T
+    most, whole = np.zeros(model.nv), np.zeros((model.nv, model.nv))
+    for _ in range(POSES):
+        data.qpos[:] = rng.uniform(low, high)
+        mujoco.mj_forward(model, data)
+        mujoco.mj_fullM(model, data, whole)
+        most = np.maximum(most, np.diag(whole))
+    return most
+
+
+def _forces(model: mujoco.MjModel) -> Floats:
+    """Return the greatest torque or force of each joint, infinite where none is given [N m, N]."""
+    most = np.full(model.njnt, np.inf)
+    for k in range(model.nu):
+        joint = int(model.actuator_trnid[k, 0])
+        if model.actuator_forcelimited[k]:
+            most[joint] = model.actuator_forcerange[k, 1]
+        elif model.actuator_biastype[k] == 0 and model.actuator_ctrllimited[k]:  # a motor
+            most[joint] = model.actuator_ctrlrange[k, 1] * model.actuator_gear[k, 0]
+    limited = model.jnt_actfrclimited.astype(bool)
+    return np.where(limited, np.minimum(most, model.jnt_actfrcrange[:, 1]), most)
+
+
+def _tool(spec: Any, model: mujoco.MjModel, last: str, wanted: str) -> str:
+    """Return the site at the tool point, which is added if there is none."""
+    names = [site.name for site in spec.sites if site.name]
+    if wanted and wanted not in names:
+        raise unknown("tool_site", wanted, names)
+    if wanted:
+        return wanted
+    link = model.body(last).id
+    carried = [
+        model.site(k).name
+        for k in range(model.nsite)
+        if model.body_rootid[model.site_bodyid[k]] == model.body_rootid[link]
+        and _is_on(model, int(model.site_bodyid[k]), link)
+    ]
+    if carried and carried[-1]:
+        return carried[-1]
+    spec.body(last).add_site(name="tool", pos=[0, 0, 0])
+    return "tool"
+
+
+def _is_on(model: mujoco.MjModel, body: int, link: int) -> bool:
+    """Return whether a body is a link or is carried by it."""
+    while body and body != link:
+        body = int(model.body_parentid[body])
+    return body == link
+
+
+def _add_capsules(spec: Any, links: list[str]) -> dict[str, list[str]]:
+    """Fit capsules to what is drawn of each link and add them; return their names by link."""
+    model = _compiled(spec)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    bodies = [model.body(link).id for link in links]
+    added: dict[str, list[str]] = {}
+    for k, (link, body) in enumerate(zip(links, bodies, strict=True)):
+        after = bodies[k + 1 :]
+        own = [
+            geom
+            for geom in range(model.ngeom)
+            if _is_on(model, int(model.geom_bodyid[geom]), body)
+            and not any(_is_on(model, int(model.geom_bodyid[geom]), each) for each in after)
+        ]
+        points = [surface_of(model, data, geom) for geom in own]
+        if not points or not sum(map(len, points)):
+            added[link] = []
+            continue
+        world = np.concatenate(points) - data.xpos[body]
+        rods: list[Rod] = fit_rods(world @ data.xmat[body].reshape(3, 3))
+        added[link] = [f"{link}_capsule_{i}" for i in range(len(rods))]
+        for name, rod in zip(added[link], rods, strict=True):
+            capsule(spec.body(link), rod.start_m, rod.end_m, rod.radius_m, name=name, mass=0.0)
+    return added
