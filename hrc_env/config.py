@@ -16,7 +16,7 @@ from hrc_env.control import ControlConfig
 from hrc_env.core.errors import ConfigError, check_names, unknown
 from hrc_env.core.mapping import PRESETS, from_mapping, plain, read_toml, restored, to_toml
 from hrc_env.core.results import write_whole
-from hrc_env.geometry.camera_config import CameraConfig, read_rig
+from hrc_env.geometry.camera_config import CameraConfig, camera_of, read_rig
 from hrc_env.metrics import CostConfig
 from hrc_env.motion.generator import PEOPLE, MotionConfig, PeopleConfig
 from hrc_env.motion.schedule import WORK, Job
@@ -258,8 +258,10 @@ def rig_of(cameras: Any) -> tuple[CameraConfig, ...] | None:
 
 
 def _camera(given: Any, index: int) -> CameraConfig:
-    if isinstance(given, CameraConfig | Mapping):
-        return restored(CameraConfig, given, f"cameras[{index}]")
+    if isinstance(given, CameraConfig):
+        return given
+    if isinstance(given, Mapping):
+        return camera_of(given, f"cameras[{index}]")
     place = np.asarray(given) if isinstance(given, Sequence | np.ndarray) else np.zeros(0)
     if place.shape != (3,) or not np.issubdtype(place.dtype, np.number):
         raise ConfigError(

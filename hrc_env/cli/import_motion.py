@@ -1,5 +1,6 @@
 """python -m hrc_env import-motion: a recording of a person becomes a clip that workers play."""
 
+import math
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -50,6 +51,11 @@ class ImportMotion:
     """The recording's true rate, where its file has none (AMC) or a wrong one."""
     skeleton: Path | None = None
     """The .asf file of an .amc file, if it is not beside it."""
+    joint: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
+    """The name of a joint in the file, if it is not recognized: left_shoulder=lShldr, or a TOML
+    file of such lines. The option may be repeated."""
+    up: str | None = None
+    """The upward axis of the file, if it is not recognized: --up=+x, -x, +y, -y, +z or -z."""
     allow_off_floor: bool = False
     """Accept feet that are not on one level floor: on stairs or terrain, long in the air, or above
     the floor for want of the right .asf file. The clip is played as if all that were not so."""
@@ -93,9 +99,13 @@ class ImportMotion:
         return 0
 
     def _read(self, fps: float | None) -> "Capture":
+        from hrc_env.mocap.names import names_given
         from hrc_env.mocap.read import read_capture
 
-        return read_capture(self.file, fps, self.source_fps, self.skeleton, self.allow_off_floor)
+        return read_capture(
+            self.file, fps, self.source_fps, self.skeleton, self.allow_off_floor,
+            names_given(self.joint), self.up,
+        )  # fmt: skip
 
 
 def tell_capture(console: Console, capture: "Capture") -> None:
@@ -117,11 +127,12 @@ def tell_error(console: Console, capture: "Capture", clip: "Clip", error: "Retar
     overall = 100 * error.mean_m.mean(), 100 * error.p95_m.mean()
     table.add_row("all", "", *(f"{value:.1f}" for value in overall))
     left, right = 100 * clip.contacts.mean(0)
+    slide = f"standing feet slide by {100 * error.slip_m_s:.1f} cm/s (p95)."
     console.print(
         table,
         f"Errors after one alignment of the whole clip (scale {error.scale:.2f}).",
         f"The left foot stands for {left:.0f} % of the time, the right for {right:.0f} %; "
-        f"standing feet slide by {100 * error.slip_m_s:.1f} cm/s (p95).",
+        + ("no flat foot stands still." if math.isnan(error.slip_m_s) else slide),
         sep="\n", highlight=False,
     )  # fmt: skip
 

@@ -6,21 +6,25 @@ A rig file is TOML, a `[[camera]]` for each with the fields of `CameraConfig`:
 name = "left"
 eye_world = [2.9, 2.6, 2.45]
 lens = {model = "kannala_brandt", coefficients = [0.0667]}
+
+or by `K`, `distortion` and `T_world_from_cam` (see `CameraConfig.from_matrices`), or the
+calibration of another tool (see `calibrations`).
 """
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 
 from hrc_env.core.errors import ConfigError, check_names
-from hrc_env.core.mapping import from_mapping, read_toml, to_toml
-from hrc_env.core.typing import Floats
-from hrc_env.geometry.lens import Lens, distorted_radius, rays_cam
+from hrc_env.core.mapping import from_mapping, plain, read_toml, to_toml
+from hrc_env.core.typing import Floats, Rotations, Transforms
+from hrc_env.geometry.lens import COEFFICIENTS, Lens, distorted_radius, rays_cam
+from hrc_env.geometry.rotations import about_axis, look_at
 
 MOST_CAMERAS = 16
 """A rig has no more."""
@@ -80,6 +84,101 @@ class CameraConfig:
             if len(getattr(self, name)) not in (0, 2):
                 _refuse(self, f"{name} must be empty or two numbers (x, y)", getattr(self, name))
         _check_image(self, intrinsics(self))
+
+    @classmethod
+    def from_matrices(
+        cls, name: str, K: Floats, T_world_from_cam: Transforms, size_px: tuple[int, int],
+        distortion: Lens | Sequence[float] = (), fisheye: bool = False,
+    ) -> "CameraConfig":  # fmt: skip
+        """Return the camera that projects as OpenCV does with these matrices.
+
+        Args:
+            name: of the camera, unique in its rig.
+            K: (3, 3) intrinsics without skew [px]. Pixels count from the image's corner; to a K of
+                pixels that count from the middle of the first one, add 0.5 to cx and cy.
+            T_world_from_cam: (4, 4) from OpenCV's camera axes to the world, which is z up [m].
+            size_px: width and height of the image [px].
+            distortion: a lens, or OpenCV's coefficients.
+            fisheye: whether the coefficients are those of OpenCV's fisheye model.
+
+        Raises:
+            ConfigError: K has skew, the transform is none, or the lens is not known here.
+        """
+        K, T = np.asarray(K, float), np.asarray(T_world_from_cam, float)
+        below = K[[1, 2, 2, 2], [0, 0, 1, 2]] if K.shape == (3, 3) else np.full(4, np.nan)
+        if not np.isfinite(K).all() or not np.allclose([*below, K[0, 1]], [0, 0, 0, 1, 0], 0, 1e-3):
+            valid = "K must be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], without skew"
+            raise ConfigError(f"Camera {name!r}: {valid}, got {K.tolist()}.")
+        if T.shape != (4, 4) or not _is_pose(T):
+            valid = "T_world_from_cam must be (4, 4), a rotation and a place above 0, 0, 0, 1"
+            raise ConfigError(f"Camera {name!r}: {valid}, got {T.tolist()}.")
+        lens = distortion if isinstance(distortion, Lens) else lens_of(distortion, fisheye)
+        eye, target = T[:3, 3], T[:3, 3] + T[:3, 2]
+        rolled = look_at(eye, target).T @ T[:3, :3]
+        (fx, fy), (cx, cy) = K[[0, 1], [0, 1]].tolist(), K[:2, 2].tolist()
+        return cls(
+            name, tuple(eye.tolist()), tuple(target.tolist()), width_px=size_px[0],
+            height_px=size_px[1], roll_deg=math.degrees(math.atan2(rolled[1, 0], rolled[0, 0])),
+            focal_px=(fx, fy), centre_px=(cx, cy), lens=lens,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class _Matrices:
+    """The arguments of `CameraConfig.from_matrices` as mappings and rig files hold them."""
+
+    name: str
+    K: tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
+    T_world_from_cam: tuple[tuple[float, float, float, float], ...]
+    width_px: int = 1920
+    height_px: int = 1080
+    distortion: tuple[float, ...] = ()
+    fisheye: bool = False
+    rate_hz: float = 0.0
+    latency_s: float = 0.0
+    exposure_s: float = 0.0
+
+
+def camera_of(content: Mapping[str, Any], where: str) -> CameraConfig:
+    """Return the camera of a mapping: the fields of `CameraConfig`, or K, distortion and
+    T_world_from_cam. `ConfigError` by `where` it is if that cannot be."""
+    if "T_world_from_cam" not in content:
+        return from_mapping(CameraConfig, content, f"{where}.")
+    given = from_mapping(_Matrices, plain(content), f"{where}.")
+    size = given.width_px, given.height_px
+    K, T_world_from_cam = np.array(given.K), np.array(given.T_world_from_cam)
+    camera = CameraConfig.from_matrices(
+        given.name, K, T_world_from_cam, size, given.distortion, given.fisheye
+    )
+    times = {name: getattr(given, name) for name in ("rate_hz", "latency_s", "exposure_s")}
+    return replace(camera, **times)
+
+
+def lens_of(distortion: Sequence[float] | Floats, fisheye: bool = False) -> Lens:
+    """Return the lens of OpenCV's coefficients; `ConfigError` for more than this package knows."""
+    values = [float(each) for each in distortion]
+    while values and values[-1] == 0.0:
+        values.pop()
+    model = ("kannala_brandt" if fisheye else "brown_conrady") if values or fisheye else "none"
+    if len(values) > len(COEFFICIENTS[model]):
+        raise ConfigError(
+            f"Distortion of a lens may have {', '.join(COEFFICIENTS[model])}; got "
+            f"{len(values)} coefficients. Calibrate it with no more, or undistort its images."
+        )
+    return Lens(model, tuple(values))
+
+
+def axes_of(camera: CameraConfig) -> Rotations:
+    """Return R_world_from_cam, of OpenCV's camera axes."""
+    look = look_at(np.array(camera.eye_world, float), np.array(camera.target_world, float))
+    return look @ about_axis("z", np.radians(camera.roll_deg)) if camera.roll_deg else look
+
+
+def _is_pose(T: Transforms) -> bool:
+    """Whether (4, 4) is a rotation, no mirror, and a place."""
+    R = T[:3, :3]
+    is_rotation = np.allclose(R @ R.T, np.eye(3), atol=1e-4) and np.linalg.det(R) > 0.0
+    return bool(is_rotation and np.isfinite(T).all() and np.allclose(T[3], [0.0, 0.0, 0.0, 1.0]))
 
 
 def _refuse(camera: CameraConfig, expected: str, got: object) -> NoReturn:
@@ -148,19 +247,23 @@ def made(
 
 
 def read_rig(path: Path | str) -> tuple[CameraConfig, ...]:
-    """The cameras of a rig file. Raises `ConfigError` for a bad file or a bad field."""
+    """The cameras of a rig file, or of a calibration file of another tool (see `calibrations`).
+    Raises `ConfigError` for a bad file or a bad field."""
+    from hrc_env.geometry import calibrations  # it makes cameras
+
     content = read_toml(path)
+    if calibrations.is_calibration(content):
+        return calibrations.cameras_of(content, path)
     others, entries = sorted(set(content) - {"camera"}), content.get("camera", [])
     tables = isinstance(entries, list) and all(isinstance(entry, dict) for entry in entries)
     if others or not tables or not entries:
         raise ConfigError(
             f"{path} must hold a [[camera]] for each camera and nothing else, "
-            f"got {', '.join(map(repr, others)) or 'no camera'}."
+            f"got {', '.join(map(repr, others)) or 'no camera'}. A calibration of another tool has "
+            "a table with size, matrix, distortions, rotation and translation for each."
         )
     try:
-        return tuple(
-            from_mapping(CameraConfig, entry, f"camera[{k}].") for k, entry in enumerate(entries)
-        )
+        return tuple(camera_of(entry, f"camera[{k}]") for k, entry in enumerate(entries))
     except ConfigError as error:
         raise ConfigError(f"{path}: {error}") from error
 

@@ -29,6 +29,15 @@ def look_at(eye_world: Points3, target_world: Points3) -> Rotations:
     return np.stack([right, np.cross(forward, right), forward], -1)
 
 
+def from_rotation_vector(vector_rad: Floats) -> Rotations:
+    """Return the rotation (3, 3) about a vector (3,) by its length [rad] (Rodrigues)."""
+    x, y, z = np.asarray(vector_rad, float)
+    angle = float(np.linalg.norm((x, y, z)))
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    half = np.sinc(angle / (2.0 * np.pi))  # sin(angle / 2) / (angle / 2)
+    return np.eye(3) + np.sinc(angle / np.pi) * cross + 0.5 * half**2 * cross @ cross
+
+
 def matrix(quaternion_wxyz: QuaternionsWxyz) -> Rotations:
     """Rotations (..., 3, 3) of unit quaternions (..., 4)."""
     w, x, y, z = np.moveaxis(np.asarray(quaternion_wxyz, float), -1, 0)

@@ -13,7 +13,8 @@ import numpy as np
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.typing import Floats, Ints, Rotations
 from hrc_env.geometry.rotations import about_axis
-from hrc_env.mocap.record import FEWEST_FRAMES, Moving, Rows, at_rest, forward
+from hrc_env.mocap.record import FEWEST_FRAMES, Moving, at_rest, forward
+from hrc_env.mocap.rows import Rows
 
 ROOT = "root"
 FREEDOMS = ("tx", "ty", "tz", "rx", "ry", "rz")
@@ -198,7 +199,8 @@ def _moving(skeleton: _Skeleton, values: dict[str, Floats], repaired: tuple[str,
             rotation[:, node] = bone.axis @ turn @ bone.axis.T
     position, turned = forward(parent, offset, rotation)
     rest = at_rest(parent, along / skeleton.per_inch)
-    return Moving(tuple(names), position, turned, rest, float("nan"), repaired)
+    shift = np.zeros((len(offset), 3))
+    return Moving(tuple(names), parent, position, turned, rest, float("nan"), shift, repaired)
 
 
 def _tree(skeleton: _Skeleton) -> tuple[list[str], Ints, Floats]:

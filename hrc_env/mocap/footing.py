@@ -20,8 +20,11 @@ deviation), and this far apart along its slope [m]."""
 LEVEL_M, LEVEL_S = 0.08, 0.3
 """Feet that rest higher or lower than the floor by more [m], together for longer [s], stand on
 something else."""
-AIR_M, AIR_S = 0.10, 0.7
-"""Who has both feet higher [m] is in the air; a jump from a floor lasts no longer [s]."""
+AIR_M, AIR_S, HAND_M = 0.10, 0.7, 0.1
+"""A person is in the air with both feet higher than this [m] and no hand on the floor (the wrist
+of a hand on the floor is lower than the third [m]); a jump lasts no longer than the second [s]."""
+RUN_M_S = 2.5
+"""The feet of a person faster than this hardly rest [m/s]."""
 LEAST_SHARE = 0.1
 """One foot or the other rests for this share of the time at least."""
 FLOOR_M, SOLE_M = (-0.03, 0.09), 0.03
@@ -128,15 +131,25 @@ def off_floor(joints: Points3, fps: float) -> tuple[str, ...]:
             f"Feet rest at heights from {low:+.2f} to {high:+.2f} m (stairs, terrain, a seat?); "
             f"within {LEVEL_M} m of one floor are expected."
         )
-    first, last = max(runs(height > AIR_M), key=lambda run: run[1] - run[0], default=(0, 0))
+    hands = joints[:, [JOINT["left_wrist"], JOINT["right_wrist"]], 2].min(1) - HAND_M
+    off = np.minimum(height, hands - floor_height(joints, fps)) > AIR_M
+    first, last = max(runs(off), key=lambda run: run[1] - run[0], default=(0, 0))
     if (last - first) / fps > AIR_S and not told:
         told.append(
             f"Both feet are more than {AIR_M} m above the floor for {(last - first) / fps:.1f} s "
             f"from {first / fps:.1f} s on (hanging, thrown up?); at most {AIR_S} s are expected."
         )
-    if rests.mean() < LEAST_SHARE:
+    if rests.mean() < LEAST_SHARE and not _runs(joints, height, fps):
         told.append(
             f"One foot or the other rests for {100 * rests.mean():.0f} % of the time; at least "
             f"{100 * LEAST_SHARE:.0f} % are expected of who goes on a floor."
         )
     return tuple(told)
+
+
+def _runs(joints: Points3, height: Floats, fps: float) -> bool:
+    """Return whether the person runs: fast, with a foot near the floor every AIR_S at least."""
+    hip = joints[:, JOINT["left_hip"], :2]
+    speed_m_s = np.median(np.linalg.norm(np.diff(hip, axis=0), axis=-1)) * fps
+    aloft = max((last - first for first, last in runs(height > LEVEL_M)), default=0)
+    return bool(speed_m_s > RUN_M_S and aloft / fps < AIR_S)

@@ -1,19 +1,21 @@
 """Any file of motion capture to a `Capture`."""
 
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import JOINTS, N_JOINTS
-from hrc_env.core.typing import Points3
+from hrc_env.core.typing import Floats, Points3
 from hrc_env.mocap.acclaim import read_acclaim
 from hrc_env.mocap.bvh import read_bvh
 from hrc_env.mocap.person import resampled
 from hrc_env.mocap.record import FEWEST_FRAMES, Capture
-from hrc_env.mocap.repair import mended
-from hrc_env.mocap.skeleton import find_joints, joints_of
+from hrc_env.mocap.repair import Upward, from_origin, mended
+from hrc_env.mocap.skeleton import find_joints, joints_of, rest_up
 from hrc_env.motion.clip import check_rate
 
 SUFFIXES = (".bvh", ".amc", ".npz")
@@ -21,50 +23,73 @@ CMU_HZ, LEAST_S = 120.0, 0.5
 """Rate of the CMU database's AMC files, which do not hold it; shortest clip [s]."""
 
 
+class _Content(NamedTuple):
+    """The content of a file, in its own frame and unit."""
+
+    joints: Points3
+    """(T, 15, 3)."""
+    fps: float
+    """Frames a second; NaN: not in the file."""
+    landmarks: bool
+    """As in `Capture`."""
+    found: tuple[str, ...]
+    """As in `Capture`."""
+    repaired: tuple[str, ...] = ()
+    """As in `Capture`."""
+    rest_up: Floats | None = None
+    """(3,) from hips to shoulders of the skeleton at rest, NaN if it does not stand."""
+
+
 def read_capture(
     path: Path, fps: float | None = None, source_fps: float | None = None,
     skeleton: Path | None = None, allow_off_floor: bool = False,
+    joints: Mapping[str, str] | None = None, up: str | None = None,
 ) -> Capture:  # fmt: skip
     """Read, mend and resample a recording: a .bvh, .amc or .npz file of a person in motion.
 
     `fps` is the result's rate (None: the file's), `source_fps` the file's own, where it has none or
     a wrong one; `skeleton` the .asf file of an .amc file (None: looked for beside it). Who is not
     on one level floor (stairs, terrain, long in the air) is refused, or accepted as if they were.
+    `joints` maps joints (`names.NAMED`) to their names in the file, `up` is its upward axis ("+y");
+    both are needed only for a file in which they are not recognized.
 
     Raises:
         ConfigError: it is no such file, damaged beyond repair, of another's skeleton or off the
             floor.
     """
     source = path.name
-    joints, rate_hz, landmarks, found, repaired = _read(path, skeleton)
+    read = _read(path, skeleton, joints)
+    rate_hz, repaired = read.fps, read.repaired
     if source_fps is not None:
         rate_hz = source_fps
     elif np.isnan(rate_hz):
         rate_hz, repaired = CMU_HZ, (*repaired, f"No frame rate: taken to be {CMU_HZ:g} Hz.")
     check_rate(rate_hz, source)
     acclaim = path.suffix.lower() == ".amc"
-    joints, notes = mended(joints, rate_hz, source, acclaim, allow_off_floor)
-    lasts_s = (len(joints) - 1) / rate_hz
+    upward = Upward(up, read.rest_up)
+    placed, notes = mended(read.joints, rate_hz, source, acclaim, allow_off_floor, upward)
+    lasts_s = (len(placed) - 1) / rate_hz
     if lasts_s < LEAST_S:
         raise ConfigError(f"{source}: {lasts_s:.2f} s of motion; {LEAST_S} s is the least.")
     if fps is not None and fps != rate_hz:
         check_rate(fps, "the wished rate")
-        joints = resampled(joints, rate_hz, fps)
+        placed = resampled(placed, rate_hz, fps)
         notes = (*notes, f"Resampled from {rate_hz:g} to {fps:g} frames a second.")
         rate_hz = fps
-    return Capture(joints, rate_hz, landmarks, found, source, (*repaired, *notes))
+    return Capture(placed, rate_hz, read.landmarks, read.found, source, (*repaired, *notes))
 
 
-def _read(
-    path: Path, skeleton: Path | None
-) -> tuple[Points3, float, bool, tuple[str, ...], tuple[str, ...]]:
-    """Joints, frame rate, `Capture.landmarks`, `.found` and `.repaired`, as the file has them."""
+def _read(path: Path, skeleton: Path | None, joints: Mapping[str, str] | None) -> _Content:
+    """Return the content of a file."""
     if not path.is_file():
         raise ConfigError(f"{path} is no file.")
     suffix = path.suffix.lower()
     if suffix == ".npz":
-        joints, rate_hz = _read_joints(path)
-        return joints, rate_hz, True, JOINTS, ()
+        if joints:
+            raise ConfigError(
+                f"{path.name}: joints= is for .bvh and .amc files; an .npz file has no names."
+            )
+        return _Content(*_read_joints(path), True, JOINTS)
     if suffix == ".bvh":
         moving = read_bvh(path)
     elif suffix in (".amc", ".asf"):
@@ -73,10 +98,12 @@ def _read(
         raise ConfigError(
             f"{path.name}: expected a file that ends in {', '.join(SUFFIXES)}, got {suffix!r}."
         )
-    found, head = find_joints(moving.names, path.name)
-    made = f"made from {moving.names[head]}"
-    named = tuple(moving.names[found[joint]] if joint in found else made for joint in JOINTS)
-    return joints_of(moving, found, head), moving.fps, False, named, moving.repaired
+    found = find_joints(moving, path.name, joints)
+    made, node = f"made from {moving.names[found.head]}", found.node
+    named = tuple(moving.names[node[joint]] if joint in node else made for joint in JOINTS)
+    placed, told = from_origin(joints_of(moving, found), moving.shift)
+    repaired = (*moving.repaired, *found.notes, *told)
+    return _Content(placed, moving.fps, False, named, repaired, rest_up(moving, found))
 
 
 def _read_joints(path: Path) -> tuple[Points3, float]:

@@ -1,12 +1,9 @@
 """What a file of motion capture says, in the project's joints, frames and units."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError
 from hrc_env.core.typing import Floats, Ints, Points3, Rotations
 
 FEWEST_FRAMES = 2
@@ -36,6 +33,8 @@ class Moving:
 
     names: tuple[str, ...]
     """(N,) as in the file; the tip of a chain is called after its joint, with " end" added."""
+    parent: Ints
+    """(N,) the node that each hangs on, -1 for none; it comes before those that hang on it."""
     position: Points3
     """(T, N, 3) origins of the nodes [unit of the file]."""
     rotation: Rotations
@@ -44,6 +43,9 @@ class Moving:
     """(N, 3) origins with every rotation zero [unit of the file]."""
     fps: float
     """Frames a second; NaN where the format has none."""
+    shift: Points3
+    """(T, 3) how much further all nodes would be if the places of whole bodies were added to their
+    OFFSET and did not stand for it [unit of the file]."""
     repaired: tuple[str, ...] = ()
     """What was guessed or mended, a sentence each."""
 
@@ -64,40 +66,3 @@ def forward(parent: Ints, offset: Floats, rotation: Rotations) -> tuple[Points3,
 def at_rest(parent: Ints, offset: Floats) -> Points3:
     """Origins (N, 3) of a tree without rotations."""
     return forward(parent, offset[None], np.tile(np.eye(3), (1, len(offset), 1, 1)))[0][0]
-
-
-class Rows:
-    """The lines of a text file that hold words, one after the other; errors say where."""
-
-    def __init__(self, path: Path) -> None:
-        self.source = path.name
-        self._lines = path.read_text(errors="replace").splitlines()
-        self.at = 0
-
-    def next(self, expected: str) -> list[str]:
-        """Words of the next line that has any; `ConfigError` where the file ends here."""
-        for words in self.rest():
-            return words
-        raise ConfigError(
-            f"{self.source} is cut off: after its {len(self._lines)} lines {expected} is missing."
-        )
-
-    def rest(self) -> Iterator[list[str]]:
-        """Words of each line that is left and has any."""
-        while self.at < len(self._lines):
-            words = self._lines[self.at].split()
-            self.at += 1
-            if words:
-                yield words
-
-    def wrong(self, expected: str) -> ConfigError:
-        """The error for the line that was read last."""
-        line = self._lines[max(self.at, 1) - 1].strip() if self._lines else ""
-        return ConfigError(f"{self.source}, line {self.at}: {expected}; got {line[:60]!r}.")
-
-    def numbers(self, words: list[str]) -> list[float]:
-        """Words of the line that was read last as numbers."""
-        try:
-            return [float(word) for word in words]
-        except ValueError:
-            raise self.wrong("expected a number") from None

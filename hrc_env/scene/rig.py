@@ -12,9 +12,8 @@ import numpy as np
 
 from hrc_env.core.errors import ConfigError, unknown, whole
 from hrc_env.core.typing import Floats, Rotations
-from hrc_env.geometry.camera_config import MOST_CAMERAS, CameraConfig, intrinsics
+from hrc_env.geometry.camera_config import MOST_CAMERAS, CameraConfig, axes_of, intrinsics
 from hrc_env.geometry.cameras import PinholeCamera
-from hrc_env.geometry.rotations import about_axis, look_at
 from hrc_env.scene.places import SCENES
 
 OPENCV_FROM_OPENGL: Floats = np.diag([1.0, -1.0, -1.0])
@@ -67,11 +66,7 @@ def pinholes(cameras: tuple[CameraConfig, ...]) -> tuple[PinholeCamera, ...]:
 def _hung(camera: CameraConfig) -> PinholeCamera:
     """A camera at its place; it has a lens if a plain pinhole would show another image."""
     K, T_world_from_cam = intrinsics(camera), np.eye(4)
-    eye = np.array(camera.eye_world, float)
-    R_world_from_cam = look_at(eye, np.array(camera.target_world, float))
-    if camera.roll_deg:
-        R_world_from_cam = R_world_from_cam @ about_axis("z", np.radians(camera.roll_deg))
-    T_world_from_cam[:3, :3], T_world_from_cam[:3, 3] = R_world_from_cam, eye
+    T_world_from_cam[:3, :3], T_world_from_cam[:3, 3] = axes_of(camera), camera.eye_world
     plain = camera.lens.model == "none" and K[0, 0] == K[1, 1]
     size = camera.width_px, camera.height_px
     return PinholeCamera(camera.name, K, T_world_from_cam, *size, None if plain else camera.lens)

@@ -1,0 +1,153 @@
+"""Rigs out of calibration files that other tools write: anipose, FreeMoCap, Caliscope, Pose2Sim.
+
+Such a file is TOML with a table for each camera:
+
+[cam_0]
+name = "left"
+size = [1920, 1080]
+matrix = [[905.0, 0.0, 948.0], [0.0, 912.0, 551.0], [0.0, 0.0, 1.0]]
+distortions = [-0.21, 0.06, 0.0, 0.0, 0.0]
+rotation = [1.2, -1.2, 1.1]
+translation = [0.1, 1.4, 3.1]
+
+`rotation` (Rodrigues' vector, or a matrix) and `translation` take points of the world to the
+camera. `fisheye = true` means OpenCV's fisheye model. Pixels count from the middle of the first
+one, ours from the image's corner: half a pixel is added to the principal point.
+"""
+
+import math
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.typing import Floats
+from hrc_env.geometry.camera_config import CameraConfig, axes_of, intrinsics, lens_of
+from hrc_env.geometry.rotations import from_rotation_vector
+
+TABLE = ("size", "matrix", "distortions", "rotation", "translation")
+"""Entries that the table of a camera must hold."""
+HALF_PX = 0.5
+"""From the middle of the first pixel to the image's corner [px]."""
+FAR_M = 30.0
+"""Cameras that are further from their middle, or one from the origin, are not in metres."""
+MM = 1e-3
+CLEARLY = 0.7
+"""An axis is up if the upright direction of the images has a greater component along it."""
+
+
+def is_calibration(content: Mapping[str, Any]) -> bool:
+    """Return whether a TOML file's content is a calibration of another tool."""
+    return any("matrix" in table for table in _tables(content).values())
+
+
+def cameras_of(content: Mapping[str, Any], path: Path | str) -> tuple[CameraConfig, ...]:
+    """Return the cameras of a calibration that another tool has written.
+
+    Lengths in millimetres are turned into metres; a `UserWarning` reports them, and a world whose
+    z axis is not up.
+
+    Args:
+        content: of the file.
+        path: of the file, for errors.
+
+    Raises:
+        ConfigError: a camera has no extrinsics, lacks another entry, or has an unknown lens.
+    """
+    cameras = []
+    for key, table in _tables(content).items():
+        if any(word in table for word in TABLE[1:]) and not table.get("ignore", False):
+            try:
+                cameras.append(_camera(str(table.get("name", key)), table))
+            except ConfigError as error:
+                raise ConfigError(f"{path}, table {key!r}: {error}") from error
+    if not cameras:
+        raise ConfigError(f"{path} holds no camera that is not to be ignored.")
+    return _in_metres(cameras, path)
+
+
+def _tables(content: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    """The tables of a file that may be cameras, by their keys; Caliscope's own nests them."""
+    nested = content.get("cameras")
+    inside = nested if isinstance(nested, Mapping) else content
+    return {key: each for key, each in inside.items() if isinstance(each, Mapping)}
+
+
+def _camera(name: str, table: Mapping[str, Any]) -> CameraConfig:
+    """A camera of its table, lengths in the file's unit."""
+    missing = [word for word in TABLE if word not in table or table[word] in ("null", [], None)]
+    if missing:
+        hint = " It has no place in the world yet: calibrate its extrinsics." if (
+            {"rotation", "translation"} & {*missing}
+        ) else ""  # fmt: skip
+        raise ConfigError(f"it must have {', '.join(TABLE)}; missing {', '.join(missing)}.{hint}")
+    size = _numbers(table, "size", (2,))
+    K, translation = _numbers(table, "matrix", (3, 3)), _numbers(table, "translation", (3,))
+    rotation = np.ravel(np.asarray(table["rotation"], object))
+    R_cam_from_world = (
+        _numbers(table, "rotation", (3, 3))
+        if len(rotation) == 9
+        else from_rotation_vector(_numbers(table, "rotation", (3,)))
+    )
+    K = K + np.array([[0.0, 0.0, HALF_PX], [0.0, 0.0, HALF_PX], [0.0, 0.0, 0.0]])
+    T_world_from_cam = np.eye(4)
+    T_world_from_cam[:3, :3] = R_cam_from_world.T
+    T_world_from_cam[:3, 3] = -R_cam_from_world.T @ translation
+    distortion = _numbers(table, "distortions", (-1,))
+    lens = lens_of(distortion, fisheye=bool(table.get("fisheye", False)))
+    width, height = (round(float(each)) for each in size)
+    return CameraConfig.from_matrices(name, K, T_world_from_cam, (width, height), lens)
+
+
+def _numbers(table: Mapping[str, Any], word: str, shape: tuple[int, ...]) -> Floats:
+    """An entry as finite numbers of a shape; -1: any length."""
+    try:
+        values = np.asarray(table[word], float)
+        values = values.reshape(-1 if shape == (-1,) else shape)
+    except (TypeError, ValueError):
+        values = np.full(1, np.nan)
+    if not np.isfinite(values).all():
+        many = "numbers" if shape == (-1,) else f"{' x '.join(map(str, shape))} numbers"
+        raise ConfigError(f"{word} must be {many}, got {table[word]!r}.")
+    return values
+
+
+def _in_metres(cameras: list[CameraConfig], path: Path | str) -> tuple[CameraConfig, ...]:
+    """Return the cameras in metres, with a warning about another unit or upward axis."""
+    eyes = np.array([camera.eye_world for camera in cameras])
+    centred = eyes - eyes.mean(0) if len(eyes) > 1 else eyes
+    unit_m = MM if np.linalg.norm(centred, axis=-1).max() > FAR_M else 1.0
+    said = []
+    if unit_m != 1.0:
+        far_m = unit_m * max(math.dist(a, b) for a in eyes for b in eyes)
+        said.append(
+            "lengths were taken to be in millimetres: the cameras are up to "
+            f"{far_m:.2f} m from each other. Multiply the translations if that is wrong"
+        )
+    upright = -np.mean([axes_of(camera)[:, 1] for camera in cameras], axis=0)
+    axis = int(np.argmax(np.abs(upright)))
+    if abs(upright[axis]) > CLEARLY and (axis != 2 or upright[2] < 0.0):
+        name = ("+" if upright[axis] > 0.0 else "-") + "xyz"[axis]
+        said.append(
+            f"its world's {name} axis seems to be up, as the images are upright along it; here +z "
+            "is up, and the robot stands at the origin. Turn the calibration's world"
+        )
+    if said:
+        warnings.warn(f"{path}: {'; '.join(said)}.", UserWarning, stacklevel=2)
+    return tuple(_scaled(camera, unit_m) for camera in cameras)
+
+
+def _scaled(camera: CameraConfig, unit_m: float) -> CameraConfig:
+    """Return a camera with its place converted to metres and the same orientation."""
+    if unit_m == 1.0:
+        return camera
+    T_world_from_cam = np.eye(4)
+    T_world_from_cam[:3, :3] = axes_of(camera)
+    T_world_from_cam[:3, 3] = unit_m * np.array(camera.eye_world)
+    size = camera.width_px, camera.height_px
+    return CameraConfig.from_matrices(
+        camera.name, intrinsics(camera), T_world_from_cam, size, camera.lens
+    )

@@ -1,0 +1,99 @@
+"""Lines of text files of motion capture, in whatever encoding and with whatever decimal sign."""
+
+import codecs
+import math
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from hrc_env.core.errors import ConfigError
+
+MARKS = (
+    (codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF32_LE, "utf-32-le"),
+    (codecs.BOM_UTF32_BE, "utf-32-be"), (codecs.BOM_UTF16_LE, "utf-16-le"),
+    (codecs.BOM_UTF16_BE, "utf-16-be"),
+)  # fmt: skip
+"""Byte order marks and the encodings that they announce, the longer ones first."""
+LOOKED_AT = 400
+"""Bytes at the beginning of a file by which UTF-16 without a mark is known."""
+NO_NUMBER = re.compile(r"[-+]?(1\.#\w+|nan(\(\w*\))?|inf(inity)?)", re.IGNORECASE)
+"""Spellings of missing values: not a number, or not finite."""
+
+
+def decode(data: bytes) -> str:
+    """Return the text of a file in UTF-8, UTF-16 or UTF-32, with or without a mark, or Latin-1."""
+    for mark, encoding in MARKS:
+        if data.startswith(mark):
+            return data[len(mark) :].decode(encoding, errors="replace").strip("\0\x1a")
+    begin = data[:LOOKED_AT]
+    for first, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):
+        if begin[first::2].count(0) > len(begin) // 4:
+            return data.decode(encoding, errors="replace").strip("\0\x1a")
+    try:
+        return data.decode("utf-8").strip("\0\x1a")
+    except UnicodeDecodeError:
+        return data.decode("latin-1").strip("\0\x1a")
+
+
+def separate_numbers(words: Sequence[str], count: int | None = None) -> list[str]:
+    """Return the numbers in words, each with a decimal point; "," and ";" may be in between.
+
+    A comma is the decimal sign where there are `count` numbers then, else it separates them. If the
+    count is not known, it separates them where one word has two commas, or a comma and a point.
+    """
+    if not any("," in word or ";" in word for word in words):
+        return list(words)
+    text = " ".join(words).replace(";", " ")
+    apart = [word for word in (each.strip(",") for each in text.split()) if word]
+    is_sign = len(apart) == count
+    if count is None:
+        is_sign = all(word.count(",") + word.count(".") <= 1 for word in apart)
+    return [word.replace(",", ".") for word in apart] if is_sign else text.replace(",", " ").split()
+
+
+def to_number(word: str) -> float:
+    """Return the number of a word, NaN for a missing value; `ValueError` for any other word."""
+    return math.nan if NO_NUMBER.fullmatch(word) else float(word)
+
+
+class Rows:
+    """The lines of a text file that hold words, one after the other; errors say where."""
+
+    def __init__(self, path: Path, comments: str = "") -> None:
+        """Read a file without its comments, each of which begins with a match of `comments`."""
+        self.source = path.name
+        self._lines = decode(path.read_bytes()).splitlines()
+        self._comment = re.compile(rf"(?:^|\s)(?:{comments}).*") if comments else None
+        self.at = 0
+
+    def next(self, expected: str) -> list[str]:
+        """Words of the next line that has any; `ConfigError` where the file ends here."""
+        for words in self.rest():
+            return words
+        raise ConfigError(
+            f"{self.source} is cut off: after its {len(self._lines)} lines {expected} is missing."
+        )
+
+    def rest(self) -> Iterator[list[str]]:
+        """Words of each line that is left and has any."""
+        while self.at < len(self._lines):
+            line = self._lines[self.at]
+            words = (self._comment.sub("", line) if self._comment else line).split()
+            self.at += 1
+            if words:
+                yield words
+
+    def wrong(self, expected: str) -> ConfigError:
+        """The error for the line that was read last."""
+        line = self._lines[max(self.at, 1) - 1].strip() if self._lines else ""
+        return ConfigError(f"{self.source}, line {self.at}: {expected}; got {line[:60]!r}.")
+
+    def numbers(self, words: Sequence[str], count: int | None = None) -> list[float]:
+        """Words of the line that was read last as numbers, `count` of them if that is known."""
+        try:
+            values = [to_number(word) for word in separate_numbers(words, count)]
+        except ValueError:
+            raise self.wrong("expected a number") from None
+        if count is not None and len(values) < count:
+            raise self.wrong(f"expected {count} numbers")
+        return values[:count]
