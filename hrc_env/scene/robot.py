@@ -6,7 +6,7 @@ follow it (`velocity`); one of them alone has 3-20 mm of tool error instead of 0
 angle [rad] of a hinge is a way [m] of a slide, here and everywhere.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -17,6 +17,7 @@ import numpy as np
 
 from hrc_env.core.errors import ConfigError, check_names
 from hrc_env.core.mapping import from_mapping, read_toml
+from hrc_env.core.registry import Registry
 from hrc_env.core.typing import Floats, Ints, Transforms
 from hrc_env.geometry.chains import SerialChain
 from hrc_env.scene.primitives import (
@@ -140,18 +141,22 @@ def _read(path: Path) -> Robot:
     return from_mapping(Robot, read_toml(path) | own)
 
 
-ROBOTS: dict[str, Robot] = {
-    path.stem: _read(path) for path in sorted((assets_dir() / "robots").glob("*.toml"))
-}
+ROBOTS: Registry[Robot] = Registry(
+    "robot", {path.stem: _read(path) for path in sorted((assets_dir() / "robots").glob("*.toml"))}
+)
 """By name: those in `assets/robots`, and those that were registered."""
 
 
-def robot_called(robot: str | Robot) -> Robot:
-    """A robot by its name, or itself. Raises `ConfigError` for a name that there is not."""
+def robot_called(robot: str | Robot | Mapping[str, Any]) -> Robot:
+    """A robot by its name, its fields, or itself; `ConfigError` for a name that there is not."""
+    if isinstance(robot, Mapping):
+        return from_mapping(Robot, robot, "robot.")
     if isinstance(robot, Robot):
         return robot
     if not isinstance(robot, str):
-        raise ConfigError(f"robot must be a name or a Robot, got {robot!r}.")
+        raise ConfigError(
+            f"robot must be a name, a Robot or a mapping of its fields, got {robot!r}."
+        )
     check_names("robot", [robot], ROBOTS)
     return ROBOTS[robot]
 
