@@ -22,6 +22,7 @@ from hrc_env.control import checked_action
 from hrc_env.core.batching import Stateful, one
 from hrc_env.core.errors import ConfigError, unknown, whole
 from hrc_env.core.mapping import for_json, plain
+from hrc_env.core.registry import share
 from hrc_env.core.typing import Floats
 from hrc_env.motion.generator import Clip, PeopleConfig
 from hrc_env.perception.faults.fault import FaultConfig
@@ -110,6 +111,7 @@ class EnvBase(HasSpec, Stateful):
     def _open(self, settings: Settings, render_mode: str | None, width: int, height: int) -> None:
         """Keep settings, and a form of pictures once it is known to be one."""
         check_render_mode(render_mode)
+        share()
         self._size = picture_size(width, height)
         self.render_mode, self.config, self._task = render_mode, settings.config, settings.task
         fps = round(1 / self.config.ctrl_dt)
