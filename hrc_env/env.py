@@ -47,12 +47,12 @@ ADVICE = {
     "estimator": "Register an estimator (hrc_env.register_estimator) and give its name.",
     "shield": "Register the shield (hrc_env.register_shield) and give its name.",
 }
-"""For arguments that JSON cannot hold, by name,"""
+"""For arguments that JSON cannot hold, by name."""
 OTHERWISE = (
     "Give text, numbers, lists, records or mappings of these; of a clip in memory the path of its "
     "file (hrc_env.motion.clip.save_clip writes one)."
 )
-"""and for others."""
+"""The advice for other arguments."""
 
 
 class Spec(EnvSpec):

@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING, Any
 
 from gymnasium.envs.registration import register, registry
 
-from hrc_env.core import snapshot
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.registry import FILES, Registry, importing, share
+from hrc_env.core.reservation import reserve
 from hrc_env.tasks import BUILT_IN, EPISODE_STEPS
 
 if TYPE_CHECKING:
+    from hrc_env.core.registry import Registry
     from hrc_env.perception.detector import KeypointFunction
     from hrc_env.safety.shield import Shield
     from hrc_env.scene.robot import Robot
@@ -107,8 +107,13 @@ def import_files(paths: str | None = None) -> None:
 
 def adopt() -> None:
     """Make the registrations of the process that started this one known; those of this process
-    have precedence. The error of a file is kept for who looks up a name that it registers."""
-    found = snapshot.inherited()
+    have precedence. The error of a file is kept for lookups of names that it registers."""
+    if not reserve():
+        return
+    from hrc_env.core.registry import FILES
+    from hrc_env.core.snapshot import inherited
+
+    found = inherited()
     for path in found.files:
         try:
             _import_file(Path(path), recorded=False)
@@ -121,6 +126,8 @@ def adopt() -> None:
 
 def _import_file(path: Path, recorded: bool) -> None:
     """Import a file unless it is already; `recorded`: child processes do so, too."""
+    from hrc_env.core.registry import FILES, importing, share
+
     name = f"hrc_env_import_{path.stem}"
     if name in sys.modules and sys.modules[name].__file__ != str(path):  # another of that name
         name = f"{name}_{zlib.crc32(str(path).encode()):x}"

@@ -33,7 +33,7 @@ class Registry(UserDict[str, ObjectT]):
         super().__init__(known or {})
         self.kind = kind
         self.own: dict[str, str | None] = {}
-        """Names that were registered in this process, with the files that did it."""
+        """Names that were registered in this process, with the files that did so."""
         _REGISTRIES[kind] = self
 
     def register(self, name: str, thing: ObjectT) -> None:
@@ -79,7 +79,7 @@ class Registry(UserDict[str, ObjectT]):
 
 @contextmanager
 def importing(file: str, recorded: bool) -> Iterator[None]:
-    """Attribute registrations to a file; `recorded`: child processes are told to import it."""
+    """Attribute registrations to a file; `recorded`: child processes import it as well."""
     _IMPORTING.append(file if recorded else "")
     try:
         yield
@@ -129,7 +129,7 @@ def _pickled(thing: Any, own: set[int]) -> bytes:
 
 
 def _restored(kind: str, name: str, entry: Entry) -> Any:
-    """Return an inherited object, or a `ConfigError` that says how else to bring it along."""
+    """Return an inherited object, or raise a `ConfigError` with other ways to bring it along."""
     reason, cause = entry.refused or FILES.get(entry.file) or f"{entry.file} lacks it", None
     if entry.pickled:
         try:

@@ -1,8 +1,8 @@
 """Snapshots: the registrations of one process in a private file, read by its child processes.
 
-The environment variable `VARIABLE` names the file from the import of this package on, so that
-children of any kind (spawn, forkserver, loky, Ray on this machine) find it however early they
-started. It exists once something is registered, and its process removes it at exit.
+`reservation.VARIABLE` names the file from the import of this package on, so that children of any
+kind (spawn, forkserver, loky, Ray on this machine) find it however early they started. It exists
+once something is registered; its process removes it at exit.
 """
 
 import os
@@ -15,12 +15,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from multiprocessing.util import Finalize
 from pathlib import Path
-from tempfile import gettempdir
 
 from hrc_env.core.errors import HRCError
+from hrc_env.core.reservation import VARIABLE, existing, new_folder, prepend, reserve
 
-VARIABLE = "HRC_ENV_REGISTERED"
-"""Environment variable: the snapshot of the process that started this one."""
 _LOCK = threading.RLock()
 
 
@@ -52,28 +50,28 @@ class _State:
     """The files of this process."""
 
     source: str
-    """The file that is inherited; empty: none."""
+    """Files that may be inherited, as in `VARIABLE`; the first that exists counts."""
     pid: int
-    """The process that may write"""
+    """The process to which `path` belongs."""
     path: str
-    """this file."""
+    """Its file."""
     written: Snapshot | None = None
-    """Its content."""
+    """The content of that file; None: none."""
     seen: tuple[int, int] = (0, 0)
-    """Inode and time of change of `source` when it was last read."""
+    """Inode and time of change of the inherited file when it was last read."""
     inherited: Snapshot = Snapshot()
 
 
 def inherited() -> Snapshot:
     """Return the registrations of the process that started this one, read anew after a change."""
     with _LOCK:
-        if _STATE.source:
-            _read(_STATE.source)
+        if path := existing(_STATE.source):
+            _read(path)
         return _STATE.inherited
 
 
 def write(snapshot: Snapshot) -> None:
-    """Replace this process's file, atomically; a warning says why that is impossible."""
+    """Replace this process's file, atomically; a warning if that is impossible."""
     from hrc_env.core.results import write_whole  # takes time to import
 
     with _LOCK:
@@ -81,11 +79,12 @@ def write(snapshot: Snapshot) -> None:
             return
         if snapshot == _STATE.written and Path(_STATE.path).is_file():
             return
-        if _STATE.pid != os.getpid():
-            _STATE.path, _STATE.pid = str(_folder() / _new_name()), os.getpid()
         folder = Path(_STATE.path).parent
+        if _STATE.pid != os.getpid() or (folder.exists() and not _is_private(folder)):
+            folder = folder if _is_private(folder) else Path(new_folder())
+            _STATE.path, _STATE.pid = prepend(str(folder)), os.getpid()
         try:
-            if not folder.is_dir():
+            if not folder.exists():
                 folder.mkdir(mode=0o700)
                 Finalize(None, shutil.rmtree, (folder, True), exitpriority=-100)
             write_whole(Path(_STATE.path), pickle.dumps(snapshot))
@@ -93,19 +92,6 @@ def write(snapshot: Snapshot) -> None:
             _warn(f"Child processes will not know the registrations of this one: {error}")
             return
         _STATE.written = snapshot
-        os.environ[VARIABLE] = _STATE.path
-
-
-def _folder() -> Path:
-    """Return the parent process's folder, which that one removes, or the name of a new one."""
-    named = os.environ.get(VARIABLE)
-    if named and _is_private(Path(named).parent):
-        return Path(named).parent
-    return Path(gettempdir()) / f"hrc_env_{os.urandom(8).hex()}"
-
-
-def _new_name() -> str:
-    return f"{os.getpid()}_{os.urandom(4).hex()}.pickle"
 
 
 def _is_private(folder: Path) -> bool:
@@ -121,7 +107,7 @@ def _is_private(folder: Path) -> bool:
 def _read(source: str) -> None:
     try:
         about = os.stat(source)
-    except OSError:  # nothing registered yet, or no longer there
+    except OSError:  # no longer there
         return
     seen = (about.st_ino, about.st_mtime_ns)
     if seen == _STATE.seen:
@@ -144,11 +130,10 @@ def _warn(said: str) -> None:
 
 
 def _begun() -> _State:
-    """Return the state at import; without an inherited file one is named for child processes."""
-    if source := os.environ.get(VARIABLE, ""):
-        return _State(source, 0, "")
-    os.environ[VARIABLE] = path = str(_folder() / _new_name())
-    return _State("", os.getpid(), path)
+    """Return the state at import."""
+    reserve()
+    own, _, others = os.environ[VARIABLE].partition(os.pathsep)
+    return _State(others, os.getpid(), own)
 
 
 _STATE = _begun()
