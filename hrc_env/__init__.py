@@ -7,6 +7,7 @@ does both. See `hrc_env.env` for the arguments, `hrc_env.config` for everything 
 
 from hrc_env.registration import (
     IDS,
+    adopt,
     import_files,
     register_detector,
     register_environment,
@@ -30,3 +31,4 @@ __all__ = [
 for _id in BUILT_IN:
     register_environment(_id, LONGER.get(_id, EPISODE_STEPS))
 import_files()
+adopt()

@@ -5,7 +5,7 @@ env = gymnasium.make("HRCReach-v0", perception="keypoints")
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,41 +17,102 @@ from gymnasium.spaces import Box, Dict
 from numpy.typing import NDArray
 
 from hrc_env import observations, rewards
-from hrc_env.config import ConfigChoice, Settings, settle
+from hrc_env.config import ConfigChoice, HRCConfig, Settings, resolve, settle
 from hrc_env.control import checked_action
 from hrc_env.core.batching import Stateful, one
 from hrc_env.core.errors import ConfigError, unknown, whole
 from hrc_env.core.infos import Words, worded
-from hrc_env.core.mapping import plain
+from hrc_env.core.mapping import for_json, plain
+from hrc_env.core.registry import share
 from hrc_env.core.typing import Floats
 from hrc_env.motion.generator import Clip, PeopleConfig
 from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.render.views import PICTURE_SIZE, Views, picture_size
 from hrc_env.rewards import RewardConfig
-from hrc_env.safety.shield import ShieldChoice
+from hrc_env.safety.shield import SHIELDS, ShieldChoice
 from hrc_env.scene.domain_randomization import AppearanceConfig
 from hrc_env.scene.robot import Robot
 from hrc_env.simulation import Simulation
 from hrc_env.step import Observation, words_of
 from hrc_env.tasks import DEFAULT, goal
-from hrc_env.tasks.task import Task, goal_of
-from hrc_env.tracking.estimators import EstimatorChoice
+from hrc_env.tasks.task import TASKS, Task, goal_of, task_called
+from hrc_env.tracking.estimators import ESTIMATORS, EstimatorChoice, estimator_called
 
 RENDER_MODES = ("rgb_array", "depth_array")
 RESET_OPTIONS = ("steps_left",)
 ENDLESS = 2**62
 """Steps that are left where nobody said otherwise; time limits are gymnasium's `TimeLimit`."""
 
+ADVICE = {
+    "task": "Register the task (hrc_env.register_task) and give its id.",
+    "estimator": "Register an estimator (hrc_env.register_estimator) and give its name.",
+    "shield": "Register the shield (hrc_env.register_shield) and give its name.",
+}
+"""For arguments that JSON cannot hold, by name."""
+OTHERWISE = (
+    "Give text, numbers, lists, records or mappings of these; of a clip in memory the path of its "
+    "file (hrc_env.motion.clip.save_clip writes one)."
+)
+"""The advice for other arguments."""
 
-class EnvBase(Stateful):
+
+class Spec(EnvSpec):
+    """A spec whose JSON holds every argument: `gymnasium.make` makes the same environment of it."""
+
+    def to_json(self) -> str:
+        """Return the spec as JSON; `ConfigError` for an argument that has no such form."""
+        given = {**self.kwargs}
+        if isinstance(given.get("config"), HRCConfig):  # its tracker is of the estimator's kind
+            task = task_called(given.get("task", DEFAULT))
+            estimator = estimator_called(given.get("estimator", "particle"))
+            given["config"] = resolve(given["config"], task, estimator)
+        for name, value in given.items():
+            try:
+                given[name] = for_json(value, name)
+            except ConfigError as error:
+                raise ConfigError(f"{error} {ADVICE.get(name, OTHERWISE)}") from error
+        return EnvSpec.to_json(replace(self, kwargs=given))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, EnvSpec) and vars(self) == vars(other)
+
+    __hash__ = None  # type: ignore[assignment]  # as of EnvSpec
+
+
+def spec_of(spec: EnvSpec) -> Spec:
+    """Return a spec with plain arguments, in which registered objects are their names."""
+    given = plain(spec.kwargs)
+    tables = {"task": TASKS, "estimator": ESTIMATORS, "shield": SHIELDS}
+    for name in tables.keys() & given.keys():
+        given[name] = tables[name].name_of(given[name]) or given[name]
+    parts = {each.name: getattr(spec, each.name) for each in fields(spec) if each.init}
+    return Spec(**{**parts, "kwargs": given})
+
+
+class HasSpec:
+    """An environment that can be made again from its `spec`."""
+
+    _spec: Spec | None = None
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """What `gymnasium.make` made this from; its arguments are as JSON has them."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = spec and spec_of(spec)
+
+
+class EnvBase(HasSpec, Stateful):
     """What a single and a vector environment have in common: states, pictures' form, `spec`."""
 
     closed = False
-    _spec: EnvSpec | None = None
 
     def _open(self, settings: Settings, render_mode: str | None, width: int, height: int) -> None:
         """Keep settings, and a form of pictures once it is known to be one."""
         check_render_mode(render_mode)
+        share()
         self._size = picture_size(width, height)
         self.render_mode, self.config, self._task = render_mode, settings.config, settings.task
         fps = round(1 / self.config.ctrl_dt)
@@ -77,15 +138,6 @@ class EnvBase(Stateful):
         if self.closed:
             raise ConfigError("This environment is closed; make a new one.")
 
-    @property
-    def spec(self) -> EnvSpec | None:
-        """What `gymnasium.make` made this from; its arguments are as JSON has them."""
-        return self._spec
-
-    @spec.setter
-    def spec(self, spec: EnvSpec | None) -> None:
-        self._spec = spec and replace(spec, kwargs=plain(spec.kwargs))
-
 
 class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
     EnvBase, gymnasium.Env[Observation, NDArray[np.float32]]
@@ -106,7 +158,8 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         scene: name of the place: "lab", a workshop, or "site", a construction site; None: that
             which the task is made for.
         robot: a name ("ur10e_like", "ur10e_gripper", "ur10e_cups", "mobile_base"), one that was
-            registered or a `hrc_env.scene.robot.Robot`; None: the one that the task is made for.
+            registered, a `hrc_env.scene.robot.Robot` or a mapping of its fields; None: the one
+            that the task is made for.
         n_workers: 0 or more workers, None: as the task is made for; (fewest, most): each
             episode's number is drawn, and the observation has room for the most.
         people: how the workers are with the robot: "attentive", "hurried", "unaware", a
@@ -144,7 +197,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         estimator: EstimatorChoice = "particle",
         cameras: str | Path | Sequence[Any] | NDArray[Any] | None = None,
         scene: str | None = None,
-        robot: str | Robot | None = None,
+        robot: str | Robot | Mapping[str, Any] | None = None,
         n_workers: int | tuple[int, int] | None = None,
         people: str | PeopleConfig | Mapping[str, Any] | None = None,
         motions: Sequence[str | Path | Clip] | None = None,

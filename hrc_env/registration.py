@@ -1,23 +1,28 @@
 """Bring your own: a task, an estimator and more, by a name that works wherever one is asked for.
 
-What is registered by a file of yours is known to the command line, too, and to every process that
-it starts: `python -m hrc_env --import my_file.py play MyTask-v0`, or the environment variable
-`HRC_ENV_IMPORT`. The files in `examples/bring_your_own/` show one of each.
+What is registered by a file of yours is known to the command line, too:
+`python -m hrc_env --import my_file.py play MyTask-v0`, or the environment variable
+`HRC_ENV_IMPORT`. Registrations reach every process that is started on this machine, as soon as it
+imports this package. The files in `examples/bring_your_own/` show one of each.
 """
 
 import os
 import sys
+import zlib
 from collections.abc import Callable
+from dataclasses import replace
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gymnasium.envs.registration import register
+from gymnasium.envs.registration import register, registry
 
 from hrc_env.core.errors import ConfigError
+from hrc_env.core.reservation import reserve
 from hrc_env.tasks import BUILT_IN, EPISODE_STEPS
 
 if TYPE_CHECKING:
+    from hrc_env.core.registry import Registry
     from hrc_env.perception.detector import KeypointFunction
     from hrc_env.safety.shield import Shield
     from hrc_env.scene.robot import Robot
@@ -39,7 +44,7 @@ def register_task(task: "Task") -> None:
     from hrc_env.tasks.task import TASKS, check_task  # in functions: kernels take time to import
 
     check_task(task)
-    _add(TASKS, "task", task.id, task)
+    _add(TASKS, task.id, task)
     register_environment(task.id, task.max_episode_steps)
 
 
@@ -49,7 +54,7 @@ def register_estimator(spec: "EstimatorSpec") -> None:
     from hrc_env.tracking.estimators import ESTIMATORS, check_estimator
 
     check_estimator(spec)
-    _add(ESTIMATORS, "estimator", spec.name, spec)
+    _add(ESTIMATORS, spec.name, spec)
 
 
 def register_robot(robot: "Robot") -> None:
@@ -62,7 +67,9 @@ def register_robot(robot: "Robot") -> None:
         raise ConfigError(f"A robot must be a Robot, got {type(robot).__name__}.")
     robot = robot_called(robot)
     warn_of_looks(robot)
-    _add(ROBOTS, "robot", robot.name, robot)
+    if not str(robot.mjcf).lstrip().startswith("<"):  # other processes may work elsewhere
+        robot = replace(robot, mjcf=str(Path(robot.mjcf).resolve()))
+    _add(ROBOTS, robot.name, robot)
 
 
 def register_detector(name: str, make: "Callable[[], KeypointFunction]") -> None:
@@ -70,18 +77,21 @@ def register_detector(name: str, make: "Callable[[], KeypointFunction]") -> None
     `make` is called once for each thread that detects."""
     from hrc_env.perception.detector import DETECTORS
 
-    _add(DETECTORS, "detector", name, make, is_function=True)
+    _add(DETECTORS, name, make, is_function=True)
 
 
 def register_shield(name: str, shield: "Shield") -> None:
     """Make a shield (`hrc_env.safety.shield.Shield`) known: `shield=name` of every environment."""
     from hrc_env.safety.shield import SHIELDS
 
-    _add(SHIELDS, "shield", name, shield, is_function=True)
+    _add(SHIELDS, name, shield, is_function=True)
 
 
 def register_environment(task_id: str, max_episode_steps: int = EPISODE_STEPS) -> None:
     """Tell Gymnasium about the environment of a task."""
+    if task_id in IDS:  # inherited: registered anew in this process
+        registry.pop(task_id, None)
+        IDS.remove(task_id)
     register(
         id=task_id,
         entry_point="hrc_env.env:HRCEnv",
@@ -93,30 +103,60 @@ def register_environment(task_id: str, max_episode_steps: int = EPISODE_STEPS) -
 
 
 def import_files(paths: str | None = None) -> None:
-    """Import Python files, each once, which register things; separated as in PATH; None: those
-    of the environment variable `IMPORT`."""
+    """Import Python files, each once, which register things, here and in child processes;
+    separated as in PATH; None: those of the environment variable `IMPORT`."""
     given = os.environ.get(IMPORT, "") if paths is None else paths
     for path in (Path(each).resolve() for each in given.split(os.pathsep) if each):
-        name = f"hrc_env_import_{path.stem}"
-        if name in sys.modules:
-            continue
-        spec = spec_from_file_location(name, path)
-        if spec is None or spec.loader is None or not path.is_file():
-            raise ConfigError(f"{path} cannot be imported: it must be a Python file (.py).")
-        sys.modules[name] = module = module_from_spec(spec)
+        _import_file(path, recorded=paths is not None)
+
+
+def adopt() -> None:
+    """Make the registrations of the process that started this one known; those of this process
+    have precedence. The error of a file is kept for lookups of names that it registers."""
+    if not reserve():
+        return
+    from hrc_env.core.registry import FILES
+    from hrc_env.core.snapshot import inherited
+
+    found = inherited()
+    for path in found.files:
         try:
+            _import_file(Path(path), recorded=False)
+        except Exception as error:  # of somebody's file, which may not be needed here
+            FILES[path] = f"{type(error).__name__}: {error}"
+    for task_id, entry in found.entries.get("task", {}).items():
+        if task_id not in IDS:
+            register_environment(task_id, entry.max_episode_steps)
+
+
+def _import_file(path: Path, recorded: bool) -> None:
+    """Import a file unless it is already; `recorded`: child processes do so, too."""
+    from hrc_env.core.registry import FILES, importing, share
+
+    name = f"hrc_env_import_{path.stem}"
+    if name in sys.modules and sys.modules[name].__file__ != str(path):  # another of that name
+        name = f"{name}_{zlib.crc32(str(path).encode()):x}"
+    if name in sys.modules:
+        return
+    spec = spec_from_file_location(name, path)
+    if spec is None or spec.loader is None or not path.is_file():
+        raise ConfigError(f"{path} cannot be imported: it must be a Python file (.py).")
+    sys.modules[name] = module = module_from_spec(spec)
+    try:
+        with importing(str(path), recorded):
             spec.loader.exec_module(module)
-        except BaseException:
-            del sys.modules[name]
-            raise
+    except BaseException:
+        del sys.modules[name]
+        raise
+    if recorded:
+        FILES[str(path)] = ""
+        share()
 
 
-def _add(
-    table: dict[str, Any], what: str, name: str, thing: Any, is_function: bool = False
-) -> None:
-    """Keep a thing in the table in which things of its kind are looked up by name."""
+def _add(table: "Registry[Any]", name: str, thing: Any, is_function: bool = False) -> None:
+    """Keep a thing in the registry in which things of its kind are looked up by name."""
     if is_function and not callable(thing):
-        raise ConfigError(f"{name}: a {what} must be a function, got {thing!r}.")
-    if name in table or name in BUILT_IN:
-        raise ConfigError(f"There is the {what} {name!r} already; choose another name.")
-    table[name] = thing
+        raise ConfigError(f"{name}: a {table.kind} must be a function, got {thing!r}.")
+    if name in BUILT_IN:
+        raise ConfigError(f"There is the {table.kind} {name!r} already; choose another name.")
+    table.register(name, thing)

@@ -13,6 +13,7 @@ from commands import ROOT
 from figures import Figures, collect, write
 
 import hrc_env
+from hrc_env.core.registry import FILES, Registry
 from hrc_env.perception.detector import DETECTORS
 from hrc_env.perception.weights import fetch_weights
 from hrc_env.registration import import_files
@@ -89,7 +90,7 @@ def process():
 @pytest.fixture(scope="module")
 def brought():
     """What examples/bring_your_own registers is known, for the tests of one file."""
-    tables: list[dict] = [TASKS, ESTIMATORS, DETECTORS, ROBOTS, SHIELDS]
+    tables: list[Registry] = [TASKS, ESTIMATORS, DETECTORS, ROBOTS, SHIELDS]
     before = [set(table) for table in tables]
     examples = sorted((ROOT / "examples" / "bring_your_own").glob("*.py"))
     import_files(os.pathsep.join(map(str, examples)))
@@ -101,3 +102,4 @@ def brought():
             hrc_env.IDS[:] = [each for each in hrc_env.IDS if each != added]
     for path in examples:
         del sys.modules[f"hrc_env_import_{path.stem}"]
+        FILES.pop(str(path), None)

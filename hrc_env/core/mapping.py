@@ -119,7 +119,7 @@ def _tuple(hint: Any, value: Any, where: str) -> tuple[Any, ...]:
 
 def plain(value: Any) -> Any:
     """A value as JSON has it: paths are text, NumPy's numbers and enumerations what they hold. What
-    has no such form (a recorded clip, a function) stays, and JSON's writer refuses it."""
+    has no such form (a recorded clip, a function) stays; `for_json` refuses it."""
     if isinstance(value, Mapping):
         return {name: plain(each) for name, each in value.items()}
     if isinstance(value, list | tuple):
@@ -129,6 +129,26 @@ def plain(value: Any) -> Any:
     if isinstance(value, enum.Enum):
         return value.value
     return str(value) if isinstance(value, Path) else value
+
+
+def for_json(value: Any, where: str) -> Any:
+    """Return a value in JSON's types, records as mappings of their fields.
+
+    Raises:
+        ConfigError: a part that has no such form, by its path: a function, a class, a recording.
+    """
+    value = plain(value)
+    if isinstance(value, Mapping):
+        return {name: for_json(each, f"{where}.{name}") for name, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [for_json(each, f"{where}[{k}]") for k, each in enumerate(value)]
+    if dataclasses.is_dataclass(value) and not callable(value):
+        parts = {each.name: getattr(value, each.name) for each in dataclasses.fields(value)}
+        if not any(isinstance(part, np.ndarray) for part in parts.values()):
+            return for_json(parts, where)
+    if value is not None and not isinstance(value, bool | int | float | str):
+        raise ConfigError(f"{where} is a {type(value).__name__}, which JSON cannot hold.")
+    return value
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from hrc_env.core.batching import Stateful
 from hrc_env.core.errors import ConfigError, check_fields, check_names, check_shape
 from hrc_env.core.records import Roi
+from hrc_env.core.registry import Registry
 from hrc_env.core.skeleton import BLAZEPOSE_INDEX, N_JOINTS
 from hrc_env.core.typing import Floats, Image, Points2, Points3
 from hrc_env.geometry.cameras import PinholeCamera, inside_image
@@ -47,7 +48,9 @@ _THREAD = threading.local()
 KeypointFunction = Callable[[Image], Floats | None]
 """A crop (256, 256, 3) RGB uint8 -> (J, 3): x, y [px] from its corner and confidence in [0, 1] of
 `core.skeleton.JOINTS`; NaN, NaN, 0 of a joint that was not found. None: nobody is there."""
-DETECTORS: dict[str, Callable[[], KeypointFunction] | None] = {"blazepose": None}
+DETECTORS: Registry[Callable[[], KeypointFunction] | None] = Registry(
+    "detector", {"blazepose": None}
+)
 """By name: what makes the function, once for every thread that calls it."""
 
 

@@ -10,6 +10,7 @@ from hrc_env.belief import Belief
 from hrc_env.core.brought import check_arguments, described, numbers_of
 from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.core.mapping import from_mapping
+from hrc_env.core.registry import Registry
 from hrc_env.core.typing import Floats, JointVelocities
 from hrc_env.safety.config import PRESETS, ShieldConfig
 from hrc_env.safety.guard import guarded
@@ -19,9 +20,9 @@ Shield = Callable[[Belief, JointVelocities, float], tuple[JointVelocities, Mappi
 [s]) -> the velocities that the arm gets, and what there is to say, (B,) by name, which becomes
 "shield/NAME" in info. It keeps nothing from step to step."""
 ShieldChoice = str | ShieldConfig | Mapping[str, Any] | Shield | None
-SHIELDS: dict[str, Shield] = {
-    name: partial(guarded, config=config) for name, config in PRESETS.items()
-}
+SHIELDS: Registry[Shield] = Registry(
+    "shield", {name: partial(guarded, config=config) for name, config in PRESETS.items()}
+)
 """By name: the built-in ones and those that were registered."""
 ACTIVE_RAD_S = 0.02
 """A shield that changes joint velocities by more is called active."""

@@ -17,6 +17,7 @@ import numpy as np
 
 from hrc_env.core.errors import ConfigError, check_names
 from hrc_env.core.mapping import from_mapping, read_toml
+from hrc_env.core.registry import Registry
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.scene.primitives import (
     OBJECT_BIT,
@@ -141,11 +142,11 @@ def _read(path: Path) -> Robot:
     return from_mapping(Robot, read_toml(path) | own)
 
 
-ROBOTS: dict[str, Robot] = {
-    path.stem: _read(path) for path in sorted((assets_dir() / "robots").glob("*.toml"))
-}
+ROBOTS: Registry[Robot] = Registry(
+    "robot", {path.stem: _read(path) for path in sorted((assets_dir() / "robots").glob("*.toml"))}
+)
 """By name: those in `assets/robots`, and those that were registered."""
-BUILT_IN = frozenset(ROBOTS.values())
+BUILT_IN = frozenset(ROBOTS.data.values())
 """Those in `assets/robots`, whose looks reach everywhere near their capsules."""
 
 
@@ -161,7 +162,9 @@ def robot_called(robot: str | Robot | Mapping[str, Any]) -> Robot:
     if isinstance(robot, Robot):
         robot = {each.name: getattr(robot, each.name) for each in fields(Robot)}
     if not isinstance(robot, Mapping):
-        raise ConfigError(f"robot must be a name or a Robot, got {robot!r}.")
+        raise ConfigError(
+            f"robot must be a name, a Robot or a mapping of its fields, got {robot!r}."
+        )
     typed = from_mapping(Robot, robot, "robot.")
     check_robot(typed)
     return typed

@@ -13,6 +13,7 @@ from hrc_env import observations, rewards
 from hrc_env.belief import Belief
 from hrc_env.core.errors import ConfigError, NoGoalError, check_shape, unknown
 from hrc_env.core.records import Cue, Effects, Grounds, World
+from hrc_env.core.registry import Registry
 from hrc_env.core.things import NOTHING, Things
 from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, Points3
 from hrc_env.observations import ObservationTerm
@@ -136,7 +137,7 @@ class Task:
         return Task, tuple(getattr(self, each.name) for each in fields(self))
 
 
-TASKS: dict[str, Task] = {}
+TASKS: Registry[Task] = Registry("task")
 """By id: those that have been asked for, and those that were registered."""
 
 

@@ -23,6 +23,7 @@ import numpy as np
 from hrc_env.core.brought import check_arguments
 from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.core.records import Keypoints, PoseEstimate
+from hrc_env.core.registry import Registry
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Ints, Rngs
 from hrc_env.tracking.checked import CheckedEstimator
@@ -107,21 +108,24 @@ def _ransac(P: Floats, ctrl_dt: float, config: TriangulationConfig) -> Triangula
     return TriangulationEstimator(P, ctrl_dt, config, config.gate_sigma)
 
 
-ESTIMATORS: dict[str, EstimatorSpec] = {
-    spec.name: spec
-    for spec in (
-        EstimatorSpec("particle", ParticleEstimator, ParticleConfig),
-        EstimatorSpec("kalman", _kalman, ParticleConfig),
-        EstimatorSpec("paper", PaperEstimator, PaperConfig),
-        EstimatorSpec("paper_restarts", PaperRestarts, PaperConfig),
-        EstimatorSpec(
-            "triangulation", TriangulationEstimator, TriangulationConfig, needs_pairs=True
-        ),
-        EstimatorSpec("ransac", _ransac, TriangulationConfig, needs_pairs=True),
-    )
-}
+ESTIMATORS = Registry(
+    "estimator",
+    {
+        spec.name: spec
+        for spec in (
+            EstimatorSpec("particle", ParticleEstimator, ParticleConfig),
+            EstimatorSpec("kalman", _kalman, ParticleConfig),
+            EstimatorSpec("paper", PaperEstimator, PaperConfig),
+            EstimatorSpec("paper_restarts", PaperRestarts, PaperConfig),
+            EstimatorSpec(
+                "triangulation", TriangulationEstimator, TriangulationConfig, needs_pairs=True
+            ),
+            EstimatorSpec("ransac", _ransac, TriangulationConfig, needs_pairs=True),
+        )
+    },
+)
 """By name: those of this package, and those that were registered."""
-BUILT_IN = frozenset(ESTIMATORS.values())
+BUILT_IN = frozenset(ESTIMATORS.data.values())
 """Those of this package; what others give is checked (`checked.CheckedEstimator`)."""
 OFFLINE = {"smoother": "hrc_env.tracking.smoother.smooth(P, clip, dt_s)"}
 """What needs the future, and the function that gives it a whole clip."""

@@ -26,13 +26,13 @@ from hrc_env.core.errors import ConfigError, whole
 from hrc_env.core.infos import worded
 from hrc_env.core.machine import n_cores
 from hrc_env.core.typing import Bools, Floats, Ints
-from hrc_env.env import EnvBase, spaces
+from hrc_env.env import EnvBase, HasSpec, spaces
 from hrc_env.render.views import PICTURE_SIZE, Views
 from hrc_env.rewards import RewardConfig
 from hrc_env.simulation import Simulation
 from hrc_env.step import Observation, StepResult, words_of
 from hrc_env.tasks import DEFAULT
-from hrc_env.tasks.task import task_called
+from hrc_env.tasks.task import TASKS, task_called
 from hrc_env.vector.infos import InfoTable, table
 from hrc_env.vector.options import (
     MAX_ENVS,
@@ -245,6 +245,10 @@ def _finals(observation: Observation, info: InfoTable, who: Bools) -> dict[str, 
     return {"final_obs": last, "_final_obs": who.copy(), **final_info}
 
 
+class PixelVectorEnv(HasSpec, AsyncVectorEnv):  # type: ignore[misc]  # `spec` is a property
+    """Environments at level "pixels", a process for each."""
+
+
 def make_vector(
     num_envs: int = 1, *, perception: str = "pixels", force: bool = False, **kwargs: Any
 ) -> VectorEnv[Any, Any, Any]:
@@ -267,6 +271,9 @@ def make_vector(
     if kwargs.pop("num_threads", None) is not None:
         raise ConfigError('perception="pixels" is processes, not threads: leave out num_threads.')
     mode = kwargs.pop("autoreset_mode", AutoresetMode.NEXT_STEP)
-    task = task_called(kwargs.pop("task", DEFAULT)).id
-    make = partial(gymnasium.make, f"hrc_env:{task}", perception="pixels", **kwargs)
-    return AsyncVectorEnv([make] * num_envs, context="spawn", autoreset_mode=mode)
+    task = task_called(kwargs.pop("task", DEFAULT))
+    if TASKS.name_of(task) is None:  # not registered: it is pickled
+        kwargs = {"max_episode_steps": task.max_episode_steps, **kwargs, "task": task}
+    task_id = TASKS.name_of(task) or DEFAULT
+    make = partial(gymnasium.make, f"hrc_env:{task_id}", perception="pixels", **kwargs)
+    return PixelVectorEnv([make] * num_envs, context="spawn", autoreset_mode=mode)

@@ -130,7 +130,7 @@ def test_too_many_processes_name_the_fast_level(monkeypatch):
 def test_force_is_taken_at_its_word(monkeypatch):
     made = []
     monkeypatch.setattr(vector_env, "n_cores", lambda: 2)
-    monkeypatch.setattr(vector_env, "AsyncVectorEnv", lambda makers, **kwargs: made.extend(makers))
+    monkeypatch.setattr(vector_env, "PixelVectorEnv", lambda makers, **kwargs: made.extend(makers))
     vector_env.make_vector(5, perception="pixels", force=True)
     assert len(made) == 5
 

@@ -1,0 +1,144 @@
+"""Registries: objects by name, those of the package and those that were registered.
+
+A name that was registered in the process that started this one is known here, too; its object is
+unpickled when it is first looked up. A registration in this process takes its place.
+"""
+
+import threading
+from collections import UserDict
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
+from io import BytesIO
+from pickle import loads
+from typing import Any, TypeVar
+
+from hrc_env.core import snapshot
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.snapshot import Entry, Snapshot
+
+ObjectT = TypeVar("ObjectT")
+FILES: dict[str, str] = {}
+"""Python files that this process imported, with their errors in words; "": none."""
+_LOCK = threading.RLock()
+_REGISTRIES: "dict[str, Registry[Any]]" = {}
+_IMPORTING: list[str] = []
+"""Files that are being imported; "" for one that every child process imports by itself."""
+
+
+class Registry(UserDict[str, ObjectT]):
+    """Objects of one kind by name."""
+
+    def __init__(self, kind: str, known: Mapping[str, ObjectT] | None = None) -> None:
+        super().__init__(known or {})
+        self.kind = kind
+        self.own: dict[str, str | None] = {}
+        """Names that were registered in this process, with the files that did so."""
+        _REGISTRIES[kind] = self
+
+    def register(self, name: str, thing: ObjectT) -> None:
+        """Add an object, for child processes as well; `ConfigError` for a name that is taken."""
+        taken = name in self.data and (name in self.own or name not in self.inherited)
+        if taken:
+            raise ConfigError(f"There is the {self.kind} {name!r} already; choose another name.")
+        self.data[name] = thing
+        if not (_IMPORTING and _IMPORTING[-1] == ""):
+            self.own[name] = _IMPORTING[-1] if _IMPORTING else None
+            share()
+
+    @property
+    def inherited(self) -> Mapping[str, Entry]:
+        """Registrations of the process that started this one."""
+        return snapshot.inherited().entries.get(self.kind, {})
+
+    def name_of(self, thing: object) -> str | None:
+        """Return the name of an object; None: it has none."""
+        return next((name for name, each in self.data.items() if each is thing), None)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.data or name in self.inherited
+
+    def __getitem__(self, name: str) -> ObjectT:
+        if name not in self.data and name in self.inherited:
+            found = _restored(self.kind, name, self.inherited[name])
+            self.data.setdefault(name, found)  # its module may have registered it
+        return self.data[name]
+
+    def __delitem__(self, name: str) -> None:
+        del self.data[name]
+        if name in self.own:
+            del self.own[name]
+            share()
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(dict.fromkeys((*self.data, *self.inherited)))
+
+    def __len__(self) -> int:
+        return len(list(iter(self)))
+
+
+@contextmanager
+def importing(file: str, recorded: bool) -> Iterator[None]:
+    """Attribute registrations to a file; `recorded`: child processes import it as well."""
+    _IMPORTING.append(file if recorded else "")
+    try:
+        yield
+    finally:
+        _IMPORTING.pop()
+
+
+def share() -> None:
+    """Bring the registrations of this process up to date for child processes.
+
+    Functions that are defined in a script or notebook travel with the values that their globals
+    have now. It runs with every registration and whenever an environment is made.
+    """
+    with _LOCK:
+        parent = snapshot.inherited()
+        own = {id(each.data[name]) for each in _REGISTRIES.values() for name in each.own}
+        entries = {kind: dict(found) for kind, found in parent.entries.items()}
+        for kind, registry in _REGISTRIES.items():
+            for name, file in registry.own.items():
+                entries.setdefault(kind, {})[name] = _entry(registry.data[name], file, own)
+        snapshot.write(Snapshot(entries, tuple(dict.fromkeys((*parent.files, *FILES)))))
+
+
+def _entry(thing: Any, file: str | None, own: set[int]) -> Entry:
+    limit = getattr(thing, "max_episode_steps", 0)
+    if file is not None:
+        return Entry(file=file, max_episode_steps=limit)
+    try:
+        return Entry(_pickled(thing, own), max_episode_steps=limit)
+    except Exception as error:  # whatever objects of others raise
+        return Entry(refused=f"{type(error).__name__}: {error}", max_episode_steps=limit)
+
+
+def _pickled(thing: Any, own: set[int]) -> bytes:
+    """Pickle a registered object, also from a script or a notebook, by value: not by its name."""
+    from cloudpickle import Pickler  # takes time to import
+
+    class ByValue(Pickler):
+        def reducer_override(self, obj: Any) -> Any:
+            if id(obj) in own and is_dataclass(obj):
+                return type(obj), tuple(getattr(obj, each.name) for each in fields(obj))
+            return super().reducer_override(obj)
+
+    file = BytesIO()
+    ByValue(file).dump(thing)
+    return file.getvalue()
+
+
+def _restored(kind: str, name: str, entry: Entry) -> Any:
+    """Return an inherited object, or raise a `ConfigError` with other ways to bring it along."""
+    reason, cause = entry.refused or FILES.get(entry.file) or f"{entry.file} lacks it", None
+    if entry.pickled:
+        try:
+            return loads(entry.pickled)
+        except Exception as error:
+            reason, cause = f"{type(error).__name__}: {error}", error
+    raise ConfigError(
+        f"The {kind} {name!r} was registered in the process that started this one and cannot be "
+        f"brought here ({reason}). Expected is an object that can be pickled, of modules that can "
+        "be imported here; or register it in a Python file and name that in HRC_ENV_IMPORT or "
+        "import_files, which every process imports."
+    ) from cause

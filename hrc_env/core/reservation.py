@@ -1,0 +1,42 @@
+"""The names of files in which child processes find the registrations of this one."""
+
+import os
+from tempfile import gettempdir
+
+VARIABLE = "HRC_ENV_REGISTERED"
+"""Environment variable: the file of this process, then those of its parent, its parent's parent
+and so on, as PATH has folders. The first that exists counts; see `core.snapshot`."""
+
+
+def reserve() -> str:
+    """Name a file for child processes and return the inherited one that exists; empty: none.
+
+    Processes that are started before the first registration know its name, too.
+    """
+    named = os.environ.get(VARIABLE, "")
+    found = existing(named)
+    if not is_own(named):
+        prepend(os.path.dirname(found) or new_folder())
+    return found
+
+
+def prepend(folder: str) -> str:
+    """Name a file of this process in a folder before the others, and return its path."""
+    path = os.path.join(folder, f"{os.getpid()}_{os.urandom(4).hex()}.pickle")
+    os.environ[VARIABLE] = os.pathsep.join(filter(None, (path, os.environ.get(VARIABLE))))
+    return path
+
+
+def existing(named: str) -> str:
+    """Return the first of several files that exists; empty: none does."""
+    return next((path for path in named.split(os.pathsep) if path and os.path.exists(path)), "")
+
+
+def new_folder() -> str:
+    """Return the path of a folder that does not exist yet."""
+    return os.path.join(gettempdir(), f"hrc_env_{os.urandom(8).hex()}")
+
+
+def is_own(named: str) -> bool:
+    """Return whether the first of several files is of this process."""
+    return os.path.basename(named.split(os.pathsep)[0]).startswith(f"{os.getpid()}_")

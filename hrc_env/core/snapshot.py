@@ -1,0 +1,139 @@
+"""Snapshots: the registrations of one process in a private file, read by its child processes.
+
+`reservation.VARIABLE` names the file from the import of this package on, so that children of any
+kind (spawn, forkserver, loky, Ray on this machine) find it however early they started. It exists
+once something is registered; its process removes it at exit.
+"""
+
+import os
+import pickle
+import shutil
+import stat
+import threading
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from multiprocessing.util import Finalize
+from pathlib import Path
+
+from hrc_env.core.errors import HRCError
+from hrc_env.core.reservation import VARIABLE, existing, new_folder, prepend, reserve
+
+_LOCK = threading.RLock()
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """How a registered object reaches another process: pickled, by a file, or not at all."""
+
+    pickled: bytes = b""
+    file: str = ""
+    """The Python file that registers it."""
+    refused: str = ""
+    """The error of pickling it."""
+    max_episode_steps: int = 0
+    """The time limit of a task."""
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """Registrations of a process."""
+
+    entries: Mapping[str, Mapping[str, Entry]] = field(default_factory=dict)
+    """By kind ("robot") and name."""
+    files: tuple[str, ...] = ()
+    """Python files to import, in this order."""
+
+
+@dataclass(slots=True)
+class _State:
+    """The files of this process."""
+
+    source: str
+    """Files that may be inherited, as in `VARIABLE`; the first that exists counts."""
+    pid: int
+    """The process to which `path` belongs."""
+    path: str
+    """Its file."""
+    written: Snapshot | None = None
+    """The content of that file; None: none."""
+    seen: tuple[int, int] = (0, 0)
+    """Inode and time of change of the inherited file when it was last read."""
+    inherited: Snapshot = Snapshot()
+
+
+def inherited() -> Snapshot:
+    """Return the registrations of the process that started this one, read anew after a change."""
+    with _LOCK:
+        if path := existing(_STATE.source):
+            _read(path)
+        return _STATE.inherited
+
+
+def write(snapshot: Snapshot) -> None:
+    """Replace this process's file, atomically; a warning if that is impossible."""
+    from hrc_env.core.results import write_whole  # takes time to import
+
+    with _LOCK:
+        if _STATE.written is None and snapshot == _STATE.inherited:
+            return
+        if snapshot == _STATE.written and Path(_STATE.path).is_file():
+            return
+        folder = Path(_STATE.path).parent
+        if _STATE.pid != os.getpid() or (folder.exists() and not _is_private(folder)):
+            folder = folder if _is_private(folder) else Path(new_folder())
+            _STATE.path, _STATE.pid = prepend(str(folder)), os.getpid()
+        try:
+            if not folder.exists():
+                folder.mkdir(mode=0o700)
+                Finalize(None, shutil.rmtree, (folder, True), exitpriority=-100)
+            write_whole(Path(_STATE.path), pickle.dumps(snapshot))
+        except (OSError, HRCError) as error:
+            _warn(f"Child processes will not know the registrations of this one: {error}")
+            return
+        _STATE.written = snapshot
+
+
+def _is_private(folder: Path) -> bool:
+    """Return whether nobody but this user can write there: pickles are code."""
+    try:
+        about = folder.stat(follow_symlinks=False)
+    except OSError:
+        return False
+    private = about.st_uid == os.getuid() and not about.st_mode & 0o022
+    return private and stat.S_ISDIR(about.st_mode)
+
+
+def _read(source: str) -> None:
+    try:
+        about = os.stat(source)
+    except OSError:  # no longer there
+        return
+    seen = (about.st_ino, about.st_mtime_ns)
+    if seen == _STATE.seen:
+        return
+    _STATE.seen = seen
+    if not _is_private(Path(source).parent):
+        _warn(f"{source} is ignored: its folder must belong to this user and to nobody else.")
+        return
+    try:
+        found = pickle.loads(Path(source).read_bytes())
+    except Exception as error:
+        _warn(f"The registrations of the parent process cannot be read: {error!r}.")
+        return
+    if isinstance(found, Snapshot):
+        _STATE.inherited = found
+
+
+def _warn(said: str) -> None:
+    warnings.warn(said, RuntimeWarning, stacklevel=3)
+
+
+def _begun() -> _State:
+    """Return the state at import."""
+    reserve()
+    own, _, others = os.environ[VARIABLE].partition(os.pathsep)
+    return _State(others, os.getpid(), own)
+
+
+_STATE = _begun()
