@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
@@ -20,7 +20,7 @@ from hrc_env import observations, rewards
 from hrc_env.config import ConfigChoice, Settings, settle
 from hrc_env.control import checked_action
 from hrc_env.core.batching import Stateful, one
-from hrc_env.core.errors import ConfigError, unknown, whole
+from hrc_env.core.errors import ConfigError, NoAttributeError, unknown, whole
 from hrc_env.core.mapping import plain
 from hrc_env.core.typing import Floats
 from hrc_env.motion.generator import Clip, PeopleConfig
@@ -47,10 +47,12 @@ class EnvBase(Stateful):
 
     closed = False
     _spec: EnvSpec | None = None
+    PICTURES: ClassVar[tuple[str, ...]] = RENDER_MODES
+    """The render modes that are taken."""
 
     def _open(self, settings: Settings, render_mode: str | None, width: int, height: int) -> None:
         """Keep settings, and a form of pictures once it is known to be one."""
-        check_render_mode(render_mode)
+        check_render_mode(render_mode, self.PICTURES)
         self._size = picture_size(width, height)
         self.render_mode, self.config, self._task = render_mode, settings.config, settings.task
         fps = round(1 / self.config.ctrl_dt)
@@ -72,7 +74,38 @@ class EnvBase(Stateful):
         others = [term.name for term in self._task.rewards] + others
         return partial(goal.judged, apart, config=self.config.task, others=others)
 
-    def _refuse_closed(self) -> None:
+    @property
+    def compute_terminated(self) -> Callable[[Any, Any, Any], Any]:
+        """(achieved_goal, desired_goal, info) -> whether the episode ended in the step of that
+        info, or of many as `compute_reward` takes them.
+
+        No goal ends an episode: a contact does, if `config.cost.contact_terminates`.
+
+        Raises:
+            NoGoalError: as of `compute_reward`.
+            NoAttributeError: the task ends episodes by a function of its own, `Task.over`.
+        """
+        apart = goal_of(self._task)
+        if self._task.over is not None:
+            raise NoAttributeError(
+                f"{self._task.id} ends episodes by a function of its own (Task.over), which goals "
+                "and infos do not tell: read `terminated` of `step`."
+            )
+        entries = ("cost_contact",) if self.config.cost.contact_terminates else ()
+        return partial(goal.ended, apart, entries=entries)
+
+    @property
+    def compute_truncated(self) -> Callable[[Any, Any, Any], Any]:
+        """(achieved_goal, desired_goal, info) -> False, for many (B,): what cuts an episode off is
+        its time limit.
+
+        Raises:
+            NoGoalError: as of `compute_reward`.
+        """
+        return partial(goal.ended, goal_of(self._task))
+
+    def refuse_closed(self) -> None:
+        """Raise a `ConfigError` once the environment is closed."""
         if self.closed:
             raise ConfigError("This environment is closed; make a new one.")
 
@@ -178,7 +211,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
             options: "steps_left": after so many steps this episode is truncated, if its time
                 limit does not end it before.
         """
-        self._refuse_closed()
+        self.refuse_closed()
         steps_left = _steps_left(options or {})
         super().reset(seed=seed)
         self._begun, self._steps_left = True, steps_left
@@ -189,7 +222,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         self, action: NDArray[np.float32]
     ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Act for one control step (1 / 25 s); the walk itself is `Simulation.step`."""
-        self._refuse_closed()
+        self.refuse_closed()
         if not self._begun:
             raise ConfigError("Call reset() before step().")
         values = checked_action(action, (self.simulation.n_actions,))
@@ -209,12 +242,14 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
 
     def render(self) -> NDArray[Any] | None:  # type: ignore[override]
         """The scene from a good viewpoint, as the render mode says."""
+        self.refuse_closed()
         if self.render_mode is None:
             return None
         return self.views.picture(self.render_mode == "depth_array", size=self._size)
 
     def mosaic(self) -> NDArray[np.uint8]:
         """The four cameras with crops, detected keypoints and the estimated skeleton."""
+        self.refuse_closed()
         return self.views.mosaic()
 
     def split_observation(self, observation: Observation) -> dict[str, Floats]:
@@ -242,16 +277,16 @@ def _steps_left(options: Mapping[str, Any]) -> int:
     return whole('options["steps_left"]', options.get("steps_left", ENDLESS), 1, ENDLESS)
 
 
-def check_render_mode(render_mode: str | None) -> None:
-    """Raise a `ConfigError` for a render mode that there is not, with those that there are."""
+def check_render_mode(render_mode: str | None, valid: Sequence[str] = RENDER_MODES) -> None:
+    """Raise a `ConfigError` for a render mode that is not `valid`, with those that are."""
     if render_mode == "human":
         raise ConfigError(
             "render_mode='human' is a window round an environment that draws: gymnasium.make("
             "ID, render_mode='human') puts it there (pip install 'hrc_env[view]'), or "
             "gymnasium.wrappers.HumanRendering does, round one with render_mode='rgb_array'."
         )
-    if render_mode is not None and render_mode not in RENDER_MODES:
-        raise unknown("render_mode", render_mode, RENDER_MODES)
+    if render_mode is not None and render_mode not in valid:
+        raise unknown("render_mode", render_mode, valid)
 
 
 def spaces(simulation: Simulation) -> tuple[Any, Box[np.float32]]:
