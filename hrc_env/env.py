@@ -5,113 +5,53 @@ env = gymnasium.make("HRCReach-v0", perception="keypoints")
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
-from gymnasium.envs.registration import EnvSpec
 from gymnasium.spaces import Box, Dict
 from numpy.typing import NDArray
 
 from hrc_env import observations, rewards
-from hrc_env.config import ConfigChoice, HRCConfig, Settings, resolve, settle
+from hrc_env.config import ConfigChoice, Settings, settle
 from hrc_env.control import checked_action
 from hrc_env.core.batching import Stateful, one
-from hrc_env.core.errors import ConfigError, unknown, whole
+from hrc_env.core.errors import ConfigError, NoAttributeError, unknown, whole
 from hrc_env.core.infos import Words, worded
-from hrc_env.core.mapping import for_json, plain
 from hrc_env.core.registry import share
 from hrc_env.core.typing import Floats
 from hrc_env.motion.generator import Clip, PeopleConfig
 from hrc_env.perception.faults.fault import FaultConfig
+from hrc_env.registration import HasSpec
 from hrc_env.render.views import PICTURE_SIZE, Views, picture_size
 from hrc_env.rewards import RewardConfig
-from hrc_env.safety.shield import SHIELDS, ShieldChoice
+from hrc_env.safety.shield import ShieldChoice
 from hrc_env.scene.domain_randomization import AppearanceConfig
 from hrc_env.scene.robot import Robot
 from hrc_env.simulation import Simulation
 from hrc_env.step import Observation, words_of
 from hrc_env.tasks import DEFAULT, goal
-from hrc_env.tasks.task import TASKS, Task, goal_of, task_called
-from hrc_env.tracking.estimators import ESTIMATORS, EstimatorChoice, estimator_called
+from hrc_env.tasks.task import Task, goal_of
+from hrc_env.tracking.estimators import EstimatorChoice
 
 RENDER_MODES = ("rgb_array", "depth_array")
 RESET_OPTIONS = ("steps_left",)
 ENDLESS = 2**62
 """Steps that are left where nobody said otherwise; time limits are gymnasium's `TimeLimit`."""
 
-ADVICE = {
-    "task": "Register the task (hrc_env.register_task) and give its id.",
-    "estimator": "Register an estimator (hrc_env.register_estimator) and give its name.",
-    "shield": "Register the shield (hrc_env.register_shield) and give its name.",
-}
-"""For arguments that JSON cannot hold, by name."""
-OTHERWISE = (
-    "Give text, numbers, lists, records or mappings of these; of a clip in memory the path of its "
-    "file (hrc_env.motion.clip.save_clip writes one)."
-)
-"""The advice for other arguments."""
-
-
-class Spec(EnvSpec):
-    """A spec whose JSON holds every argument: `gymnasium.make` makes the same environment of it."""
-
-    def to_json(self) -> str:
-        """Return the spec as JSON; `ConfigError` for an argument that has no such form."""
-        given = {**self.kwargs}
-        if isinstance(given.get("config"), HRCConfig):  # its tracker is of the estimator's kind
-            task = task_called(given.get("task", DEFAULT))
-            estimator = estimator_called(given.get("estimator", "particle"))
-            given["config"] = resolve(given["config"], task, estimator)
-        for name, value in given.items():
-            try:
-                given[name] = for_json(value, name)
-            except ConfigError as error:
-                raise ConfigError(f"{error} {ADVICE.get(name, OTHERWISE)}") from error
-        return EnvSpec.to_json(replace(self, kwargs=given))
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, EnvSpec) and vars(self) == vars(other)
-
-    __hash__ = None  # type: ignore[assignment]  # as of EnvSpec
-
-
-def spec_of(spec: EnvSpec) -> Spec:
-    """Return a spec with plain arguments, in which registered objects are their names."""
-    given = plain(spec.kwargs)
-    tables = {"task": TASKS, "estimator": ESTIMATORS, "shield": SHIELDS}
-    for name in tables.keys() & given.keys():
-        given[name] = tables[name].name_of(given[name]) or given[name]
-    parts = {each.name: getattr(spec, each.name) for each in fields(spec) if each.init}
-    return Spec(**{**parts, "kwargs": given})
-
-
-class HasSpec:
-    """An environment that can be made again from its `spec`."""
-
-    _spec: Spec | None = None
-
-    @property
-    def spec(self) -> EnvSpec | None:
-        """What `gymnasium.make` made this from; its arguments are as JSON has them."""
-        return self._spec
-
-    @spec.setter
-    def spec(self, spec: EnvSpec | None) -> None:
-        self._spec = spec and spec_of(spec)
-
 
 class EnvBase(HasSpec, Stateful):
     """What a single and a vector environment have in common: states, pictures' form, `spec`."""
 
     closed = False
+    PICTURES: ClassVar[tuple[str, ...]] = RENDER_MODES
+    """The render modes that are taken."""
 
     def _open(self, settings: Settings, render_mode: str | None, width: int, height: int) -> None:
         """Keep settings, and a form of pictures once it is known to be one."""
-        check_render_mode(render_mode)
+        check_render_mode(render_mode, self.PICTURES)
         share()
         self._size = picture_size(width, height)
         self.render_mode, self.config, self._task = render_mode, settings.config, settings.task
@@ -134,7 +74,38 @@ class EnvBase(HasSpec, Stateful):
         others = [term.name for term in self._task.rewards] + others
         return partial(goal.judged, apart, config=self.config.task, others=others)
 
-    def _refuse_closed(self) -> None:
+    @property
+    def compute_terminated(self) -> Callable[[Any, Any, Any], Any]:
+        """(achieved_goal, desired_goal, info) -> whether the episode ended in the step of that
+        info, or of many as `compute_reward` takes them.
+
+        No goal ends an episode: a contact does, if `config.cost.contact_terminates`.
+
+        Raises:
+            NoGoalError: as of `compute_reward`.
+            NoAttributeError: the task ends episodes by a function of its own, `Task.over`.
+        """
+        apart = goal_of(self._task)
+        if self._task.over is not None:
+            raise NoAttributeError(
+                f"{self._task.id} ends episodes by a function of its own (Task.over), which goals "
+                "and infos do not tell: read `terminated` of `step`."
+            )
+        entries = ("cost_contact",) if self.config.cost.contact_terminates else ()
+        return partial(goal.ended, apart, entries=entries)
+
+    @property
+    def compute_truncated(self) -> Callable[[Any, Any, Any], Any]:
+        """(achieved_goal, desired_goal, info) -> False, for many (B,): what cuts an episode off is
+        its time limit.
+
+        Raises:
+            NoGoalError: as of `compute_reward`.
+        """
+        return partial(goal.ended, goal_of(self._task))
+
+    def refuse_closed(self) -> None:
+        """Raise a `ConfigError` once the environment is closed."""
         if self.closed:
             raise ConfigError("This environment is closed; make a new one.")
 
@@ -232,7 +203,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
             options: "steps_left": after so many steps this episode is truncated, if its time
                 limit does not end it before.
         """
-        self._refuse_closed()
+        self.refuse_closed()
         steps_left = _steps_left(options or {})
         super().reset(seed=seed)
         self._begun, self._steps_left = True, steps_left
@@ -243,7 +214,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         self, action: NDArray[np.float32]
     ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Act for one control step (1 / 25 s); the walk itself is `Simulation.step`."""
-        self._refuse_closed()
+        self.refuse_closed()
         if not self._begun:
             raise ConfigError("Call reset() before step().")
         values = checked_action(action, (self.simulation.n_actions,))
@@ -267,12 +238,14 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
 
     def render(self) -> NDArray[Any] | None:  # type: ignore[override]
         """The scene from a good viewpoint, as the render mode says."""
+        self.refuse_closed()
         if self.render_mode is None:
             return None
         return self.views.picture(self.render_mode == "depth_array", size=self._size)
 
     def mosaic(self) -> NDArray[np.uint8]:
         """The four cameras with crops, detected keypoints and the estimated skeleton."""
+        self.refuse_closed()
         return self.views.mosaic()
 
     def split_observation(self, observation: Observation) -> dict[str, Floats]:
@@ -300,16 +273,16 @@ def _steps_left(options: Mapping[str, Any]) -> int:
     return whole('options["steps_left"]', options.get("steps_left", ENDLESS), 1, ENDLESS)
 
 
-def check_render_mode(render_mode: str | None) -> None:
-    """Raise a `ConfigError` for a render mode that there is not, with those that there are."""
+def check_render_mode(render_mode: str | None, valid: Sequence[str] = RENDER_MODES) -> None:
+    """Raise a `ConfigError` for a render mode that is not `valid`, with those that are."""
     if render_mode == "human":
         raise ConfigError(
             "render_mode='human' is a window round an environment that draws: gymnasium.make("
             "ID, render_mode='human') puts it there (pip install 'hrc_env[view]'), or "
             "gymnasium.wrappers.HumanRendering does, round one with render_mode='rgb_array'."
         )
-    if render_mode is not None and render_mode not in RENDER_MODES:
-        raise unknown("render_mode", render_mode, RENDER_MODES)
+    if render_mode is not None and render_mode not in valid:
+        raise unknown("render_mode", render_mode, valid)
 
 
 def spaces(simulation: Simulation) -> tuple[Any, Box[np.float32]]:

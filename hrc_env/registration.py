@@ -10,16 +10,16 @@ import os
 import sys
 import zlib
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gymnasium.envs.registration import register, registry
+from gymnasium.envs.registration import EnvSpec, register, registry
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.reservation import reserve
-from hrc_env.tasks import BUILT_IN, EPISODE_STEPS
+from hrc_env.tasks import BUILT_IN, DEFAULT, EPISODE_STEPS
 
 if TYPE_CHECKING:
     from hrc_env.core.registry import Registry
@@ -160,3 +160,74 @@ def _add(table: "Registry[Any]", name: str, thing: Any, is_function: bool = Fals
     if name in BUILT_IN:
         raise ConfigError(f"There is the {table.kind} {name!r} already; choose another name.")
     table.register(name, thing)
+
+
+ADVICE = {
+    "task": "Register the task (hrc_env.register_task) and give its id.",
+    "estimator": "Register an estimator (hrc_env.register_estimator) and give its name.",
+    "shield": "Register the shield (hrc_env.register_shield) and give its name.",
+}
+"""For arguments that JSON cannot hold, by name."""
+OTHERWISE = (
+    "Give text, numbers, lists, records or mappings of these; of a clip in memory the path of its "
+    "file (hrc_env.motion.clip.save_clip writes one)."
+)
+"""The advice for other arguments."""
+
+
+class Spec(EnvSpec):
+    """A spec whose JSON holds every argument: `gymnasium.make` makes the same environment of it."""
+
+    def to_json(self) -> str:
+        """Return the spec as JSON; `ConfigError` for an argument that has no such form."""
+        from hrc_env.config import HRCConfig, resolve
+        from hrc_env.core.mapping import for_json
+        from hrc_env.tasks.task import task_called
+        from hrc_env.tracking.estimators import estimator_called
+
+        given = {**self.kwargs}
+        if isinstance(given.get("config"), HRCConfig):  # its tracker is of the estimator's kind
+            task = task_called(given.get("task", DEFAULT))
+            estimator = estimator_called(given.get("estimator", "particle"))
+            given["config"] = resolve(given["config"], task, estimator)
+        for name, value in given.items():
+            try:
+                given[name] = for_json(value, name)
+            except ConfigError as error:
+                raise ConfigError(f"{error} {ADVICE.get(name, OTHERWISE)}") from error
+        return EnvSpec.to_json(replace(self, kwargs=given))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, EnvSpec) and vars(self) == vars(other)
+
+    __hash__ = None  # type: ignore[assignment]  # as of EnvSpec
+
+
+def spec_of(spec: EnvSpec) -> Spec:
+    """Return a spec with plain arguments, in which registered objects are their names."""
+    from hrc_env.core.mapping import plain
+    from hrc_env.safety.shield import SHIELDS
+    from hrc_env.tasks.task import TASKS
+    from hrc_env.tracking.estimators import ESTIMATORS
+
+    given = plain(spec.kwargs)
+    tables = {"task": TASKS, "estimator": ESTIMATORS, "shield": SHIELDS}
+    for name in tables.keys() & given.keys():
+        given[name] = tables[name].name_of(given[name]) or given[name]
+    parts = {each.name: getattr(spec, each.name) for each in fields(spec) if each.init}
+    return Spec(**{**parts, "kwargs": given})
+
+
+class HasSpec:
+    """An environment that can be made again from its `spec`."""
+
+    _spec: Spec | None = None
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """What `gymnasium.make` made this from; its arguments are as JSON has them."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = spec and spec_of(spec)

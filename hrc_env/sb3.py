@@ -5,23 +5,30 @@ PPO("MlpPolicy", HRCVecEnv(64, stagger=True, perception="keypoints"))
 """
 
 import time
+import warnings
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AutoresetMode
+from gymnasium.wrappers import OrderEnforcing, TimeLimit
 from numpy.typing import NDArray
 
-from hrc_env.core.errors import ConfigError, learner
+from hrc_env.core.errors import ConfigError, check_shape, learner, whole
 from hrc_env.core.typing import Bools, Floats, Ints
+from hrc_env.env import ENDLESS
 from hrc_env.rewards import RewardConfig
 from hrc_env.safety.incidents import KINDS
 from hrc_env.simulation import Simulation
 from hrc_env.step import Observation
 from hrc_env.tasks.goal import TERM
 from hrc_env.vector.env import HRCVectorEnv
+from hrc_env.vector.member import TOGETHER, Member, info_of
+from hrc_env.vector.options import steps_behind
 
 with learner():
+    from stable_baselines3.common.monitor import Monitor
     from stable_baselines3.common.vec_env import VecEnv
 
 COSTS = ("cost", "cost_proximity", "cost_contact")
@@ -32,6 +39,8 @@ SO_FAR = np.dtype(
 """What an episode has come to so far; a long touch is one contact."""
 ACHIEVED, FAILED = "goals_reached", "goals_missed"
 """What an episode's statistics call the attempts of every task (`Task.achieved`, `Task.failed`)."""
+REPLACED = (Monitor, OrderEnforcing)
+"""Wrappers of one environment that this `VecEnv` replaces, with a time limit `TimeLimit` too."""
 
 
 class HRCVecEnv(VecEnv):
@@ -40,7 +49,8 @@ class HRCVecEnv(VecEnv):
     Environment k of `seed(s)` and then `reset()` is the single environment after
     `reset(seed=s + k)`. The info of a step holds its "cost" only (with goals also the rest of the
     reward, for HER with `copy_info_dict`), but where an episode ended the whole, with
-    "terminal_observation", "TimeLimit.truncated" and the statistics, "episode".
+    "terminal_observation", "TimeLimit.truncated" and the statistics, "episode": `Monitor`'s work is
+    done. Attributes and methods of one environment are those of `hrc_env.vector.member.Member`.
 
     Args:
         stagger: after a `seed()`, let each environment's first episode end early at a random
@@ -54,8 +64,10 @@ class HRCVecEnv(VecEnv):
     ) -> None:
         self.env = HRCVectorEnv(num_envs, autoreset_mode=AutoresetMode.SAME_STEP, **kwargs)
         space, actions = self.env.single_observation_space, self.env.single_action_space
+        self._past: list[list[Past]] = [[] for _ in range(num_envs)]
+        self._n_steps = np.zeros(num_envs, int)
         super().__init__(num_envs, space, actions)
-        self.metadata = self.env.metadata
+        self.metadata = self._member(0).metadata
         self.stagger, self.started_s = stagger, time.time()
         self.seed(seed)
         self.costs: Floats = np.zeros(num_envs)
@@ -68,6 +80,11 @@ class HRCVecEnv(VecEnv):
         """The environments' simulation; of several, the first."""
         return self.env.shards.first
 
+    @property
+    def spec(self) -> EnvSpec | None:
+        """Specification of one environment for `gymnasium.make`; None of an unregistered task."""
+        return self._member(0).spec
+
     def seed(self, seed: int | None = None) -> list[int | None]:  # type: ignore[override]
         """Seed environment k with seed + k at the next reset; None draws a seed."""
         seeds = list(super().seed(seed))
@@ -75,22 +92,33 @@ class HRCVecEnv(VecEnv):
         return seeds
 
     def set_options(self, options: Any = None) -> None:
-        """Not supported: environments take their settings when they are made."""
-        if options:
-            raise ConfigError(f"HRCVecEnv takes no options, got {options}; use its arguments.")
+        """Take options for the next reset: "steps_left" or "elapsed_steps", as of
+        `HRCVectorEnv.reset` a number each; one mapping for all environments or a list of them.
+
+        Raises:
+            ConfigError: an unknown option, a value that cannot work, or a list of another
+                length.
+        """
+        each = options if isinstance(options, (list, tuple)) else [options] * self.num_envs
+        check_shape("options", (len(each),), (self.num_envs,), "a mapping for each environment")
+        for one in each:
+            steps_behind(one, self.env.max_episode_steps)
+        super().set_options([dict(one or {}) for one in each])
 
     def reset(self) -> Observation:  # type: ignore[override]
         """Start every environment: from its seed the first time, then on with its stream."""
-        options = None
+        limit = self.env.max_episode_steps
+        elapsed = np.zeros(self.num_envs, int)
         if self._phases is not None:
-            elapsed = self._phases.integers(self.env.max_episode_steps, size=self.num_envs)
-            options, self._phases = {"elapsed_steps": elapsed}, None
-        seeds = None if None in self._seeds else self._seeds
-        observation, infos = self.env.reset(seed=seeds, options=options)
+            elapsed, self._phases = self._phases.integers(limit, size=self.num_envs), None
+        for k, options in enumerate(self._options):
+            elapsed[k] = steps_behind(options, limit) if options else elapsed[k]
+        observation, infos = self.env.reset(seed=self._seeds, options={"elapsed_steps": elapsed})
         self._reset_seeds()
+        self._reset_options()
         self.costs = np.zeros(self.num_envs)
         self._begin(np.arange(self.num_envs))
-        self.reset_infos = [_info_of(infos, b) for b in range(self.num_envs)]
+        self.reset_infos = [info_of(infos, b) for b in range(self.num_envs)]
         return observation
 
     def step_async(self, actions: NDArray[Any]) -> None:
@@ -107,11 +135,12 @@ class HRCVecEnv(VecEnv):
         infos = self._infos(fresh)
         ended = np.flatnonzero(done)
         for b in ended.tolist():
-            infos[b] = _info_of(fresh["final_info"], b)
+            infos[b] = info_of(fresh["final_info"], b)
             infos[b]["terminal_observation"] = fresh["final_obs"][b]
             infos[b]["TimeLimit.truncated"] = bool(truncated[b] and not terminated[b])
-            infos[b]["episode"] = self._episode(b, infos[b])
-            self.reset_infos[b] = _info_of(fresh, b)
+            infos[b]["episode"] = episode = self._episode(b, infos[b])
+            self._past[b].append(Past(episode["r"], int(episode["l"]), episode["t"]))
+            self.reset_infos[b] = info_of(fresh, b)
         self._begin(ended)
         return observation, reward.astype(np.float32), done, infos
 
@@ -133,8 +162,13 @@ class HRCVecEnv(VecEnv):
         """Release threads and graphics contexts."""
         self.env.close()
 
-    def get_images(self) -> list[NDArray[np.uint8]]:
-        """A picture of every environment."""
+    def get_images(self) -> list[NDArray[np.uint8] | None]:
+        """Return a picture of every environment; None of each, with a warning, unless the render
+        mode is "rgb_array"."""
+        if self.render_mode != "rgb_array":
+            said = f"Images take render_mode='rgb_array', this one is {self.render_mode!r}."
+            warnings.warn(said, stacklevel=2)
+            return [None] * self.num_envs
         return list(self.env.render() or ())
 
     def _begin(self, ids: Ints) -> None:
@@ -144,6 +178,7 @@ class HRCVecEnv(VecEnv):
     def _count(self, reward: Floats, infos: Mapping[str, Any]) -> None:
         now = self._so_far
         now["steps"] += 1
+        self._n_steps += 1
         now["reward"] += reward
         costs = {name: of_step(infos, name, self.num_envs) for name in COSTS}
         for name, cost in costs.items():
@@ -173,28 +208,101 @@ class HRCVecEnv(VecEnv):
         }
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """An attribute of the vector environment, the same for everyone."""
-        return [getattr(self.env, attr_name)] * len(list(self._get_indices(indices)))
+        """Return the attribute of each environment."""
+        return [getattr(self._member(k), attr_name) for k in self._chosen(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Not supported: the environments are one object."""
-        raise ConfigError(f"HRCVecEnv cannot set {attr_name!r} on single environments.")
+        """Set `np_random` or an attribute of your own; `ConfigError` for a setting."""
+        for k in self._chosen(indices):
+            setattr(self._member(k), attr_name, value)
 
-    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> Any:
-        """What HER asks for: "compute_reward" of goals and infos, the same for everyone. No other
-        method: the environments are one object.
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any
+    ) -> list[Any]:
+        """Call a method of each environment and return the results.
 
         Raises:
-            NoGoalError: the task has no goals apart from its observation.
+            NoAttributeError: there is no such method.
+            ConfigError: it must not be called for some environments only.
         """
-        if method_name == "compute_reward":
-            reward = self.env.compute_reward(*args, **kwargs)
-            return [reward] * len(list(self._get_indices(indices)))
-        raise ConfigError(f"HRCVecEnv cannot call {method_name!r} on single environments.")
+        chosen = self._chosen(indices)
+        if method_name not in TOGETHER:
+            methods = [getattr(self._member(k), method_name) for k in chosen]
+            return [method(*method_args, **method_kwargs) for method in methods]
+        if set(chosen) != set(range(self.num_envs)):
+            raise ConfigError(
+                f"{method_name}() is for all environments together: leave out indices={indices}."
+            )
+        return [getattr(self.env, method_name)(*method_args, **method_kwargs)] * len(chosen)
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
-        """No environment is wrapped."""
-        return [False] * len(list(self._get_indices(indices)))
+        """Return whether this wrapper is replaced (`REPLACED`), for each environment."""
+        limited = self.env.max_episode_steps != ENDLESS
+        done = (*REPLACED, TimeLimit) if limited else REPLACED
+        wrapped = any(issubclass(each, wrapper_class) for each in done)
+        return [wrapped] * len(self._chosen(indices))
+
+    def _chosen(self, indices: Any) -> list[int]:
+        """Return the numbers of the chosen environments; -1 is the last, as in a list."""
+        n = self.num_envs
+        return [whole("indices", k, -n, n - 1) % n for k in self._get_indices(indices)]
+
+    def _member(self, k: int) -> "MonitoredMember":
+        return MonitoredMember(self, k)
+
+    def past_of(self, k: int) -> list["Past"]:
+        """Return the finished episodes of environment `k`."""
+        return self._past[k]
+
+    def count_steps(self, k: int) -> int:
+        """Return the steps of environment `k` since it was made."""
+        return int(self._n_steps[k])
+
+    def begin_alone(self, k: int, info: dict[str, Any]) -> None:
+        """Begin the statistics of environment `k`, which has started alone, with this info."""
+        self._begin(np.array([k]))
+        self.costs = np.where(np.arange(self.num_envs) == k, 0.0, self.costs)
+        self.reset_infos[k] = info
+
+
+class Past(NamedTuple):
+    """A finished episode, as `Monitor` keeps it."""
+
+    reward: float
+    length: int
+    since_start_s: float
+
+
+class MonitoredMember(Member):
+    """Environment `k` of an `HRCVecEnv`, with the statistics of a `Monitor`."""
+
+    def __init__(self, many: HRCVecEnv, k: int) -> None:
+        super().__init__(many.env, k)
+        self.__dict__["_many"] = many
+
+    def reset(
+        self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Start an episode of this environment, and its statistics."""
+        observation, info = super().reset(seed=seed, options=options)
+        self._many.begin_alone(self._k, info)
+        return observation, info
+
+    def get_total_steps(self) -> int:
+        """Return the steps since the environment was made."""
+        return self._many.count_steps(self._k)
+
+    def get_episode_rewards(self) -> list[float]:
+        """Return the returns of finished episodes."""
+        return [each.reward for each in self._many.past_of(self._k)]
+
+    def get_episode_lengths(self) -> list[int]:
+        """Return the lengths of finished episodes [steps]."""
+        return [each.length for each in self._many.past_of(self._k)]
+
+    def get_episode_times(self) -> list[float]:
+        """Return the ends of finished episodes, since the environments were made [s]."""
+        return [each.since_start_s for each in self._many.past_of(self._k)]
 
 
 def of_step(infos: Mapping[str, Any], name: str, num_envs: int) -> Floats:
@@ -205,8 +313,3 @@ def of_step(infos: Mapping[str, Any], name: str, num_envs: int) -> Floats:
             known = part[f"_{name}"]
             value[known] = part[name][known]
     return value
-
-
-def _info_of(infos: Mapping[str, Any], b: int) -> dict[str, Any]:
-    """What a vector environment's infos say about environment `b`."""
-    return {name: infos[name][b] for name in infos if not name.startswith(("_", "final_"))}

@@ -2,6 +2,7 @@
 
 import pickle
 import warnings
+from dataclasses import replace
 
 import gymnasium
 import numpy as np
@@ -19,6 +20,7 @@ from hrc_env.core.errors import ConfigError, NoGoalError
 from hrc_env.env import HRCEnv
 from hrc_env.sb3 import HRCVecEnv
 from hrc_env.tasks.reach_goal import ReachGoalConfig
+from hrc_env.vector.env import HRCVectorEnv
 
 REACH, PICK = IDS = ("HRCReachGoal-v0", "HRCPickPlaceGoal-v0")
 SIZES = {REACH: 3, PICK: 9}
@@ -218,8 +220,49 @@ def test_a_task_without_goals_says_which_have_some():
             ask()
         assert all(task in str(error.value) for task in IDS)
         assert "choose one of these" in str(error.value)
-    with pytest.raises(ConfigError, match="cannot call 'close'"):
-        many.env_method("close")
+    for name in ("compute_reward", "compute_terminated", "compute_truncated"):
+        assert not many.has_attr(name)
+        assert not hasattr(env, name)
+
+
+@pytest.mark.parametrize("ends", [True, False])
+def test_what_ended_an_episode_follows_from_goals_and_info(ends):
+    """As Gymnasium-Robotics asks of goal environments; a contact ends it here."""
+    cost = {"cost": {"contact_terminates": ends}}
+    people = {"n_workers": 2, "people": "unaware", "control": "tool"}
+    env = HRCEnv(REACH, perception="none", config=cost, **people)
+    over = touched = 0
+    for seed in (55, 4):  # in which the tool meets somebody
+        env.reset(seed=seed)
+        for _ in range(15):
+            seen, _, terminated, truncated, info = env.step(np.ones(3))
+            judged = *goals(seen), info
+            assert env.compute_terminated(*judged) is terminated
+            assert env.compute_truncated(*judged) is truncated is False
+            over, touched = over + terminated, touched + (info["cost_contact"] > 0)
+            if terminated:
+                break
+    assert touched >= 2
+    assert over == (2 if ends else 0)
+
+
+def test_many_are_judged_at_once():
+    cost = {"cost": {"contact_terminates": True}}
+    env = HRCVectorEnv(2, task=REACH, perception="none", config=cost)
+    pairs = np.zeros((2, 3)), np.zeros((2, 3))
+    infos = [{"cost_contact": 0.0}, {"cost_contact": 1.0}]
+    assert env.compute_terminated(*pairs, infos).tolist() == [False, True]
+    assert env.compute_truncated(*pairs, infos).tolist() == [False, False]
+    with pytest.raises(ConfigError, match="must both have shape"):
+        env.compute_truncated(np.zeros(3), np.zeros(2), {})
+
+
+def test_a_task_that_ends_by_itself_does_not_pretend_to_follow_from_goals():
+    task = replace(HRCEnv(REACH, perception="none").simulation.task, over=lambda step: step)
+    env = HRCEnv(task, perception="none")
+    assert not hasattr(env, "compute_terminated")
+    with pytest.raises(ConfigError, match=r"Task\.over"):
+        env.compute_terminated  # noqa: B018
 
 
 @pytest.mark.parametrize(

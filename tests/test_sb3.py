@@ -7,7 +7,11 @@ from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.callbacks import EvalCallback
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
-from stable_baselines3.common.vec_env import VecCheckNan, VecMonitor, VecNormalize
+from stable_baselines3.common.vec_env import (
+    VecCheckNan,
+    VecFrameStack,
+    VecNormalize,
+)
 
 import hrc_env  # noqa: F401  registers the ids
 from hrc_env.core.errors import ConfigError
@@ -194,16 +198,8 @@ def test_sb3_finds_what_it_asks_a_vec_env_for():
     assert env.render_mode is None
     assert env.get_attr("max_episode_steps", indices=[0, 2]) == [250, 250]
     assert not env.has_attr("nobody_has_this")
-    assert env.env_is_wrapped(Monitor) == [False] * 3
+    assert env.env_is_wrapped(Monitor) == [True] * 3
     env.set_options({})
-    refused = (
-        lambda: env.set_options({"start": 1}),
-        lambda: env.set_attr("config", None),
-        lambda: env.env_method("look"),
-    )
-    for refusal in refused:
-        with pytest.raises(ConfigError, match="HRCVecEnv"):
-            refusal()
 
 
 def test_pictures_of_all_environments_are_tiled():
@@ -219,8 +215,9 @@ def test_pictures_of_all_environments_are_tiled():
 def test_sb3s_own_wrappers_and_learners_take_it():
     """On policy and off; VecCheckNan raises at the first NaN."""
     made = HRCVecEnv(4, perception="truth", max_episode_steps=20)
-    PPO("MlpPolicy", VecNormalize(VecCheckNan(made)), n_steps=32, batch_size=64).learn(256)
-    learner = SAC("MlpPolicy", VecMonitor(made), learning_starts=20, buffer_size=500)
+    stacked = VecFrameStack(VecCheckNan(made), 2)
+    PPO("MlpPolicy", VecNormalize(stacked), n_steps=32, batch_size=64).learn(256)
+    learner = SAC("MlpPolicy", made, learning_starts=20, buffer_size=500)
     learner.learn(120)
     assert learner.replay_buffer.timeouts.any()
     assert len(learner.ep_info_buffer) >= 4

@@ -24,6 +24,10 @@ class NoGoalError(ConfigError, AttributeError):
     """A reward by goals is asked for of a task that has none. Who asks with `hasattr` hears so."""
 
 
+class NoAttributeError(ConfigError, AttributeError):
+    """An environment has no attribute of this name; `hasattr` gives False."""
+
+
 class DownloadError(HRCError, RuntimeError):
     """Something that is fetched once could not be fetched, or is not what it should be."""
 

@@ -168,9 +168,9 @@ class Views:
             images.append(image)
         return images
 
-    def mosaic(self) -> Image:
-        """The cameras in two columns."""
-        return overlay.tile(self.cameras(*MOSAIC_TILE, self.glance()), 2)
+    def mosaic(self, b: int = 0) -> Image:
+        """The cameras of environment `b` in two columns."""
+        return overlay.tile(self.cameras(*MOSAIC_TILE, self.glance(b)), 2)
 
     def close(self) -> None:
         """Free the graphics contexts."""

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from hrc_env.belief import Belief
 from hrc_env.core.errors import ConfigError, check_shape
-from hrc_env.core.typing import Floats, Tensor
+from hrc_env.core.typing import Bools, Floats, Tensor
 from hrc_env.rewards import RewardTerm
 
 ACHIEVED, DESIRED = "achieved_goal", "desired_goal"
@@ -88,17 +88,42 @@ def judged(
     Returns:
         A number, or (B,).
     """
-    pair = [_numbers(name, of) for name, of in ((ACHIEVED, achieved), (DESIRED, desired))]
-    if pair[0].shape != pair[1].shape or pair[0].ndim not in (1, 2):
-        raise ConfigError(
-            f"{ACHIEVED} and {DESIRED} must both have shape ({goal.size},) or (B, {goal.size}), "
-            f"got {pair[0].shape} and {pair[1].shape}."
-        )
-    check_shape(ACHIEVED, pair[0].shape[-1:], (goal.size,), "its last axis: entries of a goal")
-    value = np.zeros(pair[0].shape[:-1]) + goal.reward(pair[0], pair[1], config)
+    reached, wanted = _pair(goal, achieved, desired)
+    value = np.zeros(reached.shape[:-1]) + goal.reward(reached, wanted, config)
     for name in others:
         value = value + _told(info, f"reward/{name}", value.shape)
     return value if value.ndim else float(value)
+
+
+def ended(
+    goal: Goal, achieved: ArrayLike, desired: ArrayLike, info: Any, entries: Sequence[str] = ()
+) -> Bools | bool:
+    """Return whether the steps of these infos end their episodes, which reached goals never do.
+
+    Args:
+        goal, achieved, desired, info: as of `judged`.
+        entries: of an info, any of which ends an episode where it is above 0.
+
+    Returns:
+        A bool, or (B,).
+    """
+    reached, _ = _pair(goal, achieved, desired)
+    over = np.zeros(reached.shape[:-1], bool)
+    for name in entries:
+        over = over | (_told(info, name, over.shape) > 0)
+    return over if over.ndim else bool(over)
+
+
+def _pair(goal: Goal, achieved: ArrayLike, desired: ArrayLike) -> tuple[Floats, Floats]:
+    """Return both as numbers, (size,) or (B, size); `ConfigError` for other shapes or values."""
+    reached, wanted = _numbers(ACHIEVED, achieved), _numbers(DESIRED, desired)
+    if reached.shape != wanted.shape or reached.ndim not in (1, 2):
+        raise ConfigError(
+            f"{ACHIEVED} and {DESIRED} must both have shape ({goal.size},) or (B, {goal.size}), "
+            f"got {reached.shape} and {wanted.shape}."
+        )
+    check_shape(ACHIEVED, reached.shape[-1:], (goal.size,), "its last axis: entries of a goal")
+    return reached, wanted
 
 
 def _numbers(name: str, given: ArrayLike) -> Floats:

@@ -17,23 +17,26 @@ import numpy as np
 from gymnasium.utils import seeding
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
+from gymnasium.wrappers.vector import HumanRendering
 from numpy.typing import NDArray
 
 from hrc_env.config import settle
 from hrc_env.control import checked_action
 from hrc_env.core.batching import copied, mapped, one, write_rows
-from hrc_env.core.errors import ConfigError, whole
+from hrc_env.core.errors import ConfigError, check_shape, whole
 from hrc_env.core.infos import worded
 from hrc_env.core.machine import n_cores
 from hrc_env.core.typing import Bools, Floats, Ints
-from hrc_env.env import EnvBase, HasSpec, spaces
-from hrc_env.render.views import PICTURE_SIZE, Views
+from hrc_env.env import RENDER_MODES, EnvBase, spaces
+from hrc_env.registration import HasSpec
+from hrc_env.render.views import PICTURE_SIZE
 from hrc_env.rewards import RewardConfig
 from hrc_env.simulation import Simulation
 from hrc_env.step import Observation, StepResult, words_of
 from hrc_env.tasks import DEFAULT
-from hrc_env.tasks.task import TASKS, task_called
+from hrc_env.tasks.task import TASKS, Task, task_called
 from hrc_env.vector.infos import InfoTable, table
+from hrc_env.vector.member import TOGETHER, Member
 from hrc_env.vector.options import (
     MAX_ENVS,
     autoreset_of,
@@ -42,6 +45,7 @@ from hrc_env.vector.options import (
     threads_of,
     time_limit,
 )
+from hrc_env.vector.pictures import LISTS, Pictures
 from hrc_env.vector.shards import Shards
 
 PROCESSES_PER_CORE = 2
@@ -60,10 +64,13 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         autoreset_mode: when an environment whose episode is over starts anew: at the next
             step (default), in the same step, or not by itself ("Disabled").
         num_threads: threads that share the environments; all cores if None.
-        arguments: of `HRCEnv`, as are `render_mode`, `width` and `height`.
+        render_mode: of `HRCEnv`, or with "_list" behind it: `render` gives every environment's
+            pictures of all steps since the last `render` or the beginning of the episode.
+        arguments: of `HRCEnv`, as are `width` and `height`.
     """
 
     CHANGES = ("shards", "_streams", "_steps", "_ended", "_observation")
+    PICTURES = (*RENDER_MODES, *LISTS)
 
     def __init__(
         self,
@@ -85,12 +92,18 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
             )
         settings = settle(perception=perception, **arguments)
         self._open(settings, render_mode, width, height)
+        if render_mode in LISTS:
+            self.metadata["render_modes"].append(render_mode)
+        size = {"width": width, "height": height} if self._size != PICTURE_SIZE else {}
+        shown = {} if render_mode is None else {"render_mode": render_mode, **size}
+        self.arguments = {"perception": perception, **arguments, **shown}
+        """Given arguments of `HRCEnv`."""
         self.num_envs = whole("num_envs", num_envs, 1, MAX_ENVS)
         self.autoreset_mode = autoreset_of(autoreset_mode)
         self.metadata["autoreset_mode"] = self.autoreset_mode
         n_shards = min(threads_of(num_threads), self.num_envs)
         self.shards = Shards(self.num_envs, n_shards, partial(Simulation, settings=settings))
-        self.views = [Views(part) for part in self.shards.parts]
+        self.pictures = Pictures(self.shards, render_mode, self._size)
         self.single_observation_space, self.single_action_space = spaces(self.shards.first)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
@@ -102,6 +115,8 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         self._steps = np.zeros(self.num_envs, int)
         self._ended = np.zeros(self.num_envs, bool)
         self._observation: Observation | None = None
+        self.notes: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        """Attributes of every environment that a user has set."""
 
     def reset(
         self,
@@ -122,7 +137,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         Returns:
             Observations of all environments, and infos of those that started.
         """
-        self._refuse_closed()
+        self.refuse_closed()
         seeds = seeds_of(seed, self.num_envs)
         mask, elapsed_steps = read_options(options, self.num_envs, self.max_episode_steps)
         if self._observation is None and not mask.all():
@@ -137,6 +152,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
             self._observation = mapped(fresh.observation, np.empty_like)
         write_rows(self._observation, ids, fresh.observation)
         self._ended = self._ended & ~mask
+        self.pictures.take(mask, mask)
         return copied(self._observation), table(fresh, ids, self.num_envs).arrays(mask)
 
     def step(self, actions: NDArray[np.float32]) -> Step:
@@ -158,8 +174,9 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         if self.autoreset_mode is AutoresetMode.SAME_STEP and ended.any():
             finals = _finals(observation, info, ended)
             self._restart(ended, observation, info)
-            ended = np.zeros_like(ended)
+            over, ended = ended, np.zeros_like(ended)
         self._observation, self._ended = observation, ended
+        self.pictures.take(np.ones_like(over), over)
         infos = {**finals, **info.arrays(np.ones_like(ended))}
         return copied(observation), reward, terminated, truncated, infos
 
@@ -179,17 +196,42 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         for part in self.shards.parts:
             part.set_reward(weights)
 
-    def render(self) -> tuple[NDArray[Any], ...] | None:  # type: ignore[override]
-        """A picture of every environment, one after the other (slow), as the render mode says."""
-        self._refuse_closed()
+    def render(self) -> tuple[Any, ...] | None:  # type: ignore[override]
+        """Return every environment's picture, one after the other (slow), or its list of pictures,
+        by the render mode."""
+        self.refuse_closed()
         if self.render_mode is None:
             return None
-        depth = self.render_mode == "depth_array"
-        return tuple(
-            view.picture(depth, b, self._size)
-            for view, part in zip(self.views, self.shards.parts, strict=True)
-            for b in range(part.batch)
-        )
+        return tuple(self.pictures.of(k) for k in range(self.num_envs))
+
+    def member(self, k: int) -> Member:
+        """Return environment `k` by itself."""
+        return Member(self, k)
+
+    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
+        """Return the result of a method, or the value of an attribute, of every environment; the
+        methods `TOGETHER` are called once."""
+        if name in TOGETHER:
+            return (getattr(self, name)(*args, **kwargs),) * self.num_envs
+        said = [getattr(self.member(k), name) for k in range(self.num_envs)]
+        return tuple(each(*args, **kwargs) if callable(each) else each for each in said)
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """Return an attribute of every environment; see `Member`."""
+        return self.call(name)
+
+    def set_attr(self, name: str, values: Any) -> None:
+        """Set an attribute of your own of every environment, to the values of a list or tuple or
+        to one value; see `Member`."""
+        each = values if isinstance(values, (list, tuple)) else [values] * self.num_envs
+        check_shape(f"values of {name!r}", (len(each),), (self.num_envs,), "one an environment")
+        for k, value in enumerate(each):
+            setattr(self.member(k), name, value)
+
+    @property
+    def task(self) -> Task:
+        """The task of every robot."""
+        return self._task
 
     @property
     def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
@@ -201,10 +243,15 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         """What the environments' random generators were made from."""
         return tuple(seed for _, seed in self._streams)
 
+    def set_stream(self, k: int, stream: np.random.Generator) -> None:
+        """Let environment `k` draw from this generator, of unknown seed (-1)."""
+        if not isinstance(stream, np.random.Generator):
+            raise ConfigError(f"np_random must be a numpy.random.Generator, got {stream!r}.")
+        self._streams[k] = stream, -1
+
     def close_extras(self, **kwargs: Any) -> None:
         """Stop the threads and release graphics contexts."""
-        for view in self.views:
-            view.close()
+        self.pictures.close()
         self.shards.close()
 
     def _begin(self, ids: Ints) -> StepResult:
@@ -221,7 +268,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
 
     def _checked(self, actions: Any) -> Floats:
         """Actions (num_envs, n) clipped to [-1, 1]; zero for environments that start anew."""
-        self._refuse_closed()
+        self.refuse_closed()
         if self._observation is None:
             raise ConfigError("Call reset() before step().")
         over = np.flatnonzero(self._ended)
@@ -259,7 +306,10 @@ def make_vector(
         kwargs: of `HRCVectorEnv`; no `num_threads` with "pixels".
     """
     if perception != "pixels":
-        return HRCVectorEnv(num_envs, perception=perception, **kwargs)
+        if kwargs.get("render_mode") != "human":
+            return HRCVectorEnv(num_envs, perception=perception, **kwargs)
+        drawn = {**kwargs, "render_mode": "rgb_array"}
+        return HumanRendering(HRCVectorEnv(num_envs, perception=perception, **drawn))
     limit = PROCESSES_PER_CORE * n_cores()
     if num_envs > limit and not force:
         raise ConfigError(

@@ -7,14 +7,16 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from hrc_env.core.errors import ConfigError, check_shape, unknown, whole
+from hrc_env.core.errors import ConfigError, check_names, check_shape, unknown, whole
 from hrc_env.core.machine import n_cores
 from hrc_env.core.typing import Bools, Ints
 from hrc_env.env import ENDLESS
 
 MAX_ENVS = 16_384
 """More would be gigabytes of filters' states, and no faster."""
-RESET_OPTIONS = ("reset_mask", "steps_left", "elapsed_steps")
+ALONE = ("steps_left", "elapsed_steps")
+"""Options of a reset that one environment may have of its own."""
+RESET_OPTIONS = ("reset_mask", *ALONE)
 
 
 def time_limit(max_episode_steps: int) -> int:
@@ -78,6 +80,15 @@ def read_options(
         return mask, np.maximum(max_episode_steps - steps_left, 0)
     elapsed_steps = given.get("elapsed_steps", np.zeros(num_envs, int))
     return mask, _steps("elapsed_steps", elapsed_steps, num_envs, 0, max_episode_steps - 1)
+
+
+def steps_behind(options: Mapping[str, Any] | None, max_episode_steps: int) -> int:
+    """Return the steps that one environment's episode has behind it, from the options of its
+    reset; `ConfigError` as of `read_options`."""
+    given = dict(options or {})
+    check_names("reset option of one environment", given, ALONE)
+    each = {name: np.array([value]) for name, value in given.items()}
+    return int(read_options(each, 1, max_episode_steps)[1][0])
 
 
 def _mask(mask: Any, num_envs: int) -> Bools:

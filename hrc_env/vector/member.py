@@ -1,0 +1,153 @@
+"""One environment of a vector environment by itself, with the interface of `HRCEnv`."""
+
+import inspect
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import gymnasium
+import numpy as np
+from gymnasium.envs.registration import EnvSpec
+from numpy.typing import NDArray
+
+from hrc_env import observations
+from hrc_env.core.batching import copied, one
+from hrc_env.core.errors import ConfigError, NoAttributeError, unknown
+from hrc_env.core.mapping import plain
+from hrc_env.core.typing import Floats
+from hrc_env.env import ENDLESS, HRCEnv
+from hrc_env.step import Observation
+from hrc_env.vector.options import steps_behind
+
+if TYPE_CHECKING:
+    from hrc_env.vector.env import HRCVectorEnv
+
+ALIKE = (
+    "closed", "compute_reward", "compute_terminated", "compute_truncated", "config",
+    "max_episode_steps", "render_mode",
+)  # fmt: skip
+"""Attributes of the vector environment that hold for every environment."""
+TOGETHER = ("close", "set_reward")
+"""Methods for all environments together only."""
+TAKEN = {*inspect.signature(HRCEnv).parameters, *dir(HRCEnv), *ALIKE, "simulation", "views"}
+"""Names of an environment's attributes and arguments."""
+
+
+class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
+    """Environment `k` of a vector environment: its attributes, its pictures and resets of it alone.
+
+    It steps with the others only. The vector environment keeps attributes that a user sets.
+    """
+
+    def __init__(self, vector: "HRCVectorEnv", k: int) -> None:
+        self.__dict__.update(_vector=vector, _k=k)
+
+    def reset(
+        self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Start an episode of this environment; as of `HRCEnv`, and "elapsed_steps"."""
+        number = self._vector.num_envs
+        alone = np.arange(number) == self._k
+        behind = np.full(number, steps_behind(options, self._vector.max_episode_steps))
+        observation, infos = self._vector.reset(
+            seed=[seed if each else None for each in alone],
+            options={"reset_mask": alone, "elapsed_steps": behind},
+        )
+        return copied(one(observation, self._k)), info_of(infos, self._k)
+
+    def step(self, action: Any) -> NoReturn:
+        """Raise a `ConfigError`: environments step together."""
+        raise ConfigError(
+            f"Environment {self._k} of {self._vector} steps with the others: call step() of the "
+            "vector, with an action for each."
+        )
+
+    def render(self) -> Any:
+        """Return a picture of this environment, or with a mode "..._list" those since the last."""
+        self._vector.refuse_closed()
+        return self._vector.pictures.of(self._k)
+
+    def mosaic(self) -> NDArray[np.uint8]:
+        """Return the cameras' pictures, as `HRCEnv` does."""
+        self._vector.refuse_closed()
+        return self._vector.pictures.mosaic(self._k)
+
+    def split_observation(self, observation: Observation) -> dict[str, Floats]:
+        """Return an observation's terms by name, as `HRCEnv` does."""
+        return observations.split(observation, self._vector.shards.first.layout)
+
+    @property
+    def observation_space(self) -> Any:  # type: ignore[override]
+        """Of one environment."""
+        return self._vector.single_observation_space
+
+    @property
+    def action_space(self) -> Any:  # type: ignore[override]
+        """Of one environment."""
+        return self._vector.single_action_space
+
+    @property
+    def metadata(self) -> dict[str, Any]:  # type: ignore[override]
+        """Of one environment, without the `autoreset_mode`."""
+        said = self._vector.metadata
+        return {name: value for name, value in said.items() if name != "autoreset_mode"}
+
+    @property
+    def render_mode(self) -> str | None:  # type: ignore[override]
+        """Of every environment."""
+        return self._vector.render_mode
+
+    @property
+    def spec(self) -> EnvSpec | None:  # type: ignore[override]
+        """Specification for `gymnasium.make`; None of an unregistered task."""
+        vector = self._vector
+        known = gymnasium.registry.get(vector.task.id)
+        if known is None:
+            return None
+        limit = None if vector.max_episode_steps == ENDLESS else vector.max_episode_steps
+        kwargs = {**vector.arguments, "task": vector.task.id}
+        return replace(known, max_episode_steps=limit, kwargs=plain(kwargs))
+
+    @property
+    def np_random(self) -> np.random.Generator:
+        """The environment's random generator."""
+        return self._vector.np_random[self._k]
+
+    @np_random.setter
+    def np_random(self, value: np.random.Generator) -> None:
+        self._vector.set_stream(self._k, value)
+
+    @property
+    def np_random_seed(self) -> int:
+        """Seed of the random generator; -1 of one that a user has set."""
+        return self._vector.np_random_seed[self._k]
+
+    def __getattr__(self, name: str) -> Any:
+        if "_vector" not in self.__dict__:  # while it is copied
+            raise AttributeError(name)
+        if name in ALIKE:
+            return getattr(self._vector, name)
+        if name not in self._vector.notes[self._k]:
+            valid = [each for each in dir(self) if not each.startswith("_")]
+            raise NoAttributeError(str(unknown("attribute of one environment", name, valid)))
+        return self._vector.notes[self._k][name]
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name == "np_random":
+            super().__setattr__(name, value)
+        elif name in TAKEN or hasattr(type(self), name):
+            raise ConfigError(
+                f"{name!r} of one environment of many cannot be set: environments take their "
+                "settings when they are made. What can be set is `np_random` and attributes of "
+                "your own; reset(options=...) and set_reward(...) change episodes and rewards."
+            )
+        else:
+            self._vector.notes[self._k][name] = value
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *ALIKE, *self._vector.notes[self._k]})
+
+
+def info_of(infos: Mapping[str, Any], b: int) -> dict[str, Any]:
+    """Return the info of environment `b`, of a vector environment's infos."""
+    return {name: infos[name][b] for name in infos if not name.startswith(("_", "final_"))}
