@@ -16,6 +16,12 @@ from hrc_env.core.typing import Floats, Image
 
 LEAST_CONTRAST = 3.0
 """Least standard deviation of a colour channel of a picture that is not blank, in `COARSE_PX`."""
+LEAST_EDGES, EDGE_SHARE = 0.06, 0.98
+"""How much the sharpest parts of a picture, beyond this quantile, differ from their surroundings at
+least, as a share of the span of grey levels: in rooms 0.1 and more, on slopes 0.05 at most."""
+EDGE_PX, EDGE_SIGMA_PX, EDGE_BORDER_PX = 64, 2.0, 6
+"""Size of the picture in which edges are looked for, the Gaussian that makes the surroundings, and
+the border that is left out [px]."""
 COARSE_PX = 32
 """Contrast is measured on a picture of this size [px]: the noise of pixels averages out."""
 DULL, DULLEST = 75.0, 60.0
@@ -83,6 +89,17 @@ def is_blank(crop: Image, mask: Image | None = None) -> bool:
     seen = None if mask is None else cv2.resize(mask, size, interpolation=cv2.INTER_NEAREST)
     _, deviation = cv2.meanStdDev(coarse, mask=seen)
     return bool(deviation.max() < LEAST_CONTRAST)
+
+
+def has_edges(crop: Image) -> bool:
+    """Return whether a crop (n, n, 3) shows any edge: a covered lens, fog or a light that shines
+    into the camera show slopes only, however much of the range of grey levels they span."""
+    tones = _tones(crop, None)
+    size = (EDGE_PX, EDGE_PX)
+    small = cv2.resize(tones.grey.astype(np.float32), size, interpolation=cv2.INTER_AREA)
+    off = np.abs(small - cv2.GaussianBlur(small, (0, 0), EDGE_SIGMA_PX))
+    inner = off[EDGE_BORDER_PX:-EDGE_BORDER_PX, EDGE_BORDER_PX:-EDGE_BORDER_PX]
+    return bool(np.quantile(inner, EDGE_SHARE) >= LEAST_EDGES * tones.span)
 
 
 def develop(crop: Image, mask: Image | None = None) -> Developed:

@@ -24,7 +24,7 @@ from hrc_env.geometry.cameras import (
     rays,
 )
 from hrc_env.perception import blazepose
-from hrc_env.perception.exposure import develop
+from hrc_env.perception.exposure import develop, has_edges
 from hrc_env.perception.network import LANDMARK_SIDE, PersonDetector
 
 SEARCH_RAD = math.radians(75.0)
@@ -87,6 +87,7 @@ def search_jobs(
 
 def _searched(detect: PersonDetector, c: int, crop: Image, window: Roi) -> Searched:
     picture, _, shows = develop(crop)
+    shows = shows and has_edges(crop)
     found = people(detect, picture)
     windows = [blazepose.person_window(person, window) for person in found]
     scores = [person.score for person in found]

@@ -9,7 +9,7 @@ from hrc_env.core.records import Roi
 from hrc_env.core.skeleton import BLAZEPOSE_INDEX
 from hrc_env.geometry.cameras import pinhole
 from hrc_env.perception.detector import PoseDetector
-from hrc_env.perception.exposure import MOST_DOUBT, SPAN, develop, is_blank
+from hrc_env.perception.exposure import MOST_DOUBT, SPAN, develop, has_edges, is_blank
 from hrc_env.scene.build import build
 from hrc_env.scene.domain_randomization import AppearanceConfig, draw_look
 from hrc_env.scene.render import CropRenderer
@@ -101,6 +101,27 @@ def test_pictures_in_which_noise_hides_people_show_nothing(pictures, share, nois
         dull = darker(crop, share, noise, base=40.0)
         assert not is_blank(dull)
         assert develop(dull).shows == shows
+
+
+X, Y = np.meshgrid(np.arange(256.0), np.arange(256.0))
+SLOPES = {
+    "a light": 255 * np.exp(-((X - 128) ** 2 + (Y - 128) ** 2) / (2 * 90.0**2)),
+    "a slope": 40 + 160 * X / 255,
+    "a hand": 130 + 20 * np.sin(X / 40) + 15 * np.cos(Y / 50),
+    "fog": 170 + 40 * Y / 255 + 6 * np.sin((X + Y) / 70),
+    "noise on a slope": 40 + 160 * X / 255 + np.random.default_rng(0).normal(0, 6, X.shape),
+}
+
+
+@pytest.mark.parametrize("name", SLOPES)
+def test_pictures_of_slopes_alone_show_nobody(name):
+    grey = np.clip(SLOPES[name], 0, 255).astype(np.uint8)
+    assert not has_edges(np.repeat(grey[..., None], 3, axis=2))
+
+
+@pytest.mark.parametrize("light", [1.0, 0.3, 0.15])
+def test_pictures_of_rooms_have_edges_in_any_light(pictures, light):
+    assert all(has_edges((light * crop).astype(np.uint8)) for crop in pictures)
 
 
 def test_what_lies_outside_the_image_does_not_count(pictures):
