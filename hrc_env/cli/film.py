@@ -5,7 +5,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import ExitStack, closing
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -128,8 +128,7 @@ def _filmed(
     still: Future[Image] = Future()
     diary, closest_m, started_s = np.zeros(n_steps, MOMENT), np.inf, time.monotonic()
     step, counts = 0, {}
-    with closing(writer), ThreadPoolExecutor(1, "hrc_env-film") as thread, ExitStack() as after:
-        after.callback(lambda: thread.submit(env.views.close).result())  # where they were made
+    with closing(writer), ThreadPoolExecutor(1, "hrc_env-film") as thread:
         for step, (_, info) in enumerate(track(played, "filming", n_steps)):
             believed = env.simulation.belief.separation.distance_m
             true_m = info.get("safety/min_separation_m", np.inf)
