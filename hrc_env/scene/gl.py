@@ -36,9 +36,9 @@ WINDOWS = ("", "glfw", "glx", "enable", "enabled", "on", "true", "1")
 OFF = ("disable", "disabled", "off", "false", "0")
 """Values of MUJOCO_GL that switch rendering off."""
 VARIABLES = ("PYOPENGL_PLATFORM", "MUJOCO_EGL_DEVICE_ID", "CUDA_VISIBLE_DEVICES", "EGL_PLATFORM")
-"""What also decides whether there is a context."""
+"""Variables that decide, too, whether a context can be made."""
 EXIT_PATIENCE_S = 2.0
-"""So long a picture that another thread draws may keep the process from ending."""
+"""How long a picture that another thread draws may keep the process from ending [s]."""
 _MAKING = threading.Lock()
 _OPEN: weakref.WeakSet["Drawing"] = weakref.WeakSet()
 
@@ -47,13 +47,13 @@ class Drawing:
     """A GL context with a model's looks in it, for any thread, one at a time."""
 
     def __init__(self, context: Any, looks: "mujoco.MjrContext") -> None:
-        """Of a context of one of mujoco's classes, and what is drawn with."""
+        """Keep a context of one of mujoco's classes, and the looks that were made in it."""
         self._gl, self.looks = context, looks
         self._lock, self._freed = threading.RLock(), False
 
     @contextlib.contextmanager
     def current(self) -> Iterator["mujoco.MjrContext"]:
-        """Make the context current on this thread; what was so before is so again afterwards."""
+        """Make the context current on this thread; the one before is current again afterwards."""
         with self._lock:
             if self._freed:
                 raise RenderingError("This graphics context has been freed: make a new renderer.")
@@ -195,14 +195,14 @@ def _settings(backend: str) -> str:
 
 
 def _free_all() -> None:
-    """Free what is open before libraries are unloaded: at exit nothing is said."""
+    """Free open contexts before their libraries are unloaded, for a silent exit."""
     for drawing in list(_OPEN):
         with contextlib.suppress(Exception):
             drawing.free_at_exit()
 
 
 def _way_back(context_class: type) -> Callable[[], Any]:
-    """What makes current again what is current on this thread now, or nothing."""
+    """Return the call that makes the context current again that is current on this thread now."""
     kind = context_class.__module__
     if kind == "mujoco.egl":
         egl = sys.modules[kind]

@@ -126,9 +126,9 @@ def test_a_variable_that_keeps_pictures_away_is_named(name, value, process):
     """Clusters set it; whoever draws nothing does not notice."""
     done = process("-c", TRUTH, MUJOCO_GL="egl", **{name: value})
     assert done.returncode == 0, done.stderr
-    said = done.stdout.splitlines()[-1]
-    assert said.startswith("RenderingError No OpenGL context could be made (MUJOCO_GL='egl'")
-    assert f"{name}={value!r}" in said
+    said = "RenderingError No OpenGL context could be made (MUJOCO_GL='egl', "
+    assert said in done.stdout
+    assert f"{name}={value!r}" in done.stdout
     assert not done.stderr
 
 
