@@ -254,7 +254,7 @@ def check_render_mode(render_mode: str | None) -> None:
         raise unknown("render_mode", render_mode, RENDER_MODES)
 
 
-def spaces(simulation: Simulation) -> tuple[Any, Box[np.float32]]:
+def spaces(simulation: Simulation) -> tuple[Any, Box]:
     """The spaces of one environment's observations, a `Box` or with goals a `Dict`, and actions."""
     where, apart = simulation.layout, simulation.task.goal
     seen = Box(where.low, where.high, dtype=np.float32)

@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache, partial
 from typing import Any
 
+from hrc_env.core.kernels import UNTESTED
 from hrc_env.core.kernels.cache import folder
 from hrc_env.core.kernels.signatures import Signature, decode, kernel_named, recorded
 from hrc_env.core.machine import n_cores
@@ -50,7 +51,8 @@ def compile_missing(level: str | None, say: Say) -> int:
 
 def _serve(wanted: Iterator[Signature], total_s: float, say: Say) -> None:
     """Let one process compile until nothing is left, beside others that take of the same."""
-    command = [sys.executable, "-m", "hrc_env.core.kernels.ahead"]
+    quiet = f"ignore:{UNTESTED}"  # said once, by the process that needs them
+    command = [sys.executable, "-W", quiet, "-m", "hrc_env.core.kernels.ahead"]
     pipes: Any = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True, "bufsize": 1}
     try:
         process: Any = subprocess.Popen(command, **pipes)

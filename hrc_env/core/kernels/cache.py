@@ -14,17 +14,15 @@ import tempfile
 import uuid
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numba
 from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
+from numba.core.dispatcher import Dispatcher
 from numba.core.serialize import dumps
 
 from hrc_env.core.kernels.digest import digest_of
-
-if TYPE_CHECKING:
-    from hrc_env.core.kernels.lean import KernelDispatcher
 
 PACKAGE = Path(__file__).resolve().parents[2]
 SUFFIX = ".nbc"
@@ -61,7 +59,7 @@ def _can_make(path: Path) -> bool:
 class KernelCache(NullCache):
     """The compiled forms of one kernel."""
 
-    def __init__(self, dispatcher: "KernelDispatcher") -> None:
+    def __init__(self, dispatcher: Dispatcher) -> None:
         self._dispatcher = dispatcher
 
     def path(self, args: tuple[Any, ...]) -> Path:
