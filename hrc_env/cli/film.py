@@ -15,7 +15,8 @@ from rich.console import Console
 from rich.table import Table
 
 from hrc_env.cli.frame import MOMENT, Diary, compose
-from hrc_env.cli.progress import compile_kernels, track
+from hrc_env.cli.progress import track
+from hrc_env.cli.ready import make_ready
 from hrc_env.core.checkout import agents
 from hrc_env.core.typing import Image
 from hrc_env.env import HRCEnv
@@ -44,7 +45,7 @@ def film_episode(
     closest moment that is no near miss yet, or of the first, is written beside it.
     """
     level = kwargs.get("perception", "pixels")
-    compile_kernels(Console(), level)
+    make_ready(Console(), level, draws=True)
     Console().print(f"Making the environment: perception {level} ...")
     env = HRCEnv(**kwargs)
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -101,15 +101,5 @@ def track(
             meter.show(k)
 
 
-def compile_kernels(console: Console, level: str | None = None) -> None:
-    """Compile what a perception level (None: any) calls and is not compiled yet, under a bar."""
-    from hrc_env.core.kernels import ahead  # here: --help imports no compiler
-
-    if n_missing := len(ahead.missing(level)):
-        console.print(f"Compiling {n_missing} kernels for this machine, once ...")
-        with progress_bar(console, "kernels") as say:
-            ahead.compile_missing(level, say)
-
-
 def _time(seconds: float) -> str:
     return str(timedelta(seconds=round(seconds)))

@@ -26,6 +26,8 @@ def empty_cache(tmp_path, monkeypatch):
 
 
 def pip_says(monkeypatch, stderr):
+    """From now on pip says this, and fails."""
+
     def run(command, **_):
         return subprocess.CompletedProcess(command, 1, stdout="", stderr=stderr)
 
