@@ -46,7 +46,8 @@ def pip_download(
     command += ["--dest", str(came), *options]
     places = {name: str(parts) for name in ("TMPDIR", "TEMP", "TMP")}
     if not os.access(Path(os.environ.get("HOME") or "/"), os.W_OK):
-        places["UV_CACHE_DIR"] = str(parts / "uv")
+        uv = ("UV_CACHE_DIR", "UV_TOOL_DIR", "UV_PYTHON_INSTALL_DIR")
+        places |= {name: str(parts / name) for name in uv}
     try:
         with _watched(folder, requirement, size_bytes):
             result = subprocess.run(
@@ -105,12 +106,12 @@ def _pip() -> list[str]:
         return own
     if (other := shutil.which("pip")) is not None:
         return [other]
-    if (uv := os.environ.get("UV") or shutil.which("uv")) is not None:
-        return [uv, "tool", "run", "pip"]
     bundled = importlib.util.find_spec("ensurepip")
     for folder in (bundled and bundled.submodule_search_locations) or ():
         for wheel in (Path(folder) / "_bundled").glob("pip-*.whl"):
             return [sys.executable, str(wheel / "pip")]
+    if (uv := os.environ.get("UV") or shutil.which("uv")) is not None:
+        return [uv, "tool", "run", "--python", sys.executable, "pip"]
     return own
 
 
@@ -123,7 +124,7 @@ def _watched(folder: Path, name: str, size_bytes: float) -> Iterator[None]:
         while not done.wait(SAY_EVERY_S):
             came, passed_s = _size(folder), time.monotonic() - began_s
             far = f"{came / 1e6:.0f} MB"
-            if 0 < came < size_bytes:
+            if 0.01 * size_bytes < came < size_bytes:
                 left_s = passed_s * (size_bytes / came - 1)
                 far += f" of {size_bytes / 1e6:.0f}, about {left_s:.0f} s left"
             log.warning("Downloading %s: %.0f s passed, %s", name, passed_s, far)

