@@ -50,7 +50,8 @@ class Meter:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._bar.stop()
+        if not self._bar.disable:  # rich before 15 ends with an empty line
+            self._bar.stop()
         if self._line_s > self._began_s:
             self._say()
 
