@@ -251,8 +251,13 @@ class PoseDetector(Stateful):
         """Results in order."""
         if self._threads is None:
             self._threads = ThreadPoolExecutor(2, thread_name_prefix="hrc_env-detector")
-        given = [self._threads.submit(self._done, job) for job in jobs]
-        return [future.result() for future in given]
+        given: list[Callable[[], ResultT]] = []
+        for job in jobs:
+            try:
+                given.append(self._threads.submit(self._done, job).result)
+            except RuntimeError:  # the interpreter is ending, and its threads take no more work
+                given.append(functools.partial(self._done, job))
+        return [result() for result in given]
 
     def _done(self, job: Callable[[_Networks], ResultT]) -> ResultT:
         """What a job gives with this thread's networks."""

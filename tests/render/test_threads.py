@@ -118,6 +118,21 @@ def test_a_freed_context_says_so():
         pass
 
 
+@pytest.mark.usefixtures("pixels")
+def test_pixels_are_seen_to_the_very_end(process):
+    """Threads of the interpreter take no more work when it is ending."""
+    done = process(
+        "-c",
+        "import atexit, gymnasium, hrc_env, numpy\n"
+        "env = gymnasium.make('HRCReach-v0', perception='pixels')\n"
+        "env.reset(seed=0)\n"
+        "atexit.register(lambda: print(env.step(numpy.zeros(6, numpy.float32))[1]))\n",
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Error" not in done.stderr
+    float(done.stdout)
+
+
 def test_an_open_environment_ends_without_a_word(process):
     done = process("-c", LEFT_OPEN)
     assert done.returncode == 0, done.stderr
