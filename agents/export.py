@@ -13,7 +13,8 @@ from rich.console import Console
 from hrc_env import __version__
 from hrc_env.cli.environment import shield_named
 from hrc_env.cli.export import Export
-from hrc_env.cli.progress import compile_kernels, progress_bar
+from hrc_env.cli.progress import progress_bar
+from hrc_env.cli.ready import make_ready
 from hrc_env.cli.train import Train
 from hrc_env.core.errors import CheckpointError, learner
 from hrc_env.core.results import write_whole
@@ -46,7 +47,7 @@ def run(asked: Export) -> int:
     if path.exists():
         raise CheckpointError(f"{path} is there already; give another --name, or delete it.")
     console, kwargs = Console(), arguments.keywords()
-    compile_kernels(console, arguments.perception)
+    make_ready(console, arguments.perception)
     env = HRCVecEnv(1, **kwargs)
     try:
         here = env_info(env.simulation)

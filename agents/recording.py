@@ -19,7 +19,8 @@ import gymnasium
 import numpy as np
 from rich.console import Console
 
-from hrc_env.cli.progress import compile_kernels, progress_bar
+from hrc_env.cli.progress import progress_bar
+from hrc_env.cli.ready import make_ready
 from hrc_env.cli.record import Record
 from hrc_env.core.errors import ConfigError, MissingExtraError
 from hrc_env.core.results import write_whole
@@ -47,7 +48,7 @@ def run(asked: Record) -> int:
     path = _free(minari, asked.out)
     draft, console = path.with_name(f".{path.name}.draft"), Console()
     _same_as_before(asked, draft)
-    compile_kernels(console, asked.perception)
+    make_ready(console, asked.perception)
     firsts = range(0, asked.episodes, asked.num_envs)
     with progress_bar(console, "recording") as say:
         for first in firsts:

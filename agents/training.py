@@ -11,7 +11,8 @@ from typing import Any, get_type_hints
 
 from rich.console import Console
 
-from hrc_env.cli.progress import Meter, compile_kernels, progress_bar
+from hrc_env.cli.progress import Meter, progress_bar
+from hrc_env.cli.ready import make_ready
 from hrc_env.cli.train import Train
 from hrc_env.config import settle
 from hrc_env.core.errors import CheckpointError, RenderingError, learner
@@ -67,7 +68,7 @@ def run(arguments: Train) -> int:
     if arguments.resume is not None:
         arguments = as_before(arguments, folder)
     mine = filled(arguments)
-    compile_kernels(console, mine.perception)
+    make_ready(console, mine.perception)
     curve, took = train(mine, folder, console)
     if took is None:
         return STOPPED

@@ -285,8 +285,9 @@ def check_render_mode(render_mode: str | None, valid: Sequence[str] = RENDER_MOD
         raise unknown("render_mode", render_mode, valid)
 
 
-def spaces(simulation: Simulation) -> tuple[Any, Box[np.float32]]:
-    """The spaces of one environment's observations, a `Box` or with goals a `Dict`, and actions."""
+def spaces(simulation: Simulation) -> tuple[Any, Any]:
+    """The spaces of one environment's observations, a `Box` or with goals a `Dict`, and actions, a
+    `Box`."""
     where, apart = simulation.layout, simulation.task.goal
     seen = Box(where.low, where.high, dtype=np.float32)
     actions = Box(-1.0, 1.0, (simulation.n_actions,), np.float32)

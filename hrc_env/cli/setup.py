@@ -1,14 +1,11 @@
 """python -m hrc_env setup: everything that pip does not bring."""
 
-import os
-import shutil
-import subprocess
 from dataclasses import dataclass
 from typing import Literal
 
 from rich.console import Console
 
-from hrc_env.cli.progress import compile_kernels
+from hrc_env.cli.ready import compile_kernels, fetch_networks, find_opengl
 
 
 @dataclass(frozen=True)
@@ -22,24 +19,10 @@ class Setup:
 
     def run(self) -> int:
         """Set up; 0 also without OpenGL, which only pictures need."""
-        from hrc_env.core.kernels.cache import folder  # here: --help imports no simulator
-        from hrc_env.perception import weights
-        from hrc_env.scene.gl import APT_LINE, gl_status
-
         console = Console()
-        with console.status("Fetching the weights of MediaPipe Pose ..."):
-            extra = [f"pose_landmark_{network}" for network in self.networks]
-            weights.fetch_weights(names=[*weights.ALWAYS, *extra])
-        console.print(f"[green]ok[/] pose network: official weights in {weights.cache_dir()}")
-        compile_kernels(console)
-        console.print(f"[green]ok[/] kernels: compiled, in {folder()}")
-        ready, message = gl_status()
-        if not ready and _may_install():
-            console.print(f"Installing OpenGL: {APT_LINE}")
-            subprocess.run(["apt-get", "update", "-qq"], check=False)
-            apt, install, *packages = APT_LINE.removeprefix("sudo ").split()
-            subprocess.run([apt, install, "-qq", "-y", *packages], check=False)
-            ready, message = gl_status()
+        fetch_networks(console, [f"pose_landmark_{network}" for network in self.networks])
+        ready, message = find_opengl(console)
+        compile_kernels(console, says=True)
         if ready:
             console.print(f"[green]ok[/] headless OpenGL: {message}")
         else:
@@ -48,8 +31,3 @@ class Setup:
                 "Without it everything works but perception='pixels' and pictures."
             )
         return 0
-
-
-def _may_install() -> bool:
-    """Root on a machine with apt-get (not on Windows, which has no users by number)."""
-    return shutil.which("apt-get") is not None and getattr(os, "geteuid", lambda: 1)() == 0

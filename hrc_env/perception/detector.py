@@ -39,7 +39,7 @@ from hrc_env.perception.searching import (
     search_jobs,
     search_windows,
 )
-from hrc_env.perception.weights import find_weights
+from hrc_env.perception.weights import fetch_weights
 
 SIDE = network.LANDMARK_SIDE
 ResultT = TypeVar("ResultT")
@@ -89,6 +89,12 @@ class DetectorConfig:
         check_fields(self, "be in (0, 1]", "min_presence", "sure_presence", "outside_confidence")
         check_fields(self, "be positive", "gate_every", "search_every", "max_offset")
 
+    @property
+    def weights(self) -> tuple[str, ...]:
+        """The names of the weights that these networks need."""
+        landmark = dict.fromkeys((self.network, self.folded))
+        return ("pose_detection", *(f"pose_landmark_{name}" for name in landmark))
+
 
 @dataclass(frozen=True, slots=True)
 class Detection:
@@ -124,12 +130,10 @@ class PoseDetector(Stateful):
         error: Floats = ERROR,
     ) -> None:
         """`floor_world` (N, 3) [m], `error`: as of `pipeline.looking.Looking`.
-        Raises `WeightsError` without the weights, `ConfigError` without the runtime."""
+        Raises `WeightsError` where the weights cannot be had, `ConfigError` without the runtime."""
         self.cameras = tuple(cameras)
         self.config = config or DetectorConfig()
-        find_weights("pose_detection")
-        for name in (self.config.network, self.config.folded):
-            find_weights(f"pose_landmark_{name}")
+        fetch_weights(self.config.weights)
         network.chosen_runtime(self.config.runtime)
         self.floor_world, self.error = floor_world, error
         self._search = [search_windows(camera, floor_world) for camera in self.cameras]
@@ -250,8 +254,13 @@ class PoseDetector(Stateful):
         """Results in order."""
         if self._threads is None:
             self._threads = ThreadPoolExecutor(2, thread_name_prefix="hrc_env-detector")
-        given = [self._threads.submit(self._done, job) for job in jobs]
-        return [future.result() for future in given]
+        given: list[Callable[[], ResultT]] = []
+        for job in jobs:
+            try:
+                given.append(self._threads.submit(self._done, job).result)
+            except RuntimeError:  # the interpreter is ending, and its threads take no more work
+                given.append(functools.partial(self._done, job))
+        return [result() for result in given]
 
     def _done(self, job: Callable[[_Networks], ResultT]) -> ResultT:
         """What a job gives with this thread's networks."""

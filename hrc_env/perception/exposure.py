@@ -140,7 +140,7 @@ def doubt_of(noise: float, span: float) -> float:
 def _tones(crop: Image, mask: Image | None) -> _Tones:
     """Return the grey levels of the dark and of the bright parts, without windows and lamps."""
     grey = np.asarray(cv2.cvtColor(crop, cv2.COLOR_RGB2GRAY), np.uint8)
-    count: Floats = cv2.calcHist([grey], [0], mask, [256], [0, 256])[:, 0].cumsum()
+    count: Floats = cv2.calcHist([grey], [0], mask, [256], [0, 256]).ravel().cumsum()
     dark, usual, bright = np.searchsorted(count, np.array(ENDS) * count[-1]).tolist()
     return _Tones(dark, min(bright, max(GLARE * usual, dark + 1.0)), grey)
 

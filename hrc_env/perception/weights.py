@@ -1,4 +1,4 @@
-"""The pose network's weights: fetched once, checked always, kept in the user's cache folder.
+"""The pose network's weights: fetched when first needed, checked always, kept in the user's cache.
 
 Google's BlazePose (Apache-2.0): detector and `full` out of the official `mediapipe` wheel, which is
 never installed; `lite` and `heavy`, when asked for, out of Google's package on npm.
@@ -6,26 +6,26 @@ never installed; `lite` and `heavy`, when asked for, out of Google's package on 
 
 import functools
 import hashlib
+import logging
 import os
-import shutil
-import subprocess
-import sys
 import tarfile
 import tempfile
-import urllib.request
 import zipfile
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from hrc_env.core import folders
 from hrc_env.core.errors import DownloadError, WeightsError, unknown
+from hrc_env.perception.downloads import download_file, download_wheel, member_of
+
+log = logging.getLogger("hrc_env.weights")
 
 WHEEL = "mediapipe==0.10.21"
 """The last release of mediapipe that carries both files."""
+WHEEL_BYTES = 35_622_638.0
 TARBALL = "https://registry.npmjs.org/@mediapipe/pose/-/pose-0.5.1675469404.tgz"
 """The package `@mediapipe/pose`, which carries all landmark networks."""
-PATIENCE_S = 60.0
-"""How long the server of npm may be silent."""
 SETUP = "python -m hrc_env setup"
 
 
@@ -68,21 +68,18 @@ def setup_for(names: Iterable[str]) -> str:
 
 
 def cache_dir() -> Path:
-    """The folder that keeps the weights: $HRC_ENV_CACHE, or `hrc_env` in the user's caches."""
+    """Return the folder that keeps the weights: $HRC_ENV_CACHE, or `hrc_env` in the user's caches;
+    a temporary one where those cannot be written."""
     if chosen := os.environ.get("HRC_ENV_CACHE"):
         return Path(chosen).expanduser()
-    chosen = os.environ.get("XDG_CACHE_HOME")
-    if sys.platform == "win32":
-        chosen = chosen or os.environ.get("LOCALAPPDATA")
-    usual = {"darwin": "~/Library/Caches", "win32": "~/AppData/Local"}.get(sys.platform, "~/.cache")
-    return Path(chosen or usual).expanduser() / "hrc_env"
+    return folders.user_cache()
 
 
 def find_weights(name: str) -> Path:
     """A weights file, checked once per process. Raises `WeightsError` if missing or another."""
     if name not in WEIGHTS:
         raise unknown("weights", name, WEIGHTS)
-    path = cache_dir() / f"{name}.tflite"
+    path = _place_of(name)
     if not path.is_file():
         raise WeightsError(
             f"The pose network's weights {path.name!r} are not in {path.parent}. "
@@ -92,25 +89,63 @@ def find_weights(name: str) -> Path:
     return path
 
 
+def _place_of(name: str) -> Path:
+    """Return the path of a weights file: also in caches that can be read only."""
+    usual, file = folders.usual_cache(), f"{name}.tflite"
+    if not os.environ.get("HRC_ENV_CACHE") and usual is not None and (usual / file).is_file():
+        return usual / file
+    return cache_dir() / file
+
+
 def fetch_weights(names: Iterable[str] = ALWAYS) -> dict[str, Path]:
-    """Weights by name; downloads what is not there yet. Raises `WeightsError` where that fails."""
-    found, missing = {}, []
-    for name in names:
+    """Weights by name; downloads and logs those that are not there yet. Raises
+    `WeightsError` where that fails, with the ways out."""
+    names = list(dict.fromkeys(names))
+    found = {name: path for name in names if (path := _found(name)) is not None}
+    if len(found) == len(names):
+        return found
+    folder = cache_dir()
+    if not folders.can_write(folder):
+        raise WeightsError(
+            f"Weights cannot be written into {folder}. "
+            f"Choose another folder with $HRC_ENV_CACHE, then run: {SETUP}"
+        )
+    with folders.alone(folder, lambda: log.warning("Waiting for another program's download ...")):
+        missing = [name for name in names if _found(name) is None]
+        for archive in dict.fromkeys(WEIGHTS[name].archive for name in missing):
+            _fetch(archive, [name for name in missing if WEIGHTS[name].archive == archive], folder)
+    return {name: find_weights(name) for name in names}
+
+
+def _found(name: str) -> Path | None:
+    """Return the path of a weights file that is there and the official one."""
+    try:
+        return find_weights(name)
+    except WeightsError:
+        return None
+
+
+def _fetch(archive: str, names: list[str], folder: Path) -> None:
+    """Download an archive and put these weights out of it into a folder."""
+    is_wheel, again = archive == WHEEL, setup_for(names)
+    size = f", {WHEEL_BYTES / 1e6:.0f} MB" if is_wheel else ""
+    what = archive if is_wheel else archive.rsplit("/", 1)[-1]
+    log.warning("Fetching the pose network's weights (%s%s), once, into %s ...", what, size, folder)
+    with tempfile.TemporaryDirectory() as scratch:
         try:
-            found[name] = find_weights(name)
-        except WeightsError:
-            missing.append(name)
-    for archive in dict.fromkeys(WEIGHTS[name].archive for name in missing):
-        with tempfile.TemporaryDirectory() as folder:
-            download = download_wheel if archive == WHEEL else _download_tarball
-            try:
-                place = download(archive, Path(folder), setup_for(missing))
-            except DownloadError as error:
-                raise WeightsError(str(error)) from error
-            for name in (each for each in missing if WEIGHTS[each].archive == archive):
-                _unpack(place, name)
-                found[name] = find_weights(name)
-    return found
+            if is_wheel:
+                place = download_wheel(archive, Path(scratch), again, WHEEL_BYTES)
+            else:
+                place = download_file(archive, Path(scratch), again)
+        except DownloadError as error:
+            files = ", ".join(f"{name}.tflite" for name in names)
+            raise WeightsError(
+                f"{error} Without a network: copy {files} from the cache of a machine that has "
+                f"them into {folder} (or the folder that $HRC_ENV_CACHE names), or use "
+                "perception='keypoints', which needs none."
+            ) from error
+        for name in names:
+            _unpack(place, name)
 
 
 @functools.cache
@@ -128,48 +163,6 @@ def _check(name: str, content: bytes, where: str) -> None:
             f"with sha256 {expected.sha256}, got {len(content)} bytes with sha256 {came}. "
             f"Fetch it anew with: {setup_for([name])}"
         )
-
-
-def download_wheel(requirement: str, folder: Path, again: str) -> Path:
-    """A wheel (`name==1.2.3`), downloaded into a folder by pip as it is configured, for a platform
-    and a Python that matter not: it is unzipped. Errors as of `pip_download`."""
-    options = ["--only-binary=:all:", "--python-version", "3.11", "--ignore-requires-python"]
-    for platform in ("manylinux_2_28_x86_64", "manylinux2014_x86_64"):
-        options += ["--platform", platform]
-    return pip_download([*options, requirement], requirement, folder, again)
-
-
-def pip_download(options: list[str], requirement: str, folder: Path, again: str) -> Path:
-    """What `pip download OPTIONS` puts into an empty folder, without dependencies. Raises
-    `DownloadError`, which names the requirement and the command `again`."""
-    command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps"]
-    command += ["--disable-pip-version-check", "--dest", str(folder), *options]
-    result = subprocess.run(command, capture_output=True, text=True, check=False)
-    came = sorted(folder.iterdir())
-    if result.returncode == 0 and came:
-        return came[0]
-    if "No module named pip" in result.stderr:
-        raise DownloadError(
-            f"pip is needed to download {requirement}, and {sys.executable} has none. "
-            f"Add it with: python -m ensurepip, then run: {again}"
-        )
-    said = (result.stderr.strip().splitlines() or ["nothing"])[-1].strip()
-    raise DownloadError(
-        f"Could not download {requirement} (is there a network?). pip said: {said} "
-        f"Try again with: {again}"
-    )
-
-
-def _download_tarball(url: str, folder: Path, again: str) -> Path:
-    place = folder / url.rsplit("/", 1)[-1]
-    try:
-        with urllib.request.urlopen(url, timeout=PATIENCE_S) as answer, place.open("wb") as file:
-            shutil.copyfileobj(answer, file)
-    except OSError as error:
-        raise DownloadError(
-            f"Could not download {url} (is there a network?): {error}. Try again with: {again}"
-        ) from error
-    return place
 
 
 def _unpack(place: Path, name: str) -> None:
@@ -193,15 +186,3 @@ def _unpack(place: Path, name: str) -> None:
             f"Could not write the weights into {folder}: {error}. "
             f"Choose another folder with $HRC_ENV_CACHE, then run: {SETUP}"
         ) from error
-
-
-def member_of(place: Path, name: str) -> bytes:
-    """A file out of a wheel or a tarball; `KeyError` where it holds none of that name."""
-    if place.suffix == ".whl":
-        with zipfile.ZipFile(place) as wheel:
-            return wheel.read(name)
-    with tarfile.open(place) as tarball:
-        file = tarball.extractfile(name)
-        if file is None:
-            raise KeyError(name)
-        return file.read()

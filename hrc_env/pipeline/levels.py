@@ -13,11 +13,14 @@ from dataclasses import replace
 from hrc_env.config import HRCConfig
 from hrc_env.core.batching import rows, write_rows
 from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.kernels import ahead
 from hrc_env.core.records import PoseEstimate
 from hrc_env.core.typing import Ints
 from hrc_env.geometry.cameras import projections
+from hrc_env.perception.detector import DetectorConfig
 from hrc_env.perception.faults.fault import IMAGE, KINDS
 from hrc_env.perception.faults.schedule import Schedule
+from hrc_env.perception.weights import fetch_weights
 from hrc_env.pipeline.emulated import EmulatorPipeline
 from hrc_env.pipeline.rendered import PixelPipeline
 from hrc_env.pipeline.sensor_input import Generators, Sensor, TrueState, with_truth
@@ -34,6 +37,14 @@ CAMERA_LEVELS = LEVELS[:2]
 """Those that have cameras."""
 EMULATED = ("darkness",)
 """Faults of images that level `keypoints` emulates."""
+
+
+def prepare(level: str, detector: DetectorConfig) -> None:
+    """Fetch and compile a perception level's needs that are missing, the quickest first. Raises
+    `WeightsError` without the network's weights, and with no way to them."""
+    if level == "pixels":
+        fetch_weights(detector.weights)
+    ahead.ensure(level)
 
 
 def make_pipeline(

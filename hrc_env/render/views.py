@@ -66,8 +66,8 @@ class Glance:
 class Views:
     """Pictures of a simulation's environments; graphics contexts are made when asked for.
 
-    One thread must ask for all of them and call `close`; with a `glance` taken before, that may
-    be another one than the simulation's.
+    Any thread may ask for one, and call `close`, but no two at once; with a `glance` taken before,
+    the simulation may go on in another one.
     """
 
     def __init__(self, simulation: Simulation) -> None:

@@ -1,10 +1,9 @@
 """One OpenGL context with a scene in it: pose it, aim it, read the picture.
 
-The context is made when the first picture is drawn, in the thread that draws it, and made current
-before every call: several canvases never draw into each other.
+The context is made when the first picture is drawn, and current only while one is: threads may
+take turns, and several canvases never draw into each other.
 """
 
-import contextlib
 import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -67,8 +66,7 @@ class Canvas:
         self._option.sitegroup[:] = 0
         self._camera = mujoco.MjvCamera()
         mujoco.mjv_defaultFreeCamera(self._model, self._camera)
-        self._gl: Any = None
-        self._context: Any = None
+        self._drawing: gl.Drawing | None = None
         self._lists: dict[Part, Any] = {}
         self._shown: Any = None
         self._fresh: set[Part] = set()
@@ -176,12 +174,11 @@ class Canvas:
     def read(self, rgb: NDArray[np.uint8] | None, z: NDArray[np.float32] | None) -> None:
         """Draw into rgb (H, W, 3) and z (H, W; 1 near, 0 far), which may be smaller than the
         canvas, bottom row first as OpenGL has them."""
-        self._open()
-        self._gl.make_current()
         shapes = [each.shape for each in (rgb, z) if each is not None]
         rect = mujoco.MjrRect(0, 0, shapes[0][1], shapes[0][0])
-        mujoco.mjr_render(rect, self._shown, self._context)
-        mujoco.mjr_readPixels(rgb, z, rect, self._context)
+        with self._open().current() as looks:
+            mujoco.mjr_render(rect, self._shown, looks)
+            mujoco.mjr_readPixels(rgb, z, rect, looks)
 
     def paint(self) -> Image:
         """The picture (H, W, 3), top row first."""
@@ -203,28 +200,30 @@ class Canvas:
 
     def close(self) -> None:
         """Free the context; the canvas cannot draw any more. Twice does no harm."""
-        if self._context is not None:
-            self._gl.make_current()
-            self._context.free()
-            self._gl.free()
-        self._gl = self._context = self._shown = None
+        if self._drawing is not None:
+            self._drawing.free()
+        self._drawing = self._shown = None
         self._lists.clear()
         self._closed = True
 
     def __del__(self) -> None:
-        with contextlib.suppress(Exception):  # at exit, OpenGL may be gone before us
+        try:  # without a helper: at exit there may be none any more
             self.close()
+        except Exception:
+            return
 
     def _take_over_textures(self) -> None:
         """Which material has which picture: the context keeps a copy of its own."""
-        if self._context is not None:
+        if self._drawing is not None:
             of_material = self._model.mat_texid.ravel()
-            self._context.mat_texid[: len(of_material)] = of_material
+            self._drawing.looks.mat_texid[: len(of_material)] = of_material
 
-    def _open(self) -> None:
+    def _open(self) -> gl.Drawing:
         if self._closed:
             raise RenderingError("This renderer has been closed: make a new one.")
-        if self._context is None:
-            self._gl, self._context = gl.new_context(self.width_px, self.height_px, self._model)
-            mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
-            self._context.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
+        if self._drawing is None:
+            self._drawing = gl.new_context(self.width_px, self.height_px, self._model)
+            with self._drawing.current() as looks:
+                mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, looks)
+                looks.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
+        return self._drawing

@@ -2,8 +2,11 @@
 
 mujoco reads MUJOCO_GL when it is imported. Unless the user has set it, Linux draws through EGL
 where its library is (no display is needed), else through OSMesa, else in a hidden window.
+
+A context is current on a thread only while that thread draws: any thread may draw or close next.
 """
 
+import atexit
 import contextlib
 import ctypes
 import ctypes.util
@@ -11,6 +14,9 @@ import functools
 import importlib.util
 import os
 import sys
+import threading
+import weakref
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +35,48 @@ WINDOWS = ("", "glfw", "glx", "enable", "enabled", "on", "true", "1")
 """Values of MUJOCO_GL with which mujoco on Linux draws in a hidden window."""
 OFF = ("disable", "disabled", "off", "false", "0")
 """Values of MUJOCO_GL that switch rendering off."""
+VARIABLES = ("PYOPENGL_PLATFORM", "MUJOCO_EGL_DEVICE_ID", "CUDA_VISIBLE_DEVICES", "EGL_PLATFORM")
+"""Variables that decide, too, whether a context can be made."""
+EXIT_PATIENCE_S = 2.0
+"""How long a picture that another thread draws may keep the process from ending [s]."""
+_MAKING = threading.Lock()
+_OPEN: weakref.WeakSet["Drawing"] = weakref.WeakSet()
+
+
+class Drawing:
+    """A GL context with a model's looks in it, for any thread, one at a time."""
+
+    def __init__(self, context: Any, looks: "mujoco.MjrContext") -> None:
+        """Keep a context of one of mujoco's classes, and the looks that were made in it."""
+        self._gl, self.looks = context, looks
+        self._lock, self._freed = threading.RLock(), False
+
+    @contextlib.contextmanager
+    def current(self) -> Iterator["mujoco.MjrContext"]:
+        """Make the context current on this thread; the one before is current again afterwards."""
+        with self._lock:
+            if self._freed:
+                raise RenderingError("This graphics context has been freed: make a new renderer.")
+            go_back = _way_back(type(self._gl))
+            self._gl.make_current()
+            try:
+                yield self.looks
+            finally:
+                go_back()
+
+    def free(self) -> None:
+        """Free the context, which cannot draw any more; twice does no harm."""
+        with self._lock:
+            if not self._freed:
+                with self.current():
+                    self.looks.free()
+                self._gl.free()
+                self._freed = True
+
+    def free_at_exit(self) -> None:
+        """Free the context and keep its lock: a thread that still wants to draw waits for ever."""
+        if self._lock.acquire(timeout=EXIT_PATIENCE_S):
+            self.free()
 
 
 def import_mujoco() -> None:
@@ -91,27 +139,25 @@ def gl_status() -> tuple[bool, str]:
     import mujoco
 
     try:
-        context, drawing = new_context(16, 16, mujoco.MjModel.from_xml_string("<mujoco/>"))
-        rectangle, seen = mujoco.MjrRect(0, 0, 16, 16), np.zeros((16, 16, 3), np.uint8)
-        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, drawing)
-        mujoco.mjr_rectangle(rectangle, 1.0, 0.0, 1.0, 1.0)
-        mujoco.mjr_readPixels(seen, None, rectangle, drawing)
+        drawing = new_context(16, 16, mujoco.MjModel.from_xml_string("<mujoco/>"))
     except RenderingError as error:
         return False, str(error)
-    renderer = _renderer()
+    rectangle, seen = mujoco.MjrRect(0, 0, 16, 16), np.zeros((16, 16, 3), np.uint8)
+    with drawing.current() as looks:
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, looks)
+        mujoco.mjr_rectangle(rectangle, 1.0, 0.0, 1.0, 1.0)
+        mujoco.mjr_readPixels(seen, None, rectangle, looks)
+        renderer = _renderer()
     drawing.free()
-    context.free()
     backend = os.environ.get("MUJOCO_GL") or "the default"
     if tuple(seen[8, 8]) != (255, 0, 255):
         return False, f"OpenGL (MUJOCO_GL={backend}, {renderer}) does not draw what it is told."
     return True, f"OpenGL works (MUJOCO_GL={backend}, {renderer})."
 
 
-def new_context(
-    width_px: int, height_px: int, model: "mujoco.MjModel"
-) -> tuple[Any, "mujoco.MjrContext"]:
-    """A GL context of the chosen backend, current on this thread, with the model's looks in it.
-    Raises `RenderingError`, which says how to get OpenGL."""
+def new_context(width_px: int, height_px: int, model: "mujoco.MjModel") -> Drawing:
+    """A GL context of the chosen backend with the model's looks in it, current nowhere. Raises
+    `RenderingError`, which says how to get OpenGL."""
     import mujoco
 
     backend = choose_backend()
@@ -119,15 +165,67 @@ def new_context(
         raise RenderingError(f"Rendering is switched off by MUJOCO_GL={backend!r}: unset it.")
     load_triton_first()
     try:
-        context = _context_class(backend)(width_px, height_px)
-        context.make_current()
-        return context, mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
+        with _MAKING:  # libraries are loaded, and displays opened, by one thread
+            kind = _context_class(backend)
+            go_back = _way_back(kind)
+            try:
+                context = kind(width_px, height_px)
+                context.make_current()
+                font = mujoco.mjtFontScale.mjFONTSCALE_100.value
+                made = Drawing(context, mujoco.MjrContext(model, font))
+            finally:
+                go_back()
+            if not _OPEN:
+                atexit.unregister(_free_all)
+                atexit.register(_free_all)  # after mujoco has, so that this comes before it
+            _OPEN.add(made)
+            return made
     except Exception as error:
         raise RenderingError(
-            f"No OpenGL context could be made (MUJOCO_GL={backend or 'not set'!r}): "
+            f"No OpenGL context could be made ({_settings(backend)}): "
             f"{str(error).strip().rstrip('.')}. EGL, which needs no display, is taken where "
             f"MUJOCO_GL is not set; on Debian or Ubuntu it comes with: {APT_LINE}"
         ) from error
+
+
+def _settings(backend: str) -> str:
+    """The variables that decide how pictures are drawn, as they are set."""
+    others = [f"{name}={os.environ[name]!r}" for name in VARIABLES if name in os.environ]
+    return ", ".join([f"MUJOCO_GL={backend or 'not set'!r}", *others])
+
+
+def _free_all() -> None:
+    """Free open contexts before their libraries are unloaded, for a silent exit."""
+    for drawing in list(_OPEN):
+        with contextlib.suppress(Exception):
+            drawing.free_at_exit()
+
+
+def _way_back(context_class: type) -> Callable[[], Any]:
+    """Return the call that makes the context current again that is current on this thread now."""
+    kind = context_class.__module__
+    if kind == "mujoco.egl":
+        egl = sys.modules[kind]
+        library, nothing = egl.EGL, (egl.EGL.EGL_NO_SURFACE,) * 2
+        library.eglBindAPI(library.EGL_OPENGL_API)  # a new thread has it not
+        before = library.eglGetCurrentContext()
+        if not before:
+            none = library.EGL_NO_CONTEXT
+            return lambda: library.eglMakeCurrent(egl.EGL_DISPLAY, *nothing, none)
+        faces = [
+            library.eglGetCurrentSurface(side) for side in (library.EGL_DRAW, library.EGL_READ)
+        ]
+        display = library.eglGetCurrentDisplay()
+        return lambda: library.eglMakeCurrent(display, *faces, before)
+    if kind == "mujoco.osmesa":
+        made = sys.modules[kind]
+        return lambda: made.osmesa.OSMesaMakeCurrent(None, None, made.GL.GL_FLOAT, 0, 0)
+    if kind == "mujoco.glfw":
+        import glfw
+
+        window = glfw.get_current_context()
+        return lambda: glfw.make_context_current(window)
+    return lambda: None
 
 
 def _context_class(backend: str) -> Any:
@@ -141,6 +239,9 @@ def _context_class(backend: str) -> Any:
         raise unknown("MUJOCO_GL", backend, [*LIBRARIES, "glfw"])
     if not _has_library(LIBRARIES[backend]):
         raise OSError(f"there is no library lib{LIBRARIES[backend]}")
+    platform = os.environ.get("PYOPENGL_PLATFORM") or backend
+    if platform.lower() != backend:
+        raise OSError(f"PYOPENGL_PLATFORM={platform!r} must be {backend!r} or not set")
     return importlib.import_module(f"mujoco.{backend}").GLContext
 
 

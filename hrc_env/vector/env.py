@@ -251,6 +251,8 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
 
     def close_extras(self, **kwargs: Any) -> None:
         """Stop the threads and release graphics contexts."""
+        if "pictures" not in vars(self):  # gymnasium before 1.4 closes what could not be made, too
+            return
         self.pictures.close()
         self.shards.close()
 

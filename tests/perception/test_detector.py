@@ -1,6 +1,7 @@
 """Eyes: crops in, keypoints out, whoever does the work."""
 
 import pickle
+import subprocess
 import time
 
 import numpy as np
@@ -214,7 +215,7 @@ def test_folded_workers_have_a_network_of_their_own(four, monkeypatch):
         return lambda image: asked.append(network) or landmark(image)
 
     monkeypatch.setattr(detector_module.network, "load_landmarker", load)
-    monkeypatch.setattr(detector_module, "find_weights", lambda name: name)
+    monkeypatch.setattr(detector_module, "fetch_weights", lambda names: names)
     detector = new_detector(4, DetectorConfig(folded="heavy"))
     detector.detect(stills, [WINDOW] * 4)
     assert set(asked) == {"full"}
@@ -242,7 +243,11 @@ def test_wrong_shapes_are_explained(four):
         detector.detect(Small(), [WINDOW] * 4)
 
 
-def test_eyes_without_weights_say_so_at_once(tmp_path, monkeypatch):
+def test_eyes_without_weights_and_network_say_so_at_once(tmp_path, monkeypatch):
     monkeypatch.setenv("HRC_ENV_CACHE", str(tmp_path))
-    with pytest.raises(WeightsError, match="python -m hrc_env setup"):
+    failed = subprocess.CompletedProcess([], 1, "", "ERROR: no route to host")
+    monkeypatch.setattr(subprocess, "run", lambda *_, **__: failed)
+    with pytest.raises(WeightsError, match="no route to host") as error:
         new_detector(1)
+    for part in ("python -m hrc_env setup", "Without a network: copy", "perception='keypoints'"):
+        assert part in str(error.value)

@@ -1,19 +1,25 @@
 """Weights are the official ones or an error says what to do."""
 
 import hashlib
+import importlib.util
 import io
 import shutil
 import subprocess
 import sys
 import tarfile
+import tempfile
+import time
 import urllib.error
 import urllib.request
 import zipfile
 from dataclasses import replace
 
+import gymnasium
 import pytest
 
+from hrc_env.core import folders
 from hrc_env.core.errors import ConfigError, WeightsError
+from hrc_env.perception import downloads
 from hrc_env.perception import weights as w
 
 SETUP = "python -m hrc_env setup"
@@ -26,6 +32,8 @@ def empty_cache(tmp_path, monkeypatch):
 
 
 def pip_says(monkeypatch, stderr):
+    """From now on pip says this, and fails."""
+
     def run(command, **_):
         return subprocess.CompletedProcess(command, 1, stdout="", stderr=stderr)
 
@@ -69,6 +77,107 @@ def test_without_a_network_the_error_repeats_what_pip_said(empty_cache, monkeypa
     with pytest.raises(WeightsError, match="No matching distribution") as error:
         w.fetch_weights()
     assert SETUP in str(error.value)
+
+
+@pytest.fixture
+def pip_brings(weights, monkeypatch):
+    """From now on pip brings a wheel that holds the official files; its commands."""
+    commands = []
+
+    def run(command, **_):
+        commands.append(command)
+        wheel = f"{command[command.index('--dest') + 1]}/mediapipe-0.10.21-py3-none-any.whl"
+        with zipfile.ZipFile(wheel, "w") as archive:
+            for name, path in weights.items():
+                archive.write(path, w.WEIGHTS[name].member)
+        time.sleep(0.3)
+        return subprocess.CompletedProcess(command, 0, stdout="", stderr="")
+
+    monkeypatch.setattr(subprocess, "run", run)
+    return commands
+
+
+def test_the_first_make_at_pixels_fetches_what_is_missing_and_says_so(
+    empty_cache, pip_brings, caplog
+):
+    for _ in range(2):
+        gymnasium.make("HRCReach-v0", perception="pixels").close()
+    assert len(pip_brings) == 1
+    (said,) = [each.message for each in caplog.records if each.name == "hrc_env.weights"]
+    assert said.startswith("Fetching the pose network's weights (mediapipe==0.10.21, 36 MB)")
+    assert str(empty_cache) in said
+
+
+@pytest.mark.usefixtures("empty_cache", "pip_brings")
+def test_a_long_download_says_how_much_time_is_left(monkeypatch, caplog):
+    monkeypatch.setattr(downloads, "SAY_EVERY_S", 0.1)
+    w.fetch_weights()
+    said = [each.message for each in caplog.records if each.name == "hrc_env.downloads"]
+    assert "s left" in said[0]
+    assert "MB of 36" in said[0]
+
+
+@pytest.fixture
+def read_only_home(tmp_path, monkeypatch):
+    """The user's caches, which cannot be written; and where temporary files lie."""
+    home, elsewhere = tmp_path / "home", tmp_path / "tmp"
+    elsewhere.mkdir()
+    monkeypatch.delenv("HRC_ENV_CACHE", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(home))
+    monkeypatch.setattr(tempfile, "tempdir", str(elsewhere))
+    monkeypatch.setattr(folders, "can_write", lambda folder: home not in folder.parents)
+    folders.temporary_cache.cache_clear()
+    yield home / "hrc_env", elsewhere
+    folders.temporary_cache.cache_clear()
+
+
+@pytest.mark.usefixtures("pip_brings")
+def test_where_home_can_only_be_read_a_temporary_folder_keeps_them(read_only_home):
+    home, elsewhere = read_only_home
+    for path in w.fetch_weights().values():
+        assert path.parent.parent == elsewhere
+    assert not home.exists()
+
+
+def test_weights_in_a_home_that_can_only_be_read_are_found(read_only_home, weights, monkeypatch):
+    home, _ = read_only_home
+    home.mkdir(parents=True)
+    for path in weights.values():
+        shutil.copy(path, home)
+    pip_says(monkeypatch, "there must be no download")
+    assert {path.parent for path in w.fetch_weights().values()} == {home}
+
+
+@pytest.mark.parametrize(
+    ("there", "words"),
+    [
+        ({"pip": "/usr/bin/pip", "uv": "/usr/bin/uv"}, ["/usr/bin/pip"]),
+        ({"uv": "/usr/bin/uv"}, ["/usr/bin/uv", "tool", "run", "--python", sys.executable, "pip"]),
+    ],
+)
+@pytest.mark.usefixtures("empty_cache")
+def test_an_environment_without_pip_takes_another(there, words, pip_brings, monkeypatch):
+    """Those that uv makes have none."""
+    real = importlib.util.find_spec
+    monkeypatch.delenv("UV", raising=False)
+    monkeypatch.setattr(shutil, "which", there.get)
+    monkeypatch.setattr(
+        importlib.util,
+        "find_spec",
+        lambda name: None if name in ("pip", "ensurepip") else real(name),
+    )
+    w.fetch_weights()
+    assert pip_brings[0][: len(words)] == words
+
+
+def test_a_chosen_folder_that_cannot_be_written_is_refused_before_a_download(
+    tmp_path, pip_brings, monkeypatch
+):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("HRC_ENV_CACHE", str(tmp_path / "file" / "folder"))
+    with pytest.raises(WeightsError, match="Choose another folder"):
+        w.fetch_weights()
+    assert pip_brings == []
 
 
 def test_without_pip_the_error_says_how_to_get_it(empty_cache, monkeypatch):

@@ -119,6 +119,19 @@ def test_a_backend_that_cannot_draw_says_what_to_do(backend, said, process):
     assert said in done.stdout.replace("\\", "")
 
 
+@pytest.mark.parametrize(
+    ("name", "value"), [("PYOPENGL_PLATFORM", "glx"), ("MUJOCO_EGL_DEVICE_ID", "first")]
+)
+def test_a_variable_that_keeps_pictures_away_is_named(name, value, process):
+    """Clusters set it; whoever draws nothing does not notice."""
+    done = process("-c", TRUTH, MUJOCO_GL="egl", **{name: value})
+    assert done.returncode == 0, done.stderr
+    said = "RenderingError No OpenGL context could be made (MUJOCO_GL='egl', "
+    assert said in done.stdout
+    assert f"{name}={value!r}" in done.stdout
+    assert not done.stderr
+
+
 @pytest.mark.skipif(bool(ctypes.util.find_library("OSMesa")), reason="OSMesa is installed here")
 def test_without_a_library_truth_works_and_pictures_say_what_to_do(process):
     """mujoco itself cannot be imported with such a MUJOCO_GL."""

@@ -1,6 +1,7 @@
 """The vector environment: the single ones, many at once, by gymnasium's conventions."""
 
 import importlib.util
+from importlib.metadata import version
 from pathlib import Path
 
 import gymnasium
@@ -213,6 +214,10 @@ def test_what_was_returned_is_never_written_again():
     assert same(env.step(after), again.step(after))
 
 
+@pytest.mark.skipif(
+    version("gymnasium") in ("1.1.0", "1.1.1", "1.2.0", "1.2.1"),
+    reason="not tested: gymnasium's own wrappers do not fit each other before 1.2.2",
+)
 def test_gymnasiums_vector_wrappers_work_on_it():
     env = DictInfoToList(RecordEpisodeStatistics(NormalizeObservation(make(num_envs=2))))
     env.reset(seed=0)

@@ -10,15 +10,20 @@ Kernels are compiled by numba without Python's lock, kept on disk (`cache`), and
 they are needed where that is known (`ahead`).
 """
 
+import importlib
+import warnings
 from collections.abc import Callable
 from functools import partial
 from typing import Any, TypeVar, overload
 
+import numba
 from numba.core import config
 
-from hrc_env.core.kernels.lean import KernelDispatcher
-
-KERNELS: dict[str, KernelDispatcher] = {}
+LEAN_WITH = ("0.68",)
+"""Releases of numba that `lean` was tested with: it builds on the inside of the compiler."""
+UNTESTED = "hrc_env's compiler of kernels was not tested with numba"
+"""How the warning of another release begins."""
+KERNELS: dict[str, Any] = {}
 """Every kernel that has been imported, by "module:name"."""
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -60,6 +65,25 @@ def kernel(
         "nopython": True, "nogil": True, "error_model": "numpy", "_nrt": makes_arrays,
         "no_cfunc_wrapper": True, "fastmath": fastmath, "forceinline": forceinline,
     }  # fmt: skip
-    made = KernelDispatcher(function, options)
+    made = DISPATCHER(function, options)
     KERNELS[f"{function.__module__}:{function.__qualname__}"] = made
     return made
+
+
+def dispatcher(version: str) -> Any:
+    """Return the class of kernels for a release of numba; other releases than those tested get
+    numba's own, and one warning."""
+    tested = version.startswith(tuple(f"{release}." for release in LEAN_WITH))
+    if not tested:
+        warnings.warn(
+            f"{UNTESTED} {version}, but with {', '.join(LEAN_WITH)}: numba's own compiler is used, "
+            "which takes about twice as long, once.",
+            stacklevel=2,
+        )
+    name = "lean" if tested else "plain"
+    found = importlib.import_module(f"hrc_env.core.kernels.{name}")
+    return found.KernelDispatcher if tested else found.PlainDispatcher
+
+
+DISPATCHER = dispatcher(numba.__version__)
+"""The class of every kernel here."""

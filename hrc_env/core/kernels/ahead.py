@@ -11,6 +11,8 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache, partial
 from typing import Any
 
+from hrc_env.core.folders import alone
+from hrc_env.core.kernels import UNTESTED
 from hrc_env.core.kernels.cache import folder
 from hrc_env.core.kernels.signatures import Signature, decode, kernel_named, recorded
 from hrc_env.core.machine import n_cores
@@ -38,7 +40,7 @@ def ensure(level: str) -> None:
 def compile_missing(level: str | None, say: Say) -> int:
     """Compile what is missing in as many processes as there are cores; how many there were. Where
     no process can be started, or one dies, kernels are compiled when they are called."""
-    with _alone(say):
+    with alone(folder(), lambda: say(0.0, "waiting for another program that compiles")):
         todo = missing(level)
         wanted, total_s = iter(todo), sum(each.seconds for each in todo)
         with ThreadPoolExecutor(n_cores()) as threads:
@@ -50,7 +52,8 @@ def compile_missing(level: str | None, say: Say) -> int:
 
 def _serve(wanted: Iterator[Signature], total_s: float, say: Say) -> None:
     """Let one process compile until nothing is left, beside others that take of the same."""
-    command = [sys.executable, "-m", "hrc_env.core.kernels.ahead"]
+    quiet = f"ignore:{UNTESTED}"  # said once, by the process that needs them
+    command = [sys.executable, "-W", quiet, "-m", "hrc_env.core.kernels.ahead"]
     pipes: Any = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True, "bufsize": 1}
     try:
         process: Any = subprocess.Popen(command, **pipes)
@@ -70,37 +73,19 @@ def _serve(wanted: Iterator[Signature], total_s: float, say: Say) -> None:
         process.communicate()
 
 
-@contextlib.contextmanager
-def _alone(say: Say) -> Iterator[None]:
-    """Wait for another program that compiles into the same folder."""
-    try:
-        import fcntl
-
-        folder().mkdir(parents=True, exist_ok=True)
-        lock = (folder() / "lock").open("w")
-    except (ImportError, OSError):  # no such locks, or nothing can be written: no harm, only work
-        yield
-        return
-    with lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            say(0.0, "waiting for another program that compiles")
-            fcntl.flock(lock, fcntl.LOCK_EX)
-        yield
-
-
 def _logged() -> Say:
     """Progress as lines of the log."""
-    said_s, done = time.monotonic(), 0.0
+    began_s = said_s = time.monotonic()
+    done = 0.0
     log.warning("Compiling hrc_env's kernels for this machine, once (a minute or two) ...")
 
-    def say(share: float, what: str) -> None:
+    def say(share: float, _: str) -> None:
         nonlocal done, said_s
         done += share
         if time.monotonic() - said_s > LOG_EVERY_S:
             said_s = time.monotonic()
-            log.warning("Compiling kernels: %.0f %% (%s)", 100 * done, what)
+            left_s = (said_s - began_s) * (1 / max(done, 1e-3) - 1)
+            log.warning("Compiling kernels: %.0f %%, about %.0f s left", 100 * done, left_s)
 
     return say
 

@@ -10,21 +10,19 @@ import hashlib
 import os
 import pickle
 import sys
-import tempfile
 import uuid
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numba
 from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
+from numba.core.dispatcher import Dispatcher
 from numba.core.serialize import dumps
 
+from hrc_env.core import folders
 from hrc_env.core.kernels.digest import digest_of
-
-if TYPE_CHECKING:
-    from hrc_env.core.kernels.lean import KernelDispatcher
 
 PACKAGE = Path(__file__).resolve().parents[2]
 SUFFIX = ".nbc"
@@ -33,35 +31,28 @@ SUFFIX = ".nbc"
 @lru_cache(maxsize=1)
 def folder() -> Path:
     """Where compiled kernels are kept: in NUMBA_CACHE_DIR; else beside the package's bytecode, so
-    that a copied tree keeps them; where nobody may write there, in the user's cache folder."""
+    that a copied tree keeps them; where that cannot be written, in the user's cache folder."""
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     if chosen:
         return Path(chosen) / "hrc_env"
-    beside = PACKAGE / "__pycache__" / "kernels"
-    if _can_make(beside):
-        return beside
-    name = _hashed(str(PACKAGE))[:12]
-    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return cache / "hrc_env" / f"kernels-{name}"
+    if folders.can_write(_beside()):
+        return _beside()
+    return folders.user_cache() / f"kernels-{_hashed(str(PACKAGE))[:12]}"
+
+
+def _beside() -> Path:
+    """Return the folder beside the package's bytecode."""
+    return PACKAGE / "__pycache__" / "kernels"
 
 
 def _hashed(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _can_make(path: Path) -> bool:
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=path):
-            return True
-    except OSError:
-        return False
-
-
 class KernelCache(NullCache):
     """The compiled forms of one kernel."""
 
-    def __init__(self, dispatcher: "KernelDispatcher") -> None:
+    def __init__(self, dispatcher: Dispatcher) -> None:
         self._dispatcher = dispatcher
 
     def path(self, args: tuple[Any, ...]) -> Path:
@@ -73,7 +64,10 @@ class KernelCache(NullCache):
         made_of = _hashed(f"{digest_of(self._dispatcher)} {versions}")[:16]
         function = self._dispatcher.py_func
         name = f"{function.__module__.removeprefix('hrc_env.')}.{function.__qualname__}"
-        return folder() / f"{name}-{kind}-{made_of}{SUFFIX}"
+        file = f"{name}-{kind}-{made_of}{SUFFIX}"
+        if not os.environ.get("NUMBA_CACHE_DIR") and (_beside() / file).exists():
+            return _beside() / file  # also where that can only be read
+        return folder() / file
 
     def load_overload(  # type: ignore[override]
         self, sig: Any, target_context: Any

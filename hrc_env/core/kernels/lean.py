@@ -5,7 +5,8 @@ callee is left in LLVM's intermediate form; the kernel that Python calls links e
 optimises once and emits once: half the time and memory to compile.
 
 Everything is done by subclasses, so that other people's numba functions are compiled as ever. What
-is subclassed is numba's inside: `pyproject.toml` admits the versions with which this is tested.
+is subclassed is numba's inside: other releases than those that this is tested with (`LEAN_WITH`)
+get `plain`.
 """
 
 import copy

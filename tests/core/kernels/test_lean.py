@@ -5,8 +5,12 @@ import numpy as np
 import pytest
 from numba.core.codegen import JITCodeLibrary
 
-from hrc_env.core.kernels import kernel
-from hrc_env.core.kernels.lean import LeanLibrary
+from hrc_env.core.kernels import DISPATCHER, kernel
+from hrc_env.core.kernels.lean import KernelDispatcher, LeanLibrary
+
+pytestmark = pytest.mark.skipif(
+    DISPATCHER is not KernelDispatcher, reason="not tested: a numba that lean was not tested with"
+)
 
 
 @kernel

@@ -1,0 +1,74 @@
+"""Folders in which files are kept between runs, also where home or package cannot be written."""
+
+import contextlib
+import hashlib
+import os
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from functools import lru_cache
+from pathlib import Path
+
+
+def usual_cache() -> Path | None:
+    """Return `hrc_env` in the user's caches, which need not exist; None without a home."""
+    chosen = os.environ.get("XDG_CACHE_HOME")
+    if sys.platform == "win32":
+        chosen = chosen or os.environ.get("LOCALAPPDATA")
+    usual = {"darwin": "~/Library/Caches", "win32": "~/AppData/Local"}.get(sys.platform, "~/.cache")
+    try:
+        return Path(chosen or usual).expanduser() / "hrc_env"
+    except RuntimeError:  # no HOME, and no user of that number
+        return None
+
+
+def user_cache() -> Path:
+    """Return the folder of the user's caches that can be written, or else a temporary one."""
+    usual = usual_cache()
+    return usual if usual is not None and can_write(usual) else temporary_cache()
+
+
+@lru_cache(maxsize=1)
+def temporary_cache() -> Path:
+    """Return a folder among the temporary ones that is this user's alone."""
+    owner = getattr(os, "getuid", lambda: 0)()
+    folder = Path(tempfile.gettempdir()) / f"hrc_env-{owner}"
+    with contextlib.suppress(OSError):
+        folder.mkdir(mode=0o700, exist_ok=True)
+        status = folder.lstat()
+        if status.st_uid == owner and not status.st_mode & 0o022 and not folder.is_symlink():
+            return folder
+        name = hashlib.sha256(os.urandom(16)).hexdigest()[:12]
+        folder = folder.with_name(f"{folder.name}-{name}")  # another user took the first
+        folder.mkdir(mode=0o700)
+    return folder
+
+
+def can_write(folder: Path) -> bool:
+    """Return whether files can be written into a folder, which is made if it can be."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False
+
+
+@contextlib.contextmanager
+def alone(folder: Path, wait: Callable[[], object]) -> Iterator[None]:
+    """Hold the lock of a folder; `wait` is called where another program holds it."""
+    try:
+        import fcntl
+
+        name = hashlib.sha256(str(folder.absolute()).encode()).hexdigest()[:12]
+        lock = (temporary_cache() / f"lock-{name}").open("w")
+    except (ImportError, OSError):  # no locks here, or no place for one: work is done twice
+        yield
+        return
+    with lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            wait()
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        yield

@@ -1,0 +1,20 @@
+"""The usual way through numba's compiler, for releases that `lean` was not tested with.
+
+Callees are compiled at every level of calls: kernels take about twice as long to compile, and run
+as fast.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+from numba.core import registry
+
+from hrc_env.core.kernels.cache import KernelCache
+
+
+class PlainDispatcher(registry.CPUDispatcher):
+    """A kernel as Python and other kernels call it, kept on disk."""
+
+    def __init__(self, py_func: Callable[..., Any], targetoptions: dict[str, Any]) -> None:
+        super().__init__(py_func, targetoptions=targetoptions)
+        self._cache: Any = KernelCache(self)
