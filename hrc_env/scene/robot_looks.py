@@ -13,7 +13,8 @@ import mujoco
 import numpy as np
 from scipy.spatial import KDTree
 
-from hrc_env.core.typing import Floats, Points3
+from hrc_env.core.typing import Bools, Floats, Points3
+from hrc_env.scene.capsule_fit import are_inside_sides, sides_of_hull
 from hrc_env.scene.robot_chain import id_of, link_of, parsed
 
 if TYPE_CHECKING:
@@ -69,6 +70,7 @@ def compare_looks(robot: "Robot") -> dict[str, Mismatch]:
     along = data.geom_xmat[capsules].reshape(-1, 3, 3)[..., 2] * model.geom_size[capsules, 1:2]
     middle = data.geom_xpos[capsules]
     ends, radius_m = np.stack([middle - along, middle + along], 1), model.geom_size[capsules, 0]
+    solids = [solid_of(model, data, geom) for geom in looks]
     found = {}
     for k, (name, geom) in enumerate(zip(robot.capsules, capsules, strict=True)):
         link, others = carrier[geom], np.arange(len(capsules)) != k
@@ -76,7 +78,10 @@ def compare_looks(robot: "Robot") -> dict[str, Mismatch]:
         hull = hull[_outside_m(hull, ends[others], radius_m[others]) > -INSIDE_M]
         near = [points[each] for each in looks if abs(carrier[each] - link) <= 1]
         own = [points[each] for each in looks if carrier[each] == link]
-        found[name] = Mismatch(bare_m(hull, near), outside_capsules_m(own, ends, radius_m))
+        hidden = np.any([solid.holds(hull) for solid in solids], axis=0)
+        found[name] = Mismatch(
+            bare_m(hull[~hidden] if solids else hull, near), outside_capsules_m(own, ends, radius_m)
+        )
     return found
 
 
@@ -108,6 +113,52 @@ def surface_of(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Points3
     else:
         local = _ON_SHAPES.get(kind, _on_nothing)(size)
     return data.geom_xpos[geom] + local @ data.geom_xmat[geom].reshape(3, 3).T
+
+
+class Solid(NamedTuple):
+    """A geom, for asking what is in it."""
+
+    kind: int
+    size: Floats
+    at_world: Points3
+    turn_world: Floats
+    around_m: float
+    """No point of it is farther from its middle [m]."""
+    sides: Floats
+    """(F, 4) of a mesh's convex hull; of none for other kinds."""
+
+    def holds(self, points_world: Points3) -> Bools:
+        """Return which points (N, 3) are inside; of a mesh, inside of its convex hull."""
+        off = points_world - self.at_world
+        near = np.linalg.norm(off, axis=-1) < self.around_m
+        near[near] = self._holds(off[near] @ self.turn_world)
+        return near
+
+    def _holds(self, local: Points3) -> Bools:
+        flat, height, size = np.hypot(*local[:, :2].T), np.abs(local[:, 2]), self.size
+        inside = {
+            mujoco.mjtGeom.mjGEOM_MESH: lambda: are_inside_sides(self.sides, local),
+            mujoco.mjtGeom.mjGEOM_BOX: lambda: (np.abs(local) < size).all(-1),
+            mujoco.mjtGeom.mjGEOM_CYLINDER: lambda: (flat < size[0]) & (height < size[1]),
+            mujoco.mjtGeom.mjGEOM_CAPSULE: lambda: (
+                np.hypot(flat, np.maximum(height - size[1], 0.0)) < size[0]
+            ),
+            mujoco.mjtGeom.mjGEOM_SPHERE: lambda: np.hypot(flat, height) < size[0],
+            mujoco.mjtGeom.mjGEOM_ELLIPSOID: lambda: np.linalg.norm(local / size, axis=-1) < 1.0,
+        }
+        found = {int(kind): test for kind, test in inside.items()}.get(self.kind)
+        return np.zeros(len(local), np.bool_) if found is None else np.asarray(found())
+
+
+def solid_of(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Solid:
+    """Return a geom in its pose in the world."""
+    kind, sides = int(model.geom_type[geom]), np.zeros((0, 4))
+    if kind == int(mujoco.mjtGeom.mjGEOM_MESH):
+        corners = _triangles(model, int(model.geom_dataid[geom]))
+        sides = sides_of_hull(corners.reshape(-1, 3))
+    turn = data.geom_xmat[geom].reshape(3, 3).copy()
+    at, around_m = data.geom_xpos[geom].copy(), float(model.geom_rbound[geom])
+    return Solid(kind, model.geom_size[geom].copy(), at, turn, around_m, sides)
 
 
 def outside_capsules_m(looks: Sequence[Points3], ends_world: Floats, radius_m: Floats) -> float:
@@ -197,9 +248,8 @@ _ON_SHAPES: dict[int, Any] = {
 
 def _on_mesh(model: mujoco.MjModel, mesh: int) -> Points3:
     """Return points on a mesh: corners of its triangles, and more where these are large."""
-    first, n = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
-    begin = model.mesh_vertadr[mesh]
-    corners = model.mesh_vert[begin + model.mesh_face[first : first + n]].astype(float)
+    corners = _triangles(model, mesh)
+    n = len(corners)
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = np.linalg.norm(across, axis=-1) / 2
     rng = np.random.default_rng(0)
@@ -209,3 +259,10 @@ def _on_mesh(model: mujoco.MjModel, mesh: int) -> Points3:
     u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
     a, b, c = np.moveaxis(corners[chosen], 1, 0)
     return np.concatenate([a + u * (b - a) + v * (c - a), corners.reshape(-1, 3)[::3]])
+
+
+def _triangles(model: mujoco.MjModel, mesh: int) -> Floats:
+    """Return the corners (T, 3, 3) of a mesh [m]."""
+    first, n = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
+    faces = model.mesh_vertadr[mesh] + model.mesh_face[first : first + n]
+    return np.asarray(model.mesh_vert[faces], np.float64)
