@@ -30,7 +30,12 @@ def check_arguments(what: str, function: Callable[..., Any], *names: str) -> Non
     """Raise `ConfigError` unless a function can be called with so many arguments by position."""
     try:
         signature = inspect.signature(function)
-    except (ValueError, TypeError):  # of functions written in C there is none
+    except (ValueError, TypeError) as error:  # of what is written in C there is none
+        if isinstance(function, type):
+            raise ConfigError(
+                f"{what} must be a function of ({', '.join(names)}), got the class "
+                f"{function.__name__}."
+            ) from error
         return
     try:
         signature.bind(*names)
@@ -83,8 +88,14 @@ def flags_of(what: str, value: object, shape: tuple[int, ...], meaning: str) -> 
 
 def points_of(what: str, value: object) -> NDArray[np.float64]:
     """Return a value as points (N, 3), at least one; `ConfigError` if it is none."""
-    n = len(value) if isinstance(value, list | tuple | np.ndarray) and np.size(value) else 1
-    return numbers_of(what, value, (n, 3), "points, xyz")
+    return numbers_of(what, value, (count_of(value), 3), "points, xyz")
+
+
+def count_of(value: object) -> int:
+    """Return the length of a list or array, at least 1; of anything else 1."""
+    if isinstance(value, list | tuple) or (isinstance(value, np.ndarray) and value.ndim > 0):
+        return max(len(value), 1)
+    return 1
 
 
 def positive(what: str, value: object, unit: str) -> float:

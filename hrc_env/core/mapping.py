@@ -76,6 +76,10 @@ def restored(hint: Any, value: Any, where: str) -> Any:
         value = value.item()
     if hint is str and isinstance(value, Path):
         return str(value)
+    if hint is type(None):
+        return _checked(value is None, "None", value, where)
+    if hint is Path:
+        return _checked(isinstance(value, str | Path), "a path", value, where)
     if hint is float:
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
         finite = is_number and math.isfinite(typing.cast(float, value))

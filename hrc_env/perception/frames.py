@@ -18,7 +18,8 @@ class Frames:
     def __init__(self, cameras: Sequence[PinholeCamera], images: Sequence[Image]) -> None:
         """Check that there is an image for each camera, (H, W, 3) RGB of uint8, of the size for
         which the camera is calibrated; `ConfigError` says of which one it is not so."""
-        if not isinstance(images, list | tuple | np.ndarray) or len(images) != len(cameras):
+        is_array = isinstance(images, np.ndarray) and images.ndim > 0
+        if not (is_array or isinstance(images, list | tuple)) or len(images) != len(cameras):
             raise ConfigError(
                 f"There must be one image for each of {len(cameras)} cameras, or an object with "
                 f"crop(camera_index, window), got {described(images)}."

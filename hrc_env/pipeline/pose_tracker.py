@@ -12,7 +12,14 @@ from typing import Any
 import numpy as np
 
 from hrc_env.core.batching import one
-from hrc_env.core.brought import check_kind, check_kinds, numbers_of, points_of, positive
+from hrc_env.core.brought import (
+    check_kind,
+    check_kinds,
+    count_of,
+    numbers_of,
+    points_of,
+    positive,
+)
 from hrc_env.core.errors import needed, whole
 from hrc_env.core.records import PoseEstimate, Roi
 from hrc_env.core.typing import Bools, Capsules, Image, Points3
@@ -132,11 +139,13 @@ class PoseTracker:
             robot_world: the robot's capsules (K, 2, 3) [m]: of more people than `n_workers` those
                 nearest to it are followed. None: those who were followed first.
         """
-        drawn = list(rngs) or [np.random.default_rng(0)]
-        check_kinds("rngs", drawn, np.random.Generator)
+        if isinstance(rngs, tuple | list) and not rngs:
+            rngs = [np.random.default_rng(0)]
+        check_kinds("rngs", rngs, np.random.Generator)
+        drawn = list(rngs)
         dt_s = self.dt_s if dt_s is None else positive("dt_s", dt_s, "s")
         if robot_world is not None:
-            shape = (*np.shape(robot_world)[:1], 2, 3)
+            shape = (count_of(robot_world), 2, 3)
             robot_world = numbers_of("robot_world [m]", robot_world, shape, "K capsules, ends, xyz")
         given: Any = source
         shown = given if hasattr(given, "crop") else Frames(self.cameras, given)

@@ -20,7 +20,7 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
-from hrc_env.core.brought import check_arguments
+from hrc_env.core.brought import check_arguments, described
 from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.registry import Registry
@@ -142,6 +142,11 @@ def estimator_called(estimator: EstimatorChoice) -> EstimatorSpec:
     if callable(estimator):
         check_arguments("An estimator", estimator, "P", "ctrl_dt", "config")
         return EstimatorSpec(getattr(estimator, "__name__", type(estimator).__name__), estimator)
+    if not isinstance(estimator, str):
+        raise ConfigError(
+            "estimator must be a name, an EstimatorSpec or a function of (P, ctrl_dt, config), got "
+            f"{described(estimator)}."
+        )
     if estimator in OFFLINE:
         raise ConfigError(
             f"{estimator!r} needs the future: call {OFFLINE[estimator]} for a whole clip."
