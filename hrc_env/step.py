@@ -85,8 +85,8 @@ def reset_info(
     return {
         **{f"reward/{term.name}": np.zeros(n) for term in terms},
         **{f"cost{name}": np.zeros(n) for name in costs},
-        **{f"safety/{name}": np.full(n, value) for name, value in happened.items()},
         "safety/min_separation_m": np.where(present.any(1), nearest_m, np.nan),
+        **{f"safety/{name}": np.full(n, value) for name, value in happened.items()},
         "safety/time_to_stop_s": np.zeros(n),
     }
 
