@@ -109,7 +109,7 @@ class Simulation(Stateful):
         made = (batch, most, config.tracker)
         self.estimates = tuple(oracle.prior(*made) for _ in (0.0, *config.forecast_s))
         """What is believed of the workers now, and expected at each of `forecast_s`."""
-        self.identities = metrics.no_identities(batch, most)
+        self.identities, self.keys = metrics.no_identities(batch, most), list[str]()
         robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
         self.measured = handling.world_of(self.physics, self._everyone, robot).objects
         """The task's loose objects as they were measured last; None: there are none."""
@@ -140,12 +140,12 @@ class Simulation(Stateful):
         belief = self._believed(ids, world, estimates := self._perceive(ids))
         identities = metrics.no_identities(*self.present[ids].shape)
         present, terms = self.present[ids], (*task.own_rewards, *rewards.SHARED_TERMS)
-        info = {
+        info = step.agreed(self.keys, {
             **step.reset_info(robot, truth, present, terms, self.config.cost),
             **step.tracking_info(estimates[0], truth, present, identities),
             **shielded(self.shield, belief, np.zeros_like(q), self.config.ctrl_dt)[1],
             **self._episode_info(ids, generator.activity(self.motion), None),
-        }
+        })  # fmt: skip
         write_rows(self.identities, ids, identities)
         return StepResult(self._observed(belief), nothing := np.zeros(len(ids)), nothing > 0, info)
 
@@ -190,14 +190,14 @@ class Simulation(Stateful):
         costs = step.cost_info(cost, happened, present, config.cost)
         self.episode_cost += costs["cost"]
         self.separation_m = cost.min_separation_m
-        info = {
+        info = step.agreed(self.keys, {
             **{f"reward/{name}": value for name, value in terms.items()},
             **costs,
             **step.incident_info(happened, self.watch, robot),
             **step.tracking_info(estimates[0], truth, present, self.identities),
             **shield_info,
             **self._episode_info(self._everyone, activity, happened),
-        }
+        })  # fmt: skip
         over = (cost.contact > 0) & config.cost.contact_terminates
         if self.task.over is not None:
             over |= self.task.over(progress)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env import metrics
+from hrc_env.core.errors import ConfigError
 from hrc_env.core.infos import MISCALIBRATED, MORE_PEOPLE, Info, of_workers, published
 from hrc_env.core.records import PoseEstimate, RobotState, WorkerTruth
 from hrc_env.core.typing import Bools, Floats, Ints, Records
@@ -37,6 +38,21 @@ class StepResult:
     def info_of(self, b: int) -> dict[str, Any]:
         """Return the info of one environment, as NumPy scalars."""
         return {name: value[b] for name, value in published(self.info).items()}
+
+
+def agreed(keys: list[str], info: Info) -> Info:
+    """Return an info with the `keys` of the first one, which fills the list; `ConfigError` for
+    another, as of a shield or a task whose names come and go."""
+    if not keys:
+        keys.extend(info)
+    if list(info) != keys and info.keys() != set(keys):
+        came, gone = sorted(info.keys() - set(keys)), sorted(set(keys) - info.keys())
+        raise ConfigError(
+            "Infos must have the same keys at every reset and step: what a shield says, and a "
+            f"task's info, under the same names each time. New: {', '.join(came) or 'none'}; "
+            f"missing: {', '.join(gone) or 'none'}. Give NaN where there is no number."
+        )
+    return info
 
 
 def joined(results: Sequence[StepResult]) -> StepResult:

@@ -7,6 +7,7 @@ import pytest
 import hrc_env
 from agents.env_info import env_info
 from agents.registry import make_agent
+from hrc_env.core.errors import ConfigError
 from hrc_env.core.infos import ENTRIES, entry_of, published
 from hrc_env.env import HRCEnv
 from hrc_env.vector.env import HRCVectorEnv
@@ -70,6 +71,17 @@ def test_what_was_not_measured_has_a_stand_in_beside_a_key_that_says_so():
     assert told["shield/own"].tolist() == [0.0, 1.0]
     assert told["shield/own_measured"].tolist() == [0.0, 1.0]
     assert entry_of("reward/goal").stand_in is None
+
+
+@pytest.mark.parametrize("make", [HRCEnv, lambda **given: HRCVectorEnv(2, **given)])
+def test_names_that_come_and_go_are_refused(make):
+    def shield(belief, velocities, dt_s):
+        return velocities, {} if velocities.any() else {"own": np.zeros(len(velocities))}
+
+    env = make(perception="none", shield=shield)
+    env.reset(seed=0)
+    with pytest.raises(ConfigError, match="missing: shield/own"):
+        env.step(np.ones(env.action_space.shape, np.float32))
 
 
 def test_indices_stand_for_words():
