@@ -76,8 +76,6 @@ def restored(hint: Any, value: Any, where: str) -> Any:
         value = value.item()
     if hint is str and isinstance(value, Path):
         return str(value)
-    if hint is type(None):
-        return _checked(value is None, "None", value, where)
     if hint is Path:
         return _checked(isinstance(value, str | Path), "a path", value, where)
     if hint is float:

@@ -15,6 +15,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from hrc_env.core.brought import check_kind
 from hrc_env.core.errors import ConfigError, check_names
 from hrc_env.core.mapping import from_mapping, read_toml
 from hrc_env.core.registry import Registry
@@ -109,6 +110,8 @@ class Robot:
         return bool(self.hand or self.suction)
 
     def __post_init__(self) -> None:
+        check_kind(f"{self.name}: hand", self.hand, Hand, None)
+        check_kind(f"{self.name}: suction", self.suction, Suction, None)
         if self.hand and self.suction:
             raise ConfigError(f"{self.name} has a hand and suction: give one of them.")
         for name in ("home_q", "spread_rad", "slew"):
