@@ -227,7 +227,8 @@ def check_robot(robot: Robot) -> None:
         )
     if robot.slew and min(robot.slew) <= 0:
         raise ConfigError(f"{robot.name}: slew must be positive [rad/s^2], got {robot.slew}.")
-    for body in parsed(robot).bodies[1:]:
+    spec = parsed(robot)  # its bodies do not keep it
+    for body in spec.bodies[1:]:
         if body.joints and not body.explicitinertial:
             raise ConfigError(f"{robot.name}: link {body.name!r} needs an <inertial>.")
 
