@@ -107,7 +107,8 @@ def _add_material(assets: ElementTree.Element, material: Any) -> None:
     picture = material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB]
     if picture:
         given["texture"] = picture
-    default = mujoco.MjSpec().add_material()
+    empty = mujoco.MjSpec()  # its parts do not keep it
+    default = empty.add_material()
     given |= _changed(material, default, ("rgba", "specular", "shininess", "emission"))
     ElementTree.SubElement(assets, "material", given)
 
@@ -127,7 +128,8 @@ def _add_content(parent: ElementTree.Element, body: Any) -> None:
         _add_joint(parent, joint)
     for geom in body.geoms:
         _add_geom(parent, geom)
-    plain = mujoco.MjSpec().worldbody.add_site()
+    empty = mujoco.MjSpec()  # its parts do not keep it
+    plain = empty.worldbody.add_site()
     for site in body.sites:
         ElementTree.SubElement(
             parent, "site", name=site.name, pos=_text(site.pos), size=_text(site.size[0]),
@@ -152,7 +154,8 @@ def _add_joint(parent: ElementTree.Element, joint: Any) -> None:
 
 
 def _add_body(parent: ElementTree.Element, body: Any) -> None:
-    default = mujoco.MjSpec().worldbody.add_body()
+    empty = mujoco.MjSpec()  # its parts do not keep it
+    default = empty.worldbody.add_body()
     given = {"name": body.name} if body.name else {}
     if body.mocap:
         given["mocap"] = "true"
@@ -168,7 +171,8 @@ def _add_body(parent: ElementTree.Element, body: Any) -> None:
 
 
 def _add_geom(parent: ElementTree.Element, geom: Any) -> None:
-    default = mujoco.MjSpec().worldbody.add_geom()
+    empty = mujoco.MjSpec()  # its parts do not keep it
+    default = empty.worldbody.add_geom()
     kind, n_sizes = KINDS[geom.type]
     given = {"name": geom.name} if geom.name else {}
     given["type"] = kind
