@@ -150,7 +150,7 @@ ROBOTS: Registry[Robot] = Registry(
 )
 """By name: those in `assets/robots`, and those that were registered."""
 BUILT_IN = frozenset(ROBOTS.data.values())
-"""Those in `assets/robots`, whose looks reach everywhere near their capsules."""
+"""Those in `assets/robots`; none of their capsules reaches out of the looks by `BARE_M`."""
 
 
 def robot_called(robot: str | Robot | Mapping[str, Any]) -> Robot:
