@@ -1,7 +1,9 @@
 """Robots that users bring are seen by cameras as distances count them, whoever made their MJCF."""
 
+import warnings
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -9,8 +11,9 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCEnv
 from hrc_env.scene.capsule_fit import fit_rods, outside_m, surface_of_rod
 from hrc_env.scene.robot import ROBOTS, robot_called
+from hrc_env.scene.robot_chain import parsed
 from hrc_env.scene.robot_import import robot_from_mjcf
-from hrc_env.scene.robot_looks import bare_capsules, compare_looks
+from hrc_env.scene.robot_looks import bare_capsules, compare_looks, warn_of_looks
 
 SERVOED = """
 <mujoco model="servoed">
@@ -144,3 +147,17 @@ def test_rods_hold_the_points_they_are_fitted_to():
         assert np.min([outside_m(points, rod) for rod in rods], axis=0).max() < 0.01
         for rod in rods:
             np.testing.assert_allclose(outside_m(surface_of_rod(rod), rod), 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("sticks_out", [False, True])
+def test_looks_that_no_capsule_holds_are_told(servoed, sticks_out):
+    spec = parsed(servoed)
+    if sticks_out:
+        spec.body("jib").add_geom(
+            type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.05, 0, 0], pos=[0.2, 0, 0.2], mass=0.0
+        )
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        warn_of_looks(replace(servoed, mjcf=spec.to_xml()))
+    assert bool(told) == sticks_out
+    assert all("out of all capsules" in str(each.message) for each in told)
