@@ -230,7 +230,12 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
 
     def words(self, info: Mapping[str, Any]) -> Words:
         """Return in words what an info says of workers, contacts and cameras: `infos.worded`."""
-        return worded(info, words_of(self.simulation.bodies.names))
+        return worded(info, words_of(self.body_names))
+
+    @property
+    def body_names(self) -> tuple[str, ...]:
+        """The bodies that `worker_N/body` of infos counts."""
+        return self.simulation.bodies.names
 
     def set_reward(self, weights: RewardConfig) -> None:
         """Weigh the reward's terms so from the next step on."""

@@ -1,20 +1,39 @@
-"""Capsules that stand for a shape which is known by points on its surface."""
+"""Capsules that stand for a shape which is known by points on its surface.
+
+A ball reaches out of a shape by its radius less the depth of its middle. A grid of depths
+therefore gives the greatest radius of a capsule along any line; of many lines, those whose
+capsules cover most of the surface that is left are taken one after the other.
+"""
 
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import ConvexHull, KDTree, QhullError
+from scipy.ndimage import map_coordinates
+from scipy.spatial import KDTree
 
-from hrc_env.core.typing import Bools, Floats, Points3
+from hrc_env.core.typing import Floats, Points3
 
-TIGHT_M = 0.025
-"""A capsule may reach out of the shape, and the shape out of it, by about this [m]."""
-MOST = 5
-"""Greatest number of capsules for one shape."""
-LEAST_POINTS = 12
+TRIES = ((0.02, 7), (0.025, 7), (0.025, 14), (0.04, 14), (0.08, 14))
+"""How far capsules may reach out of the shape [m], and how many they may be: the first with which
+enough of the surface is covered."""
+UNCOVERED_M = 0.005
+"""The surface may reach out of all capsules by this: no more are added then [m]."""
+LEFT_M = 0.015
+"""By this it may reach out if there are as many capsules as may be [m]."""
 LEAST_RADIUS_M = 0.01
+CELL_M = 0.01
+"""Spacing of the grid of depths; points on surfaces are wanted at half of it [m]."""
+WALLS = 5
+"""A cell is inside if the surface lies beyond it in at least so many of six directions: a tube with
+open ends has an inside, the corner of an L has none."""
+LINES, MIDDLES = 8000, 1000
+"""Numbers of lines that are tried, and of points that these connect."""
+COUNTED = 1000
+"""Number of points by which the covered surface is measured."""
 _TURN = np.pi * (3.0 - 5.0**0.5) * np.arange(120)
 _HEIGHT = (2.0 * np.arange(120) + 1.0) / 120.0 - 1.0
+SHORT = np.array([0.0, 0.0, 1e-3])
+"""The axis of a capsule that is nearly a ball; MuJoCo wants some length [m]."""
 SPHERE = np.stack(
     [np.sqrt(1 - _HEIGHT**2) * np.cos(_TURN), np.sqrt(1 - _HEIGHT**2) * np.sin(_TURN), _HEIGHT], -1
 )
@@ -30,34 +49,99 @@ class Rod(NamedTuple):
     radius_m: float
 
 
-class _Part(NamedTuple):
-    """Some of the points, and the capsule round them."""
+class _Depths(NamedTuple):
+    """How deep points are in a shape."""
 
-    points: Points3
-    rod: Rod
-    hull: Floats
-    """(F, 4) the sides of their convex hull."""
+    low_m: Points3
+    """(3,) the first cell's middle [m]."""
+    depth_m: Floats
+    """(X, Y, Z) distance of cells to the surface [m]; negative outside."""
+
+    def middles(self) -> Points3:
+        """Return the middles of all cells (X, Y, Z, 3) [m]."""
+        return np.moveaxis(np.indices(self.depth_m.shape), 0, -1) * CELL_M + self.low_m
+
+    def at(self, points_m: Points3) -> Floats:
+        """Return the depth of points (..., 3) [m]."""
+        cells = ((points_m - self.low_m) / CELL_M).reshape(-1, 3).T
+        found = map_coordinates(self.depth_m, cells, order=1, mode="nearest")
+        return np.asarray(found, np.float64).reshape(points_m.shape[:-1])
 
 
 def fit_rods(points_m: Points3) -> list[Rod]:
-    """Return capsules round points (N, 3) on the surface of a shape [m]: one, or more where one
-    would be too thick.
+    """Return the few capsules that cover points on the surface of a shape.
 
-    The part whose capsule reaches farthest out of the shape is cut in two across its longest side,
-    until all are tight or there are `MOST`.
+    Args:
+        points_m: (N, 3), neighbours not farther apart than half of `CELL_M` [m].
     """
-    parts, tree = [_part(points_m)], KDTree(points_m)
-    while len(parts) < MOST:
-        loose = [_looseness_m(k, parts, tree) for k in range(len(parts))]
-        worst = int(np.argmax(loose))
-        if loose[worst] < TIGHT_M:
+    rng = np.random.default_rng(0)
+    depths = _measure_depths(points_m)
+    counted = points_m
+    if len(points_m) > COUNTED:
+        counted = points_m[rng.choice(len(points_m), COUNTED, replace=False)]
+    covers = []
+    for out_m, most in TRIES:
+        rods = _cover(counted, _draw_lines(depths, out_m, rng), most)
+        covers.append((float(_outside_all_m(counted, rods).max()), rods))
+        if covers[-1][0] <= LEFT_M:
             break
-        parts[worst : worst + 1] = [_part(each) for each in _cut(parts[worst].points)]
-    return [part.rod for part in parts]
+    rods = min(covers, key=lambda cover: cover[0])[1]
+    return _shrink(points_m, rods)
 
 
-def _part(points: Points3) -> _Part:
-    return _Part(points, _round(points), sides_of_hull(points))
+def _measure_depths(points_m: Points3) -> _Depths:
+    margin_m = max(out_m for out_m, _ in TRIES)
+    low_m = points_m.min(0) - margin_m
+    counts = np.ceil((points_m.max(0) + margin_m - low_m) / CELL_M).astype(int) + 1
+    wall = np.zeros(counts, np.bool_)
+    wall[tuple(np.round((points_m - low_m) / CELL_M).astype(int).T)] = True
+    walls = np.zeros(counts, int)
+    for axis in range(3):
+        walls += np.logical_or.accumulate(wall, axis)
+        walls += np.flip(np.logical_or.accumulate(np.flip(wall, axis), axis), axis)
+    depths = _Depths(low_m, np.where(wall, 0.0, np.where(walls >= WALLS, 1.0, -1.0)))
+    away_m = np.asarray(KDTree(points_m).query(depths.middles())[0], np.float64)
+    return depths._replace(depth_m=depths.depth_m * away_m)
+
+
+def _draw_lines(depths: _Depths, out_m: float, rng: np.random.Generator) -> list[Rod]:
+    """Return capsules, the thickest along random lines that reach out of the shape by `out_m`."""
+    middles = depths.middles()[depths.depth_m + out_m > LEAST_RADIUS_M]
+    middles = middles[rng.permutation(len(middles))[:MIDDLES]]
+    start, end = middles[rng.integers(len(middles), size=(2, LINES))]
+    start, end = np.concatenate([middles, start]), np.concatenate([middles, end]) + SHORT
+    shares = np.linspace(0.0, 1.0, 16)[:, None, None]
+    radius = depths.at(start + shares * (end - start)).min(0) + out_m
+    thick = radius > LEAST_RADIUS_M
+    return [Rod(*each) for each in zip(start[thick], end[thick], radius[thick], strict=True)]
+
+
+def _cover(points_m: Points3, lines: list[Rod], most: int) -> list[Rod]:
+    """Return capsules for points, each the one that covers most of the rest, at most `most`."""
+    covers = np.stack([outside_m(points_m, line) <= UNCOVERED_M for line in lines])
+    left, rods = np.ones(len(points_m), np.bool_), list[Rod]()
+    while left.any() and len(rods) < most:
+        best = int(covers[:, left].sum(1).argmax())
+        rods.append(lines[best])
+        left &= ~covers[best]
+    return rods
+
+
+def _shrink(points_m: Points3, rods: list[Rod]) -> list[Rod]:
+    """Return capsules as thin as those points allow which are in no other."""
+    rods = list(rods)
+    for k, rod in enumerate(rods):
+        own = points_m[_outside_all_m(points_m, rods[:k] + rods[k + 1 :]) > UNCOVERED_M]
+        needed_m = outside_m(own, rod).max(initial=-rod.radius_m) + rod.radius_m - UNCOVERED_M
+        radius_m = float(np.clip(needed_m, LEAST_RADIUS_M, rod.radius_m))
+        rods[k] = rod._replace(radius_m=radius_m)
+    return rods
+
+
+def _outside_all_m(points_m: Points3, rods: list[Rod]) -> Floats:
+    """Return how far points (N, 3) reach out of all capsules (N,) [m]."""
+    away_m = [outside_m(points_m, rod) for rod in rods]
+    return np.asarray(np.min([np.full(len(points_m), np.inf), *away_m], axis=0))
 
 
 def surface_of_rod(rod: Rod) -> Points3:
@@ -70,7 +154,7 @@ def surface_of_rod(rod: Rod) -> Points3:
     flat = SPHERE[np.abs(up) < 0.9]
     flat = flat - (flat @ axis)[:, None] * axis
     flat /= np.linalg.norm(flat, axis=-1, keepdims=True)
-    shares = np.linspace(0.0, 1.0, 2 + int(length / TIGHT_M))[:, None, None]
+    shares = np.linspace(0.0, 1.0, 2 + int(length / CELL_M))[:, None, None]
     side = rod.start_m + shares * along + rod.radius_m * flat
     return np.asarray(np.concatenate([ends, side.reshape(-1, 3)]), np.float64)
 
@@ -81,75 +165,3 @@ def outside_m(points_m: Points3, rod: Rod) -> Floats:
     share = (points_m - rod.start_m) @ along / max(float(along @ along), 1e-12)
     nearest = rod.start_m + np.clip(share, 0.0, 1.0)[:, None] * along
     return np.asarray(np.linalg.norm(points_m - nearest, axis=-1), np.float64) - rod.radius_m
-
-
-def _looseness_m(k: int, parts: list[_Part], tree: KDTree) -> float:
-    """Return how far a capsule, where it is in no other, reaches out of the shape at most [m]."""
-    if len(parts[k].points) <= LEAST_POINTS:
-        return 0.0
-    surface = surface_of_rod(parts[k].rod)
-    for other in (*parts[:k], *parts[k + 1 :]):
-        surface = surface[outside_m(surface, other.rod) > 0.0]
-    away_m = np.asarray(tree.query(surface)[0]) if len(surface) else np.zeros(0)
-    surface, away_m = surface[away_m > TIGHT_M], away_m[away_m > TIGHT_M]
-    hidden = np.zeros(len(surface), np.bool_)
-    for part in parts:
-        hidden |= are_inside_sides(part.hull, surface)
-    return float(away_m[~hidden].max(initial=0.0))
-
-
-def sides_of_hull(points_m: Points3) -> Floats:
-    """Return the sides (F, 4) of the convex hull of points (N, 3): normals outwards, and less their
-    distance from the origin; of points in a plane, a side that leaves nothing inside."""
-    try:
-        return np.asarray(ConvexHull(points_m).equations, np.float64)
-    except (QhullError, ValueError):
-        return np.array([[0.0, 0.0, 0.0, 1.0]])
-
-
-def are_inside_sides(sides: Floats, asked_m: Points3) -> Bools:
-    """Return which of some points (M, 3) are behind all sides (F, 4) of a hull."""
-    return np.asarray((asked_m @ sides[:, :3].T + sides[:, 3] <= 0.0).all(-1))
-
-
-def _axes(points: Points3) -> Points3:
-    """Return the principal axes (3, 3) of points, the longest first."""
-    off = points - points.mean(0)
-    return np.asarray(np.linalg.svd(off, full_matrices=False)[2], np.float64)
-
-
-def _round(points: Points3) -> Rod:
-    """Return the smallest capsule round all points along one of their principal axes."""
-    axes = _axes(points)
-    rods = [_along(points, np.roll(axes, -k, axis=0)) for k in range(len(axes))]
-    return min(rods, key=_volume_m3)
-
-
-def _along(points: Points3, axes: Points3) -> Rod:
-    """Return a capsule round all points along the first of some axes (3, 3)."""
-    local = points @ axes.T
-    middle = (local.max(0) + local.min(0)) / 2
-    off = local - middle
-    across = np.linalg.norm(off[:, 1:], axis=-1)
-    radius = max(float(across.max()) - TIGHT_M / 4, LEAST_RADIUS_M)
-    # The ends are as near to the middle as the points allow, round them all.
-    rise = np.sqrt(np.maximum(radius**2 - np.minimum(across, radius) ** 2, 0.0))
-    half = max(float((np.abs(off[:, 0]) - rise).max()), 0.0)
-    ends = np.array([[-half, 0.0, 0.0], [half, 0.0, 0.0]]) + middle
-    start, end = ends @ axes
-    return Rod(start, end, radius)
-
-
-def _volume_m3(rod: Rod) -> float:
-    length = float(np.linalg.norm(rod.end_m - rod.start_m))
-    return np.pi * rod.radius_m**2 * (length + 4.0 / 3.0 * rod.radius_m)
-
-
-def _cut(points: Points3) -> list[Points3]:
-    """Return two parts of points, cut across the longest side of their box."""
-    axes = _axes(points)
-    local = points @ axes.T
-    side = int(np.argmax(np.ptp(local, axis=0)))
-    middle = (local[:, side].max() + local[:, side].min()) / 2
-    low = local[:, side] < middle
-    return [part for part in (points[low], points[~low]) if len(part)]

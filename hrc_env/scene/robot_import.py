@@ -20,7 +20,7 @@ import numpy as np
 from hrc_env.core.brought import check_kind, positive
 from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.core.typing import Floats
-from hrc_env.scene.capsule_fit import Rod, fit_rods
+from hrc_env.scene.capsule_fit import CELL_M, Rod, fit_rods
 from hrc_env.scene.primitives import capsule
 from hrc_env.scene.robot import Robot
 from hrc_env.scene.robot_looks import surface_of
@@ -286,7 +286,7 @@ def _add_capsules(spec: Any, links: list[str]) -> dict[str, list[str]]:
             if _is_on(model, int(model.geom_bodyid[geom]), body)
             and not any(_is_on(model, int(model.geom_bodyid[geom]), each) for each in after)
         ]
-        points = [surface_of(model, data, geom) for geom in own]
+        points = [surface_of(model, data, geom, CELL_M / 2) for geom in own]
         if not points or not sum(map(len, points)):
             added[link] = []
             continue

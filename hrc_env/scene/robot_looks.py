@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import mujoco
 import numpy as np
-from scipy.spatial import KDTree
+from scipy.spatial import ConvexHull, KDTree, QhullError
 
 from hrc_env.core.typing import Bools, Floats, Points3
-from hrc_env.scene.capsule_fit import are_inside_sides, sides_of_hull
 from hrc_env.scene.robot_chain import id_of, link_of, parsed
 
 if TYPE_CHECKING:
@@ -29,7 +28,7 @@ UNLIKE_M = 0.05
 SPACING_M = 0.02
 """Distance of neighbouring points on a surface [m]."""
 MOST_POINTS = 4000
-"""Of one geom."""
+"""Of one mesh at that spacing."""
 
 
 class Mismatch(NamedTuple):
@@ -54,9 +53,9 @@ def bare_capsules(robot: "Robot") -> frozenset[str]:
     )
 
 
-def compare_looks(robot: "Robot") -> dict[str, Mismatch]:
+def compare_looks(robot: "Robot", spacing_m: float = SPACING_M) -> dict[str, Mismatch]:
     """Return how far each capsule and what is drawn on its link and the next ones are apart, in the
-    pose at rest."""
+    pose at rest; points on surfaces are `spacing_m` apart."""
     model = parsed(robot).compile()
     data, gripped = mujoco.MjData(model), robot.hand or robot.suction
     data.qpos[: len(robot.joints)] = robot.home_q
@@ -66,7 +65,7 @@ def compare_looks(robot: "Robot") -> dict[str, Mismatch]:
     capsules = [id_of(model, "geom", name) for name in robot.capsules]
     pads = [id_of(model, "geom", name) for name in gripped.pads] if gripped else []
     looks = [geom for geom in range(model.ngeom) if geom not in (*capsules, *pads)]
-    points = {geom: surface_of(model, data, geom) for geom in (*looks, *capsules)}
+    points = {geom: surface_of(model, data, geom, spacing_m) for geom in (*looks, *capsules)}
     along = data.geom_xmat[capsules].reshape(-1, 3, 3)[..., 2] * model.geom_size[capsules, 1:2]
     middle = data.geom_xpos[capsules]
     ends, radius_m = np.stack([middle - along, middle + along], 1), model.geom_size[capsules, 0]
@@ -105,13 +104,15 @@ def warn_of_looks(robot: "Robot") -> None:
             )
 
 
-def surface_of(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Points3:
+def surface_of(
+    model: mujoco.MjModel, data: mujoco.MjData, geom: int, spacing_m: float = SPACING_M
+) -> Points3:
     """Return points (N, 3) all over the surface of a geom in the world [m]."""
     kind, size = int(model.geom_type[geom]), model.geom_size[geom]
     if kind == int(mujoco.mjtGeom.mjGEOM_MESH):
-        local = _on_mesh(model, int(model.geom_dataid[geom]))
+        local = _on_mesh(model, int(model.geom_dataid[geom]), spacing_m)
     else:
-        local = _ON_SHAPES.get(kind, _on_nothing)(size)
+        local = _ON_SHAPES.get(kind, _on_nothing)(size, spacing_m)
     return data.geom_xpos[geom] + local @ data.geom_xmat[geom].reshape(3, 3).T
 
 
@@ -137,7 +138,7 @@ class Solid(NamedTuple):
     def _holds(self, local: Points3) -> Bools:
         flat, height, size = np.hypot(*local[:, :2].T), np.abs(local[:, 2]), self.size
         inside = {
-            mujoco.mjtGeom.mjGEOM_MESH: lambda: are_inside_sides(self.sides, local),
+            mujoco.mjtGeom.mjGEOM_MESH: lambda: _are_inside(self.sides, local),
             mujoco.mjtGeom.mjGEOM_BOX: lambda: (np.abs(local) < size).all(-1),
             mujoco.mjtGeom.mjGEOM_CYLINDER: lambda: (flat < size[0]) & (height < size[1]),
             mujoco.mjtGeom.mjGEOM_CAPSULE: lambda: (
@@ -155,10 +156,24 @@ def solid_of(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Solid:
     kind, sides = int(model.geom_type[geom]), np.zeros((0, 4))
     if kind == int(mujoco.mjtGeom.mjGEOM_MESH):
         corners = _triangles(model, int(model.geom_dataid[geom]))
-        sides = sides_of_hull(corners.reshape(-1, 3))
+        sides = _sides_of_hull(corners.reshape(-1, 3))
     turn = data.geom_xmat[geom].reshape(3, 3).copy()
     at, around_m = data.geom_xpos[geom].copy(), float(model.geom_rbound[geom])
     return Solid(kind, model.geom_size[geom].copy(), at, turn, around_m, sides)
+
+
+def _sides_of_hull(points_m: Points3) -> Floats:
+    """Return the sides (F, 4) of the convex hull of points (N, 3): normals outwards, and less their
+    distance from the origin; of points in a plane, a side that leaves nothing inside."""
+    try:
+        return np.asarray(ConvexHull(points_m).equations, np.float64)
+    except (QhullError, ValueError):
+        return np.array([[0.0, 0.0, 0.0, 1.0]])
+
+
+def _are_inside(sides: Floats, points_m: Points3) -> Bools:
+    """Return which of some points (M, 3) are behind all sides (F, 4) of a hull."""
+    return np.asarray((points_m @ sides[:, :3].T + sides[:, 3] <= 0.0).all(-1))
 
 
 def outside_capsules_m(looks: Sequence[Points3], ends_world: Floats, radius_m: Floats) -> float:
@@ -190,12 +205,12 @@ def bare_m(capsule_points: Points3, looks: Sequence[Points3]) -> float:
     return float(KDTree(points_world).query(capsule_points)[0].max())
 
 
-def _grid(length_m: float) -> int:
-    return int(np.clip(np.ceil(length_m / SPACING_M), 1, 60)) + 1
+def _grid(length_m: float, spacing_m: float) -> int:
+    return int(np.clip(np.ceil(length_m / spacing_m), 1, 60 * SPACING_M / spacing_m)) + 1
 
 
-def _on_box(size: Floats) -> Points3:
-    axes = [np.linspace(-half, half, _grid(2 * half)) for half in size]
+def _on_box(size: Floats, spacing_m: float) -> Points3:
+    axes = [np.linspace(-half, half, _grid(2 * half, spacing_m)) for half in size]
     faces = []
     for k in range(3):
         flat = np.stack(np.meshgrid(*(axes[i] for i in range(3) if i != k)), -1).reshape(-1, 2)
@@ -204,10 +219,10 @@ def _on_box(size: Floats) -> Points3:
     return np.concatenate(faces)
 
 
-def _on_round(radius_m: float, half_m: float, cap: Floats) -> Points3:
+def _on_round(radius_m: float, half_m: float, cap: Floats, spacing_m: float) -> Points3:
     """Return points on a tube about z and on its ends; `cap` (n, 2): radius and height of rings."""
-    around = np.linspace(0, 2 * np.pi, _grid(2 * np.pi * radius_m), endpoint=False)
-    tube = [(radius_m, z) for z in np.linspace(-half_m, half_m, _grid(2 * half_m))]
+    around = np.linspace(0, 2 * np.pi, _grid(2 * np.pi * radius_m, spacing_m), endpoint=False)
+    tube = [(radius_m, z) for z in np.linspace(-half_m, half_m, _grid(2 * half_m, spacing_m))]
     rings = np.array(
         [*tube, *((r, half_m + h) for r, h in cap), *((r, -half_m - h) for r, h in cap)]
     )
@@ -215,25 +230,27 @@ def _on_round(radius_m: float, half_m: float, cap: Floats) -> Points3:
     return np.concatenate([np.stack([r * x, r * y, np.full_like(x, z)], -1) for r, z in rings])
 
 
-def _on_capsule(size: Floats) -> Points3:
-    rise = np.linspace(0.0, np.pi / 2, _grid(np.pi / 2 * size[0]))
-    return _on_round(size[0], size[1], size[0] * np.stack([np.cos(rise), np.sin(rise)], -1))
+def _on_capsule(size: Floats, spacing_m: float) -> Points3:
+    rise = np.linspace(0.0, np.pi / 2, _grid(np.pi / 2 * size[0], spacing_m))
+    return _on_round(
+        size[0], size[1], size[0] * np.stack([np.cos(rise), np.sin(rise)], -1), spacing_m
+    )
 
 
-def _on_cylinder(size: Floats) -> Points3:
-    radii = np.linspace(0.0, size[0], _grid(size[0]))
-    return _on_round(size[0], size[1], np.stack([radii, 0 * radii], -1))
+def _on_cylinder(size: Floats, spacing_m: float) -> Points3:
+    radii = np.linspace(0.0, size[0], _grid(size[0], spacing_m))
+    return _on_round(size[0], size[1], np.stack([radii, 0 * radii], -1), spacing_m)
 
 
-def _on_ellipsoid(size: Floats) -> Points3:
-    return _on_capsule(np.array([1.0, 0.0, 0.0])) * size
+def _on_ellipsoid(size: Floats, spacing_m: float) -> Points3:
+    return _on_capsule(np.array([1.0, 0.0, 0.0]), spacing_m / size.max()) * size
 
 
-def _on_sphere(size: Floats) -> Points3:
-    return _on_capsule(np.array([size[0], 0.0, 0.0]))
+def _on_sphere(size: Floats, spacing_m: float) -> Points3:
+    return _on_capsule(np.array([size[0], 0.0, 0.0]), spacing_m)
 
 
-def _on_nothing(size: Floats) -> Points3:
+def _on_nothing(size: Floats, spacing_m: float) -> Points3:
     return np.zeros((0, 3))
 
 
@@ -246,14 +263,15 @@ _ON_SHAPES: dict[int, Any] = {
 }
 
 
-def _on_mesh(model: mujoco.MjModel, mesh: int) -> Points3:
+def _on_mesh(model: mujoco.MjModel, mesh: int, spacing_m: float) -> Points3:
     """Return points on a mesh: corners of its triangles, and more where these are large."""
     corners = _triangles(model, mesh)
     n = len(corners)
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = np.linalg.norm(across, axis=-1) / 2
     rng = np.random.default_rng(0)
-    count = int(min(MOST_POINTS, area.sum() / SPACING_M**2 * 4 + 1))
+    most = MOST_POINTS * SPACING_M / spacing_m
+    count = int(min(most, area.sum() / spacing_m**2 * 4 + 1))
     chosen = rng.choice(n, count, p=area / area.sum())
     u, v = rng.random((2, count, 1))
     u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)

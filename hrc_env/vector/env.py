@@ -183,13 +183,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
     def words(self, infos: Mapping[str, Any]) -> dict[str, NDArray[np.object_]]:
         """Return in words what infos say of workers, contacts and cameras, (num_envs,) tuples each:
         see `hrc_env.core.infos.worded`."""
-        words = words_of(self.shards.first.bodies.names)
-        numbers = {name: infos[name] for name in infos if not name.startswith(("_", "final_"))}
-        said = [
-            worded({name: values[b] for name, values in numbers.items()}, words)
-            for b in range(self.num_envs)
-        ]
-        return {name: np.fromiter((each[name] for each in said), object) for name in said[0]}
+        return _worded(infos, self.num_envs, self.shards.first.bodies.names)
 
     def set_reward(self, weights: RewardConfig) -> None:
         """Weigh the reward's terms so from the next step on, in every environment."""
@@ -296,6 +290,22 @@ def _finals(observation: Observation, info: InfoTable, who: Bools) -> dict[str, 
 
 class PixelVectorEnv(HasSpec, AsyncVectorEnv):  # type: ignore[misc]  # `spec` is a property
     """Environments at level "pixels", a process for each."""
+
+    def words(self, infos: Mapping[str, Any]) -> dict[str, NDArray[np.object_]]:
+        """Return in words what infos say, as `HRCVectorEnv.words` does."""
+        return _worded(infos, self.num_envs, self.get_attr("body_names")[0])
+
+
+def _worded(
+    infos: Mapping[str, Any], num_envs: int, bodies: tuple[str, ...]
+) -> dict[str, NDArray[np.object_]]:
+    words = words_of(bodies)
+    numbers = {name: infos[name] for name in infos if not name.startswith(("_", "final_"))}
+    said = [
+        worded({name: values[b] for name, values in numbers.items()}, words)
+        for b in range(num_envs)
+    ]
+    return {name: np.fromiter((each[name] for each in said), object) for name in said[0]}
 
 
 def make_vector(

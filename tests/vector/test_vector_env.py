@@ -258,6 +258,7 @@ def test_pixels_are_processes(pixels):
     assert observation in env.observation_space
     for action in actions(2, 2):
         _, _, _, truncated, infos = env.step(action)
+    assert [len(each) for each in env.words(infos)["worker/body"]] == [1, 1]
     assert truncated.all()
     assert infos["_final_obs"].all()
     env.close()
