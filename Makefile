@@ -65,8 +65,8 @@ check: $(DEV)
 	$(VENV)/bin/pyright
 
 bench: $(DEV)
-	$(RUN) -m hrc_env bench speed
-	$(RUN) -m hrc_env bench perception
+	$(RUN) -m benchmarks speed
+	$(RUN) -m benchmarks perception
 	$(RUN) benchmarks/soak.py
 
 train-quick: $(TRAIN)

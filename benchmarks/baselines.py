@@ -23,10 +23,10 @@ import torch
 import tyro
 from rich.console import Console
 
-from agents import checkpoints
-from agents.evaluate import EVALUATION_SEED, judged, worth
-from agents.registry import AGENTS, make_agent
 from benchmarks.common import publish
+from hrc_env.agents import checkpoints
+from hrc_env.agents.evaluate import EVALUATION_SEED, judged, worth
+from hrc_env.agents.registry import AGENTS, make_agent
 from hrc_env.cli.checks import at_least, writable_folder
 from hrc_env.cli.progress import progress_bar
 from hrc_env.core.results import Metric

@@ -15,9 +15,9 @@ from typing import Any
 import tyro
 from rich.console import Console
 
-from agents.evaluate import judged
-from agents.registry import make_agent
 from benchmarks.common import publish
+from hrc_env.agents.evaluate import judged
+from hrc_env.agents.registry import make_agent
 from hrc_env.cli.checks import at_least, writable_folder
 from hrc_env.cli.progress import progress_bar
 from hrc_env.core.errors import check_names

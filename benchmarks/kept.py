@@ -14,10 +14,10 @@ from typing import Any
 import tyro
 from rich.console import Console
 
-from agents import policies
-from agents.evaluate import EVALUATION_SEED, judged
-from agents.registry import make_agent
 from benchmarks.common import publish
+from hrc_env.agents import policies
+from hrc_env.agents.evaluate import EVALUATION_SEED, judged
+from hrc_env.agents.registry import make_agent
 from hrc_env.cli.checks import writable_folder
 from hrc_env.cli.progress import progress_bar
 from hrc_env.core.results import Metric

@@ -20,10 +20,10 @@ import torch
 import tyro
 from rich.console import Console
 
-from agents.evaluate import EVALUATION_SEED, judged
-from agents.recipes import filled
-from agents.registry import make_agent
 from benchmarks.common import exactly, publish
+from hrc_env.agents.evaluate import EVALUATION_SEED, judged
+from hrc_env.agents.recipes import filled
+from hrc_env.agents.registry import make_agent
 from hrc_env.cli.checks import at_least, writable_folder
 from hrc_env.cli.progress import progress_bar
 from hrc_env.cli.train import Train

@@ -21,10 +21,10 @@ import torch
 import tyro
 from rich.console import Console
 
-from agents.callbacks import Curve
-from agents.evaluate import EVALUATION_SEED, judged, worth
-from agents.registry import make_agent
 from benchmarks.common import exactly, publish
+from hrc_env.agents.callbacks import Curve
+from hrc_env.agents.evaluate import EVALUATION_SEED, judged, worth
+from hrc_env.agents.registry import make_agent
 from hrc_env.cli.progress import progress_bar
 from hrc_env.core.results import Metric, over
 from hrc_env.experiments.study.cache import PartCache, PartProgress

@@ -17,9 +17,9 @@ from unittest.mock import patch
 import gymnasium
 import numpy as np
 
-from agents.env_info import env_info
-from agents.registry import make_agent
 from benchmarks.common import exactly, publish
+from hrc_env.agents.env_info import env_info
+from hrc_env.agents.registry import make_agent
 from hrc_env.core.results import Metric, over
 from hrc_env.core.typing import Floats
 from hrc_env.experiments.study.report import Column, Report, table_of

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from hrc_env.core.errors import check_names
 from hrc_env.experiments.study.versions import check_subsystems
 
-EXPERIMENT, BENCH = "python -m hrc_env experiment ", "python -m hrc_env bench "
+EXPERIMENT, BENCH = "python -m hrc_env experiment ", "python -m benchmarks "
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,9 +25,9 @@ import imageio.v2 as imageio
 import numpy as np
 from PIL import Image
 
-from agents.env_info import env_info
-from agents.experts import expert
 from benchmarks.gallery.still import views
+from hrc_env.agents.env_info import env_info
+from hrc_env.agents.experts import expert
 from hrc_env.core.batching import copied
 from hrc_env.core.records import Roi
 from hrc_env.env import HRCEnv

@@ -13,13 +13,14 @@ from typing import Any, get_args, get_origin
 import gymnasium
 import numpy as np
 
+from assets.emulator.calibrate import CalibrateKeypoints
 from assets.recordings.clips import AGAIN, CLIPS, Recorded
 from assets.recordings.sources import SOURCES
 from assets.recordings.synthetic import STYLES
+from benchmarks.__main__ import Benchmarks
 from hrc_env import __main__, observations
 from hrc_env.belief import NEAR_FLOOR_M
 from hrc_env.cli.environment import EnvironmentArguments
-from hrc_env.core.checkout import module_of
 from hrc_env.core.infos import ALWAYS, ENTRIES, OF_WORKERS, Entry
 from hrc_env.env import HRCEnv
 from hrc_env.geometry.camera_config import CameraConfig
@@ -391,7 +392,14 @@ def command_line() -> str:
         _options(EnvironmentArguments),
     ]
     for name, (module, kind, says) in __main__.COMMANDS.items():
-        parts += [f"## {name}", says, *_command(getattr(module_of(module), kind), name)]
+        command = getattr(importlib.import_module(module), kind)
+        parts += [f"## {name}", says, *_command(command, name)]
+    parts += [
+        "# Commands of a clone",
+        "## python -m benchmarks",
+        *_command(Benchmarks, "benchmarks"),
+    ]
+    parts += ["## python -m assets.emulator.calibrate", *_command(CalibrateKeypoints, "calibrate")]
     return "\n\n".join(part for part in parts if part) + "\n"
 
 

@@ -3,18 +3,16 @@
 A command's own file is imported when it is called, so that this one answers at once.
 """
 
-import os
 import platform
 import sys
 import textwrap
 from collections.abc import Sequence
+from importlib import import_module
 from importlib.metadata import version
-from pathlib import Path
 
 from hrc_env import __version__
-from hrc_env.core.checkout import module_of
-from hrc_env.core.errors import ConfigError, HRCError, unknown
-from hrc_env.registration import IMPORT, import_files
+from hrc_env.cli.entry import import_first, run_command, show_errors
+from hrc_env.core.errors import ConfigError, unknown
 
 PROGRAM = "python -m hrc_env"
 COMMANDS: dict[str, tuple[str, str, str]] = {
@@ -51,11 +49,6 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
         "hrc_env.cli.record", "Record",
         "Record an agent's episodes as a Minari data set.",
     ),
-    "bench": (
-        "benchmarks.commands", "Bench",
-        "Measure the estimators (tracking), the detector (perception), the environment (speed) or "
-        "the workers (motion).",
-    ),
     "experiment": (
         "hrc_env.cli.experiment", "Experiment",
         "The paper's two experiments (site, lab), what perception is worth in safety (impact), "
@@ -67,20 +60,18 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
         "Judge a policy on fixed seeds: beside unaware, hurried and attentive people, with four "
         "cameras, late ones, one, and the truth, without and with a shield.",
     ),
-    "gallery": (
-        "benchmarks.commands", "Gallery",
-        "Draw every worker, a film strip of every motion, and both scenes from all cameras.",
-    ),
     "import-motion": (
         "hrc_env.cli.import_motion", "ImportMotion",
         "Bring your own motion capture: a BVH, ASF/AMC or npz recording becomes a clip.",
     ),
-    "calibrate-keypoints": (
-        "assets.emulator.calibrate", "CalibrateKeypoints",
-        "Fit the emulator of keypoints to what the pose network says of rendered workers.",
-    ),
 }  # fmt: skip
 """Each command: its module, its class, and the class's first sentence."""
+MOVED = {
+    "bench": "python -m benchmarks",
+    "gallery": "python -m benchmarks gallery",
+    "calibrate-keypoints": "python -m assets.emulator.calibrate",
+}
+"""Former commands, and what they are called in a clone of the repository."""
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -94,20 +85,7 @@ def main(words: Sequence[str] | None = None) -> int:
     if given[0] == "--version":
         print(versions())
         return 0
-    try:
-        given = _imported(given)
-        return _run(given[0], given[1:])
-    except HRCError as error:
-        from rich.console import Console
-        from rich.markup import escape
-
-        name = type(error).__name__
-        said = f"[bold red]{name}[/]: {escape(str(error))}"
-        Console(stderr=True).print(said, highlight=False, soft_wrap=True)
-        return 2
-    except KeyboardInterrupt:
-        print("Stopped.", file=sys.stderr)
-        return 130
+    return show_errors(lambda: _run(*import_first(given, PROGRAM)))
 
 
 def overview() -> str:
@@ -133,34 +111,13 @@ def versions() -> str:
     return ", ".join(f"{name} {number}" for name, number in named.items())
 
 
-def _imported(words: list[str]) -> list[str]:
-    """The words without `--import FILE`, here or in a process that this one starts imported."""
-    while "--import" in words:
-        at = words.index("--import")
-        if at + 1 == len(words):
-            raise ConfigError("--import wants a Python file, as in --import my_task.py.")
-        known, file = os.environ.get(IMPORT, ""), str(Path(words[at + 1]).resolve())
-        os.environ[IMPORT] = os.pathsep.join(filter(None, (known, file)))
-        words = words[:at] + words[at + 2 :]
-    import_files()
-    if not words:
-        raise ConfigError(f"--import goes with a command; {PROGRAM} --help names them.")
-    return words
-
-
-def _run(name: str, words: list[str]) -> int:
+def _run(name: str, *words: str) -> int:
+    if name in MOVED:
+        raise ConfigError(f"{name} is, in a clone of the repository: {MOVED[name]}")
     if name not in COMMANDS:
         raise unknown("command", name, COMMANDS)
-    import tyro
-
-    module, kind, _ = COMMANDS[name]
-    command = tyro.cli(
-        getattr(module_of(module), kind),
-        prog=f"{PROGRAM} {name}",
-        args=words,
-        config=(tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
-    )
-    return command.run()
+    module, command, _ = COMMANDS[name]
+    return run_command(getattr(import_module(module), command), words, f"{PROGRAM} {name}")
 
 
 if __name__ == "__main__":

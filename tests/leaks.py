@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from agents.env_info import env_info
-from agents.registry import make_agent
 from hrc_env import simulation
+from hrc_env.agents.env_info import env_info
+from hrc_env.agents.registry import make_agent
 from hrc_env.core.batching import copied
 from hrc_env.motion import generator
 from hrc_env.pipeline.emulated import EmulatedCameras

@@ -13,8 +13,8 @@ import pytest
 from commands import ROOT, hrc
 
 import hrc_env
-from agents.env_info import env_info
-from agents.registry import make_agent
+from hrc_env.agents.env_info import env_info
+from hrc_env.agents.registry import make_agent
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Roi
 from hrc_env.env import HRCEnv

@@ -11,7 +11,7 @@ from hrc_env.worker.body import load_body
 
 
 @pytest.mark.parametrize(
-    "command", ["setup", "demo", "check", "list", "play", "bench", "experiment", "import-motion"]
+    "command", ["setup", "demo", "check", "list", "play", "experiment", "import-motion"]
 )
 def test_help_explains_every_command(command):
     done = hrc(command, "--help")

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks import __main__ as benchmarks
 from benchmarks import results
 from docs import generate, tables
 from hrc_env.__main__ import main
@@ -275,20 +276,20 @@ def test_what_measured_a_table_can_be_called(study):
 
 
 @cache
-def options_of(*words: str) -> set[str]:
+def options_of(program: str, *words: str) -> set[str]:
     """What a command's help lists."""
     out = io.StringIO()
     with redirect_stdout(out), suppress(SystemExit):
-        main([*words, "--help"])
+        {"hrc_env": main, "benchmarks": benchmarks.main}[program]([*words, "--help"])
     return set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", out.getvalue()))
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_options_that_a_page_names_exist(page):
-    calls = r"python -m hrc_env (?:--import \S+ )?([a-z-]+)([^`#\n]*)"
-    for command, line in re.findall(calls, page.read_text()):
-        which = re.match(r" (\w+)", line) if command in ("bench", "experiment") else None
-        known = options_of(command, *which.groups()) if which else options_of(command)
+    calls = r"python -m (hrc_env|benchmarks) (?:--import \S+ )?([a-z-]+)([^`#\n]*)"
+    for program, command, line in re.findall(calls, page.read_text()):
+        which = re.match(r" (\w+)", line) if command == "experiment" else None
+        known = options_of(program, command, *which.groups() if which else ())
         assert {*re.findall(r" (--[a-z-]+)", line)} <= {*known, "--import"}, (command, line)
 
 

@@ -13,9 +13,9 @@ from stable_baselines3 import SAC, HerReplayBuffer
 from stable_baselines3.common.env_checker import check_env as check_env_for_sb3
 
 import hrc_env  # noqa: F401  registers the ids
-from agents.evaluate import evaluate
-from agents.registry import make_agent
 from benchmarks import identity
+from hrc_env.agents.evaluate import evaluate
+from hrc_env.agents.registry import make_agent
 from hrc_env.core.errors import ConfigError, NoGoalError
 from hrc_env.env import HRCEnv
 from hrc_env.sb3 import HRCVecEnv
@@ -161,7 +161,7 @@ def test_success_is_to_be_there_at_the_end():
 
 
 def told(env):
-    from agents.env_info import env_info
+    from hrc_env.agents.env_info import env_info
 
     return env_info(env.unwrapped.simulation)
 

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 import hrc_env
-from agents.env_info import env_info
-from agents.registry import make_agent
+from hrc_env.agents.env_info import env_info
+from hrc_env.agents.registry import make_agent
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.infos import ENTRIES, entry_of, published
 from hrc_env.env import HRCEnv

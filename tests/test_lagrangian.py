@@ -10,9 +10,9 @@ from gymnasium import spaces
 from stable_baselines3.common.vec_env import VecEnv
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
-from agents import checkpoints
-from agents.ppo_lagrangian import Multiplier, PPOLagrangian
 from hrc_env.__main__ import main
+from hrc_env.agents import checkpoints
+from hrc_env.agents.ppo_lagrangian import Multiplier, PPOLagrangian
 from hrc_env.core.errors import ConfigError
 from hrc_env.sb3 import HRCVecEnv
 

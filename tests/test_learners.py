@@ -8,13 +8,13 @@ import pytest
 from commands import ROOT, called
 from stable_baselines3 import PPO, HerReplayBuffer
 
-from agents import checkpoints, cloning, sac
-from agents.cloning import CloningSettings, clone
-from agents.env_info import env_info
-from agents.features import NearAndFar
-from agents.recipes import Run, filled
-from agents.registry import make_agent
 from hrc_env.__main__ import main
+from hrc_env.agents import checkpoints, cloning, sac
+from hrc_env.agents.cloning import CloningSettings, clone
+from hrc_env.agents.env_info import env_info
+from hrc_env.agents.features import NearAndFar
+from hrc_env.agents.recipes import Run, filled
+from hrc_env.agents.registry import make_agent
 from hrc_env.cli.train import Train
 from hrc_env.core.errors import CheckpointError, NoGoalError
 from hrc_env.env import HRCEnv
@@ -114,7 +114,7 @@ def test_ppo_takes_every_id(task, tmp_path):
 
 def test_a_policy_learns_from_the_expert_before_it_learns_itself(tmp_path, monkeypatch):
     short = CloningSettings(rounds=2, steps=20)
-    monkeypatch.setattr("agents.training.CloningSettings", lambda: short)
+    monkeypatch.setattr("hrc_env.agents.training.CloningSettings", lambda: short)
     shown = []
     once = cloning._learn
     monkeypatch.setattr(cloning, "_learn", lambda *of: shown.append(len(of[1][1])) or once(*of))
@@ -128,7 +128,7 @@ def test_a_policy_learns_from_the_expert_before_it_learns_itself(tmp_path, monke
 
 def test_who_only_imitates_can_learn_on_later(tmp_path, monkeypatch):
     short = CloningSettings(rounds=1, steps=20)
-    monkeypatch.setattr("agents.training.CloningSettings", lambda: short)
+    monkeypatch.setattr("hrc_env.agents.training.CloningSettings", lambda: short)
     folder = tmp_path / "run"
     words = ["--task", "HRCReach-v0", "--demonstrations", 4, "--out", folder]
     train(*words, "--timesteps", 0)

@@ -1,5 +1,8 @@
 """What the package says of itself: ranges of versions, metadata, the forms of a repository."""
 
+import os
+import subprocess
+import sys
 import tomllib
 from importlib.metadata import requires
 from pathlib import Path
@@ -60,3 +63,21 @@ def test_authors_urls_and_pythons_are_named():
     assert all(url.startswith(home) for url in PROJECT["urls"].values())
     for minor in range(11, 15):
         assert f"Programming Language :: Python :: 3.{minor}" in PROJECT["classifiers"]
+
+
+OURS = ("agents", "assets", "benchmarks", "docs", "examples", "tests", "train")
+"""Modules at the top of the checkout, beside the package."""
+
+
+def test_no_other_module_of_ours_is_importable_outside_of_the_checkout(tmp_path: Path):
+    code = f"""
+import hrc_env, hrc_env.agents.registry
+from importlib.util import find_spec
+print([name for name in {OURS} if find_spec(name) is not None])
+"""
+    usual = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, env=usual, capture_output=True, text=True,
+        check=True,
+    )  # fmt: skip
+    assert done.stdout == "[]\n"

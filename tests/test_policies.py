@@ -16,13 +16,13 @@ from safetensors.numpy import load, save
 from stable_baselines3 import PPO, SAC
 from test_extras import WITHOUT
 
-from agents import checkpoints, policies, ppo, sac
-from agents.env_info import env_info
-from agents.export import command, taken
-from agents.network import Architecture, Network
-from agents.recipes import filled
-from agents.registry import make_agent
 from hrc_env.__main__ import main
+from hrc_env.agents import checkpoints, policies, ppo, sac
+from hrc_env.agents.env_info import env_info
+from hrc_env.agents.export import command, taken
+from hrc_env.agents.network import Architecture, Network
+from hrc_env.agents.recipes import filled
+from hrc_env.agents.registry import make_agent
 from hrc_env.cli.train import Train
 from hrc_env.core.errors import CheckpointError, ConfigError
 from hrc_env.env import HRCEnv

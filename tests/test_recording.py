@@ -6,10 +6,10 @@ import gymnasium
 import numpy as np
 import pytest
 
-from agents import recording
-from agents.env_info import env_info
-from agents.registry import make_agent
 from hrc_env.__main__ import main
+from hrc_env.agents import recording
+from hrc_env.agents.env_info import env_info
+from hrc_env.agents.registry import make_agent
 
 minari = pytest.importorskip("minari", reason='Minari is not installed: pip install ".[minari]"')
 pytest.importorskip("h5py", reason='h5py is not installed: pip install ".[minari]"')

@@ -11,14 +11,14 @@ from types import ModuleType, SimpleNamespace
 
 import pytest
 
-from agents import checkpoints, policies
-from agents.callbacks import Ramp
-from agents.env_info import EnvInfo, env_info
-from agents.experts import expert
-from agents.recording import _same_as_before
-from agents.registry import control_of, make_agent
-from agents.training import as_before, asked_of
 from hrc_env import __version__
+from hrc_env.agents import checkpoints, policies
+from hrc_env.agents.callbacks import Ramp
+from hrc_env.agents.env_info import EnvInfo, env_info
+from hrc_env.agents.experts import expert
+from hrc_env.agents.recording import _same_as_before
+from hrc_env.agents.registry import control_of, make_agent
+from hrc_env.agents.training import as_before, asked_of
 from hrc_env.cli.record import Record
 from hrc_env.cli.train import Train
 from hrc_env.core.errors import CheckpointError, ConfigError

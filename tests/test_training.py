@@ -13,13 +13,13 @@ import pytest
 from commands import ROOT, called
 from matplotlib.figure import Figure
 
-from agents import checkpoints
-from agents.callbacks import Interrupt, Ramp, TrainingMonitor, plot_curve
-from agents.env_info import env_info
-from agents.evaluate import evaluate, judged, one_by_one
-from agents.registry import make_agent
-from agents.training import as_before
 from hrc_env.__main__ import main
+from hrc_env.agents import checkpoints
+from hrc_env.agents.callbacks import Interrupt, Ramp, TrainingMonitor, plot_curve
+from hrc_env.agents.env_info import env_info
+from hrc_env.agents.evaluate import evaluate, judged, one_by_one
+from hrc_env.agents.registry import make_agent
+from hrc_env.agents.training import as_before
 from hrc_env.cli.train import Train
 from hrc_env.core.errors import CheckpointError, ConfigError
 from hrc_env.env import HRCEnv

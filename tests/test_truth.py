@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from leaks import PERTURBED, another_worker, differences, displaced, leaks, shifted
 
-from agents import checkpoints, ppo
-from agents.registry import AGENTS
 from hrc_env import simulation
+from hrc_env.agents import checkpoints, ppo
+from hrc_env.agents.registry import AGENTS
 from hrc_env.motion import generator
 from hrc_env.pipeline.emulated import EmulatorPipeline
 from hrc_env.pipeline.levels import NoPerception

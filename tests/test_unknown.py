@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from agents.env_info import env_info
-from agents.experts import EXPERTS, expert
-from agents.scripted import Yielding
+from hrc_env.agents.env_info import env_info
+from hrc_env.agents.experts import EXPERTS, expert
+from hrc_env.agents.scripted import Yielding
 from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCEnv
 from hrc_env.rewards import RewardConfig

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import hrc_env  # noqa: F401
-from agents.env_info import env_info
-from agents.registry import make_agent
 from hrc_env import observations
+from hrc_env.agents.env_info import env_info
+from hrc_env.agents.registry import make_agent
 from hrc_env.core.vacancy import EMPTY, POSSIBLE
 from hrc_env.env import HRCEnv
 

@@ -1,5 +1,6 @@
-"""python -m hrc_env calibrate-keypoints: the emulator's numbers, fitted to renders."""
+"""python -m assets.emulator.calibrate: the emulator's numbers, fitted to renders."""
 
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -7,6 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from hrc_env.cli.checks import at_least, writable_file
+from hrc_env.cli.entry import run_command, show_errors
 from hrc_env.cli.progress import progress_bar
 
 
@@ -59,3 +61,8 @@ class CalibrateKeypoints:
             console.print(table)
             console.print(f"In [bold]{self.out.with_suffix('.png')}[/]: distributions of both")
         return 0
+
+
+if __name__ == "__main__":
+    program = "python -m assets.emulator.calibrate"
+    sys.exit(show_errors(lambda: run_command(CalibrateKeypoints, sys.argv[1:], program)))

@@ -1,4 +1,4 @@
-"""The whole of `python -m hrc_env calibrate-keypoints`: render, fit, write, compare."""
+"""The whole of `python -m assets.emulator.calibrate`: render, fit, write, compare."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -83,7 +83,7 @@ def folder_of(out: Path) -> Path:
 
 
 def _made(run: CalibrationRun, out: Path, n_clips: int) -> dict[str, object]:
-    words = f"python -m hrc_env calibrate-keypoints --rounds {run.rounds} --seed {run.seed}"
+    words = f"python -m assets.emulator.calibrate --rounds {run.rounds} --seed {run.seed}"
     words += " --recordings" * run.recordings
     command = f"{words} --out {out.name}"
     return {"command": command, "seed": run.seed, "git": provenance()["git"], "clips": n_clips}

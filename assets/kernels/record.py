@@ -16,8 +16,8 @@ from typing import Any
 import gymnasium
 from numba.core import event
 
-from agents.env_info import env_info
-from agents.registry import make_agent
+from hrc_env.agents.env_info import env_info
+from hrc_env.agents.registry import make_agent
 from hrc_env.core.kernels import DISPATCHER, KERNELS, ahead, signatures
 from hrc_env.core.kernels.signatures import Signature
 

@@ -79,7 +79,7 @@ def run(config: GalleryConfig, out: Path, say: Progress) -> list[Exhibit]:
     for k, body in enumerate(bodies):  # strips of one worker are drawn one after another
         for name in config.motions[k :: len(bodies)]:
             hang(strip(name, body), "Motions", name, f"by {body.replace('_', ' ')}", True)
-    write_page(shown, out, "python -m hrc_env gallery")
+    write_page(shown, out, "python -m benchmarks gallery")
     return shown
 
 

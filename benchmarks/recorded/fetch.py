@@ -11,7 +11,7 @@ from pathlib import Path
 
 from assets.recordings.archives import Archive, fetch
 
-AGAIN = "python -m hrc_env bench tracking --real"
+AGAIN = "python -m benchmarks tracking --real"
 _CALIBRATION = "calibration/Calib.qca.txt"
 _FILMS = tuple(f"videos/cam0{k}.mp4" for k in (1, 2, 3, 4))
 POSE2SIM = Archive(

@@ -1,6 +1,6 @@
 """An estimator of your own: triangulation, smoothed by constant gains.
 
-python -m hrc_env --import examples/bring_your_own/estimator.py bench tracking --quick
+python -m benchmarks --import examples/bring_your_own/estimator.py tracking --quick
 """
 
 from dataclasses import dataclass, replace

@@ -8,7 +8,6 @@ from typing import Annotated
 import tyro
 
 from hrc_env.cli.checks import at_least, writable_folder
-from hrc_env.core.checkout import agents
 from hrc_env.core.errors import ConfigError
 
 
@@ -35,4 +34,6 @@ class Export:
                 f"--name is of small letters, digits and _, as fast_shielded; got {self.name!r}."
             )
         writable_folder(self.out)
-        return agents("export").run(self)
+        from hrc_env.agents import export  # here: it imports the learner
+
+        return export.run(self)

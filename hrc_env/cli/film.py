@@ -14,10 +14,10 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from hrc_env.agents.env_info import env_info
 from hrc_env.cli.frame import MOMENT, Diary, compose
 from hrc_env.cli.progress import track
 from hrc_env.cli.ready import make_ready
-from hrc_env.core.checkout import agents
 from hrc_env.core.typing import Image
 from hrc_env.env import HRCEnv
 
@@ -80,7 +80,7 @@ def nearest_seed(
 
 def begun(env: Any, make: Make, seed: int, n_steps: int) -> Steps:
     """The steps of an agent's episode, which has begun, up to its end."""
-    agent = make(agents("env_info").env_info(env.unwrapped.simulation))
+    agent = make(env_info(env.unwrapped.simulation))
     return _steps(env, agent, env.reset(seed=seed)[0], n_steps)
 
 

@@ -7,7 +7,6 @@ from rich.table import Table
 
 from hrc_env import IDS
 from hrc_env.cli.environment import EnvironmentArguments
-from hrc_env.core.checkout import agents
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,7 +23,9 @@ class List(EnvironmentArguments):
         """Print the table, or the configuration."""
         if self.config is not None:
             return self._show_config()
-        from hrc_env.control import CONTROLS  # here: --help imports no simulator
+        from hrc_env.agents import policies  # here: --help imports no simulator
+        from hrc_env.agents.registry import AGENTS
+        from hrc_env.control import CONTROLS
         from hrc_env.pipeline.levels import LEVELS
         from hrc_env.scene.build import SCENES
         from hrc_env.scene.rig import LAB_CAMERAS
@@ -37,7 +38,7 @@ class List(EnvironmentArguments):
             "robot": ROBOTS, "cameras": [camera.name for camera in LAB_CAMERAS],
             "control": CONTROLS,
             "agent": (
-                *agents("registry").AGENTS, *agents("policies").names(), "a checkpoint: PATH.zip",
+                *AGENTS, *policies.names(), "a checkpoint: PATH.zip",
                 "a policy: PATH.safetensors",
             ),
         }  # fmt: skip

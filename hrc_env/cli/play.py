@@ -15,7 +15,6 @@ from hrc_env.cli.checks import at_least, writable_file
 from hrc_env.cli.environment import EnvironmentArguments
 from hrc_env.cli.progress import track
 from hrc_env.cli.ready import make_ready
-from hrc_env.core.checkout import agents
 from hrc_env.core.errors import check_names
 from hrc_env.tasks import DEFAULT
 
@@ -43,12 +42,14 @@ class Play(EnvironmentArguments):
         check_names("environment", [self.task], hrc_env.IDS)
         at_least("--episodes", self.episodes, 1)
         at_least("--seed", self.seed, 0)
-        asked = replace(self, control=self.control or agents("registry").control_of(self.agent))
+        from hrc_env.agents.registry import control_of  # here: --help imports no simulator
+
+        asked = replace(self, control=self.control or control_of(self.agent))
         if self.video is not None:
             writable_file(self.video, ".mp4", "--video")
             filmed(asked, self.agent, self.video)
             return 0
-        import gymnasium  # here: --help imports no simulator
+        import gymnasium
 
         make_ready(Console(), self.perception)
         with closing(gymnasium.make(self.task, **asked.keywords())) as env:
@@ -120,4 +121,6 @@ def filmed(
 
 def named(agent: str, seed: int) -> Callable[[Any], Any]:
     """What makes an agent, by its name, for an `EnvInfo`."""
-    return lambda env_info: agents("registry").make_agent(agent, env_info, seed)
+    from hrc_env.agents.registry import make_agent
+
+    return lambda env_info: make_agent(agent, env_info, seed)

@@ -8,7 +8,6 @@ import tyro
 import hrc_env
 from hrc_env.cli.checks import at_least
 from hrc_env.cli.environment import EnvironmentArguments
-from hrc_env.core.checkout import agents
 from hrc_env.core.errors import ConfigError, check_names
 from hrc_env.tasks import DEFAULT
 
@@ -47,4 +46,6 @@ class Record(EnvironmentArguments):
             raise ConfigError(
                 "--perception pixels is too slow to record: record keypoints, which emulates it."
             )
-        return agents("recording").run(self)
+        from hrc_env.agents import recording  # here: it imports Minari
+
+        return recording.run(self)

@@ -7,7 +7,6 @@ from typing import Any
 
 from hrc_env.cli.checks import at_least, writable_folder
 from hrc_env.cli.environment import EnvironmentArguments, merged
-from hrc_env.core.checkout import agents
 from hrc_env.core.errors import ConfigError, check_names
 
 ALGORITHMS = ("ppo", "ppo_lagrangian", "sac")
@@ -61,11 +60,13 @@ class Train(EnvironmentArguments):
 
     def run(self) -> int:
         """Train; a `ConfigError` for a number or a name that cannot be learnt with."""
+        from hrc_env.agents.recipes import filled  # here: --help imports no simulator
+
         for name in ("num_envs", "threads", "episodes"):
             at_least(f"--{name.replace('_', '-')}", getattr(self, name), 1)
         for name in ("seed", "proximity", "ramp", "demonstrations"):
             at_least(f"--{name}", getattr(self, name), 0)
-        mine = agents("recipes").filled(self)
+        mine = filled(self)
         at_least("--timesteps", mine.timesteps, 0 if mine.demonstrations else 1)
         check_names("algorithm", [mine.algorithm], ALGORITHMS)
         _check_limit(self.cost_limit, mine.algorithm)
@@ -79,7 +80,8 @@ class Train(EnvironmentArguments):
                 "--perception pixels is too slow to learn on: learn on keypoints, which emulates "
                 "it, and play the policy on pixels."
             )
-        training = agents("training")
+        from hrc_env.agents import training  # here: it imports the learner
+
         writable_folder(self.resume or self.out, "--out" if self.resume is None else "--resume")
         return training.run(self)
 

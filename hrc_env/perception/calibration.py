@@ -1,5 +1,5 @@
 """What is known of the detector's errors: numbers fitted to renders, in a small JSON file, which
-`python -m hrc_env calibrate-keypoints` writes (docs/emulator.md)."""
+`python -m assets.emulator.calibrate` writes (docs/emulator.md)."""
 
 import functools
 import json
@@ -101,7 +101,7 @@ _SHARES = ("common", "shares", "confidence", "swap_share", "miss_share")
 _CORRELATIONS = ("limb", "space_limb", "follows")
 LONGEST_TAIL = 3.0
 """A vector of normal variables n grows by 1 + n.n then, to almost n's cube."""
-_RENEW = "make a new one with: python -m hrc_env calibrate-keypoints --out FILE"
+_RENEW = "make a new one with: python -m assets.emulator.calibrate --out FILE"
 
 
 def read_calibration(path: Path | str | None = None) -> Calibration:

@@ -26,7 +26,7 @@ class EmulatorConfig:
     """What is known of the detector's errors, and what is different where they are drawn."""
 
     calibration: str = ""
-    """A file that `python -m hrc_env calibrate-keypoints` wrote; empty: the package's own. What it
+    """A file that `python -m assets.emulator.calibrate` wrote; empty: the package's own. What it
     says of deviations and offsets the tracker is told at `pixels` too."""
     error_scale: float = 1.0
     """Factor on all errors of position; 0: the projected truth. What is told of them stays."""

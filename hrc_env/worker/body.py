@@ -57,10 +57,8 @@ OWN = ("stature_m", "rest_position", "joint_offset", "capsule_ends", "capsule_ra
 
 
 def assets_dir() -> Path:
-    """The folder of assets: `hrc_env/assets` when installed, `../assets` in a checkout."""
-    package = Path(__file__).parents[1]
-    installed = package / "assets"
-    return installed if installed.is_dir() else package.parent / "assets"
+    """Return the folder of assets; in a checkout it is a link to `assets/` beside the package."""
+    return Path(__file__).parents[1] / "assets"
 
 
 def worker_names() -> tuple[str, ...]:

@@ -28,11 +28,11 @@ from tests.behaviour.probe import (
 from tests.behaviour.rooms import ROOMS, Placed
 
 ROOT = Path(__file__).resolve().parents[2]
-VERSIONS = ROOT / "behaviour.toml"
+VERSIONS = ROOT / "hrc_env" / "behaviour.toml"
 CHANGELOG = ROOT / "CHANGELOG.md"
 DOORS = "tests/behaviour/doors.py"
 RECORDED = "tests/behaviour/recorded"
-OWN = (RECORDED, "behaviour.toml", "CHANGELOG.md")
+OWN = (RECORDED, "hrc_env/behaviour.toml", "CHANGELOG.md")
 """Paths that may differ from the last commit while values are accepted."""
 KINDS = {
     "observation/": "observation",

@@ -24,11 +24,11 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 import hrc_env
-from agents import policies as trained
-from agents.env_info import env_info
-from agents.registry import control_of, make_agent
 from assets.recordings.written import ORDERS, Y_UP, cmu_name, write_acclaim, write_bvh
 from hrc_env import metrics
+from hrc_env.agents import policies as trained
+from hrc_env.agents.env_info import env_info
+from hrc_env.agents.registry import control_of, make_agent
 from hrc_env.belief import (
     Belief,
     covariance_factor_m,
@@ -652,8 +652,8 @@ def learn(
         folder: an empty one. The policy is left in LEARNT and EXPORTED of it.
         options: other arguments of a training, by the command line's names.
     """
-    from agents import export, training  # here, as in all of this part: they need PyTorch
-    from agents.recipes import Run
+    from hrc_env.agents import export, training  # here, as in all of this part: they need PyTorch
+    from hrc_env.agents.recipes import Run
     from hrc_env.cli.export import Export
 
     torch_on_one_thread()
@@ -680,7 +680,7 @@ def learn(
 
 def recipe_of(env_id: str, algorithm: str | None) -> dict[str, str]:
     """Return how a task is learnt by a learner, or by its own if None, where nothing is asked."""
-    from agents.recipes import filled
+    from hrc_env.agents.recipes import filled
     from hrc_env.cli.train import Train
 
     run = filled(Train(task=env_id, algorithm=algorithm))
@@ -702,7 +702,7 @@ def clone(
     env_id: str, control: str, seed: int, n_rounds: int, n_steps: int
 ) -> dict[str, NDArray[np.float64]]:
     """Teach a policy what the scripted agent does; return its errors and what it does then."""
-    from agents import cloning, ppo
+    from hrc_env.agents import cloning, ppo
     from hrc_env.sb3 import HRCVecEnv
 
     torch_on_one_thread()
@@ -730,7 +730,7 @@ def record_episodes(
     """Return the episodes of a data set that an agent recorded, two at a time."""
     import minari
 
-    from agents import recording
+    from hrc_env.agents import recording
     from hrc_env.cli.record import Record
 
     name, before = "hrc/probe-v0", os.environ.get(recording.ROOT)
@@ -759,7 +759,7 @@ def judge_agent(
     env_id: str, agent: str, n_episodes: int, one_by_one: bool, **options: Any
 ) -> dict[str, NDArray[np.float64]]:
     """Return the statistics of an agent's episodes, and its score."""
-    from agents import evaluate
+    from hrc_env.agents import evaluate
 
     play = evaluate.one_by_one if one_by_one else evaluate.judged
     make = functools.partial(make_agent, agent)

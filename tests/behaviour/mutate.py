@@ -157,9 +157,9 @@ def copy_checkout(root: Path, folder: Path) -> None:
     command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
     names = subprocess.run(command, cwd=root, stdout=subprocess.PIPE, text=True, check=True).stdout
     for name in sorted(set(filter(None, names.split("\0")))):
-        if (root / name).is_file():
+        if (root / name).is_symlink() or (root / name).is_file():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy2(root / name, folder / name)
+            shutil.copy2(root / name, folder / name, follow_symlinks=False)
 
 
 def digest_checkout(folder: Path, *settings: object) -> str:

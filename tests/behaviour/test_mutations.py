@@ -150,11 +150,14 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     )
     folder = tmp_path / "tests" / "behaviour" / "mutants"
     folder.mkdir(parents=True)
+    (folder.parent / "__init__.py").write_text("")
     for name in ("__init__.py", "child.py"):
         (folder / name).write_text((mutants.FOLDER / name).read_text())
     source = mutants.FOLDER.parent / "mutations.py"
     (folder.parent / "mutations.py").write_text(source.read_text())
-    (folder.parent / "rooms.py").write_text("def probes(rooms):\n    return ()\n")
+    (folder.parent / "rooms.py").write_text(
+        "Placed = None\n\n\ndef probes(rooms):\n    return ()\n"
+    )
     (folder.parent / "playing.py").write_text("def play(label):\n    ...\n")
     return tmp_path
 

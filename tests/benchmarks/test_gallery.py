@@ -19,7 +19,7 @@ pytestmark = pytest.mark.slow  # a gallery is drawn
 
 def test_a_page_shows_every_picture_with_its_words(tmp_path):
     shown = [Exhibit("Motions", "a.png", "saw <wood>", "by worker 1", True)]
-    write_page(shown, tmp_path, "python -m hrc_env gallery")
+    write_page(shown, tmp_path, "python -m benchmarks gallery")
     page = (tmp_path / "index.html").read_text()
     assert 'src="a.png"' in page
     assert "saw &lt;wood&gt;" in page

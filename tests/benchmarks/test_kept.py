@@ -5,8 +5,8 @@ import json
 import pytest
 
 import hrc_env
-from agents import policies
 from benchmarks import kept
+from hrc_env.agents import policies
 from hrc_env.sb3 import ACHIEVED, FAILED
 
 pytestmark = pytest.mark.slow  # a study is played

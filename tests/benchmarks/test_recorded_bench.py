@@ -98,7 +98,7 @@ def test_without_a_network_the_error_names_the_command(cache, monkeypatch):
     monkeypatch.setattr(subprocess, "run", run)
     with pytest.raises(DownloadError) as error:
         fetch.fetch_recording(lambda _: None)
-    for part in ("is there a network", "pose2sim==0.10.49", "bench tracking --real"):
+    for part in ("is there a network", "pose2sim==0.10.49", "benchmarks tracking --real"):
         assert part in str(error.value)
 
 

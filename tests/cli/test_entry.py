@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from hrc_env import __version__
-from hrc_env.__main__ import COMMANDS, main
+from hrc_env.__main__ import COMMANDS, MOVED, main
 
 
 def test_the_overview_names_every_command_and_imports_none(process):
@@ -15,8 +15,9 @@ def test_the_overview_names_every_command_and_imports_none(process):
         "import sys\n"
         "from hrc_env.__main__ import main\n"
         "assert main(['--help']) == 0 and main(['--version']) == 0\n"
-        "heavy = {'tyro', 'rich', 'mujoco', 'numba', 'torch', 'hrc_env.cli'}\n"
+        "heavy = {'tyro', 'rich', 'mujoco', 'numba', 'torch', 'hrc_env.cli.play'}\n"
         "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n",
+        HRC_ENV_REGISTERED=None,
     )
     assert done.returncode == 0, done.stderr
     for name in COMMANDS:
@@ -36,6 +37,7 @@ def test_the_help_of_a_command_imports_no_simulator(process):
         "        assert end.code == 0\n"
         "heavy = {'mujoco', 'numba', 'torch', 'stable_baselines3', 'cv2'}\n"
         "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n",
+        HRC_ENV_REGISTERED=None,
     )
     assert done.returncode == 0, done.stderr
 
@@ -73,15 +75,9 @@ WRITING = {
     "play": ["play", "--perception", "none", "--video", "{}/film.mp4"],
     "train": ["train", "--out", "{}/run"],
     "resume": ["train", "--resume", "{}/run"],
-    "bench tracking": ["bench", "tracking", "--quick", "--out", "{}"],
-    "bench perception": ["bench", "perception", "--quick", "--out", "{}"],
-    "bench speed": ["bench", "speed", "--quick", "--out", "{}"],
-    "bench motion": ["bench", "motion", "--quick", "--out", "{}/x/y"],
     "experiment": ["experiment", "site", "--quick", "--out", "{}/x"],
-    "gallery": ["gallery", "--out", "{}"],
     "import-motion": ["import-motion", "walk.bvh", "--out", "{}/walk.npz"],
     "its picture": ["import-motion", "walk.bvh", "--out", "w.npz", "--picture", "{}/walk.png"],
-    "calibrate": ["calibrate-keypoints", "--quick", "--out", "{}/keypoints.json"],
 }
 
 
@@ -117,11 +113,7 @@ def test_training_refuses_numbers_that_mean_nothing(option, tmp_path: Path, caps
         ["play", "--seed", "-1"],
         ["demo", "--seconds", "0"],
         ["demo", "--seed", "-1"],
-        ["bench", "motion", "--seeds", "0"],
-        ["bench", "tracking", "--processes", "0"],
-        ["bench", "speed", "--rounds", "0"],
         ["experiment", "impact", "--seeds", "0"],
-        ["calibrate-keypoints", "--rounds", "-1"],
         ["train", "--perception", "pixels"],
     ],
 )
@@ -132,11 +124,7 @@ def test_other_values_that_mean_nothing_are_refused(words, capsys):
     assert "Traceback" not in said
 
 
-@pytest.mark.parametrize("name", ["bench", "gallery", "calibrate-keypoints"])
-def test_what_only_a_clone_has_says_so_elsewhere(name, monkeypatch, capsys):
-    def absent(module: str):
-        raise ModuleNotFoundError(f"No module named {module!r}", name=module.split(".")[0])
-
-    monkeypatch.setattr("hrc_env.core.checkout.importlib.import_module", absent)
+@pytest.mark.parametrize(("name", "today"), MOVED.items())
+def test_a_command_that_only_a_clone_has_says_how_it_is_called_there(name, today, capsys):
     assert main([name, "--help"]) == 2
-    assert "Clone the repository" in " ".join(capsys.readouterr().err.split())
+    assert today in " ".join(capsys.readouterr().err.split())

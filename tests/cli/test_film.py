@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from hrc_env.agents.registry import make_agent
 from hrc_env.cli import film
-from hrc_env.core.checkout import agents
 from hrc_env.core.errors import RenderingError
 
 
 def scripted(env_info):
-    return agents("registry").make_agent("scripted", env_info)
+    return make_agent("scripted", env_info)
 
 
 def test_a_film_has_a_frame_for_every_second_step(tmp_path):

@@ -88,14 +88,16 @@ def test_a_policy_is_judged_and_entered_and_goes_on(tmp_path, monkeypatch, capsy
     made = json.loads((tmp_path / "out" / "results.json").read_text())["metrics"]
     assert made[f"{KEY}.goals_per_minute"]["value"] == 0.0
     assert len(made) == 12 * 8
-    monkeypatch.setattr("agents.evaluate.judged", lambda *of, **_: pytest.fail("played again"))
+    monkeypatch.setattr(
+        "hrc_env.agents.evaluate.judged", lambda *of, **_: pytest.fail("played again")
+    )
     assert main(words) == 0
 
 
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (["--policy", "agents.nowhere:make"], "must be MODULE:FUNCTION"),
+        (["--policy", "hrc_env.agents.nowhere:make"], "must be MODULE:FUNCTION"),
         (["--policy", f"{__name__}:nobody"], "which has no act"),
         (["--policy", "scriptd"], "Did you mean 'scripted'"),
         (["--policy", "scripted", "--ids", "HRCReach-v1"], "Did you mean 'HRCReach-v0'"),

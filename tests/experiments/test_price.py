@@ -161,7 +161,7 @@ def test_what_cannot_be_played_is_refused(change, words):
 
 
 def test_a_task_that_nobody_has_scripted_is_refused(monkeypatch):
-    from agents import experts
+    from hrc_env.agents import experts
 
     monkeypatch.delitem(experts.EXPERTS, "HRCHandover-v0")
     with pytest.raises(ConfigError, match="there is none for HRCHandover-v0; there is for HRCR"):

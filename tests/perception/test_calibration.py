@@ -48,7 +48,7 @@ def test_shares_of_errors_add_up_to_one():
 
 def test_a_file_of_another_version_is_refused_with_the_command_that_makes_a_new_one(tmp_path):
     path = changed(tmp_path, version=VERSION + 1)
-    with pytest.raises(ConfigError, match=f"version {VERSION + 1}.*calibrate-keypoints --out"):
+    with pytest.raises(ConfigError, match=f"version {VERSION + 1}.*emulator.calibrate --out"):
         settle(config={"emulator": {"calibration": str(path)}})
 
 

@@ -11,8 +11,8 @@ from figures import Figure, count
 from gymnasium.utils import seeding
 from numpy.typing import NDArray
 
-from agents.env_info import env_info
-from agents.registry import make_agent
+from hrc_env.agents.env_info import env_info
+from hrc_env.agents.registry import make_agent
 from hrc_env.config import settle
 from hrc_env.core.results import Metric
 from hrc_env.experiments.study.intervals import ratio_over

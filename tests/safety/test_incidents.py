@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from agents.env_info import env_info
-from agents.registry import make_agent
+from hrc_env.agents.env_info import env_info
+from hrc_env.agents.registry import make_agent
 from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCEnv

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import hrc_env
-from agents.env_info import env_info
-from agents.registry import make_agent
 from hrc_env import simulation
+from hrc_env.agents.env_info import env_info
+from hrc_env.agents.registry import make_agent
 from hrc_env.belief import estimated_separation, of_concern, unseen_floor
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import WorkerPath

@@ -6,9 +6,9 @@ import gymnasium
 import numpy as np
 import pytest
 
-from agents.env_info import env_info
-from agents.experts import expert
-from agents.scripted import Yielding
+from hrc_env.agents.env_info import env_info
+from hrc_env.agents.experts import expert
+from hrc_env.agents.scripted import Yielding
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import World
 from hrc_env.geometry import chains

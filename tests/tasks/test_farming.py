@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from agents.env_info import env_info
-from agents.experts import PickPlacer
+from hrc_env.agents.env_info import env_info
+from hrc_env.agents.experts import PickPlacer
 from hrc_env.core.records import ObjectState, World
 from hrc_env.env import HRCEnv
 from hrc_env.observations import split

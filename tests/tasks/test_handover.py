@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 import hrc_env  # noqa: F401  # registers the ids
-from agents.env_info import env_info
-from agents.experts import expert
+from hrc_env.agents.env_info import env_info
+from hrc_env.agents.experts import expert
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Deeds, ObjectState, World
 from hrc_env.tasks import handover

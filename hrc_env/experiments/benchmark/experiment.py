@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 
-from hrc_env.core.checkout import agents
+from hrc_env.agents.registry import control_of, make_agent
 from hrc_env.core.errors import check_names
 from hrc_env.core.results import Metric, provenance
 from hrc_env.experiments.benchmark.conditions import CONDITIONS, SEED, VERSION
@@ -33,7 +33,7 @@ class BenchmarkConfig:
     """Who is judged, and how long."""
 
     policy: str = "scripted"
-    """As `agents.registry.make_agent` takes it."""
+    """As `agents.make_agent` takes it."""
     control: str | None = None
     """What its actions are; None: joint velocities."""
     ids: tuple[str, ...] = tuple(BUILT_IN)
@@ -49,7 +49,7 @@ class BenchmarkConfig:
 
 def config_for(policy: str, ids: Sequence[str], control: str | None, seeds: int) -> BenchmarkConfig:
     """The settings that the command line asks for; a policy may say what its actions are."""
-    known = agents("registry").control_of(policy)
+    known = control_of(policy)
     return BenchmarkConfig(policy, control or known, tuple(ids), seeds)
 
 
@@ -72,15 +72,16 @@ def _episodes(
     config: BenchmarkConfig, task: str, name: str, tick: PartProgress
 ) -> dict[str, Episodes]:
     """One row, whose episodes take turns in the condition's cameras."""
-    evaluate, registry = agents("evaluate"), agents("registry")
+    from hrc_env.agents.evaluate import judged  # here: it imports the learner
+
     control = {} if config.control is None else {"control": config.control}
     turns, done = CONDITIONS[name].keywords(task), []
     for k, kwargs in enumerate(turns):
         n = len(range(k, config.n_seeds, len(turns)))
         part = partial(lambda share, of: tick(share * of / config.n_seeds), of=n)
         if n:
-            done += evaluate.judged(
-                partial(registry.make_agent, config.policy), n, SEED + len(done), part,
+            done += judged(
+                partial(make_agent, config.policy), n, SEED + len(done), part,
                 **kwargs, **control,
             )  # fmt: skip
     return {"episodes": done}

@@ -7,7 +7,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from hrc_env.core.checkout import agents
+from hrc_env.agents.env_info import env_info
+from hrc_env.agents.experts import expert
+from hrc_env.agents.registry import make_agent
+from hrc_env.agents.scripted import Yielding
 from hrc_env.core.machine import n_cores
 from hrc_env.experiments.impact.episodes import PEOPLE, SLOW_M, STOP_M, MakeAgent
 from hrc_env.experiments.study.cache import PartCache, PartProgress
@@ -45,12 +48,12 @@ def maker(policy: Policy, checkpoint: Path) -> MakeAgent:
     """What makes the agent for a robot."""
 
     def make(part: Simulation) -> Any:
-        env_info = agents("env_info").env_info(part)
+        known = env_info(part)
         if policy.name == SLOWED:
             limits_m = STOP_M + policy.margin_m, SLOW_M + policy.margin_m
-            return agents("experts").expert(env_info, agents("scripted").Yielding(*limits_m))
+            return expert(known, Yielding(*limits_m))
         name = str(checkpoint) if policy.name == PPO else policy.name
-        return agents("registry").make_agent(name, env_info)
+        return make_agent(name, known)
 
     return make
 
@@ -67,6 +70,7 @@ def trained(cache: PartCache, n_steps: int, path: Path, key: str, task: str = DE
 
 def _train(n_steps: int, path: Path, tick: PartProgress, task: str = DEFAULT) -> dict[str, Any]:
     """Learn on the camera emulator with the default estimator; write the checkpoint."""
+    from hrc_env.agents import checkpoints  # here: it imports the learner
     from hrc_env.sb3 import HRCVecEnv
 
     env = HRCVecEnv(
@@ -74,16 +78,17 @@ def _train(n_steps: int, path: Path, tick: PartProgress, task: str = DEFAULT) ->
         people=PEOPLE, config={"reward": {"proximity": PROXIMITY}}, num_threads=n_cores(),
     )  # fmt: skip
     learner = taught(env, n_steps, SEED, lambda learner: tick(N_ENVS / n_steps))
-    agents("checkpoints").save(learner, path, {"people": PEOPLE, "seed": SEED})
+    checkpoints.save(learner, path, {"people": PEOPLE, "seed": SEED})
     return {"sha256": _digest(path), "n_steps": learner.num_timesteps}
 
 
 def taught(env: Any, n_steps: int, seed: int, note: Callable[[Any], None]) -> Any:
     """PPO that has learnt for so many steps on environments, which are closed then; it is noted at
     first and after each of their steps."""
-    ppo, callbacks = agents("ppo"), agents("callbacks")
-    import torch
+    import torch  # here: a learner takes seconds to import, and need not be there
     from stable_baselines3.common.callbacks import ConvertCallback
+
+    from hrc_env.agents import callbacks, ppo
 
     threads = torch.get_num_threads()
     torch.set_num_threads(1)  # more are slower in networks as small as these

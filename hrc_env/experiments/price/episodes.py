@@ -13,8 +13,9 @@ import numpy as np
 from gymnasium.utils import seeding
 from numpy.typing import NDArray
 
+from hrc_env.agents.env_info import env_info
+from hrc_env.agents.registry import make_agent
 from hrc_env.control import checked_action
-from hrc_env.core.checkout import agents
 from hrc_env.core.typing import Points3
 from hrc_env.experiments.impact.episodes import MakeAgent, Rows, build
 from hrc_env.experiments.price.eyes import Eyes
@@ -80,7 +81,7 @@ class Stage:
 
 def scripted(part: Simulation) -> Any:
     """The agent that drives to its goals whoever is near."""
-    return agents("registry").make_agent("scripted", agents("env_info").env_info(part))
+    return make_agent("scripted", env_info(part))
 
 
 def run(

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from hrc_env.agents.experts import EXPERTS
 from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.experiments.impact.episodes import PEOPLE, Rows
 from hrc_env.experiments.price import blindness
@@ -100,14 +101,11 @@ class PriceConfig:
 
 def _check_task(task: str) -> None:
     """Raise `ConfigError` for a task that the study cannot play."""
-    from hrc_env.core.checkout import agents
-
     task_called(task)
-    known = agents("experts").EXPERTS
-    if task not in known:
+    if task not in EXPERTS:
         raise ConfigError(
             f"The price is that of a scripted robot, and there is none for {task}; there is for "
-            f"{', '.join(known)}."
+            f"{', '.join(EXPERTS)}."
         )
 
 

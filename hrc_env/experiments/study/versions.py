@@ -18,13 +18,12 @@ from hrc_env.core.errors import ConfigError, check_names
 
 SUBSYSTEMS = ("env", "tracker", "emulator", "detector", "motion", "shield", "agents")
 """Names in `behaviour.toml`."""
-_PACKAGE = Path(__file__).resolve().parents[2]
+_PACKAGE = Path(__file__).parents[2]
 
 
 def find_behaviour() -> Path:
-    """Return the path of `behaviour.toml`: inside an installed package, beside one in a clone."""
-    installed = _PACKAGE / "behaviour.toml"
-    return installed if installed.is_file() else _PACKAGE.parent / "behaviour.toml"
+    """Return the path of `behaviour.toml`, a file of the package."""
+    return _PACKAGE / "behaviour.toml"
 
 
 def read_versions(path: Path | None = None) -> dict[str, int]:
@@ -95,7 +94,7 @@ def source_digest(made: object) -> str:
     parts of this package, which have one, and for anything that has no file.
     """
     try:
-        path = Path(inspect.getfile(made)).resolve()  # type: ignore[arg-type]
+        path = Path(inspect.getfile(made)).absolute()  # type: ignore[arg-type]
         is_ours = path.is_relative_to(_PACKAGE)
         return "" if is_ours else hashlib.sha256(path.read_bytes()).hexdigest()
     except (OSError, TypeError):

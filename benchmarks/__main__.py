@@ -1,5 +1,7 @@
-"""python -m hrc_env bench and gallery: what is measured, and pictures of workers and scenes."""
+"""python -m benchmarks: measure estimators, detector, speed, workers; draw workers and scenes."""
 
+import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -9,10 +11,13 @@ import tyro
 from rich.console import Console
 
 from hrc_env.cli.checks import at_least, writable_folder
+from hrc_env.cli.entry import import_first, run_command, show_errors
 from hrc_env.cli.progress import progress_bar, show
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.machine import n_cores
 from hrc_env.experiments.study.runner import Study, changed, run
+
+PROGRAM = "python -m benchmarks"
 
 
 @dataclass(frozen=True)
@@ -133,28 +138,6 @@ class PerceptionBench(AnyBench):
 
 
 @dataclass(frozen=True)
-class Bench:
-    """Measure the estimators (tracking), the detector (perception), the environment (speed) or the
-    workers (motion).
-
-    Each takes --quick (minutes, not hours) and --out DIR, where it writes report.html, results.json
-    and figures; `bench tracking --help` and so on say the rest.
-    """
-
-    what: (
-        Annotated[TrackingBench, tyro.conf.subcommand("tracking")]
-        | Annotated[PerceptionBench, tyro.conf.subcommand("perception")]
-        | Annotated[SpeedBench, tyro.conf.subcommand("speed")]
-        | Annotated[MotionBench, tyro.conf.subcommand("motion")]
-    )
-    """Which bench."""
-
-    def run(self) -> int:
-        """Run it."""
-        return self.what.run()
-
-
-@dataclass(frozen=True)
 class Gallery:
     """Draw every worker, a film strip of every motion, and both scenes from all cameras."""
 
@@ -171,3 +154,36 @@ class Gallery:
             exhibits = run(GalleryConfig(), self.out, say)
         console.print(f"{len(exhibits)} pictures; open [bold]{self.out / 'index.html'}[/]")
         return 0
+
+
+@dataclass(frozen=True)
+class Benchmarks:
+    """Measure the estimators (tracking), the detector (perception), the environment (speed) or the
+    workers (motion); draw workers, motions and scenes (gallery).
+
+    Each bench takes --quick (minutes, not hours) and --out DIR, where it writes report.html,
+    results.json and figures; `tracking --help` and so on say the rest.
+    """
+
+    what: (
+        Annotated[TrackingBench, tyro.conf.subcommand("tracking")]
+        | Annotated[PerceptionBench, tyro.conf.subcommand("perception")]
+        | Annotated[SpeedBench, tyro.conf.subcommand("speed")]
+        | Annotated[MotionBench, tyro.conf.subcommand("motion")]
+        | Annotated[Gallery, tyro.conf.subcommand("gallery")]
+    )
+    """Which one."""
+
+    def run(self) -> int:
+        """Run it."""
+        return self.what.run()
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Run a bench, of the process's words if none are given; return the exit status."""
+    given = list(sys.argv[1:] if words is None else words) or ["--help"]
+    return show_errors(lambda: run_command(Benchmarks, import_first(given, PROGRAM), PROGRAM))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
