@@ -8,6 +8,7 @@ import pytest
 
 from hrc_env.scene.build import SceneConfig, build, drawing_model, visuals
 from hrc_env.scene.places import SCENES
+from hrc_env.scene.primitives import SOLID
 from hrc_env.scene.robot import BUILT_IN
 from hrc_env.worker.body import assets_dir
 
@@ -61,3 +62,19 @@ def test_both_servos_of_a_joint_take_the_same_commands_and_hold_it_in_its_range(
     hold, rate = slice(0, n), slice(n, 2 * n)
     np.testing.assert_array_equal(model.actuator_actrange[hold], model.jnt_range[:n])
     np.testing.assert_array_equal(model.actuator_ctrlrange[hold], model.actuator_ctrlrange[rate])
+
+
+def specifications(*patterns):
+    return [
+        (path.name, mujoco.MjSpec.from_file(str(path)))
+        for pattern in patterns
+        for path in sorted(assets_dir().glob(pattern))
+        if ElementTree.parse(path).getroot().tag == "mujoco"
+    ]
+
+
+def test_geoms_whose_place_is_read_before_they_are_compiled_have_one():
+    for name, spec in specifications("scenes/*.xml", "tasks/*.xml"):
+        for geom in spec.geoms:
+            read = name == "props.xml" or geom.contype or geom.group == SOLID
+            assert not read or np.isnan(geom.fromto[0]), (name, geom.name)
