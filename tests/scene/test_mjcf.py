@@ -76,5 +76,6 @@ def specifications(*patterns):
 def test_geoms_whose_place_is_read_before_they_are_compiled_have_one():
     for name, spec in specifications("scenes/*.xml", "tasks/*.xml"):
         for geom in spec.geoms:
-            read = name == "props.xml" or geom.contype or geom.group == SOLID
-            assert not read or np.isnan(geom.fromto[0]), (name, geom.name)
+            if name == "props.xml" or geom.contype or geom.group == SOLID:
+                assert np.isnan(geom.fromto[0]), (name, geom.name)
+                assert geom.alt.type == mujoco.mjtOrientation.mjORIENTATION_QUAT, (name, geom.name)
