@@ -1,1 +1,0 @@
-"""The makers of what tasks put beside the robot."""
