@@ -18,11 +18,11 @@ from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 from hrc_env.cli.progress import Meter
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import write_whole
+from hrc_env.evaluation.episodes import summarize
 from hrc_env.experiments.study.plots import label, new_figure, save
 from hrc_env.sb3 import HRCVecEnv
 
 from . import checkpoints
-from .evaluate import summarise
 from .ppo_lagrangian import PPOLagrangian
 
 RECENT_EPISODES = 64
@@ -145,7 +145,7 @@ class TrainingMonitor(BaseCallback):
     def _note(self) -> None:
         note = ""
         if self.recent:
-            score = asdict(summarise(list(self.recent)))
+            score = asdict(summarize(list(self.recent)))
             wall_s = self.before_s + time.monotonic() - self.started_s
             share = self.ramp.at(self.num_timesteps)
             point = {"steps": float(self.num_timesteps), "wall_s": wall_s, "safety_share": share}

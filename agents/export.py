@@ -18,11 +18,11 @@ from hrc_env.cli.ready import make_ready
 from hrc_env.cli.train import Train
 from hrc_env.core.errors import CheckpointError, learner
 from hrc_env.core.results import write_whole
+from hrc_env.evaluation.episodes import EVALUATION_SEED, measure, play_episodes
 from hrc_env.sb3 import HRCVecEnv
 
 from . import checkpoints, policies
 from .env_info import env_info
-from .evaluate import EVALUATION_SEED, judged, worth
 from .features import NearAndFar
 from .network import Architecture, Network, Tensors
 from .policies import SUFFIX, Card, Worth
@@ -119,11 +119,11 @@ def _worth(
 ) -> Worth:
     """What it is worth on the seeds of evaluations, also printed."""
     with progress_bar(console, f"judged, shield {shield}") as say:
-        episodes = judged(
+        episodes = play_episodes(
             lambda _: network, asked.episodes, tick=lambda share: say(share, ""),
             **{**kwargs, "shield": shield_named(None if shield == "none" else shield)},
         )  # fmt: skip
-    found = worth(episodes)
+    found = measure(episodes)
     names = ("goals_per_minute", "cost_per_episode", "contacts_per_episode")
     for name in names:
         told = found[name]

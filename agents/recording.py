@@ -9,7 +9,7 @@ import json
 import os
 import shutil
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -17,6 +17,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from numpy.typing import NDArray
 from rich.console import Console
 
 from hrc_env.cli.progress import progress_bar
@@ -24,9 +25,10 @@ from hrc_env.cli.ready import make_ready
 from hrc_env.cli.record import Record
 from hrc_env.core.errors import ConfigError, MissingExtraError
 from hrc_env.core.results import write_whole
+from hrc_env.evaluation.rollout import Transition, rollout
 from hrc_env.vector.env import HRCVectorEnv
 
-from .env_info import env_info
+from .env_info import Agent, Observation, env_info
 from .registry import make_agent
 
 INFOS = ("cost", "is_success")
@@ -114,32 +116,37 @@ def _played(asked: Record, first: int, n: int) -> list[Episode]:
     env = HRCVectorEnv(n, **asked.keywords())
     try:
         agent = make_agent(asked.agent, env_info(env.shards.first), asked.seed + first)
-        seen, info = env.reset(seed=asked.seed + first)
-        frames: list[Any] = [(seen, None, None, None, None, info)]
-        ended, last = np.zeros(n, bool), np.zeros(n, int)
-        while not ended.all():
-            action = np.clip(agent.act(seen), -1, 1)
-            seen, reward, terminated, truncated, info = env.step(action)
-            frames.append((seen, action, reward, terminated, truncated, info))
-            over = terminated | truncated
-            last[over & ~ended] = len(frames)
-            ended |= over
-        return [_episode(frames[: last[b]], b, asked.seed + first + b) for b in range(n)]
+        begun = env.reset(seed=asked.seed + first)
+        steps = list(rollout(env, _Clipped(agent), begun[0]))
+        lengths = np.sum([step.is_playing for step in steps], axis=0)
+        return [_episode(begun, steps[: lengths[b]], b, asked.seed + first + b) for b in range(n)]
     finally:
         env.close()
 
 
-def _episode(frames: list[Any], b: int, seed: int) -> Episode:
-    """That of environment `b`."""
-    seen, action, reward, terminated, truncated, infos = zip(*frames, strict=True)
+class _Clipped:
+    """An agent whose actions are within the action space, as data sets want them."""
+
+    def __init__(self, agent: Agent) -> None:
+        self.agent = agent
+
+    def act(self, observation: Observation) -> NDArray[np.float32]:
+        """Return the agent's actions, clipped."""
+        return np.clip(self.agent.act(observation), -1, 1)
+
+
+def _episode(begun: tuple[Any, Any], steps: Sequence[Transition], b: int, seed: int) -> Episode:
+    """Return the episode of environment `b`."""
+    seen = [begun[0], *(step.observation for step in steps)]
+    infos = [begun[1], *(step.info for step in steps)]
     parts = seen if isinstance(seen[0], Mapping) else [{"": each} for each in seen]
     observations = {f"observations/{k}": np.stack([p[k][b] for p in parts]) for k in parts[0]}
     return {
         **observations,
-        "actions": np.stack([each[b] for each in action[1:]]),
-        "rewards": np.stack([each[b] for each in reward[1:]]),
-        "terminations": np.stack([each[b] for each in terminated[1:]]),
-        "truncations": np.stack([each[b] for each in truncated[1:]]),
+        "actions": np.stack([step.action[b] for step in steps]),
+        "rewards": np.stack([step.reward[b] for step in steps]),
+        "terminations": np.stack([step.terminated[b] for step in steps]),
+        "truncations": np.stack([step.truncated[b] for step in steps]),
         **{f"infos/{name}": np.stack([each[name][b] for each in infos]) for name in INFOS},
         "seed": np.array(seed),
     }

@@ -18,6 +18,7 @@ from hrc_env.config import settle
 from hrc_env.core.errors import CheckpointError, RenderingError, learner
 from hrc_env.core.mapping import restored
 from hrc_env.core.results import provenance, write_whole
+from hrc_env.evaluation.episodes import Score, evaluate
 from hrc_env.sb3 import HRCVecEnv
 
 from . import checkpoints, ppo, sac
@@ -31,7 +32,6 @@ from .callbacks import (
 )
 from .cloning import CloningSettings, clone
 from .env_info import EnvInfo
-from .evaluate import Score, evaluate
 from .ppo_lagrangian import PPOLagrangian
 from .recipes import Run, filled
 

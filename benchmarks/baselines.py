@@ -25,11 +25,11 @@ from rich.console import Console
 
 from benchmarks.common import publish
 from hrc_env.agents import checkpoints
-from hrc_env.agents.evaluate import EVALUATION_SEED, judged, worth
 from hrc_env.agents.registry import AGENTS, make_agent
 from hrc_env.cli.checks import at_least, writable_folder
 from hrc_env.cli.progress import progress_bar
 from hrc_env.core.results import Metric
+from hrc_env.evaluation.episodes import EVALUATION_SEED, measure, play_episodes
 from hrc_env.experiments.study.cache import PartCache, PartProgress
 from hrc_env.experiments.study.report import Column, Report, table_of
 from hrc_env.experiments.study.versions import key_of
@@ -91,7 +91,7 @@ def main(arguments: Arguments) -> None:
         parts = PartCache(arguments.out / "parts", key(arguments), len(ORDER) * len(ROWS), progress)
         for level, agent in product(ORDER, ROWS):
             done = played(parts, arguments, level, agent, policies.get((level, agent)))
-            metrics |= {f"{level}.{agent}.{name}": each for name, each in worth(done).items()}
+            metrics |= {f"{level}.{agent}.{name}": each for name, each in measure(done).items()}
     rows = {
         f"{level}.{agent}": f"`{level}`, {ROWS[agent]}" for level, agent in product(ORDER, ROWS)
     }
@@ -155,7 +155,7 @@ def played(
         kwargs["num_threads"], n_episodes = arguments.threads, arguments.episodes
 
     def play(tick: PartProgress) -> dict[str, Any]:
-        return {"episodes": judged(make, n_episodes, tick=tick, **kwargs)}
+        return {"episodes": play_episodes(make, n_episodes, tick=tick, **kwargs)}
 
     return parts.part(label, play)["episodes"]
 

@@ -16,14 +16,14 @@ import tyro
 from rich.console import Console
 
 from benchmarks.common import publish
-from hrc_env.agents.evaluate import judged
 from hrc_env.agents.registry import make_agent
 from hrc_env.cli.checks import at_least, writable_folder
 from hrc_env.cli.progress import progress_bar
 from hrc_env.core.errors import check_names
 from hrc_env.core.results import Metric
+from hrc_env.evaluation.episodes import play_episodes
+from hrc_env.evaluation.intervals import mean_over, rate_of, share_of
 from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.intervals import mean_over, rate_of, share_of
 from hrc_env.experiments.study.report import Column, Report, table_of
 from hrc_env.experiments.study.versions import key_of
 from hrc_env.tasks import BUILT_IN
@@ -128,7 +128,7 @@ def played(parts: PartCache, arguments: Arguments, task: str, way: str) -> list[
 
     def play(n_episodes: int, seed: int, tick: PartProgress) -> dict[str, Any]:
         make = partial(make_agent, how.agent)
-        return {"episodes": judged(make, n_episodes, seed, tick=tick, **kwargs)}
+        return {"episodes": play_episodes(make, n_episodes, seed, tick=tick, **kwargs)}
 
     if how.perception != "pixels":
         n = arguments.episodes

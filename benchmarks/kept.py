@@ -16,16 +16,16 @@ from rich.console import Console
 
 from benchmarks.common import publish
 from hrc_env.agents import policies
-from hrc_env.agents.evaluate import EVALUATION_SEED, judged
 from hrc_env.agents.registry import make_agent
 from hrc_env.cli.checks import writable_folder
 from hrc_env.cli.progress import progress_bar
 from hrc_env.core.results import Metric
+from hrc_env.evaluation.episodes import EVALUATION_SEED, play_episodes
+from hrc_env.evaluation.intervals import goals_over, mean_over, rate_of, share_of
+from hrc_env.evaluation.sums import ACHIEVED, FAILED
 from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.intervals import goals_over, mean_over, rate_of, share_of
 from hrc_env.experiments.study.report import Column, Report, table_of
 from hrc_env.experiments.study.versions import key_of
-from hrc_env.sb3 import ACHIEVED, FAILED
 
 DEPENDS = ("env", "tracker", "emulator", "motion", "shield", "agents")
 """Subsystems that finished parts depend on."""
@@ -114,7 +114,7 @@ def played(parts: PartCache, arguments: Arguments, row: Row) -> Episodes:
             "shield": row.shield, "num_threads": arguments.threads,
         }  # fmt: skip
         make = partial(make_agent, row.address)
-        return {"episodes": judged(make, n_episodes(arguments), tick=tick, **kwargs)}
+        return {"episodes": play_episodes(make, n_episodes(arguments), tick=tick, **kwargs)}
 
     label = row.name.replace("/", ".")
     return parts.part(f"{label}.{card.sha256[:12]}", play)["episodes"]

@@ -21,18 +21,18 @@ import tyro
 from rich.console import Console
 
 from benchmarks.common import exactly, publish
-from hrc_env.agents.evaluate import EVALUATION_SEED, judged
 from hrc_env.agents.recipes import filled
 from hrc_env.agents.registry import make_agent
 from hrc_env.cli.checks import at_least, writable_folder
 from hrc_env.cli.progress import progress_bar
 from hrc_env.cli.train import Train
 from hrc_env.core.results import Metric, over
+from hrc_env.evaluation.episodes import EVALUATION_SEED, play_episodes
+from hrc_env.evaluation.intervals import mean_over, rate_of, success_over
+from hrc_env.evaluation.sums import ACHIEVED, FAILED
 from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.intervals import mean_over, rate_of, success_over
 from hrc_env.experiments.study.report import Column, Report, table_of
 from hrc_env.experiments.study.versions import key_of
-from hrc_env.sb3 import ACHIEVED, FAILED
 from hrc_env.tasks import BUILT_IN
 
 DEPENDS = ("env", "tracker", "emulator", "motion", "agents")
@@ -156,7 +156,7 @@ def played(
 
     def play(tick: PartProgress) -> dict[str, Any]:
         make: Callable[[Any], Any] = partial(make_agent, agent)
-        return {"episodes": judged(make, arguments.episodes, tick=tick, **kwargs)}
+        return {"episodes": play_episodes(make, arguments.episodes, tick=tick, **kwargs)}
 
     return parts.part(f"{task}.{label}", play)["episodes"]
 

@@ -23,12 +23,12 @@ from rich.console import Console
 
 from benchmarks.common import exactly, publish
 from hrc_env.agents.callbacks import Curve
-from hrc_env.agents.evaluate import EVALUATION_SEED, judged, worth
 from hrc_env.agents.registry import make_agent
 from hrc_env.cli.progress import progress_bar
 from hrc_env.core.results import Metric, over
+from hrc_env.evaluation.episodes import EVALUATION_SEED, measure, play_episodes
+from hrc_env.evaluation.intervals import rate_of
 from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.intervals import rate_of
 from hrc_env.experiments.study.report import Column, Report, table_of
 from hrc_env.experiments.study.versions import key_of
 
@@ -171,7 +171,7 @@ def played(
     def play(tick: PartProgress) -> dict[str, Any]:
         make = partial(make_agent, str(policy))
         kwargs: dict[str, Any] = {"perception": "keypoints", "shield": shield}
-        return {"episodes": judged(make, arguments.episodes, tick=tick, **kwargs)}
+        return {"episodes": play_episodes(make, arguments.episodes, tick=tick, **kwargs)}
 
     return parts.part(f"{row}.{digest}", play)["episodes"]
 
@@ -179,7 +179,7 @@ def played(
 def worth_of(name: str, episodes: list[dict[str, float]]) -> dict[str, Metric]:
     """What a policy is worth, from its episodes."""
     towards = [each["contacts_towards"] for each in episodes]
-    found = worth(episodes) | {"towards": rate_of(towards, len(towards) / 1000, "per 1000")}
+    found = measure(episodes) | {"towards": rate_of(towards, len(towards) / 1000, "per 1000")}
     return {f"{name}.{key}": each for key, each in found.items()}
 
 

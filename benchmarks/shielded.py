@@ -17,14 +17,14 @@ import tyro
 from rich.console import Console
 
 from benchmarks.common import publish
-from hrc_env.agents.evaluate import judged
 from hrc_env.agents.registry import make_agent
 from hrc_env.cli.checks import writable_folder
 from hrc_env.cli.progress import progress_bar
 from hrc_env.core.results import Metric
+from hrc_env.evaluation.episodes import play_episodes
+from hrc_env.evaluation.intervals import goals_over, mean_over, rate_of, ratio_over
 from hrc_env.experiments.impact.setups import PerceptionSetup
 from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.intervals import goals_over, mean_over, rate_of, ratio_over
 from hrc_env.experiments.study.report import Column, Report, table_of
 from hrc_env.experiments.study.versions import key_of
 from hrc_env.perception.faults.fault import ALL, FaultConfig
@@ -134,7 +134,7 @@ def episodes_of(name: str, row: Row, parts: PartCache, arguments: Arguments) -> 
             }  # fmt: skip
             make = partial(make_agent, "scripted")
             count = partial(lambda share, part: tick(share * part), part=len(ids) / size)
-            found += judged(make, len(ids), SEED + int(ids[0]), tick=count, **kwargs)
+            found += play_episodes(make, len(ids), SEED + int(ids[0]), tick=count, **kwargs)
         return {"episodes": found}
 
     return [

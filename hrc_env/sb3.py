@@ -16,10 +16,10 @@ from gymnasium.wrappers import OrderEnforcing, TimeLimit
 from numpy.typing import NDArray
 
 from hrc_env.core.errors import ConfigError, check_shape, learner, whole
-from hrc_env.core.typing import Bools, Floats, Ints
+from hrc_env.core.typing import Bools, Floats
 from hrc_env.env import ENDLESS
+from hrc_env.evaluation.sums import EpisodeSums, value_of_step
 from hrc_env.rewards import RewardConfig
-from hrc_env.safety.incidents import KINDS
 from hrc_env.simulation import Simulation
 from hrc_env.step import Observation
 from hrc_env.tasks.goal import TERM
@@ -31,14 +31,6 @@ with learner():
     from stable_baselines3.common.monitor import Monitor
     from stable_baselines3.common.vec_env import VecEnv
 
-COSTS = ("cost", "cost_proximity", "cost_contact")
-"""Infos whose sums over an episode are kept."""
-SO_FAR = np.dtype(
-    [(name, "f8") for name in ("steps", "reward", *COSTS, "contacts", "touching", "nearest_m")]
-)
-"""What an episode has come to so far; a long touch is one contact."""
-ACHIEVED, FAILED = "goals_reached", "goals_missed"
-"""What an episode's statistics call the attempts of every task (`Task.achieved`, `Task.failed`)."""
 REPLACED = (Monitor, OrderEnforcing)
 """Wrappers of one environment that this `VecEnv` replaces, with a time limit `TimeLimit` too."""
 
@@ -73,7 +65,7 @@ class HRCVecEnv(VecEnv):
         self.costs: Floats = np.zeros(num_envs)
         """(num_envs,) the cost of the last step; 0 after a reset."""
         self._action = np.zeros((num_envs, *(actions.shape or ())), np.float32)
-        self._so_far = np.zeros(num_envs, SO_FAR)
+        self._sums = EpisodeSums(num_envs)
 
     @property
     def simulation(self) -> Simulation:
@@ -117,7 +109,7 @@ class HRCVecEnv(VecEnv):
         self._reset_seeds()
         self._reset_options()
         self.costs = np.zeros(self.num_envs)
-        self._begin(np.arange(self.num_envs))
+        self._sums.begin(np.arange(self.num_envs))
         self.reset_infos = [info_of(infos, b) for b in range(self.num_envs)]
         return observation
 
@@ -130,7 +122,8 @@ class HRCVecEnv(VecEnv):
     ) -> tuple[Observation, NDArray[np.float32], Bools, list[dict[str, Any]]]:
         """Step everyone; whoever is done starts anew, as SB3 expects."""
         observation, reward, terminated, truncated, fresh = self.env.step(self._action)
-        self._count(reward, fresh)
+        self._n_steps += 1
+        self.costs = self._sums.add(reward, fresh)
         done = terminated | truncated
         infos = self._infos(fresh)
         ended = np.flatnonzero(done)
@@ -141,7 +134,7 @@ class HRCVecEnv(VecEnv):
             infos[b]["episode"] = episode = self._episode(b, infos[b])
             self._past[b].append(Past(episode["r"], int(episode["l"]), episode["t"]))
             self.reset_infos[b] = info_of(fresh, b)
-        self._begin(ended)
+        self._sums.begin(ended)
         return observation, reward.astype(np.float32), done, infos
 
     def _infos(self, fresh: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -150,7 +143,7 @@ class HRCVecEnv(VecEnv):
         for term in self.simulation.task.reward_terms if self.simulation.task.goal else ():
             if term.name != TERM:
                 name = f"reward/{term.name}"
-                columns[name] = of_step(fresh, name, self.num_envs)
+                columns[name] = value_of_step(fresh, name, self.num_envs)
         values = zip(*(column.tolist() for column in columns.values()), strict=True)
         return [dict(zip(columns, row, strict=True)) for row in values]
 
@@ -171,41 +164,11 @@ class HRCVecEnv(VecEnv):
             return [None] * self.num_envs
         return list(self.env.render() or ())
 
-    def _begin(self, ids: Ints) -> None:
-        self._so_far[ids] = np.zeros(1, SO_FAR)
-        self._so_far["nearest_m"][ids] = np.inf
-
-    def _count(self, reward: Floats, infos: Mapping[str, Any]) -> None:
-        now = self._so_far
-        now["steps"] += 1
-        self._n_steps += 1
-        now["reward"] += reward
-        costs = {name: of_step(infos, name, self.num_envs) for name in COSTS}
-        for name, cost in costs.items():
-            now[name] += cost
-        self.costs, touching = costs["cost"], costs["cost_contact"] > 0
-        now["contacts"] += touching > now["touching"]
-        now["touching"] = touching
-        separation_m = of_step(infos, "safety/min_separation_m", self.num_envs)
-        now["nearest_m"] = np.fmin(now["nearest_m"], separation_m)
-
     def _episode(self, b: int, info: Mapping[str, Any]) -> dict[str, float]:
-        """Statistics of an episode under the names of SB3's Monitor, and ours."""
-        task, episode = self.simulation.task, self._so_far[b]
-        return {
-            "r": float(episode["reward"]),
-            "l": int(episode["steps"]),
-            "seconds": float(episode["steps"] * self.env.config.ctrl_dt),
-            "t": time.time() - self.started_s,
-            "cost": float(episode["cost"]),
-            "cost_steps": float(episode["cost_proximity"]),
-            "contacts": float(episode["contacts"]),
-            **{f"contacts_{kind}": info[f"safety/contacts_{kind}"] for kind in KINDS},
-            ACHIEVED: info[task.achieved],
-            FAILED: info[task.failed],
-            "success": float(info["is_success"]),
-            "min_separation_m": float(episode["nearest_m"]),
-        }
+        """Return the statistics of an episode under the names of SB3's Monitor, and ours."""
+        task, dt_s = self.simulation.task, self.env.config.ctrl_dt
+        episode = self._sums.summarize(b, info, task, dt_s)
+        return {**episode, "t": time.time() - self.started_s}
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """Return the attribute of each environment."""
@@ -260,7 +223,7 @@ class HRCVecEnv(VecEnv):
 
     def begin_alone(self, k: int, info: dict[str, Any]) -> None:
         """Begin the statistics of environment `k`, which has started alone, with this info."""
-        self._begin(np.array([k]))
+        self._sums.begin(np.array([k]))
         self.costs = np.where(np.arange(self.num_envs) == k, 0.0, self.costs)
         self.reset_infos[k] = info
 
@@ -303,13 +266,3 @@ class MonitoredMember(Member):
     def get_episode_times(self) -> list[float]:
         """Return the ends of finished episodes, since the environments were made [s]."""
         return [each.since_start_s for each in self._many.past_of(self._k)]
-
-
-def of_step(infos: Mapping[str, Any], name: str, num_envs: int) -> Floats:
-    """(B,) a value of the step itself, also where the episode ended with it; else NaN."""
-    value = np.full(num_envs, np.nan)
-    for part in (infos, infos.get("final_info", {})):
-        if name in part:
-            known = part[f"_{name}"]
-            value[known] = part[name][known]
-    return value

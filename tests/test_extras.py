@@ -23,7 +23,7 @@ sys.meta_path = [Without if finder is PathFinder else finder for finder in sys.m
 
 
 DOORS = {
-    "checkpoints", "cloning", "evaluate", "export", "features", "ppo", "ppo_lagrangian", "sac",
+    "checkpoints", "cloning", "export", "features", "ppo", "ppo_lagrangian", "sac",
     "sb3", "training",
 }  # fmt: skip
 """The modules that cannot be imported without the learner: `hrc_env.sb3`, the rest agents."""

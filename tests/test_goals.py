@@ -14,10 +14,10 @@ from stable_baselines3.common.env_checker import check_env as check_env_for_sb3
 
 import hrc_env  # noqa: F401  registers the ids
 from benchmarks import identity
-from hrc_env.agents.evaluate import evaluate
 from hrc_env.agents.registry import make_agent
 from hrc_env.core.errors import ConfigError, NoGoalError
 from hrc_env.env import HRCEnv
+from hrc_env.evaluation.episodes import evaluate
 from hrc_env.sb3 import HRCVecEnv
 from hrc_env.tasks.reach_goal import ReachGoalConfig
 from hrc_env.vector.env import HRCVectorEnv

@@ -17,12 +17,12 @@ from hrc_env.__main__ import main
 from hrc_env.agents import checkpoints
 from hrc_env.agents.callbacks import Interrupt, Ramp, TrainingMonitor, plot_curve
 from hrc_env.agents.env_info import env_info
-from hrc_env.agents.evaluate import evaluate, judged, one_by_one
 from hrc_env.agents.registry import make_agent
 from hrc_env.agents.training import as_before
 from hrc_env.cli.train import Train
 from hrc_env.core.errors import CheckpointError, ConfigError
 from hrc_env.env import HRCEnv
+from hrc_env.evaluation.episodes import evaluate, play_episodes, play_one_by_one
 
 pytestmark = pytest.mark.slow  # learners are trained
 
@@ -235,8 +235,8 @@ def test_the_learning_curve_is_drawn_over_environment_steps(run, tmp_path, monke
 
 def test_one_by_one_or_all_at_once_episodes_are_the_same():
     """What pixels are judged by is what the vector environment counts."""
-    alone = one_by_one(lambda at: make_agent("scripted", at), 3, 5, perception="truth")
-    together = judged(lambda at: make_agent("scripted", at), 3, 5, perception="truth")
+    alone = play_one_by_one(lambda at: make_agent("scripted", at), 3, 5, perception="truth")
+    together = play_episodes(lambda at: make_agent("scripted", at), 3, 5, perception="truth")
     for one, other in zip(alone, together, strict=True):
         assert one == pytest.approx({name: other[name] for name in one}, abs=1e-9)
     assert sum(each["contacts"] for each in together) > 0

@@ -12,7 +12,7 @@ from benchmarks.perception.speed import ROUNDS
 from benchmarks.perception.views import FAMILIES, ROWS, View, rows_of
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats, Ints
-from hrc_env.experiments.study.intervals import (
+from hrc_env.evaluation.intervals import (
     bootstrap,
     quantile_over,
     ratio_over,

@@ -12,7 +12,7 @@ from hrc_env.core.records import PoseEstimate
 from hrc_env.core.results import Metric
 from hrc_env.core.skeleton import BONES, MIRROR
 from hrc_env.core.typing import Bools, Covariances3, Floats, Points3
-from hrc_env.experiments.study.intervals import quantile_over, ratio_over
+from hrc_env.evaluation.intervals import quantile_over, ratio_over
 from hrc_env.geometry.cameras import project
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import ESTIMATORS, make_estimator

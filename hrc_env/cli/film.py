@@ -20,6 +20,7 @@ from hrc_env.cli.progress import track
 from hrc_env.cli.ready import make_ready
 from hrc_env.core.typing import Image
 from hrc_env.env import HRCEnv
+from hrc_env.evaluation.rollout import Transition, rollout
 
 STEPS_PER_FRAME = 2
 """A film shows every second step, in real time."""
@@ -32,8 +33,6 @@ FRAMES_BEHIND = 2
 
 Make = Callable[[Any], Any]
 """Builds the agent for an `EnvInfo`."""
-Steps = Iterator[tuple[float, dict[str, Any]]]
-"""Reward and info."""
 
 
 def film_episode(
@@ -78,18 +77,10 @@ def nearest_seed(
     return max(closest_m, key=closest_m.__getitem__)  # all are near misses: the least one
 
 
-def begun(env: Any, make: Make, seed: int, n_steps: int) -> Steps:
-    """The steps of an agent's episode, which has begun, up to its end."""
+def begin(env: Any, make: Make, seed: int, n_steps: int) -> Iterator[Transition]:
+    """Begin an episode of the agent that is made; return its steps up to its end."""
     agent = make(env_info(env.unwrapped.simulation))
-    return _steps(env, agent, env.reset(seed=seed)[0], n_steps)
-
-
-def _steps(env: Any, agent: Any, observation: Any, n_steps: int) -> Steps:
-    for _ in range(n_steps):
-        observation, reward, terminated, truncated, info = env.step(agent.act(observation))
-        yield float(reward), info
-        if terminated or truncated:
-            break
+    return rollout(env, agent, env.reset(seed=seed)[0], n_steps)
 
 
 def table(totals: dict[str, float], title: str = "") -> Table:
@@ -107,15 +98,15 @@ def _limit(env: HRCEnv) -> int:
 
 
 def _closest_m(env: HRCEnv, make: Make, seed: int, n_steps: int) -> float:
-    played = begun(env, make, seed, n_steps)
-    return min(float(info["safety/min_separation_m"]) for _, info in played)
+    played = begin(env, make, seed, n_steps)
+    return min(float(step.info["safety/min_separation_m"]) for step in played)
 
 
 def _filmed(
     env: HRCEnv, make: Make, path: Path, seed: int, n_steps: int
 ) -> tuple[dict[str, float], Image]:
     """Play, while a thread draws and encodes every second step; what came of it, and the still."""
-    played, waiting = begun(env, make, seed, n_steps), deque[Future[Image]]()
+    played, waiting = begin(env, make, seed, n_steps), deque[Future[Image]]()
     writer: Any = imageio.get_writer(
         path, fps=1 / env.config.ctrl_dt / STEPS_PER_FRAME,
         quality=None, macro_block_size=4, output_params=list(H264),
@@ -130,7 +121,8 @@ def _filmed(
     diary, closest_m, started_s = np.zeros(n_steps, MOMENT), np.inf, time.monotonic()
     step, counts = 0, {}
     with closing(writer), ThreadPoolExecutor(1, "hrc_env-film") as thread:
-        for step, (_, info) in enumerate(track(played, "filming", n_steps)):
+        for step, made in enumerate(track(played, "filming", n_steps)):
+            info = made.info
             believed = env.simulation.belief.separation.distance_m
             true_m = info["safety/min_separation_m"]
             error_m = info["tracking/mpjpe_m"] if info["tracking/mpjpe_measured"] else np.nan

@@ -64,10 +64,10 @@ class Play(EnvironmentArguments):
         inner = env.unwrapped
         window = Viewer(inner.simulation.scene) if self.viewer else None
         limit = env.spec.max_episode_steps
-        played = film.begun(env, named(self.agent, seed), seed, limit)
+        played = film.begin(env, named(self.agent, seed), seed, limit)
         started_s, total, step, info = time.monotonic(), 0.0, 0, {}
-        for step, (reward, told) in enumerate(track(played, f"episode {seed}", limit), 1):
-            total, info = total + reward, told
+        for step, made in enumerate(track(played, f"episode {seed}", limit), 1):
+            total, info = total + float(made.reward), made.info
             if window is not None:
                 window.show(*inner.views.pose())
                 due_s = started_s + step * inner.config.ctrl_dt

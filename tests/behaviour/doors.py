@@ -759,15 +759,15 @@ def judge_agent(
     env_id: str, agent: str, n_episodes: int, one_by_one: bool, **options: Any
 ) -> dict[str, NDArray[np.float64]]:
     """Return the statistics of an agent's episodes, and its score."""
-    from hrc_env.agents import evaluate
+    from hrc_env.evaluation import episodes as played
 
-    play = evaluate.one_by_one if one_by_one else evaluate.judged
+    play = played.play_one_by_one if one_by_one else played.play_episodes
     make = functools.partial(make_agent, agent)
     options = {"task": env_id, "perception": "keypoints", **options}
     shares: list[float] = []
-    episodes = play(make, n_episodes, evaluate.EVALUATION_SEED, tick=shares.append, **options)
-    score = dataclasses.asdict(evaluate.summarise(episodes))
-    worth = evaluate.worth(episodes)
+    episodes = play(make, n_episodes, played.EVALUATION_SEED, tick=shares.append, **options)
+    score = dataclasses.asdict(played.summarize(episodes))
+    worth = played.measure(episodes)
     return {
         **_columns(episodes),
         "progress": np.cumsum(shares),

@@ -8,6 +8,7 @@ import pytest
 from benchmarks import baselines
 from docs import tables
 from hrc_env.core.results import Metric
+from hrc_env.evaluation.episodes import measure
 
 pytestmark = pytest.mark.slow  # a study is played
 
@@ -18,7 +19,7 @@ def episode(**changes: float) -> dict[str, float]:
 
 def test_what_an_agent_is_worth_comes_from_its_episodes():
     done = [episode(), episode(r=4.0, cost=6.0, contacts=2.0), episode(r=1.0, goals_reached=5.0)]
-    worth = baselines.worth(done)
+    worth = measure(done)
     assert {name: each.value for name, each in worth.items()} == pytest.approx(
         {
             "return": 2.0,
@@ -43,7 +44,7 @@ def end_to_end(tmp_path_factory):
         trained: list[object] = []
         no_process = SimpleNamespace(run=lambda *words, **_: trained.append(words))
         patched.setattr(baselines, "subprocess", no_process)
-        patched.setattr(baselines, "judged", lambda *words, **_: trained.append(words))
+        patched.setattr(baselines, "play_episodes", lambda *words, **_: trained.append(words))
         baselines.main(arguments)
     return out, json.loads(first), trained
 

@@ -28,7 +28,7 @@ def test_a_run_that_was_stopped_goes_on(tmp_path):
     experts.main(arguments)
     first = (tmp_path / "results.json").read_text()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(experts, "judged", lambda *words, **_: pytest.fail("played again"))
+        patch.setattr(experts, "play_episodes", lambda *words, **_: pytest.fail("played again"))
         experts.main(arguments)
     made = json.loads(first)["metrics"]
     assert json.loads((tmp_path / "results.json").read_text())["metrics"] == made

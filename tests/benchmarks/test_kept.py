@@ -7,7 +7,7 @@ import pytest
 import hrc_env
 from benchmarks import kept
 from hrc_env.agents import policies
-from hrc_env.sb3 import ACHIEVED, FAILED
+from hrc_env.evaluation.sums import ACHIEVED, FAILED
 
 pytestmark = pytest.mark.slow  # a study is played
 
@@ -35,6 +35,6 @@ def test_a_run_that_was_stopped_goes_on(tmp_path, monkeypatch):
     kept.main(arguments)
     made = json.loads((tmp_path / "results.json").read_text())["metrics"]
     assert made[f"{rows[0].name}.goals_per_minute"]["value"] > 20
-    monkeypatch.setattr(kept, "judged", lambda *words, **_: pytest.fail("played again"))
+    monkeypatch.setattr(kept, "play_episodes", lambda *words, **_: pytest.fail("played again"))
     kept.main(arguments)
     assert json.loads((tmp_path / "results.json").read_text())["metrics"] == made

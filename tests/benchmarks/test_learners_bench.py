@@ -21,7 +21,7 @@ def test_a_task_is_learnt_and_judged_and_goes_on(tmp_path, monkeypatch):
         made[f"HRCReach-v0.{who}.success"]["value"] for who in ("learnt", "scripted")
     )
     assert share == pytest.approx(learnt / scripted)
-    monkeypatch.setattr(learners, "judged", lambda *of, **_: pytest.fail("played again"))
+    monkeypatch.setattr(learners, "play_episodes", lambda *of, **_: pytest.fail("played again"))
     again = SimpleNamespace(run=lambda *of, **_: pytest.fail("learnt again"))
     monkeypatch.setattr(learners, "subprocess", again)
     learners.main(arguments)

@@ -42,6 +42,6 @@ def test_a_run_that_was_stopped_goes_on(tmp_path, monkeypatch):
     made = json.loads((tmp_path / "results.json").read_text())["metrics"]
     assert made["bare.share"]["value"] == 1.0
     assert made["one.share"]["value"] < 1.0
-    monkeypatch.setattr(shielded, "judged", lambda *words, **_: pytest.fail("played again"))
+    monkeypatch.setattr(shielded, "play_episodes", lambda *words, **_: pytest.fail("played again"))
     shielded.main(arguments)
     assert json.loads((tmp_path / "results.json").read_text())["metrics"] == made

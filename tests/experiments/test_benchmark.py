@@ -88,7 +88,10 @@ def test_a_policy_is_judged_and_entered_and_goes_on(tmp_path, monkeypatch, capsy
     made = json.loads((tmp_path / "out" / "results.json").read_text())["metrics"]
     assert made[f"{KEY}.goals_per_minute"]["value"] == 0.0
     assert len(made) == 12 * 8
-    monkeypatch.setattr("hrc_env.agents.evaluate.judged", lambda *of, **_: pytest.fail("again"))
+    monkeypatch.setattr(
+        "hrc_env.experiments.benchmark.experiment.play_episodes",
+        lambda *of, **_: pytest.fail("again"),
+    )
     assert main(words) == 0
 
 

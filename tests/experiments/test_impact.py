@@ -10,6 +10,8 @@ import pytest
 
 from docs import tables
 from hrc_env.core.errors import ConfigError, HRCError
+from hrc_env.evaluation.counts import GAPS_M, Bins
+from hrc_env.evaluation.intervals import counted_quantile_over
 from hrc_env.experiments.impact import policies
 from hrc_env.experiments.impact.episodes import STEP, Stage, sums_of
 from hrc_env.experiments.impact.experiment import STUDY, ImpactConfig, check_walks, config_for, play
@@ -23,8 +25,6 @@ from hrc_env.experiments.impact.setups import (
     setup_called,
 )
 from hrc_env.experiments.study.cache import PartCache
-from hrc_env.experiments.study.counts import GAPS_M, Bins
-from hrc_env.experiments.study.intervals import counted_quantile_over
 from hrc_env.experiments.study.runner import run
 from hrc_env.safety.incidents import KINDS
 

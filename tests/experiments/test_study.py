@@ -10,9 +10,10 @@ from scipy import stats
 
 from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.core.results import Metric, write_results, write_whole
-from hrc_env.experiments.study import intervals, report, runner
+from hrc_env.evaluation import intervals
+from hrc_env.evaluation.counts import ERRORS_M
+from hrc_env.experiments.study import report, runner
 from hrc_env.experiments.study.cache import PartCache, own_folder, owner_of
-from hrc_env.experiments.study.counts import ERRORS_M
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from benchmarks.tracking.rigs import DT_S
 from benchmarks.tracking.tracks import Tracks, follow_env, follow_walkers
 from hrc_env.core.batching import copied
 from hrc_env.core.results import Metric
-from hrc_env.experiments.study.intervals import bootstrap, ratio_over
+from hrc_env.evaluation.intervals import bootstrap, ratio_over
 
 WARM_UP, EVERY = 25, 2
 SEEDS = list(range(4900, 4932))

@@ -15,7 +15,7 @@ from hrc_env.agents.env_info import env_info
 from hrc_env.agents.registry import make_agent
 from hrc_env.config import settle
 from hrc_env.core.results import Metric
-from hrc_env.experiments.study.intervals import ratio_over
+from hrc_env.evaluation.intervals import ratio_over
 from hrc_env.geometry import chains
 from hrc_env.geometry.distances import least_separation
 from hrc_env.motion import generator

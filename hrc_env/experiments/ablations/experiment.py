@@ -10,6 +10,10 @@ import numpy as np
 
 from hrc_env.core.errors import ConfigError, check_names
 from hrc_env.core.results import Metric
+from hrc_env.evaluation.counts import ERRORS_M
+from hrc_env.evaluation.intervals import counted_quantile_of as quantile_of
+from hrc_env.evaluation.intervals import counted_quantile_over as quantile_over
+from hrc_env.evaluation.intervals import mean_over, paired, rate_of, ratio_over, rmse_over
 from hrc_env.experiments.ablations.ablation import Ablation, Setting
 from hrc_env.experiments.ablations.play import Sums, play, walks_of
 from hrc_env.experiments.ablations.questions.faults import CALIBRATION, LATENCY
@@ -17,10 +21,6 @@ from hrc_env.experiments.ablations.questions.filters import ALGORITHM_1, FILTER,
 from hrc_env.experiments.ablations.questions.rigs import CAMERAS, OCCLUSION, WORKERS
 from hrc_env.experiments.ablations.report import report
 from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.counts import ERRORS_M
-from hrc_env.experiments.study.intervals import counted_quantile_of as quantile_of
-from hrc_env.experiments.study.intervals import counted_quantile_over as quantile_over
-from hrc_env.experiments.study.intervals import mean_over, paired, rate_of, ratio_over, rmse_over
 from hrc_env.experiments.study.rigs import DT_S, WARM_UP_S
 from hrc_env.experiments.study.runner import Study, at_least_one, changed
 from hrc_env.experiments.study.versions import key_of

@@ -18,10 +18,10 @@ from hrc_env.core.batching import rows
 from hrc_env.core.machine import n_cores
 from hrc_env.core.records import Keypoints, PoseEstimate, WorkerMotion
 from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, Points3
+from hrc_env.evaluation.counts import ERRORS_M
 from hrc_env.experiments.ablations.ablation import Setting
 from hrc_env.experiments.ablations.handicaps import handicap, lengths_m
 from hrc_env.experiments.study.cache import PartProgress
-from hrc_env.experiments.study.counts import ERRORS_M
 from hrc_env.experiments.study.rigs import N_WARM_UP, Turn
 from hrc_env.metrics import no_identities, tracking_error
 from hrc_env.motion import generator

@@ -11,11 +11,12 @@ from pathlib import Path
 from hrc_env.agents.registry import control_of, make_agent
 from hrc_env.core.errors import check_names
 from hrc_env.core.results import Metric, provenance
+from hrc_env.evaluation.episodes import play_episodes
+from hrc_env.evaluation.intervals import goals_over, rate_of, ratio_over, success_over
 from hrc_env.experiments.benchmark.conditions import CONDITIONS, SEED, VERSION
 from hrc_env.experiments.benchmark.entries import Entry, enter, entries, regret
 from hrc_env.experiments.benchmark.report import report
 from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.intervals import goals_over, rate_of, ratio_over, success_over
 from hrc_env.experiments.study.runner import Study, at_least_one
 from hrc_env.experiments.study.versions import key_of
 from hrc_env.safety.incidents import KINDS
@@ -72,15 +73,13 @@ def _episodes(
     config: BenchmarkConfig, task: str, name: str, tick: PartProgress
 ) -> dict[str, Episodes]:
     """One row, whose episodes take turns in the condition's cameras."""
-    from hrc_env.agents.evaluate import judged  # here: it imports the learner
-
     control = {} if config.control is None else {"control": config.control}
     turns, done = CONDITIONS[name].keywords(task), []
     for k, kwargs in enumerate(turns):
         n = len(range(k, config.n_seeds, len(turns)))
         part = partial(lambda share, of: tick(share * of / config.n_seeds), of=n)
         if n:
-            done += judged(
+            done += play_episodes(
                 partial(make_agent, config.policy), n, SEED + len(done), part,
                 **kwargs, **control,
             )  # fmt: skip

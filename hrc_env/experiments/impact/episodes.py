@@ -19,16 +19,18 @@ from hrc_env.control import checked_action
 from hrc_env.core.infos import Info
 from hrc_env.core.machine import n_cores
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Ints
+from hrc_env.core.typing import Bools, Floats, Ints
+from hrc_env.evaluation.counts import ERRORS_M, GAPS_M, SPEEDS_MPS
+from hrc_env.evaluation.rollout import rollout
 from hrc_env.experiments.impact.setups import PerceptionSetup
 from hrc_env.experiments.study.cache import PartProgress
-from hrc_env.experiments.study.counts import ERRORS_M, GAPS_M, SPEEDS_MPS
 from hrc_env.experiments.study.rigs import Turn
 from hrc_env.geometry import chains
 from hrc_env.geometry.distances import least_separation
 from hrc_env.motion import generator
 from hrc_env.safety.incidents import KINDS, MOVING_M_S
 from hrc_env.simulation import Simulation
+from hrc_env.step import Observation
 from hrc_env.tasks import DEFAULT
 from hrc_env.vector.shards import Shards
 from hrc_env.worker.body import worker_truth
@@ -108,6 +110,27 @@ def build(
         return Shards(n_episodes, threads, partial(Simulation, settings=settings))
 
 
+class Endless:
+    """Environments whose episodes go on after their end, for studies of a fixed length."""
+
+    def __init__(self, env: Shards) -> None:
+        self.env = env
+        self.terminated: Bools = np.zeros(env.bounds[-1], np.bool_)
+        """(B,) whether an episode ended with the last step."""
+
+    def reset(self, seeds: Sequence[int]) -> Observation:
+        """Begin an episode of every seed; return the observation."""
+        rngs = [seeding.np_random(seed)[0] for seed in seeds]
+        return self.env.reset(np.arange(len(seeds)), rngs).observation
+
+    def step(self, action: Any) -> tuple[Observation, Floats, Bools, Bools, Info]:
+        """Step every environment; no episode is over."""
+        shape = len(self.terminated), self.env.first.n_actions
+        result = self.env.step(checked_action(action, shape))
+        self.terminated, never = result.terminated, np.zeros_like(result.terminated)
+        return result.observation, result.reward, never, never, result.info
+
+
 def run(
     env: Shards,
     make_agent: MakeAgent,
@@ -116,16 +139,14 @@ def run(
     stepped: Callable[[], None],
 ) -> tuple[Steps, list[Info]]:
     """One episode of every seed, side by side: what happened (T, B, ...), the infos of T steps."""
-    agent, shape = make_agent(env.first), (len(seeds), env.first.n_actions)
-    result = env.reset(np.arange(len(seeds)), [seeding.np_random(seed)[0] for seed in seeds])
+    agent, endless = make_agent(env.first), Endless(env)
     steps, infos = [], []
-    for _ in range(n_steps):
-        result = env.step(checked_action(agent.act(result.observation), shape))
+    for made in rollout(endless, agent, endless.reset(seeds), n_steps):
         now = np.concatenate(list(map(judge, env.parts)))
         for who in ("robot", "worker"):
-            now[f"{who}_mps"] = np.nan_to_num(result.info[f"safety/{who}_towards_m_s"])
+            now[f"{who}_mps"] = np.nan_to_num(made.info[f"safety/{who}_towards_m_s"])
         steps.append(now)
-        infos.append(result.info)
+        infos.append(made.info)
         stepped()
     return np.stack(steps), infos
 

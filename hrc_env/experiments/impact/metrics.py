@@ -17,11 +17,11 @@ import numpy as np
 from hrc_env.core.results import Metric
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Ints
+from hrc_env.evaluation import intervals
+from hrc_env.evaluation.counts import ERRORS_M, GAPS_M, SPEEDS_MPS
+from hrc_env.evaluation.intervals import paired, rate_of, ratio_of, ratio_over
 from hrc_env.experiments.impact.policies import SLOWED, Policy
 from hrc_env.experiments.impact.setups import LATE, REFERENCE, PerceptionSetup, setup_called
-from hrc_env.experiments.study import intervals
-from hrc_env.experiments.study.counts import ERRORS_M, GAPS_M, SPEEDS_MPS
-from hrc_env.experiments.study.intervals import paired, rate_of, ratio_of, ratio_over
 from hrc_env.experiments.study.report import Metrics
 
 Row = Mapping[str, list[Any]]

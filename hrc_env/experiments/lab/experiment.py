@@ -11,11 +11,11 @@ import numpy as np
 from hrc_env.config import HRCConfig
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Bools, Floats
+from hrc_env.evaluation.intervals import paired, quantile_of, quantile_over, ratio_over
 from hrc_env.experiments.lab.motions import MOTIONS, play
 from hrc_env.experiments.lab.report import ALL, COLUMNS, ESTIMATORS, WARM_UP, report
 from hrc_env.experiments.lab.sides import MISSED_SHARE, away_from_cameras, missed_by_camera
 from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.intervals import paired, quantile_of, quantile_over, ratio_over
 from hrc_env.experiments.study.recording import Recording, record, replay
 from hrc_env.experiments.study.rigs import CHOICES, MULTI
 from hrc_env.experiments.study.runner import Study, at_least_one, changed

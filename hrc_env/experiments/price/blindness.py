@@ -20,9 +20,9 @@ from functools import partial
 import numpy as np
 
 from hrc_env.core.results import Metric
+from hrc_env.evaluation.intervals import mean_over
 from hrc_env.experiments.price.trainings import BELIEF, REWARDS, TRUE, Training, learn
 from hrc_env.experiments.study.cache import PartCache
-from hrc_env.experiments.study.intervals import mean_over
 from hrc_env.experiments.study.runner import at_least_one
 from hrc_env.experiments.study.versions import key_of
 

@@ -10,14 +10,13 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from gymnasium.utils import seeding
 from numpy.typing import NDArray
 
 from hrc_env.agents.env_info import env_info
 from hrc_env.agents.registry import make_agent
-from hrc_env.control import checked_action
 from hrc_env.core.typing import Points3
-from hrc_env.experiments.impact.episodes import MakeAgent, Rows, build
+from hrc_env.evaluation.rollout import rollout
+from hrc_env.experiments.impact.episodes import Endless, MakeAgent, Rows, build
 from hrc_env.experiments.price.eyes import Eyes
 from hrc_env.experiments.price.shield import Widened
 from hrc_env.experiments.study.cache import PartProgress
@@ -88,15 +87,14 @@ def run(
     env: Shards, make_agent: MakeAgent, seeds: Sequence[int], n_steps: int, stepped: Any
 ) -> Rows:
     """One episode of every seed, side by side."""
-    agent, shape, task = make_agent(env.first), (len(seeds), env.first.n_actions), env.first.task
-    result = env.reset(np.arange(len(seeds)), [seeding.np_random(seed)[0] for seed in seeds])
+    agent, endless, task = make_agent(env.first), Endless(env), env.first.task
     steps, walks = np.zeros((n_steps, len(seeds)), STEP), [0] * len(seeds)
     so_far = {**CONTACTS, "achieved": task.achieved}
-    for step in steps:
-        result = env.step(checked_action(agent.act(result.observation), shape))
+    played = rollout(endless, agent, endless.reset(seeds), n_steps)
+    for step, made in zip(steps, played, strict=True):
         for name, key in so_far.items():
-            step[name] = result.info[key]
-        step["cost"], step["over"] = result.info["cost"], result.terminated
+            step[name] = made.info[key]
+        step["cost"], step["over"] = made.info["cost"], endless.terminated
         joints = np.concatenate(list(map(true_joints, env.parts)))
         walks = [zlib.crc32(of_one, walk) for of_one, walk in zip(joints, walks, strict=True)]
         stepped()

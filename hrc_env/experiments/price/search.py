@@ -15,8 +15,8 @@ import numpy as np
 from scipy.optimize import isotonic_regression
 
 from hrc_env.core.typing import Floats, Ints
-from hrc_env.experiments.study import intervals
-from hrc_env.experiments.study.intervals import crossing
+from hrc_env.evaluation import intervals
+from hrc_env.evaluation.intervals import crossing
 
 HALF = 0.5
 """Of an event, added to counts whose logarithm is asked for."""

@@ -83,13 +83,12 @@ class TrueProximity:
 
     def step(self, actions: Any) -> Any:
         """A step of every environment."""
-        from hrc_env.sb3 import of_step
+        from hrc_env.evaluation.sums import value_of_step
 
         observation, reward, *ends, infos = self.env.step(actions)
         weights, n = self.env.shards.first.reward_weights, self.env.num_envs
-        true_m, believed = (
-            of_step(infos, name, n) for name in ("safety/min_separation_m", "reward/proximity")
-        )
+        true_m = value_of_step(infos, "safety/min_separation_m", n)
+        believed = value_of_step(infos, "reward/proximity", n)
         truly = -weights.proximity * closeness(true_m, weights.proximity_reach_m)
         return observation, reward - believed + truly, *ends, infos
 

@@ -14,10 +14,10 @@ from hrc_env.core.records import PoseEstimate
 from hrc_env.core.results import Metric
 from hrc_env.core.skeleton import JOINT
 from hrc_env.core.typing import Floats
+from hrc_env.evaluation.intervals import mean_over, paired, rmse_of, rmse_over
 from hrc_env.experiments.site.report import report, site
 from hrc_env.experiments.site.walk import walk
 from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.intervals import mean_over, paired, rmse_of, rmse_over
 from hrc_env.experiments.study.recording import Recording, record, replay
 from hrc_env.experiments.study.rigs import CHOICES, DT_S, MULTI, N_WARM_UP, left_of
 from hrc_env.experiments.study.runner import Study, at_least_one, changed

@@ -15,7 +15,7 @@ from scipy import stats
 
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats, Ints
-from hrc_env.experiments.study.counts import Bins
+from hrc_env.evaluation.counts import Bins
 
 Metrics = dict[str, Metric]
 Numbers = Sequence[float] | Floats

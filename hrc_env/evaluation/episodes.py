@@ -1,0 +1,135 @@
+"""What an agent is worth: fixed seeds, deterministic actions, cost counted on the truth."""
+
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from hrc_env.agents.env_info import Agent, env_info
+from hrc_env.core.results import Metric
+from hrc_env.env import HRCEnv
+from hrc_env.evaluation.intervals import goals_over, mean_over, rate_of
+from hrc_env.evaluation.rollout import Transition, rollout
+from hrc_env.evaluation.sums import ACHIEVED, FAILED, EpisodeSums
+from hrc_env.tasks import DEFAULT
+from hrc_env.vector.env import HRCVectorEnv
+from hrc_env.vector.member import info_of
+
+EVALUATION_SEED = 1_000_000
+"""First seed of evaluations, far from those that training uses."""
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """Means over episodes."""
+
+    episodes: int
+    success_rate: float
+    """Of all attempts (`Task.achieved` and `Task.failed`)."""
+    goals_per_minute: float
+    contacts_per_episode: float
+    """Touches of the true worker; one that lasts counts once."""
+    cost_per_episode: float
+    close_steps_per_episode: float
+    """Steps nearer than the proximity limit to the true worker."""
+    median_min_separation_m: float
+    return_mean: float
+
+
+def evaluate(
+    make: Callable[[Any], Agent], n_episodes: int = 64, seed: int = EVALUATION_SEED, **kwargs: Any
+) -> Score:
+    """Return the score of an agent; arguments as of `play_episodes`."""
+    return summarize(play_episodes(make, n_episodes, seed, **kwargs))
+
+
+def play_episodes(
+    make: Callable[[Any], Agent],
+    n_episodes: int,
+    seed: int = EVALUATION_SEED,
+    tick: Callable[[float], None] = lambda share: None,
+    **kwargs: Any,
+) -> list[dict[str, float]]:
+    """Return the statistics of whole episodes, the k-th after `reset(seed=seed + k)` whatever the
+    agent, so that agents and perception levels can be compared episode by episode.
+
+    Args:
+        make: builds the agent for an `EnvInfo`.
+        n_episodes: their number.
+        seed: of the first.
+        tick: called with the share that was done since the last call.
+        kwargs: as of `HRCVectorEnv`; with perception="pixels", which has no batched form, as of
+            `gymnasium.make`.
+    """
+    if kwargs.get("perception") == "pixels":
+        return play_one_by_one(make, n_episodes, seed, tick, **kwargs)
+    with closing(HRCVectorEnv(n_episodes, **kwargs)) as env:
+        inner = env.shards.first
+        agent, sums = make(env_info(inner)), EpisodeSums(n_episodes)
+        episodes: list[dict[str, float]] = [{} for _ in range(n_episodes)]
+        for step in rollout(env, agent, env.reset(seed=seed)[0]):
+            sums.add(step.reward, step.info)
+            for b in np.flatnonzero(step.ends).tolist():
+                last, dt_s = info_of(step.info, b), inner.config.ctrl_dt
+                episodes[b] = sums.summarize(b, last, inner.task, dt_s)
+            tick(1 / env.max_episode_steps)
+        return episodes
+
+
+def play_one_by_one(
+    make: Callable[[Any], Agent],
+    n_episodes: int,
+    seed: int,
+    tick: Callable[[float], None] = lambda share: None,
+    **kwargs: Any,
+) -> list[dict[str, float]]:
+    """Return what `play_episodes` does, played in the single environment."""
+    with closing(gymnasium.make(kwargs.pop("task", DEFAULT), **kwargs)) as env:
+        inner: HRCEnv = env.unwrapped  # type: ignore[assignment]  # as every id of ours
+        agent, done = make(env_info(inner.simulation)), []
+        for k in range(n_episodes):
+            sums, last = EpisodeSums(1), {}
+            for step in rollout(env, agent, env.reset(seed=seed + k)[0]):
+                sums.add(np.array([step.reward]), _as_batch(step))
+                last = step.info
+            done.append(sums.summarize(0, last, inner.simulation.task, inner.config.ctrl_dt))
+            tick(1 / n_episodes)
+        return done
+
+
+def _as_batch(step: Transition) -> dict[str, Any]:
+    """Return the info of a single environment as that of a batch of one."""
+    arrays = {name: np.array([value]) for name, value in step.info.items()}
+    return arrays | {f"_{name}": np.ones(1, np.bool_) for name in arrays}
+
+
+def summarize(episodes: list[dict[str, float]]) -> Score:
+    """Return the score of finished episodes."""
+    column = {name: np.array([each[name] for each in episodes]) for name in episodes[0]}
+    reached, missed = column[ACHIEVED].sum(), column[FAILED].sum()
+    minutes = column["seconds"].sum() / 60
+    return Score(
+        episodes=len(episodes),
+        success_rate=float(reached / max(reached + missed, 1)),
+        goals_per_minute=float(reached / minutes),
+        contacts_per_episode=float(column["contacts"].mean()),
+        cost_per_episode=float(column["cost"].mean()),
+        close_steps_per_episode=float(column["cost_steps"].mean()),
+        median_min_separation_m=float(np.median(column["min_separation_m"])),
+        return_mean=float(column["r"].mean()),
+    )
+
+
+def measure(episodes: list[dict[str, float]]) -> dict[str, Metric]:
+    """Return means over episodes with 95 % intervals: exact ones of contacts, else bootstraps."""
+    column = {name: [each[name] for each in episodes] for name in episodes[0]}
+    minutes = [seconds / 60 for seconds in column["seconds"]]
+    return {
+        "return": mean_over(column["r"], "1"),
+        "goals_per_minute": goals_over(column["goals_reached"], minutes),
+        "cost_per_episode": mean_over(column["cost"], "1"),
+        "contacts_per_episode": rate_of(column["contacts"], len(episodes), "1"),
+    }
