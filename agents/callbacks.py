@@ -26,7 +26,7 @@ from . import checkpoints
 from .ppo_lagrangian import PPOLagrangian
 
 RECENT_EPISODES = 64
-"""Curves average over so many finished episodes."""
+"""Number of finished episodes over which curves average."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,7 @@ class Ramp:
             raise ConfigError(f"A ramp takes 0 or more environment steps, got {self.n_steps}.")
 
     def at(self, n_steps: int) -> float:
-        """The share in [0, 1] after so many environment steps."""
+        """Return the share in [0, 1] after a number of environment steps."""
         return 1.0 if n_steps >= self.n_steps else n_steps / self.n_steps
 
 

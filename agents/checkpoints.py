@@ -60,7 +60,7 @@ def save(learner: Learner, path: Path, facts: dict[str, Any]) -> None:
 
 
 def describe(path: Path) -> dict[str, Any]:
-    """What a checkpoint says of itself.
+    """Return the description that a checkpoint holds.
 
     Raises:
         CheckpointError: no file, or not one of ours.

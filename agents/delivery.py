@@ -32,7 +32,7 @@ BRAKE_M_S2, GONE_S, KEEP_M = 1.5, 0.3, 0.2
 SPEEDS_M_S, HEADINGS = (0.25, 0.6, 1.0, 1.35), 24
 TIMES_S = np.array([0.2, 0.5, 0.8, 1.2, 1.6, 2.0])
 NEAR_M, NEAR_GAIN_HZ, STOP_M = 1.0, 1.2, 0.15
-"""So near to its zone the base makes straight for the middle, and stops."""
+"""Distance to its zone below which the base makes straight for the middle, and stops."""
 GOOD_M, PEOPLE_PRICE, TOUCH_PRICE, FAST_PRICE, WALL_PRICE = 0.7, 6.0, 60.0, 20.0, 200.0
 """Room past people that costs nothing; prices against a metre of the way."""
 BESIDE_M, NEAR_PRICE = 0.25, 4.0
@@ -41,7 +41,7 @@ SLOW_M_S, STAY_M = 0.2, 0.25
 """Who drives slower turns towards the way, so as to fit between walls; not so near to people."""
 CHANGE_PRICE_S, TURN_HZ, TURN_RAD_S = 0.1, 1.5, 1.0
 FIELDS = 1024
-"""So many are kept."""
+"""Number that is kept."""
 
 
 class Deliverer:

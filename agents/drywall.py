@@ -28,7 +28,7 @@ FLAT_Z_M, UPRIGHT_Z_M = -0.12, 0.34
 NEAR_M, FAR_M = 0.72, 1.0
 """Its distance from the robot's axis when it is upright, and on the stack."""
 BEFORE_M, ALIGNED_M, ALIGNED_RAD = 0.13, 0.012, 0.03
-"""It is aligned so far before its place, and then pressed to it."""
+"""Distance before its place at which it is aligned, and then pressed to it."""
 STAYS = 3.0
 """It stays aligned on the way, and there, while it is off by less than so many times as much."""
 THERE_M = np.array([0.003, 0.0, 0.003])
@@ -36,7 +36,7 @@ THERE_M = np.array([0.003, 0.0, 0.003])
 CORNER_M = 0.86
 """The board's farthest corner from between the cups."""
 LAST_RAD = 0.25
-"""So near round the robot it goes straight."""
+"""Last angle of the way round the robot, on which it goes straight."""
 CARRY_M_S, PRESS_M_S, TURN_RAD_S = 0.40, 0.12, 0.9
 """Fastest with the board, and against the studs; fastest turn."""
 STACK_RAD, PLACE_RAD = np.arctan2(-0.98, 0.26), np.arctan2(1.0, 0.29)

@@ -1,4 +1,4 @@
-"""What an agent is, and what it is told about its environment."""
+"""The protocol of agents, and what they know about their environment."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

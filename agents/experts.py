@@ -17,7 +17,7 @@ from .scripted import Reacher, Yielding
 
 Terms = dict[str, NDArray[np.float64]]
 PLACED_M = 0.008
-"""A piece that is let go so near to where it is to be stays there."""
+"""Distance to its place within which a released piece stays there."""
 
 
 def reach_goal(terms: Terms) -> Terms:
@@ -34,7 +34,7 @@ def pick_place_goal(terms: Terms) -> Terms:
 
 
 class GoalReader:
-    """An expert who is told goals apart from the observation."""
+    """An expert whose goals stand apart from the observation."""
 
     def __init__(self, expert: Reacher | PickPlacer, read: Callable[[Terms], Terms]) -> None:
         self.expert, self.read = expert, read

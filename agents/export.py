@@ -1,4 +1,4 @@
-"""A run's policy as files that execute nothing, with a card that says what it is worth."""
+"""A run's policy as files that execute nothing, with a card of its scores."""
 
 import hashlib
 import json

@@ -29,7 +29,7 @@ ROUND_M = 0.58
 TURN_RAD_S, FAST_M_S, BRING_M_S, OFFER_M_S = 1.1, 0.5, 0.35, 0.15
 """Fastest turn, and way; with the tool; near the hand."""
 OFFERED_M = 0.05
-"""So near to the estimated hand the handle is held still: the hand comes to it."""
+"""Distance to the estimated hand below which the handle is held still: the hand comes to it."""
 NEAR_M, REACH_M, HIGH_M = 0.35, 1.0, 0.15
 """So near its handle is to the hand when it goes slowly. Hands are brought a tool that are nearer
 to the robot's axis than this, and higher above its foot."""

@@ -27,7 +27,7 @@ class Architecture:
     near_and_far: bool
     """Whether it sees every entry at two scales (`agents.features`)."""
     squashed: bool
-    """Whether actions are the tanh of what the last layer says (SAC), not cut at -1 and 1 (PPO)."""
+    """Whether actions are the tanh of the last layer's output (SAC), not cut at -1 and 1 (PPO)."""
 
     def __post_init__(self) -> None:
         check_names("activation", [self.activation], ACTIVATIONS)
@@ -47,7 +47,7 @@ class Network:
 
     @property
     def sizes(self) -> tuple[int, int]:
-        """Entries that it sees, and that it says."""
+        """Numbers of its inputs and outputs."""
         n_seen = self.layers[0][0].shape[1]
         return n_seen // (2 if self.architecture.near_and_far else 1), len(self.layers[-1][1])
 

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 ABOVE_M, CLEAR_M = 0.16, 0.11
 """How high above pieces the tool travels; above this it may move sideways."""
 OVER_M, OVER_RAD, STILL_OVER_M = 0.006, 0.05, 0.015
-"""So near above its target the tool goes down, and goes on to while it is still so near."""
+"""Horizontal distances to its target below which the tool goes down, and goes on down."""
 AT_M, STILL_AT_M = 0.007, 0.014
 """So near to a piece's middle fingers close, and stay closed; so near to its place they open."""
 PIECE_M = 0.15

@@ -31,7 +31,7 @@ CRITIC_RATE, CRITIC_PASSES, CRITIC_BATCH = 1e-3, 4, 1024
 
 @dataclass(slots=True)
 class Multiplier:
-    """lambda = clip(integral + kp error), after each rollout.
+    """Compute lambda = clip(integral + kp error), after each rollout.
 
     The integral changes by a share of itself, so that it finds lambdas of any size, and leaves
     large ones as fast as it came to them. It rests while lambda is at an end that the error pushes
@@ -49,7 +49,7 @@ class Multiplier:
     """Of an episode, smoothed."""
     integral: float = 0.0
     value: float = 0.0
-    """lambda."""
+    """The multiplier lambda."""
 
     def __post_init__(self) -> None:
         check_fields(self, "be positive", "limit", "smoothing", "most")
@@ -82,7 +82,7 @@ class PPOLagrangian(PPO):
     ) -> None:
         self.multiplier, self.episode_steps = Multiplier(limit), episode_steps
         self.share = 1.0
-        """limit / share is in force: a limit that is still wide lets the task be learnt first."""
+        """The limit in force is limit / share: while it is wide, the task is learnt first."""
         self.spread, self.discounted = RunningMeanStd(), np.zeros(1)
         super().__init__(*args, **kwargs)
 

@@ -1,4 +1,4 @@
-"""How each task is learnt, unless somebody says otherwise: python -m hrc_env train --task ID"""
+"""How each task is learnt by default: python -m hrc_env train --task ID"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

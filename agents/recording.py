@@ -40,7 +40,7 @@ Episode = dict[str, Any]
 
 
 def run(asked: Record) -> int:
-    """Record, tell where it is; returns the exit status.
+    """Record, print the place, and return the exit status.
 
     Raises:
         MissingExtraError: Minari is not installed.

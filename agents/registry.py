@@ -43,7 +43,7 @@ def make_agent(name: str, env_info: EnvInfo, seed: int = 0) -> Agent:
 
 
 def control_of(name: str) -> str | None:
-    """What the actions of a trained policy are (`control`); None of who does not say."""
+    """Return the `control` that a trained policy was made for; None if it names none."""
     if name.startswith(policies.PREFIX) or Path(name).suffix == policies.SUFFIX:
         return policies.read(policies.path_of(name))[0].control
     if Path(name).suffix != ".zip":

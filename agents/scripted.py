@@ -1,4 +1,4 @@
-"""A reacher without learning: straight to the goal, slower near people if asked to be.
+"""A reacher without learning: straight to the goal, slower near people with `Yielding`.
 
 The tool's speed is min(v_max, gain e, sqrt(2 a e)) for a distance e to the goal, resolved to
 joint velocities by damped least squares (`hrc_env.control`). With `Yielding`, the speed is
@@ -53,7 +53,7 @@ def fastest_m_s(velocity: Array, turn: Array, reach_m: float) -> Array:
 
 
 def speed_m_s(error_m: Array, most_m_s: float) -> Array:
-    """How fast a tool goes that has so far to go [m]."""
+    """Return the speed of a tool at a distance from its goal [m/s]."""
     return np.minimum(np.minimum(GAIN_HZ * error_m, np.sqrt(2 * BRAKE_MPS2 * error_m)), most_m_s)
 
 

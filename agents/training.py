@@ -50,7 +50,7 @@ DEMONSTRATION_SEED = 2_000_000
 ONLY_OF_A_RUN = ("out", "timesteps", "threads", "episodes", "film", "resume")
 """Arguments that a resumed run does not take from the run that it goes on with."""
 FILM_SEEDS = 8
-"""The film shows that of so many episodes which comes closest to the worker."""
+"""Number of episodes of which the film shows the one that comes closest to the worker."""
 STOPPED = 130
 """Exit status of what Ctrl-C stopped."""
 
@@ -133,7 +133,7 @@ def as_before(arguments: Train, folder: Path) -> Train:
 
 
 def asked_of(folder: Path) -> Train:
-    """What a run was asked, but for what is `ONLY_OF_A_RUN`, of which it has the steps.
+    """Return the arguments of a run; of those in `ONLY_OF_A_RUN`, only the steps.
 
     Raises:
         CheckpointError: the folder holds no run.

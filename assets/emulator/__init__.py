@@ -1,1 +1,1 @@
-"""The emulator beside the pixels: clips, what the network says of them, the fit, the proof."""
+"""The emulator beside the pixels: clips, the network's detections, the fit, the proof."""

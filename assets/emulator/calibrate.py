@@ -1,4 +1,4 @@
-"""python -m assets.emulator.calibrate: the emulator's numbers, fitted to renders."""
+"""Fit the emulator's numbers to renders: python -m assets.emulator.calibrate."""
 
 import sys
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from hrc_env.cli.progress import progress_bar
 
 @dataclass(frozen=True)
 class CalibrateKeypoints:
-    """Fit the emulator of keypoints to what the pose network says of rendered workers.
+    """Fit the emulator of keypoints to the pose network's detections of rendered workers.
 
     Every motion is played in both scenes by all bodies, four cameras look at it as they do in the
     environment, and what they find is compared with the truth. Use the file with

@@ -28,8 +28,8 @@ TRIES = 300
 """Places and moments that are tried; the one with the most room is taken."""
 
 NEAR_M = 5.0
-"""Places are so near to the middle of the working area [m]: the tracker follows nobody who is
-4 standard deviations of its prior (6 m) away."""
+"""Greatest distance of places from the middle of the working area [m]: the tracker does not follow
+workers that are 4 standard deviations of its prior (6 m) away."""
 
 FAMILIES: dict[str, tuple[str, ...]] = {
     "stand": ("stand", "look round", "point", "measure", "turn"),
@@ -49,7 +49,8 @@ FAMILIES: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 """The scenes of the repertoire by family: what folds the body is hardest to see."""
 TIMES = {"fold": 4}
-"""Families that are played so many times as often: folded bodies differ most from one another."""
+"""Families, and the factor by which they are played more often: folded bodies differ most from one
+another."""
 
 
 Moved: TypeAlias = tuple[float, float]

@@ -54,7 +54,7 @@ FITTED_SCENE, HELD_SCENE = "lab", "site"
 
 
 ROUNDS = 3
-"""Of clips, if not asked otherwise."""
+"""Default number of rounds of clips."""
 TRUTHS = {"joint": "joints_world", "landmark": "landmarks_world"}
 """What errors are taken from: where BlazePose means a joint to be, or anatomical landmarks."""
 
@@ -70,7 +70,7 @@ class Sample:
     scene: str = FITTED_SCENE
 
     def clips(self, most: int) -> list[Clip]:
-        """At most so many rounds of them, seen by cameras that hang elsewhere."""
+        """Greatest number of rounds seen by cameras that hang elsewhere."""
         where = (self.bodies, self.motions, (self.scene,))
         return clips_of(min(self.rounds, most), UNSEEN_SEEDS, (UNSEEN_RIG,), *where)
 

@@ -43,17 +43,17 @@ DAMPED = 0.7
 THROUGH_THE_TRACKER = 1.5
 """Power of the factors of tails, chosen by trial: with `DAMPED` they were short at the end."""
 OFTEN = 2000
-"""So many joints must have been of a posture to tell of it: some three clips."""
+"""Least number of joints of a posture for an estimate of it: some three clips."""
 USUAL = 2.366
 """Median of the square of three normal variables: so much a longer tail adds to the median."""
 TAKEN_BACK = 0.5
 """How much of what a longer tail adds to the median is taken off at once, before it is measured."""
 TOLD_LAGS = (2, 5, 12)
-"""Of `LAGS`, in frames: by these it is told how long errors last,"""
+"""Those of `LAGS` by which the duration of errors is estimated [frames]."""
 LONG_LAGS = (25, 35)
-"""and by these how much of them stays for good."""
+"""Those by which the lasting share of errors is estimated [frames]."""
 Say = Callable[[float, str], None]
-"""Told by how much the share that is done grew, and what is being done."""
+"""Called with the growth of the finished share, and with the current work."""
 
 
 def matched(

@@ -22,7 +22,7 @@ from hrc_env.perception.emulator import EmulatorConfig
 from hrc_env.worker.body import worker_names
 
 Say = Callable[[float, str], None]
-"""Told by how much the share that is done grew, and what is being done."""
+"""Called with the growth of the finished share, and with the current work."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,13 +26,13 @@ GROUPS = {name: (name,) for name in FAMILIES}
 GROUPS |= {"upright": tuple(name for name in FAMILIES if name != "fold"), "all": tuple(FAMILIES)}
 """Families of motions of which there are numbers, each alone and some together."""
 HALF_SEEN = 8
-"""So many joints of 15."""
+"""Least number of joints of 15."""
 DRAWS = 4
 """How often the emulator plays a clip."""
 RESAMPLES = 200
 """Draws of clips for an interval."""
 Say = Callable[[float, str], None]
-"""Told by how much the share that is done grew, and what is being done."""
+"""Called with the growth of the finished share, and with the current work."""
 InSpace = tuple[Floats, Bools]
 """(N,) errors of joints [m], and whether they are within the reported region."""
 

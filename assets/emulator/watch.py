@@ -59,7 +59,7 @@ class Watched:
     P: Floats
     """(C, 3, 4) the cameras."""
     tracker_mean_world: Points3
-    """(T, J, 3) what the tracker said, of the joints that the network means [m]."""
+    """(T, J, 3) the tracker's estimate of the network's joints [m]."""
     tracker_cov_world: Covariances3
     """(T, J, 3, 3) [m^2]."""
     tracker_velocity_world: Floats

@@ -1,4 +1,4 @@
-"""python -m assets.kernels.record: writes hrc_env/core/kernels/signatures.json.
+"""Write hrc_env/core/kernels/signatures.json: python -m assets.kernels.record.
 
 Plays every perception level, single and batched, and notes which kernels Python called with which
 types. What was not on disk is compiled meanwhile, and how long that took is noted, too; with an

@@ -20,7 +20,7 @@ class Archive:
     """One package, and what is kept of it."""
 
     requirement: str
-    """name==version."""
+    """Name and version, as name==version."""
     sha256: str
     """Of the wheel or, with `source`, of the source distribution."""
     size_mb: float

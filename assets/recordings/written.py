@@ -94,7 +94,7 @@ def write_bvh(
 def write_acclaim(
     folder: Path, position: Points3, rotation: Rotations, body: Body = BODY, name: str = "walk"
 ) -> Path:
-    """walk.asf and walk.amc as of the CMU database: y up, 0.45 lengths an inch; the .amc."""
+    """Write walk.asf and walk.amc as of the CMU database: y up, 0.45 lengths an inch; the .amc."""
     bones = _bones(body)
     unit_m = 0.0254 / 0.45
     asf = [":version 1.10", ":name WALK", ":units", "  mass 1.0", "  length 0.45", "  angle deg"]

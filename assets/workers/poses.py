@@ -31,7 +31,7 @@ POSES: dict[str, dict] = {
     "stoop": {"lean": 45, "left": ((45, 8), (60, 5)), "right": ((45, 8), (60, 5)),
               "legs": ((20, 6, 20), (20, 6, 20))},
 }  # fmt: skip
-"""lean: trunk forward; arms: (upper arm, forearm), each (forward, outward) from hanging down;
+"""Angles in degrees. lean: trunk forward; arms: (upper arm, forearm), each (forward, outward) from hanging down;
 legs: left and right (forward, outward, knee flexion). All in degrees."""
 
 

@@ -12,7 +12,7 @@ class Recipe:
     stature_m: float
     """Barefoot, without the hat."""
     sex: str
-    """male or female."""
+    """Male or female."""
     age: float
     """0.67 is an adult, 1 is old."""
     muscle: float
@@ -37,7 +37,7 @@ class Recipe:
 
     @property
     def phenotype(self) -> dict[str, float]:
-        """What anny is asked for, but for the height."""
+        """Return the arguments of anny but the height."""
         return {
             "gender": float(self.sex == "female"), "age": self.age, "muscle": self.muscle,
             "weight": self.weight, "proportions": self.proportions, **self.ancestry,

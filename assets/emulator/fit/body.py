@@ -9,7 +9,7 @@ from hrc_env.perception.calibration import BODY_KNOTS, KINDS
 LOG_RAYLEIGH_VAR = np.pi**2 / 24
 """Of the logarithm of the length of two normal variables of standard deviation 1."""
 ENOUGH = 6
-"""Joints found in an image that tell the factor."""
+"""Least number of joints in an image from which the factor is estimated."""
 _NORMAL = np.array([0.135, 2.275, 15.866, 50.0, 84.134, 97.725, 99.865])
 """Percentages of a normal distribution below `BODY_KNOTS`."""
 

@@ -1,4 +1,4 @@
-"""What the network says of its own certainty, and what the tracker is told of it."""
+"""The network's confidence, and the standard deviation that the tracker gets for it."""
 
 import math
 
@@ -60,7 +60,7 @@ def _ranks(values: Floats) -> Floats:
 
 
 def sigma_table(s: Cells, samples: Samples) -> Floats:
-    """(P, K, V) what to tell of a standard deviation by the visibility, a share of the stature; of
+    """(P, K, V) standard deviations by the visibility, a share of the stature; of
     few samples that of all joints of such bodies, and theirs that of all bodies."""
     edges = np.r_[0.0, 0.5 * (VISIBILITY[1:] + VISIBILITY[:-1]), 1.01]
     length = np.linalg.norm(samples.error, axis=-1) / STATURE_OF_SIDE

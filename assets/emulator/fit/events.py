@@ -12,11 +12,11 @@ from hrc_env.perception.calibration import N_SEEN, N_VIEWS
 from hrc_env.perception.sightlines import SEEN
 
 LAGS = (5, 12, 25, 40)
-"""In frames, at which it is asked whether it still happens."""
+"""Lags at which the event is looked for again, in frames."""
 FEW_MISSES = 20
-"""So many samples a guess counts for."""
+"""Weight of the prior guess, in samples."""
 FEWEST = 30
-"""Of fewer moments at which it happens nothing is told."""
+"""Least number of moments at which it happens for an estimate."""
 SHARED: Floats = np.linspace(0.0, 0.999, 60)
 """Correlations that are tried."""
 QUANTILES: Floats = (np.arange(64) + 0.5) / 64

@@ -1,4 +1,4 @@
-"""From what the pose network said of rendered workers to a calibration of the emulator."""
+"""From the pose network's detections of rendered workers to a calibration of the emulator."""
 
 import numpy as np
 

@@ -10,7 +10,7 @@ from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.perception.calibration import HAND, KIND, NEXT, POSTURES
 
 GROSS = 6.0
-"""Errors of so many times their median are left out: they are the business of the tails."""
+"""Errors beyond this multiple of their median are left out: they are the business of the tails."""
 LEAST_M, TOLD_M = 0.002, 0.005
 """What varies in space has at least the first standard deviation; from the second on it can be
 told whether it varies together with the next joint's [m]."""
