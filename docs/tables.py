@@ -3,7 +3,8 @@
 A page asks with `<!-- results: NAME -->`, or `<!-- results: NAME without intervals -->`, and the
 table stands between that and `<!-- end of results -->`; for a number in a sentence with
 `<!-- number: NAME.WHICH -->`, and it stands between that and `<!-- end -->`. Where all this comes
-from stands once a page, between `<!-- provenance -->` and `<!-- end of provenance -->`.
+from stands once a page, between `<!-- provenance -->` and `<!-- end of provenance -->`. A file of
+`examples/` stands between `<!-- example: PATH -->` and `<!-- end of example -->`.
 
 A file holds title, command, version of the package, "depends" (versions of the subsystems that the
 numbers depend on), date, machine, note, columns, rows, "keys" (a list of words a row; null: the row
@@ -40,7 +41,9 @@ BLOCK = re.compile(
 )
 NUMBER = re.compile(r"<!-- number: (?P<name>\w+)\.(?P<which>\w+) -->.*?<!-- end -->", re.S)
 PROVENANCE = re.compile(r"<!-- provenance -->\n.*?<!-- end of provenance -->", re.S)
-GENERATED = (BLOCK, NUMBER, PROVENANCE)
+EXAMPLE = re.compile(r"<!-- example: (?P<path>[\w/]+\.py) -->\n.*?<!-- end of example -->", re.S)
+EXAMPLES = Path(__file__).parent.parent / "examples"
+GENERATED = (BLOCK, NUMBER, PROVENANCE, EXAMPLE)
 
 
 def read(name: str) -> dict[str, Any]:
@@ -57,10 +60,11 @@ def read(name: str) -> dict[str, Any]:
 
 
 def filled(page: str) -> str:
-    """A page with its tables and its line of provenance."""
+    """A page with its tables, its examples and its line of provenance."""
     names = [found["name"] for asked in (BLOCK, NUMBER) for found in asked.finditer(page)]
     page = BLOCK.sub(lambda found: _block(found), page)
     page = NUMBER.sub(lambda found: _number(found), page)
+    page = EXAMPLE.sub(lambda found: _example(found), page)
     line = f"<!-- provenance -->\n{provenance(names)}\n<!-- end of provenance -->"
     return PROVENANCE.sub(lambda _: line, page)
 
@@ -73,6 +77,11 @@ def _block(found: re.Match[str]) -> str:
 
 def _number(found: re.Match[str]) -> str:
     return f"{found[0].split('>', 1)[0]}>{said(read(found['name']), found['which'])}<!-- end -->"
+
+
+def _example(found: re.Match[str]) -> str:
+    first, code = found[0].split("\n", 1)[0], (EXAMPLES / found["path"]).read_text()
+    return f"{first}\n```python\n{code}```\n<!-- end of example -->"
 
 
 def said(table: Mapping[str, Any], which: str) -> str:

@@ -16,7 +16,7 @@ from hrc_env.registration import (
     register_shield,
     register_task,
 )
-from hrc_env.tasks import BUILT_IN, EPISODE_STEPS, LONGER
+from hrc_env.tasks import BUILT_IN
 
 __version__ = "0.1.0"
 __all__ = [
@@ -28,7 +28,7 @@ __all__ = [
     "register_task",
 ]
 
-for _id in BUILT_IN:
-    register_environment(_id, LONGER.get(_id, EPISODE_STEPS))
+for _id, _task in BUILT_IN.items():
+    register_environment(_id, _task.max_episode_steps)
 import_files()
 adopt()

@@ -1,7 +1,6 @@
 """What a robot believes in one step: itself, its task and the estimate. No truth in here."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -71,8 +70,8 @@ class Belief:
     """(B, N) what the shield gave in the last step less what was asked for [rad/s]; 0 without."""
     model: RobotModel | None = None
     """What the robot knows of itself for good."""
-    welcome: Callable[["Belief"], Bools] | None = None
-    """Who may come to its hand (`Task.welcome`)."""
+    allowed_contact: Bools | None = None
+    """(B, W, S) which segments of estimated bodies may touch its hand; None: none of them."""
     unseen: UnseenFloor | None = None
     """Where an undetected person may be; None: anywhere."""
 

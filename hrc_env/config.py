@@ -33,7 +33,7 @@ from hrc_env.scene.rigs import RIGS
 from hrc_env.scene.robot import DEFAULT as DEFAULT_ROBOT
 from hrc_env.scene.robot import ROBOTS, Robot, robot_called
 from hrc_env.tasks import DEFAULT
-from hrc_env.tasks.task import Task, task_called
+from hrc_env.tasks.task import Task, TaskType, find_task
 from hrc_env.tracking.config import ParticleConfig, TrackerConfig, of_kind
 from hrc_env.tracking.estimators import EstimatorSpec, estimator_called
 from hrc_env.tracking.forecast import LONGEST_S
@@ -81,7 +81,7 @@ class HRCConfig:
     objects: ObjectsConfig = field(default_factory=ObjectsConfig)
     """How well the robot knows the task's loose objects."""
     task: Any = None
-    """The task's own settings (`Task.config`); None: its defaults."""
+    """The task's own settings (`Task.config_type`); None: its defaults."""
     reward: RewardConfig = field(default_factory=RewardConfig)
     """Weights of the reward's terms."""
     cost: CostConfig = field(default_factory=CostConfig)
@@ -133,7 +133,7 @@ PRESETS.update({AppearanceConfig: APPEARANCES, PeopleConfig: PEOPLE, tuple[Job, 
 class Settings:
     """Everything that a simulation is made from, whole and checked."""
 
-    task: Task
+    task: Task[Any, Any]
     perception: str
     estimator: EstimatorSpec
     cameras: Any
@@ -165,7 +165,7 @@ def settle(**arguments: Any) -> Settings:
         if name not in ARGUMENTS:
             raise unknown("argument", name, ARGUMENTS)
     given = {**ARGUMENTS, **arguments}
-    task, estimator = task_called(given["task"]), estimator_called(given["estimator"])
+    task, estimator = find_task(given["task"]), estimator_called(given["estimator"])
     config, cameras = resolve(given["config"], task, estimator), given["cameras"]
     if isinstance(cameras, np.ndarray):
         cameras = cameras.tolist()
@@ -176,15 +176,15 @@ def settle(**arguments: Any) -> Settings:
             config = _with_part(config, path, given[name], name)
     named = task.robot if given["robot"] is None else given["robot"]
     robot = robot_called(DEFAULT_ROBOT if named is None else named)
-    if task.grips and not robot.grips:
+    if task.needs_gripper and not robot.grips:
         able = [name for name, each in ROBOTS.items() if each.grips]
         raise ConfigError(
             f"{task.id} needs a robot with a hand, and {robot.name!r} has none; there are "
             f"{', '.join(map(repr, able))}."
         )
-    if task.drives != robot.drives:
-        able = [name for name, each in ROBOTS.items() if each.drives == task.drives]
-        kind = "a robot that drives" if task.drives else "an arm on the pedestal"
+    if task.needs_mobile_base != robot.drives:
+        able = [name for name, each in ROBOTS.items() if each.drives == task.needs_mobile_base]
+        kind = "a robot that drives" if task.needs_mobile_base else "an arm on the pedestal"
         raise ConfigError(
             f"{task.id} needs {kind}, and {robot.name!r} is none; there are "
             f"{', '.join(map(repr, able))}."
@@ -192,13 +192,13 @@ def settle(**arguments: Any) -> Settings:
     scene = task.scene if given["scene"] is None else given["scene"]
     n_workers = task.n_workers if given["n_workers"] is None else given["n_workers"]
     return Settings(
-        task, given["perception"], estimator, cameras, scene,
+        task(config.task), given["perception"], estimator, cameras, scene,
         robot, _worker_counts(n_workers), given["control"],
         shield_called(given["shield"]), config,
     )  # fmt: skip
 
 
-def resolve(config: ConfigChoice, task: Task, estimator: EstimatorSpec) -> HRCConfig:
+def resolve(config: ConfigChoice, task: TaskType, estimator: EstimatorSpec) -> HRCConfig:
     """A config from what a user gave: itself, a (nested) mapping of changes, a TOML file, nothing;
     `ConfigError` for a field that does not exist, a bad value, or the settings of another task."""
     if isinstance(config, str | Path):
@@ -206,7 +206,7 @@ def resolve(config: ConfigChoice, task: Task, estimator: EstimatorSpec) -> HRCCo
     if config is None or isinstance(config, Mapping):
         said = _merged(task.defaults, config or {})
         said = {name: value for name, value in said.items() if (name, value) != ("task", None)}
-        kinds = {"task": task.config, "tracker": estimator.config}
+        kinds = {"task": task.config_type, "tracker": estimator.config}
         config = from_mapping(HRCConfig, said, kinds=kinds)
     if not isinstance(config, HRCConfig):
         raise ConfigError(
@@ -215,10 +215,10 @@ def resolve(config: ConfigChoice, task: Task, estimator: EstimatorSpec) -> HRCCo
         )
     config = replace(config, tracker=of_kind(config.tracker, estimator.config))
     if config.task is None:
-        return replace(config, task=task.config())
-    if not isinstance(config.task, task.config):
+        return replace(config, task=task.config_type())
+    if not isinstance(config.task, task.config_type):
         raise ConfigError(
-            f"config.task must be {task.config.__name__} with {task.id}, "
+            f"config.task must be {task.config_type.__name__} with {task.id}, "
             f"got {type(config.task).__name__}."
         )
     return config

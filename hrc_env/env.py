@@ -33,7 +33,7 @@ from hrc_env.scene.robot import Robot
 from hrc_env.simulation import Simulation
 from hrc_env.step import Observation, words_of
 from hrc_env.tasks import DEFAULT, goal
-from hrc_env.tasks.task import Task, goal_of
+from hrc_env.tasks.task import TaskType, goal_of
 from hrc_env.tracking.estimators import EstimatorChoice
 
 RENDER_MODES = ("rgb_array", "depth_array")
@@ -83,13 +83,13 @@ class EnvBase(HasSpec, Stateful):
 
         Raises:
             NoGoalError: as of `compute_reward`.
-            NoAttributeError: the task ends episodes by a function of its own, `Task.over`.
+            NoAttributeError: the task ends episodes itself, by `Task.is_terminal`.
         """
         apart = goal_of(self._task)
-        if self._task.over is not None:
+        if self._task.can_end:
             raise NoAttributeError(
-                f"{self._task.id} ends episodes by a function of its own (Task.over), which goals "
-                "and infos do not tell: read `terminated` of `step`."
+                f"{self._task.id} ends episodes itself (Task.is_terminal), which does not follow "
+                "from goals and infos: read `terminated` of `step`."
             )
         entries = ("cost_contact",) if self.config.cost.contact_terminates else ()
         return partial(goal.ended, apart, entries=entries)
@@ -116,7 +116,8 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
     """A robot works beside people whom it knows through cameras only.
 
     Args:
-        task: what it has to do: an id ("HRCReach-v0") or a `Task` (docs/bring_your_own.md).
+        task: what it has to do: an id ("HRCReach-v0") or a subclass of `Task`
+            (docs/bring_your_own.md).
         perception: "pixels" (rendered images through MediaPipe Pose), "keypoints" (an
             emulator of that), "truth" (the worker as they are) or "none".
         estimator: "particle" (default), "kalman" (the same with one hypothesis), "paper"
@@ -163,7 +164,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
 
     def __init__(
         self,
-        task: str | Task = DEFAULT,
+        task: str | TaskType = DEFAULT,
         perception: str = "pixels",
         estimator: EstimatorChoice = "particle",
         cameras: str | Path | Sequence[Any] | NDArray[Any] | None = None,

@@ -58,8 +58,8 @@ class ObservationTerm:
     """One block of the flat observation: value = clip(function, -bound, bound) / scale."""
 
     name: str
-    size: Callable[[Sizes], int]
-    """Number of entries."""
+    size: int | Callable[[Sizes], int]
+    """Number of entries, or a function of what it depends on."""
     unit: str
     frame: str
     bound: float
@@ -291,7 +291,7 @@ class ObservationLayout:
 
 def layout(terms: tuple[ObservationTerm, ...], of: Sizes) -> ObservationLayout:
     """The layout of terms for an arm, an action space, a number of workers and of times ahead."""
-    sizes = [term.size(of) for term in terms]
+    sizes = [term.size if isinstance(term.size, int) else term.size(of) for term in terms]
     ends = np.cumsum(sizes).tolist()
     slices = {t.name: slice(end - n, end) for t, n, end in zip(terms, sizes, ends, strict=True)}
     bound = np.repeat([term.bound / term.scale for term in terms], sizes).astype(np.float32)

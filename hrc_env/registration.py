@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from hrc_env.perception.detector import KeypointFunction
     from hrc_env.safety.shield import Shield
     from hrc_env.scene.robot import Robot
-    from hrc_env.tasks.task import Task
+    from hrc_env.tasks.task import TaskType
     from hrc_env.tracking.estimators import EstimatorSpec
 
 IMPORT = "HRC_ENV_IMPORT"
@@ -35,17 +35,36 @@ IDS: list[str] = []
 """The environments that are registered."""
 
 
-def register_task(task: "Task") -> None:
+def register_task(task: "TaskType") -> None:
     """Make a task an environment: its id works in `gymnasium.make`, `make_vec` and `play`.
 
     Raises:
         ConfigError: here and below: the name is taken, or something is missing or of a wrong kind.
     """
-    from hrc_env.tasks.task import TASKS, check_task  # in functions: kernels take time to import
+    from hrc_env.tasks.check import check_task  # in functions: kernels take time to import
+    from hrc_env.tasks.task import TASKS
 
     check_task(task)
+    _play_briefly(task)
     _add(TASKS, task.id, task)
     register_environment(task.id, task.max_episode_steps)
+
+
+def _play_briefly(task: "TaskType") -> None:
+    """Play two steps of a task without cameras, so that what is wrong is said at registration."""
+    import numpy as np
+
+    from hrc_env.config import settle
+    from hrc_env.simulation import Simulation
+
+    simulation = Simulation(2, settle(task=task, perception="none"))
+    try:
+        simulation.reset(np.arange(2), [np.random.default_rng(seed) for seed in range(2)])
+        for _ in range(2):
+            simulation.step(np.zeros((2, simulation.n_actions)))
+        simulation.markers(0)
+    finally:
+        simulation.close()
 
 
 def register_estimator(spec: "EstimatorSpec") -> None:
@@ -182,12 +201,12 @@ class Spec(EnvSpec):
         """Return the spec as JSON; `ConfigError` for an argument that has no such form."""
         from hrc_env.config import HRCConfig, resolve
         from hrc_env.core.mapping import for_json
-        from hrc_env.tasks.task import task_called
+        from hrc_env.tasks.task import find_task
         from hrc_env.tracking.estimators import estimator_called
 
         given = {**self.kwargs}
         if isinstance(given.get("config"), HRCConfig):  # its tracker is of the estimator's kind
-            task = task_called(given.get("task", DEFAULT))
+            task = find_task(given.get("task", DEFAULT))
             estimator = estimator_called(given.get("estimator", "particle"))
             given["config"] = resolve(given["config"], task, estimator)
         for name, value in given.items():

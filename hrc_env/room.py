@@ -10,7 +10,8 @@ from hrc_env.motion.anatomy import anatomies
 from hrc_env.motion.clip import Clip
 from hrc_env.motion.floorplan import floorplan
 from hrc_env.scene.build import SCENES, Scene, build
-from hrc_env.tasks.spot import Spot, check_spots
+from hrc_env.tasks import reach_target
+from hrc_env.tasks.reach_target import ReachTarget
 from hrc_env.tasks.task import Task
 from hrc_env.worker.body import pool, stack
 
@@ -41,10 +42,11 @@ def told(clip: Clip, played: dict[str, float]) -> str:
     return " ".join([*said, f"It has no room in {', '.join(lacks)}."] if lacks else said)
 
 
-def check_reach(task: Task, config: Any, scene: Scene) -> None:
+def check_reach(task: Task[Any, Any], scene: Scene) -> None:
     """Raise `ConfigError` for an arm that is too short for where a task has it get to, or for what
     lies loose there."""
     loose, size_m = scene.objects, np.linalg.norm(scene.objects.half_size_m, axis=1)
     places = zip(loose.names, scene.model.body_pos[scene.object_bodies], size_m, strict=True)
-    lying = [Spot(f"object {name!r}", at, within_m=size) for name, at, size in places]
-    check_spots(task.id, scene.robot.name, scene.chain, [*task.spots(config), *lying])
+    lying = [ReachTarget(f"object {name!r}", at, within_m=size) for name, at, size in places]
+    targets = [*task.reach_targets(), *lying]
+    reach_target.check_reach(task.id, scene.robot.name, scene.chain, targets)

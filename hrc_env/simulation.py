@@ -23,12 +23,12 @@ from hrc_env.core.records import PoseEstimate, WorkerMotion, WorkerTruth, World
 from hrc_env.core.streams import children
 from hrc_env.core.typing import Bools, Floats, Ints, JointVelocities, Points3, Records
 from hrc_env.geometry import chains
-from hrc_env.motion import generator
+from hrc_env.motion import generator, starts
 from hrc_env.motion.activities.pieces import NoRoomError
 from hrc_env.pipeline.levels import CAMERA_LEVELS, make_pipeline, prepare
 from hrc_env.pipeline.sensor_input import SensorInput, TrueSensorInput
 from hrc_env.rewards import RewardConfig
-from hrc_env.safety import incidents, starts
+from hrc_env.safety import incidents
 from hrc_env.safety.model import robot_model
 from hrc_env.safety.shield import shielded
 from hrc_env.safety.watch import Watch
@@ -69,7 +69,7 @@ class Simulation(Stateful):
         scene_for = partial(
             build, config.scene, settings.scene,
             bodies=self.bodies.names, cameras=settings.cameras, robot=settings.robot,
-            things=self.task.things(config.task),
+            things=self.task.make_things(),
         )  # fmt: skip
         try:  # first, as it knows how many workers and which clips there is room for
             self.motion = generator.make_state(
@@ -85,13 +85,13 @@ class Simulation(Stateful):
                 warnings.warn(finding, stacklevel=3)
         self.settings = settings.recorded(batch, self.scene)
         self.chain, n_joints = self.scene.chain, self.scene.chain.n_joints
-        room.check_reach(self.task, config.task, self.scene)
+        room.check_reach(self.task, self.scene)
         self._spread_rad = np.array(config.start_spread_rad or settings.robot.spread_rad)
         check_shape("start_spread_rad", self._spread_rad.shape, (n_joints,), "one a joint")
         self._grips = settings.robot.grips
         self.n_actions = n_actions(settings.control, self.chain, self._grips)
         n_slides = int(self.chain.slides.sum())
-        self.place = self.task.survey(self.scene.map, config.task)
+        self.place = self.task.survey(self.scene.map)
         sizes = observations.Sizes(
             n_joints - n_slides, self.n_actions, most, len(config.forecast_s), config.uncertainty,
             int(self._grips), int(settings.robot.hand is not None), len(self.scene.objects.names),
@@ -102,7 +102,7 @@ class Simulation(Stateful):
         self.watch = Watch(batch, most, self.bodies.capsule_names, self.model, config.ctrl_dt)
         self.physics = Physics(self.scene, batch)
         self.pipeline = make_pipeline(perception, settings.estimator, self.scene, batch, config)
-        self.task_state = self.task.init(batch)
+        self.task_state = self.task.make_state(batch)
         self._everyone, self.reward_weights = np.arange(batch), config.reward
         self.action, self.shield_change = (np.zeros((batch, n)) for n in (self.n_actions, n_joints))
         self.episode_cost, self.separation_m = np.zeros(batch), np.zeros(batch)
@@ -126,11 +126,11 @@ class Simulation(Stateful):
         self.action[ids], self.episode_cost[ids], self.separation_m[ids] = 0.0, 0.0, 0.0
         self.shield_change[ids] = 0.0
         self.watch.reset(ids)
-        task, config, people = self.task, self.config.task, (self.motion, streams["motion"])
+        task, people = self.task, (self.motion, streams["motion"])
         q = starts.apart(ids, self._starting_angles, *people, self.chain, self.bodies)
         robot = chains.robot_state(self.chain, q, np.zeros_like(q))
-        task.reset(self.task_state, ids, streams["task"], World(robot, place=self.place), config)
-        poses = None if task.poses is None else task.poses(self.task_state, ids, config)
+        task.reset(self.task_state, ids, streams["task"], World(robot, place=self.place))
+        poses = task.object_poses(self.task_state, ids)
         self.physics.reset(ids, q, self.motion.workers["body"][ids], poses)
         world = handling.world_of(self.physics, ids, robot)
         self._measure(ids, world)
@@ -158,8 +158,7 @@ class Simulation(Stateful):
             self.motion, self.streams["motion"], config.scene.sim_dt, config.n_substeps
         )
         far = self.separation_m > CLOSING_M_S * config.ctrl_dt
-        if self.task.effects is not None:
-            self.physics.apply(self.task.effects(self.task_state, config.task))
+        self.physics.apply(self.task.effects(self.task_state))
         grip = self.action[:, -1] if self._grips else None
         q_path = self.physics.step(command, path, far, grip)
         truth = worker_truth(self.bodies, motion)
@@ -172,7 +171,7 @@ class Simulation(Stateful):
         self._measure(self._everyone, world)
         robot = world.robot
         seen_world = robot.capsules_world[:, self.scene.watched, 1]
-        cue = None if self.task.cue is None else self.task.cue(self.task_state)
+        cue = self.task.signal(self.task_state)
         generator.watch(self.motion, seen_world, motion, config.ctrl_dt, cue)
         if cue is not None:
             world = replace(world, deeds=generator.deeds(self.motion, motion))
@@ -180,9 +179,7 @@ class Simulation(Stateful):
         paths = incidents.measured(arm, robot.capsule_radius_m, workers, truth.capsule_radius_m)
         cost, happened = metrics.cost(paths.gaps_m, config.cost), self.watch.step(world, paths)
         judged = replace(world, touched=cost.contact > 0, place=self.place)
-        progress = self.task.advance(
-            self.task_state, self.streams["task"], judged, config.ctrl_dt, config.task
-        )
+        progress = self.task.advance(self.task_state, self.streams["task"], judged, config.ctrl_dt)
         belief = self._believed(self._everyone, world, estimates)
         terms = self._reward_terms(belief, progress, previous)
         activity = generator.activity(self.motion)
@@ -199,8 +196,7 @@ class Simulation(Stateful):
             **self._episode_info(self._everyone, activity, happened),
         })  # fmt: skip
         over = (cost.contact > 0) & config.cost.contact_terminates
-        if self.task.over is not None:
-            over |= self.task.over(progress)
+        over |= self.task.is_terminal(progress)
         return StepResult(self._observed(belief), rewards.total(terms, self.batch), over, info)
 
     def set_reward(self, weights: RewardConfig) -> None:
@@ -252,19 +248,17 @@ class Simulation(Stateful):
 
     def markers(self, b: int) -> Points3:
         """(M, 3) what the task of environment `b` has to show [m]."""
-        view = self.task.view(self.task_state, np.array([b]), self.config.task)
+        view = self.task.view(self.task_state, np.array([b]))
         return self.task.markers(view)[0]
 
     @property
-    def _loads(self) -> Bools | None:
-        return None if self.task.loads is None else self.task.loads(self.task_state)
+    def _loads(self) -> Bools | bool:
+        return self.task.is_load(self.task_state)
 
     def _starting_angles(self, ids: Ints) -> Floats:
-        """(len(ids), N) angles near home, unless the task says where robots start."""
+        """Draw the angles (len(ids), N) with which robots start."""
         rngs = picked(self.streams["robot"], ids)
-        if self.task.start is not None:
-            return self.task.start(rngs, self.place, self.config.task)
-        return starts.near(self.scene.home_q, self._spread_rad, rngs)
+        return self.task.draw_start(rngs, self.place, self.scene.home_q, self._spread_rad)
 
     def _command(self) -> tuple[JointVelocities, Info]:
         """(B, N) what the arms are to do [rad/s], and what the shield says to it."""
@@ -309,21 +303,21 @@ class Simulation(Stateful):
     def _believed(self, ids: Ints, world: World, estimates: tuple[PoseEstimate, ...]) -> Belief:
         """What the robots of environments `ids` believe; the records are of them only."""
         unseen = unseen_floor(world.robot, estimates[0], self.pipeline.vacancy(ids))
-        return Belief(
+        belief = Belief(
             robot=world.robot,
             estimate=of_concern(estimates[0], unseen),
             separation=estimated_separation(world.robot, estimates[0]),
             hand=world.hand,
             objects=None if self.measured is None else rows(self.measured, ids),
-            task=self.task.view(self.task_state, ids, self.config.task),
+            task=self.task.view(self.task_state, ids),
             action=self.action[ids],
             forecast=estimates[1:],
             command=self.physics.command[ids],
             shield_change=self.shield_change[ids],
             model=self.model,
-            welcome=self.task.welcome,
             unseen=unseen,
         )
+        return replace(belief, allowed_contact=self.task.allowed_contact(belief))
 
     def _observed(self, belief: Belief) -> Observation:
         """What robots see, and their goals if the task sets them apart."""

@@ -18,10 +18,9 @@ from hrc_env import simulation
 from hrc_env.agents.env_info import env_info
 from hrc_env.agents.registry import make_agent
 from hrc_env.core.batching import copied
-from hrc_env.motion import generator
+from hrc_env.motion import generator, starts
 from hrc_env.pipeline.emulated import EmulatedCameras
 from hrc_env.pipeline.rendered import RenderedCameras
-from hrc_env.safety import starts
 from hrc_env.simulation import Simulation
 from hrc_env.worker.body import worker_capsules, worker_truth
 

@@ -19,7 +19,7 @@ import numpy as np
 import hrc_env
 from hrc_env.registration import import_files
 from hrc_env.scene.robot import ROBOTS
-from hrc_env.tasks.task import task_called
+from hrc_env.tasks.task import find_task
 from hrc_env.tracking.config import ParticleConfig
 from hrc_env.tracking.estimators import EstimatorSpec
 from hrc_env.tracking.particle import ParticleEstimator
@@ -38,11 +38,16 @@ def slower(belief, velocities, dt_s):
     return SHARE * velocities, {"share": np.full(len(velocities), SHARE)}
 
 
+class Own(find_task("HRCReach-v0")):
+    id = "HRCOwn-v0"
+    max_episode_steps = 7
+
+    def view(self, *given):
+        return super().view(*given)
+
+
 def register():
-    reach = task_called("HRCReach-v0")
-    hrc_env.register_task(replace(
-        reach, id="HRCOwn-v0", max_episode_steps=7, view=lambda *given: reach.view(*given)
-    ))
+    hrc_env.register_task(Own)
     hrc_env.register_robot(replace(ROBOTS["ur10e_like"], name="own", home_q=(0, -1, 1, 0, 1, 0)))
     hrc_env.register_estimator(EstimatorSpec("own", make, Settings))
     hrc_env.register_shield("own", slower)
@@ -117,12 +122,12 @@ def test_they_reach_vector_environments_at_pixels(script, pixels):
             envs.reset(seed=1)
             assert (envs.step(np.zeros((2, 6), np.float32))[4]["shield/share"] == SHARE).all()
             envs.close()
-            info = task_called("HRCOwn-v0").info
-            task = replace(
-                task_called("HRCOwn-v0"), info=lambda state: {**info(state), "task/one": np.ones(1)}
-            )
+            class Other(find_task("HRCOwn-v0")):
+                def info(self, state):
+                    return {**super().info(state), "task/one": np.ones(1)}
+
             own = {"detector": {"keypoints": "own"}}
-            envs = gymnasium.make_vec("HRCReach-v0", 1, task=task, config=own)
+            envs = gymnasium.make_vec("HRCReach-v0", 1, task=Other, config=own)
             assert envs.reset(seed=1)[1]["task/one"] == [1.0], "the object, not the id's task"
             envs.close()
         """

@@ -223,9 +223,10 @@ def test_links_lead_somewhere(page):
 @pytest.mark.usefixtures("brought")  # so that what pages register is gone afterwards
 @pytest.mark.parametrize("page", [*generate.PAGES, *generate.REFERENCE], ids=name_of)
 def test_code_runs(page):
-    """The blocks of a page, one after the other, as a reader would type them."""
+    """The blocks of a page, one after the other, as a reader would type them; files of examples
+    that a page shows are imported before."""
     names = {}
-    for skipped, code in PYTHON.findall(page.read_text()):
+    for skipped, code in PYTHON.findall(tables.EXAMPLE.sub("", page.read_text())):
         if not skipped:
             exec(compile(code, page.name, "exec"), names)
 

@@ -2,7 +2,6 @@
 
 import pickle
 import warnings
-from dataclasses import replace
 
 import gymnasium
 import numpy as np
@@ -20,7 +19,9 @@ from hrc_env.env import HRCEnv
 from hrc_env.evaluation.episodes import evaluate
 from hrc_env.sb3 import HRCVecEnv
 from hrc_env.tasks.reach_goal import ReachGoalConfig
+from hrc_env.tasks.task import find_task
 from hrc_env.vector.env import HRCVectorEnv
+from tests.tasks.variants import vary
 
 REACH, PICK = IDS = ("HRCReachGoal-v0", "HRCPickPlaceGoal-v0")
 SIZES = {REACH: 3, PICK: 9}
@@ -258,10 +259,10 @@ def test_many_are_judged_at_once():
 
 
 def test_a_task_that_ends_by_itself_does_not_pretend_to_follow_from_goals():
-    task = replace(HRCEnv(REACH, perception="none").simulation.task, over=lambda step: step)
+    task = vary(find_task(REACH), is_terminal=lambda self, step: False)
     env = HRCEnv(task, perception="none")
     assert not hasattr(env, "compute_terminated")
-    with pytest.raises(ConfigError, match=r"Task\.over"):
+    with pytest.raises(ConfigError, match=r"Task\.is_terminal"):
         env.compute_terminated  # noqa: B018
 
 

@@ -8,9 +8,9 @@ import hrc_env  # noqa: F401  registers the ids
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.env import HRCEnv
 from hrc_env.observations import Sizes, layout
-from hrc_env.tasks.reach import TASK
+from hrc_env.tasks.reach import Reach
 
-TERMS = TASK.observation_terms
+TERMS = Reach().observation_terms
 
 ASKED = {"forecast_s": (0.2, 0.6)}
 ADDED = ("worker_joints_forecast", "worker_joints_forecast_std")

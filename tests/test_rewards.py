@@ -10,7 +10,7 @@ from hrc_env.core.records import PoseEstimate, RobotState
 from hrc_env.env import HRCEnv
 from hrc_env.geometry.distances import Separation
 from hrc_env.rewards import SHARED_TERMS, RewardConfig, closeness, evaluated, total
-from hrc_env.tasks.reach import TASK, ReachConfig
+from hrc_env.tasks.reach import Reach, ReachConfig
 from hrc_env.vector.env import HRCVectorEnv
 
 
@@ -34,7 +34,7 @@ def reward(now, step, before, shared, own=None):
     """All terms, of which the task's come first."""
     own = own or ReachConfig()
     terms = {
-        **evaluated(TASK.rewards, now, step, before, own),
+        **evaluated(Reach().rewards, now, step, before, own),
         **evaluated(SHARED_TERMS, now, step, before, shared),
     }
     return total(terms, 1), terms
@@ -56,7 +56,7 @@ def test_the_reward_is_the_sum_of_its_terms():
     whole, terms = reward(
         believed(0.1, 0.5), progress(0.02, True), np.zeros((1, 6)), RewardConfig()
     )
-    assert list(terms) == [term.name for term in TASK.reward_terms]
+    assert list(terms) == [term.name for term in Reach().reward_terms]
     assert whole[0] == sum(value[0] for value in terms.values())
 
 

@@ -23,10 +23,11 @@ from hrc_env.safety.shield import SHIELDS
 from hrc_env.scene.domain_randomization import AS_BUILT, AppearanceConfig
 from hrc_env.scene.rig import LAB_CAMERAS
 from hrc_env.scene.robot import ROBOTS
-from hrc_env.tasks.task import task_called
+from hrc_env.tasks.task import find_task
 from hrc_env.tracking.estimators import ESTIMATORS
 from hrc_env.tracking.particle import ParticleEstimator
 from hrc_env.worker.body import load_body
+from tests.tasks.variants import vary
 
 PLACES = [(2.9, 2.6, 2.4), (-2.9, 2.6, 2.4)]
 
@@ -98,7 +99,7 @@ def own_shield(now, velocities, dt_s):
         {"robot": ROBOTS["ur10e_cups"], "shield": ShieldConfig("ssm", margin_m=0.3)},
         {"task": "HRCDelivery-v0", "robot": replace(ROBOTS["mobile_base"], girth_m=0.4)},
         {"config": HRCConfig(), "estimator": "paper"},
-        {"config": HRCConfig(forecast_s=(0.2,)), "task": task_called("HRCReachGoal-v0")},
+        {"config": HRCConfig(forecast_s=(0.2,)), "task": find_task("HRCReachGoal-v0")},
         {"estimator": ESTIMATORS["kalman"], "shield": SHIELDS["qp"]},
     ],
     ids=lambda kwargs: "-".join(kwargs),
@@ -126,7 +127,7 @@ def seen(env) -> list:
             r"config.motion.motions\[0\] is a Clip.*save_clip",
         ),
         ({"config": {"motion": {"motions": [standing()]}}}, r"motions\[0\] is a Clip"),
-        ({"task": replace(task_called("HRCReach-v0"), says="Other.")}, "hrc_env.register_task"),
+        ({"task": vary(find_task("HRCReach-v0"), ends="Soon.")}, "hrc_env.register_task"),
         ({"estimator": ParticleEstimator}, "hrc_env.register_estimator"),
         ({"estimator": replace(ESTIMATORS["kalman"], name="x")}, "hrc_env.register_estimator"),
         ({"shield": own_shield}, "shield is a function.*hrc_env.register_shield"),

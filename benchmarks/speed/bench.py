@@ -20,7 +20,7 @@ from hrc_env.core.results import Metric, over
 from hrc_env.experiments.study.cache import PartCache, Progress
 from hrc_env.experiments.study.runner import Study, at_least_one
 from hrc_env.safety.shield import shield_called
-from hrc_env.tasks.task import task_called
+from hrc_env.tasks.task import find_task
 
 EVERY = "every"
 """In place of an id: all of them."""
@@ -59,7 +59,7 @@ class SpeedBenchConfig:
         """Raise `ConfigError` for numbers that cannot work."""
         shield_called(self.shield)
         if self.task != EVERY:
-            task_called(self.task)
+            find_task(self.task)
         at_least_one(self, "n_rounds", "least_steps", "n_resets", "task_steps")
         if WATCHED not in self.levels:
             raise ConfigError(f"levels must have {WATCHED!r} in them, got {self.levels}.")

@@ -12,6 +12,8 @@ from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm
 from hrc_env.tasks.task import Task
 
+STATE = np.dtype([("next_station", "i8"), ("n_visits", "i8")])
+
 
 @dataclass(frozen=True)
 class TendConfig:
@@ -20,41 +22,53 @@ class TendConfig:
     visit_bonus: float = 5.0
 
 
-@dataclass
-class TendState:
-    next_station: np.ndarray
-    n_visits: np.ndarray
+class Tend(Task):
+    """Go to and fro between two stations."""
+
+    id = "HRCTend-v0"
+    config_type = TendConfig
+    observations = (
+        ObservationTerm(
+            name="station", size=3, unit="m", frame="world", bound=3.0, scale=0.5,
+            doc="From the tool to the next station.",
+            function=lambda belief: belief.task - belief.robot.tool_world,
+        ),
+    )  # fmt: skip
+    rewards = (
+        RewardTerm(
+            name="visit",
+            doc="`task.visit_bonus` for every arrival at a station.",
+            function=lambda belief, arrived, last_action, config: config.visit_bonus * arrived,
+        ),
+    )
+    achieved, failed = "task/visits", "task/missing_visits"
+
+    def make_state(self, batch):
+        return np.zeros(batch, STATE)
+
+    def reset(self, state, ids, rngs, world):
+        for b in ids:
+            state[b] = rngs[b].integers(len(self.config.stations_world)), 0
+
+    def advance(self, state, rngs, world, dt_s):
+        away = self.view(state, slice(None)) - world.robot.tool_world
+        arrived = np.linalg.norm(away, axis=1) < self.config.radius_m
+        state["n_visits"] += arrived
+        state["next_station"] += arrived
+        state["next_station"] %= len(self.config.stations_world)
+        return arrived
+
+    def view(self, state, ids):
+        """The robot knows where its next station is, (B, 3) [m]."""
+        return np.array(self.config.stations_world)[state["next_station"][ids]]
+
+    def info(self, state):
+        visits, missing = 1.0 * state["n_visits"], np.maximum(2.0 - state["n_visits"], 0.0)
+        success = 1.0 * (missing == 0)
+        return {"task/visits": visits, "task/missing_visits": missing, "is_success": success}
+
+    def markers(self, view):
+        return view[:, None]
 
 
-def station(state, config):
-    return np.array(config.stations_world)[state.next_station]
-
-
-def reset(state, ids, rngs, world, config):
-    state.n_visits[ids] = 0
-    state.next_station[ids] = [rngs[b].integers(len(config.stations_world)) for b in ids]
-
-
-def advance(state, rngs, world, dt_s, config):
-    away = station(state, config) - world.robot.tool_world
-    arrived = np.linalg.norm(away, axis=1) < config.radius_m
-    state.n_visits += arrived
-    state.next_station = (state.next_station + arrived) % len(config.stations_world)
-    return arrived
-
-
-def info(state):
-    visits = 1.0 * state.n_visits
-    return {"task/visits": visits, "task/drops": 0.0 * visits, "is_success": 1.0 * (visits > 1)}
-
-
-hrc_env.register_task(Task(
-    "HRCTend-v0", "Go to and fro between two stations.", TendConfig,
-    lambda batch: TendState(np.zeros(batch, int), np.zeros(batch, int)), reset, advance,
-    lambda state, ids, config: station(state, config)[ids],
-    (ObservationTerm("station", lambda of: 3, "m", "world", 3.0, 0.5, "From tool to station.",
-                     lambda now: now.task - now.robot.tool_world),),
-    (RewardTerm("visit", "`task.visit_bonus` at a station.",
-                lambda now, step, previous, config: config.visit_bonus * step),),
-    info, "task/visits", "task/drops", lambda view: view[:, None],
-))  # fmt: skip
+hrc_env.register_task(Tend)

@@ -73,8 +73,8 @@ class ShieldConfig:
     Before any look the robot stands. 0: stop."""
     welcome_m_s: float = 0.25
     """To parts of people that a task lets come to the robot's hand, as to take what it brings
-    (`Task.welcome`), the hand and what it carries may come so fast, and no faster than the region
-    bears; 0: not at all [m/s]."""
+    (`Task.allowed_contact`), the hand and what it carries may come so fast, and no faster than the
+    region bears; 0: not at all [m/s]."""
     still_m_s: float = 0.02
     """Other links may come to them so fast where nothing else allows it: corrections that keep in
     its place what is held; with none they add up to a way [m/s]."""

@@ -5,7 +5,7 @@ velocities that the arm can reach in a step. A row that asks to get away is two 
 nearer, which hardly anything outweighs, and only then to get away: with one, an arm that flees from
 a hand pushes its wrist into the other.
 
-A task may say which parts of estimated bodies are welcome at the robot's hand (`Task.welcome`):
+A task may let parts of estimated bodies come to the robot's hand (`Task.allowed_contact`):
 forearms and hands of the one who takes a tool, or works at what is held. As long as these come no
 faster than their region bears in a touch of this arm with its load
 (`contact.permitted_contact_speed`), no link has to get away from them, which would take away what
@@ -153,11 +153,11 @@ def _touches(now: Belief, model: RobotModel, config: ShieldConfig) -> tuple[Floa
     link, shape = _links(model, now), (*now.estimate.tracked.shape, len(SEGMENT_REGIONS))
     if config.kind == "pfl":
         welcome, most_m_s = np.ones(shape, bool), np.full(len(link), np.inf)
-    elif now.welcome is None:
+    elif now.allowed_contact is None:
         return np.zeros(shape), np.zeros(len(link))
     else:
         is_last = link == model.chain.n_joints - 1
-        welcome, most_m_s = now.welcome(now), np.where(is_last, config.welcome_m_s, 0.0)
+        welcome, most_m_s = now.allowed_contact, np.where(is_last, config.welcome_m_s, 0.0)
     carried = 0.0 if now.objects is None else now.objects.held @ model.load_kg
     mass_kg = np.broadcast_to(model.mass_kg + carried, len(now.action))
     speeds = {name: permitted_contact_speed(name, mass_kg) for name in set(SEGMENT_REGIONS)}

@@ -41,13 +41,13 @@ def world_of(physics: Physics, ids: Ints, robot: RobotState) -> World:
 
 
 def loaded(
-    scene: Scene, world: World, arm_world: Capsules, q_path: Floats, loads: Bools | None = None
+    scene: Scene, world: World, arm_world: Capsules, q_path: Floats, loads: Bools | bool = True
 ) -> tuple[World, Capsules]:
     """What a robot carries is part of it, now and along capsules (B, T, K, 2, 3) where qpos is
     q_path (B, T, nq): all objects, or those that are `loads` (B, O)."""
     if world.objects is None:
         return world, arm_world
-    held = world.objects.held if loads is None else world.objects.held & loads
+    held = world.objects.held & loads
     robot, arm = with_load(world.robot, arm_world, scene.objects, q_path, held)
     return replace(world, robot=robot), arm
 

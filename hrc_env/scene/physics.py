@@ -116,8 +116,10 @@ class Physics:
         held[:, cups.objects] = self._welded[ids][:, cups.welds] > 0.0
         return held
 
-    def apply(self, effects: Effects) -> None:
-        """Do to loose objects what a task does, until it does something else."""
+    def apply(self, effects: Effects | None) -> None:
+        """Do to loose objects what a task does, until it does something else; None: go on."""
+        if effects is None:
+            return
         for name, on in effects.welded.items():
             self._welded[:, self.scene.model.equality(name).id] = on
         self._push[:, self.scene.object_bodies] = effects.push_world

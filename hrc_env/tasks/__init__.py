@@ -1,24 +1,28 @@
-"""Tasks: what the robot is to achieve. One file per task makes one `Task`; none reads a camera."""
+"""Tasks: what the robot is to achieve, one class a file. None of them reads a camera."""
+
+from dataclasses import dataclass
+
+EPISODE_STEPS = 250
+"""Time limit of an episode unless its task has another one: 10 s at 25 Hz."""
+
+
+@dataclass(frozen=True, slots=True)
+class BuiltIn:
+    """A task of the package, known before its file is imported."""
+
+    where: str
+    """Module and class."""
+    max_episode_steps: int = EPISODE_STEPS
+
 
 BUILT_IN = {
-    "HRCReach-v0": "hrc_env.tasks.reach",
-    "HRCPickPlace-v0": "hrc_env.tasks.pick_place",
-    "HRCDelivery-v0": "hrc_env.tasks.delivery",
-    "HRCDrywall-v0": "hrc_env.tasks.drywall",
-    "HRCHandover-v0": "hrc_env.tasks.handover",
-    "HRCReachGoal-v0": "hrc_env.tasks.reach_goal",
-    "HRCPickPlaceGoal-v0": "hrc_env.tasks.pick_place_goal",
+    "HRCReach-v0": BuiltIn("hrc_env.tasks.reach:Reach"),
+    "HRCPickPlace-v0": BuiltIn("hrc_env.tasks.pick_place:PickPlace", 750),
+    "HRCDelivery-v0": BuiltIn("hrc_env.tasks.delivery:Delivery", 1000),
+    "HRCDrywall-v0": BuiltIn("hrc_env.tasks.drywall:Drywall", 1000),
+    "HRCHandover-v0": BuiltIn("hrc_env.tasks.handover:Handover", 750),
+    "HRCReachGoal-v0": BuiltIn("hrc_env.tasks.reach_goal:ReachGoal", 100),
+    "HRCPickPlaceGoal-v0": BuiltIn("hrc_env.tasks.pick_place_goal:PickPlaceGoal", 750),
 }
-"""Id and file of each task that comes with the package; the file's `TASK` is imported at need."""
+"""The package's tasks by their ids."""
 DEFAULT = next(iter(BUILT_IN))
-EPISODE_STEPS = 250
-"""An episode's time limit, unless a task's file says otherwise: 10 s at 25 Hz."""
-LONGER = {
-    "HRCPickPlace-v0": 750,
-    "HRCDelivery-v0": 1000,
-    "HRCDrywall-v0": 1000,
-    "HRCHandover-v0": 750,
-    "HRCReachGoal-v0": 100,
-    "HRCPickPlaceGoal-v0": 750,
-}
-"""Those of built-in tasks that do, known before their files are imported."""

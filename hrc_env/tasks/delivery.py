@@ -9,19 +9,19 @@ not on it: they are known by the estimate only.
 
 import math
 from dataclasses import dataclass
-from functools import partial
+from typing import ClassVar
 
 import numpy as np
 
 from hrc_env.core.errors import ConfigError, check_fields
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Grounds, RobotState, World
-from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, Records
+from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, Points3, Records, Rngs
 from hrc_env.geometry.ways import gaps_m, met, nearest_point, ranges_m, spread_out, value_at, ways_m
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm, check_kind, progress
-from hrc_env.tasks import LONGER
-from hrc_env.tasks.task import Rngs, Task
+from hrc_env.tasks import BUILT_IN
+from hrc_env.tasks.task import Task
 
 CELL_M, AROUND_M = 0.2, 3.0
 """Grid of the map; how far beyond where people walk the base may drive [m]."""
@@ -119,82 +119,10 @@ class DeliveryView:
     """(B, RAYS)."""
 
 
-def survey(grounds: Grounds, config: DeliveryConfig) -> Site:
-    """Zones of a place, and the ways to them; `ConfigError` where no two are far enough apart."""
-    (x0, x1), (y0, y1) = grounds.walkable_x_m, grounds.walkable_y_m
-    xs = np.arange(x0 - AROUND_M, x1 + AROUND_M, CELL_M, dtype=float)
-    ys = np.arange(y0 - AROUND_M, y1 + AROUND_M, CELL_M, dtype=float)
-    origin, gaps = np.array([xs[0], ys[0]]), gaps_m(xs, ys, grounds.blocked)
-    roomy = (gaps > ROOMY_M) & ((xs > x0) & (xs < x1))[:, None] & ((ys > y0) & (ys < y1))
-    points: Floats = np.asarray(np.argwhere(roomy) * CELL_M + origin, np.float64)
-    works = np.array([place.xy_m for place in grounds.places]).reshape(-1, 2)
-    away = np.linalg.norm(points[:, None] - works, axis=-1).min(1, initial=np.inf)
-    points = points[away > OFF_WORK_M]
-    zones = points[spread_out(points, APART_M)] if len(points) else points
-    price = np.where(gaps > ROUND_M, 1.0, np.where(gaps > HALF_WIDTH_M, TIGHT, np.inf))
-    cells = [nearest_point(x, y, origin, CELL_M) for x, y in zones.tolist()]
-    ways = np.array([ways_m(price, cell, CELL_M) for cell in cells]).reshape(-1, *gaps.shape)
-    lengths = np.array([ways[:, i, j] for i, j in cells]).reshape(len(zones), len(zones)).T
-    low, high = config.way_m
-    if not ((lengths >= low) & (lengths <= high)).any():
-        longest = lengths.max(initial=0.0)
-        raise ConfigError(
-            f"HRCDelivery-v0 needs a place with two zones that a way of {low:g} to {high:g} m "
-            f"joins; here there are {len(zones)} zones, and the longest way is {longest:.1f} m. "
-            'Valid is scene="site", or other task.way_m.'
-        )
-    return Site(grounds.blocked, origin, gaps, zones, ways, lengths)
-
-
-def start(rngs: Rngs, site: Site, config: DeliveryConfig) -> JointAngles:
-    """(n, 3) where bases begin: in a zone from which another is far enough, turned anyhow."""
-    fit = _fit(site, config).any(1)
-    places = []
-    for rng in rngs:
-        zone = rng.choice(np.flatnonzero(fit))
-        shift = START_M * (2.0 * rng.random(2) - 1.0)
-        places.append([*(site.zones[zone] + shift), np.pi * (2.0 * rng.random() - 1.0)])
-    return np.array(places).reshape(-1, 3)
-
-
 def _fit(site: Site, config: DeliveryConfig) -> Bools:
     """(Z, Z) whether the way from one zone to another has the length that is wanted."""
     low, high = config.way_m
     return (site.lengths >= low) & (site.lengths <= high)
-
-
-def reset(state: Records, ids: Ints, rngs: Rngs, world: World, config: DeliveryConfig) -> None:
-    """Choose where the material of environments `ids` goes."""
-    site: Site = world.place
-    state[ids] = np.zeros((), DELIVERY)
-    for b, (x, y) in zip(ids.tolist(), world.robot.q[:, :2].tolist(), strict=True):
-        here = int(np.argmin(np.hypot(*(site.zones - [x, y]).T)))
-        zone = rngs[b].choice(np.flatnonzero(_fit(site, config)[here]))
-        state["zone"][b], state["goal_world"][b] = zone, site.zones[zone]
-    own = state[ids]
-    _look(own, world.robot, site)
-    state[ids] = own
-
-
-def advance(
-    state: Records, rngs: Rngs, world: World, dt_s: float, config: DeliveryConfig
-) -> Records:
-    """Judge where the bases are; (B,) of `DELIVERY_STEP`."""
-    site, robot, step = world.place, world.robot, np.zeros(len(state), DELIVERY_STEP)
-    step["progress_m"] = state["way_m"]
-    _look(state, robot, site)
-    step["progress_m"] -= state["way_m"]
-    touching = met(robot.capsules_world, robot.capsule_radius_m, site.footprints)
-    people = np.zeros(len(state), bool) if world.touched is None else world.touched
-    step["hit"] = touching & ~state["touching"]
-    state["hits"][:, 0] += step["hit"]
-    state["hits"][:, 1] += people & ~state["people"]
-    state["touching"], state["people"] = touching, people
-    off_m = np.linalg.norm(robot.q[:, :2] - state["goal_world"], axis=1)
-    speed_m_s = np.linalg.norm(robot.qd[:, :2], axis=1)
-    step["delivered"] = (off_m < config.zone_m) & (speed_m_s < config.standing_m_s)
-    state["delivered"] |= step["delivered"]
-    return step
 
 
 def _look(state: Records, robot: RobotState, site: Site) -> None:
@@ -219,60 +147,36 @@ def _follow(q: Floats, ways: Floats, origin: Floats, state: Records) -> None:
         now.way_direction[0], now.way_direction[1] = dx / length, dy / length
 
 
-def view(state: Records, ids: Ints, config: DeliveryConfig) -> DeliveryView:
-    """What robots `ids` know of their task."""
-    own = state[ids]
-    return DeliveryView(own["goal_world"], own["way_m"], own["way_direction"], own["ranges_m"])
+class Delivery(Task[DeliveryConfig, Records]):
+    """Bring material across a construction site, among the workers, and hit nothing."""
 
-
-def info(state: Records) -> dict[str, Floats]:
-    """What the episode has come to so far, (B,) each: delivered counts if nothing was hit."""
-    delivered = (state["delivered"] & ~state["hits"].any(1)).astype(float)
-    return {
-        "task/delivered": delivered,
-        "task/not_delivered": 1.0 - delivered,
-        "task/fixed_hits": state["hits"][:, 0].astype(float),
-        "task/people_hits": state["hits"][:, 1].astype(float),
-        "task/way_left_m": state["way_m"].copy(),
-        "is_success": delivered,
-    }
-
-
-TASK = Task(
-    id="HRCDelivery-v0",
-    says="Bring material across a construction site, among the workers, and hit nothing.",
-    config=DeliveryConfig,
-    init=partial(np.zeros, dtype=DELIVERY),
-    reset=reset,
-    advance=advance,
-    view=view,
-    observations=(
+    id = "HRCDelivery-v0"
+    config_type = DeliveryConfig
+    observations = (
         ObservationTerm(
-            "zone_from_base", lambda of: 2, "m", "world", 20.0, 5.0,
+            "zone_from_base", 2, "m", "world", 20.0, 5.0,
             "From the middle of the base to that of its zone, x and y.",
             lambda now: now.task.goal_world - now.robot.q[:, :2],
         ),
         ObservationTerm(
-            "way_left", lambda of: 1, "m", "-", 30.0, 5.0,
+            "way_left", 1, "m", "-", 30.0, 5.0,
             "Length of the way to the zone round what stands there, by the map.",
             lambda now: now.task.way_m,
         ),
         ObservationTerm(
-            "way_direction", lambda of: 2, "-", "world", 1.0, 1.0,
+            "way_direction", 2, "-", "world", 1.0, 1.0,
             "Unit vector along that way from where the base is, x and y.",
             lambda now: now.task.way_direction,
         ),
         ObservationTerm(
-            "ranges", lambda of: RAYS, "m", "world", RANGE_M, 2.0,
+            "ranges", RAYS, "m", "world", RANGE_M, 2.0,
             "From the middle of the base to what stands there by the map, at 24 angles from the x "
             "axis to the left, 15 degrees apart; people are not on the map.",
             lambda now: now.task.ranges_m,
         ),
-    ),
-    rewards=(
-        progress(
-            "Metres of the way that the base left behind"
-        ),
+    )  # fmt: skip
+    rewards = (
+        progress("Metres of the way that the base left behind"),
         RewardTerm(
             "delivered",
             "`task.delivered_bonus` for the step in which the base stands in its zone.",
@@ -283,19 +187,114 @@ TASK = Task(
             "Minus `task.hit_penalty` when the base begins to touch what stands there.",
             lambda now, step, previous, config: -config.hit_penalty * step["hit"],
         ),
-    ),
-    info=info,
-    achieved="task/delivered",
-    failed="task/not_delivered",
-    markers=lambda view: np.insert(view.goal_world, 2, MARKED_M, axis=1)[:, None],
-    max_episode_steps=LONGER["HRCDelivery-v0"],
-    robot="mobile_base",
-    drives=True,
-    scene="site",
-    n_workers=4,
-    viewpoint="yard",
-    survey=survey,
-    start=start,
-    over=lambda step: step["delivered"],
-    defaults={"control": {"joint_speed_share": 1.0}, "motion": {"near_probability": 0.0}},
-)  # fmt: skip
+    )
+    achieved = "task/delivered"
+    failed = "task/not_delivered"
+    max_episode_steps = BUILT_IN[id].max_episode_steps
+    robot = "mobile_base"
+    needs_mobile_base = True
+    scene = "site"
+    n_workers = 4
+    viewpoint = "yard"
+    defaults: ClassVar = {
+        "control": {"joint_speed_share": 1.0},
+        "motion": {"near_probability": 0.0},
+    }
+
+    def make_state(self, batch: int) -> Records:
+        return np.zeros(batch, DELIVERY)
+
+    def survey(self, grounds: Grounds) -> Site:
+        """Return the zones of a place and the ways between them.
+
+        Raises:
+            ConfigError: no two zones are far enough apart.
+        """
+        (x0, x1), (y0, y1) = grounds.walkable_x_m, grounds.walkable_y_m
+        xs = np.arange(x0 - AROUND_M, x1 + AROUND_M, CELL_M, dtype=float)
+        ys = np.arange(y0 - AROUND_M, y1 + AROUND_M, CELL_M, dtype=float)
+        origin, gaps = np.array([xs[0], ys[0]]), gaps_m(xs, ys, grounds.blocked)
+        roomy = (gaps > ROOMY_M) & ((xs > x0) & (xs < x1))[:, None] & ((ys > y0) & (ys < y1))
+        points: Floats = np.asarray(np.argwhere(roomy) * CELL_M + origin, np.float64)
+        works = np.array([place.xy_m for place in grounds.places]).reshape(-1, 2)
+        away = np.linalg.norm(points[:, None] - works, axis=-1).min(1, initial=np.inf)
+        points = points[away > OFF_WORK_M]
+        zones = points[spread_out(points, APART_M)] if len(points) else points
+        price = np.where(gaps > ROUND_M, 1.0, np.where(gaps > HALF_WIDTH_M, TIGHT, np.inf))
+        cells = [nearest_point(x, y, origin, CELL_M) for x, y in zones.tolist()]
+        ways = np.array([ways_m(price, cell, CELL_M) for cell in cells]).reshape(-1, *gaps.shape)
+        lengths = np.array([ways[:, i, j] for i, j in cells]).reshape(len(zones), len(zones)).T
+        low, high = self.config.way_m
+        if not ((lengths >= low) & (lengths <= high)).any():
+            longest = lengths.max(initial=0.0)
+            raise ConfigError(
+                f"HRCDelivery-v0 needs a place with two zones that a way of {low:g} to {high:g} m "
+                f"joins; here are {len(zones)} zones, and the longest way is {longest:.1f} m. "
+                'Valid is scene="site", or other task.way_m.'
+            )
+        return Site(grounds.blocked, origin, gaps, zones, ways, lengths)
+
+    def draw_start(
+        self, rngs: Rngs, place: Site, home_q: JointAngles, spread_rad: Floats
+    ) -> JointAngles:
+        """(n, 3) where bases begin: in a zone from which another is far enough, turned anyhow."""
+        fit = _fit(place, self.config).any(1)
+        places = []
+        for rng in rngs:
+            zone = rng.choice(np.flatnonzero(fit))
+            shift = START_M * (2.0 * rng.random(2) - 1.0)
+            places.append([*(place.zones[zone] + shift), np.pi * (2.0 * rng.random() - 1.0)])
+        return np.array(places).reshape(-1, 3)
+
+    def reset(self, state: Records, ids: Ints, rngs: Rngs, world: World) -> None:
+        """Choose where the material of environments `ids` goes."""
+        site: Site = world.place
+        state[ids] = np.zeros((), DELIVERY)
+        for b, (x, y) in zip(ids.tolist(), world.robot.q[:, :2].tolist(), strict=True):
+            here = int(np.argmin(np.hypot(*(site.zones - [x, y]).T)))
+            zone = rngs[b].choice(np.flatnonzero(_fit(site, self.config)[here]))
+            state["zone"][b], state["goal_world"][b] = zone, site.zones[zone]
+        own = state[ids]
+        _look(own, world.robot, site)
+        state[ids] = own
+
+    def advance(self, state: Records, rngs: Rngs, world: World, dt_s: float) -> Records:
+        """Judge where the bases are; (B,) of `DELIVERY_STEP`."""
+        site, robot, step = world.place, world.robot, np.zeros(len(state), DELIVERY_STEP)
+        step["progress_m"] = state["way_m"]
+        _look(state, robot, site)
+        step["progress_m"] -= state["way_m"]
+        touching = met(robot.capsules_world, robot.capsule_radius_m, site.footprints)
+        people = np.zeros(len(state), bool) if world.touched is None else world.touched
+        step["hit"] = touching & ~state["touching"]
+        state["hits"][:, 0] += step["hit"]
+        state["hits"][:, 1] += people & ~state["people"]
+        state["touching"], state["people"] = touching, people
+        off_m = np.linalg.norm(robot.q[:, :2] - state["goal_world"], axis=1)
+        speed_m_s = np.linalg.norm(robot.qd[:, :2], axis=1)
+        step["delivered"] = (off_m < self.config.zone_m) & (speed_m_s < self.config.standing_m_s)
+        state["delivered"] |= step["delivered"]
+        return step
+
+    def is_terminal(self, step: Records) -> Bools:
+        return step["delivered"]
+
+    def view(self, state: Records, ids: Ints) -> DeliveryView:
+        """What robots `ids` know of their task."""
+        own = state[ids]
+        return DeliveryView(own["goal_world"], own["way_m"], own["way_direction"], own["ranges_m"])
+
+    def info(self, state: Records) -> dict[str, Floats]:
+        """What the episode has come to so far, (B,) each: delivered counts if nothing was hit."""
+        delivered = (state["delivered"] & ~state["hits"].any(1)).astype(float)
+        return {
+            "task/delivered": delivered,
+            "task/not_delivered": 1.0 - delivered,
+            "task/fixed_hits": state["hits"][:, 0].astype(float),
+            "task/people_hits": state["hits"][:, 1].astype(float),
+            "task/way_left_m": state["way_m"].copy(),
+            "is_success": delivered,
+        }
+
+    def markers(self, view: DeliveryView) -> Points3:
+        return np.insert(view.goal_world, 2, MARKED_M, axis=1)[:, None]

@@ -1,8 +1,8 @@
 """Drywall: the robot presses a board against studs and holds it while a worker drives screws."""
 
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
@@ -10,14 +10,14 @@ from hrc_env.belief import Belief
 from hrc_env.core.errors import ConfigError, check_fields, needed
 from hrc_env.core.records import Cue, Effects, ObjectState, Workplace, World
 from hrc_env.core.things import FOOT_WORLD, Things, Weld
-from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records, Rotations
+from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records, Rngs, Rotations
 from hrc_env.geometry.rotations import matrix
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm, check_kind, progress
-from hrc_env.tasks import LONGER
+from hrc_env.tasks import BUILT_IN
 from hrc_env.tasks.partner import partners_arms
-from hrc_env.tasks.spot import Spot
-from hrc_env.tasks.task import Rngs, Task
+from hrc_env.tasks.reach_target import ReachTarget
+from hrc_env.tasks.task import Task
 from hrc_env.worker.body import assets_dir
 
 BOARD_M, BOARD_KG = (0.6, 1.2, 0.0125), 6.12
@@ -106,70 +106,6 @@ class DrywallView:
     """(B,) screws."""
 
 
-def things(config: DrywallConfig) -> Things:
-    """Stack, board, studs, and where the worker stands who drives the screws."""
-    place = Workplace("board", "task", BESIDE_M, 0.75 * np.pi, SCREWS_M[0][1])
-    return Things(
-        Path(assets_dir() / "tasks" / "drywall.xml").read_text(),
-        (
-            Weld("cups_board", ("task/board_cups", "robot/tool_point")),
-            Weld("board_fixed", ("task/board_middle", "task/place")),
-        ),
-        (place,),
-    )
-
-
-def spots(config: DrywallConfig) -> list[Spot]:
-    """Where the cups are when the board is in its place."""
-    front = R_PLACE @ [*CUPS_M, BOARD_M[2] / 2]
-    return [Spot("the board's place", FOOT_WORLD + PLACE_M + front, (0.0, 1.0, 0.0))]
-
-
-def reset(state: Records, ids: Ints, rngs: Rngs, world: World, config: DrywallConfig) -> None:
-    """Lay the board of environments `ids` onto the stack anew."""
-    state[ids] = np.zeros((), DRYWALL)
-    low, high = config.push_n
-    for b in ids.tolist():
-        n, draws = len(SCREWS_M), rngs[b].random(3)
-        off = MOVED_M * (2.0 * draws[:2] - 1.0)
-        half = 0.5 * (np.pi + TURNED_RAD * (2.0 * draws[2] - 1.0))
-        at = FOOT_WORLD + STACK_M + [*off, 0.0]
-        state["pose"][b] = (*at, np.cos(half), 0.0, 0.0, np.sin(half))
-        state["push_n"][b] = low + (high - low) * rngs[b].random(n)
-        way = 2.0 * np.pi * rngs[b].random(n)
-        state["shear"][b] = SHEAR * np.stack([np.cos(way), np.sin(way)], axis=1)
-    poses_ = state["pose"][ids]
-    state["left_m"][ids] = _left_m(
-        poses_[:, :3], matrix(poses_[:, 3:]), world.robot.tool_world, np.zeros(len(ids), bool)
-    )
-
-
-def advance(
-    state: Records, rngs: Rngs, world: World, dt_s: float, config: DrywallConfig
-) -> Records:
-    """Judge where the board is and what was screwed; (B,) of `DRYWALL_STEP`."""
-    board, step = needed(world.objects, "A board"), np.zeros(len(state), DRYWALL_STEP)
-    off_m, off_rad = off_place(board)
-    fine = (off_m < config.tolerance_m) & (off_rad < config.tolerance_rad)
-    pressed = fine & (board.held[:, 0] | (state["driven"] == len(SCREWS_M)))
-    state["pressed_s"] = np.where(pressed, state["pressed_s"] + dt_s, 0.0)
-    driven, boring = _screwed(state, world, dt_s)
-    step["driven"] = driven - state["driven"]
-    state["driven"], state["boring"] = driven, boring
-    state["worst_m"] = np.where(boring, np.maximum(state["worst_m"], off_m), state["worst_m"])
-    state["worst_rad"] = np.where(
-        boring, np.maximum(state["worst_rad"], off_rad), state["worst_rad"]
-    )
-    state["spoilt"] |= boring & ~fine
-    done = (driven == len(SCREWS_M)) & ~board.held[:, 0] & fine & ~state["spoilt"]
-    step["done"] = done & ~state["done"]
-    state["done"] |= done
-    at, R = board.position_world[:, 0], matrix(board.quaternion_wxyz[:, 0])
-    left_m = _left_m(at, R, world.robot.tool_world, board.held[:, 0] | (driven > 0))
-    step["progress_m"], state["left_m"] = state["left_m"] - left_m, left_m
-    return step
-
-
 def off_place(board: ObjectState) -> tuple[Floats, Floats]:
     """(B,) how far the board is from its place [m], and turned against it [rad]."""
     off_m = np.linalg.norm(board.position_world[:, 0] - (FOOT_WORLD + PLACE_M), axis=-1)
@@ -201,62 +137,24 @@ def _screwed(state: Records, world: World, dt_s: float) -> tuple[Ints, Bools]:
     return driven, np.where(alone, boring, deeds.boring.any(axis=1))
 
 
-def effects(state: Records, config: DrywallConfig) -> Effects:
-    """A screw that is being driven pushes the board; four hold it."""
-    which = np.minimum(state["driven"], len(SCREWS_M) - 1)
-    rows = np.arange(len(state))
-    push_n = np.where(state["boring"], state["push_n"][rows, which], 0.0)
-    aside = state["shear"][rows, which]
-    force = push_n[:, None] * np.stack([aside[:, 0], np.ones(len(rows)), aside[:, 1]], axis=1)
-    x, z = (np.array(SCREWS_M) - np.array(PLACE_M)[[0, 2]]).T
-    arm = np.stack([x[which], np.zeros(len(rows)), z[which]], axis=1)
-    push = np.concatenate([force, np.cross(arm, force)], axis=1)
-    return Effects({"board_fixed": state["driven"] == len(SCREWS_M)}, push[:, None])
+class Drywall(Task[DrywallConfig, Records]):
+    """Press a board against studs and hold it while a worker drives four screws."""
 
-
-def welcome(now: Belief) -> Bools:
-    """(B, W, S) whose hand is near where screws go, while the board is held there."""
-    board = needed(now.objects, "A board")
-    there = board.held[:, 0] & (off_place(board)[0] < THERE_M)
-    line = np.array([(x, WALL_Y_M, z) for x, z in (SCREWS_M[0], SCREWS_M[-1])])
-    lines = np.broadcast_to(FOOT_WORLD + line, (len(there), 2, 3))
-    return partners_arms(now.estimate, BESIDE_M, lines, NEAR_M) & there[:, None, None]
-
-
-def info(state: Records) -> dict[str, Floats]:
-    """What the episode has come to so far, (B,) each; how far off the board was while screws were
-    driven; it is a success if the board is fixed in its place and let go."""
-    begun = (state["driven"] > 0) | state["boring"]
-    return {
-        "task/screws_driven": state["driven"].astype(float),
-        "task/screws_left": len(SCREWS_M) - state["driven"].astype(float),
-        "task/worst_m": np.where(begun, state["worst_m"], np.nan),
-        "task/worst_rad": np.where(begun, state["worst_rad"], np.nan),
-        "is_success": state["done"].astype(float),
-    }
-
-
-TASK = Task(
-    id="HRCDrywall-v0",
-    says="Press a board against studs and hold it while a worker drives four screws.",
-    config=DrywallConfig,
-    init=partial(np.zeros, dtype=DRYWALL),
-    reset=reset,
-    advance=advance,
-    view=lambda state, ids, config: DrywallView(FOOT_WORLD + PLACE_M, state["driven"][ids].copy()),
-    observations=(
+    id = "HRCDrywall-v0"
+    config_type = DrywallConfig
+    observations = (
         ObservationTerm(
-            "place_from_object", lambda of: 3, "m", "world", 3.0, 0.5,
+            "place_from_object", 3, "m", "world", 3.0, 0.5,
             "From the board's middle, as measured, to where it belongs.",
             lambda now: now.task.place_world - needed(now.objects, "A board").position_world[:, 0],
         ),
         ObservationTerm(
-            "screws_driven", lambda of: 1, "-", "-", 4.0, 2.0,
+            "screws_driven", 1, "-", "-", 4.0, 2.0,
             "How many screws are driven; 4: the board is fixed.",
             lambda now: now.task.driven.astype(float),
         ),
-    ),
-    rewards=(
+    )  # fmt: skip
+    rewards = (
         progress(
             "Metres that the board came nearer to its place, 0.3 m for a radian, and the tool to "
             "it until it is held"
@@ -271,29 +169,135 @@ TASK = Task(
             "`task.done_bonus` in the step in which the fixed board is let go.",
             lambda now, step, previous, config: np.multiply(config.done_bonus, step["done"]),
         ),
-    ),
-    info=info,
-    achieved="task/screws_driven",
-    failed="task/screws_left",
-    markers=lambda view: np.broadcast_to(view.place_world, (len(view.driven), 1, 3)),
-    starts="The arm is near home. The board lies on the stack, moved by up to 2 cm and turned by "
-    "up to 0.06 rad. The worker waits out of reach until it is pressed to the studs; without a "
-    "worker screws are driven by themselves.",
-    ends="When four screws hold the board and the cups have let go. A success: while screws were "
-    "driven it was never off its place by 5 mm or half a degree.",
-    max_episode_steps=LONGER["HRCDrywall-v0"],
-    robot="ur10e_cups",
-    grips=True,
-    things=things,
-    spots=spots,
-    poses=lambda state, ids, config: state["pose"][ids][:, None],
-    effects=effects,
-    welcome=welcome,
-    loads=lambda state: (state["pressed_s"] == 0.0)[:, None],  # against the studs it is a wall
-    cue=lambda state: Cue((state["pressed_s"] > 0.0).astype(int), np.full((len(state), 3), np.nan)),
-    over=lambda step: step["done"],
-    defaults={
+    )
+    achieved = "task/screws_driven"
+    failed = "task/screws_left"
+    starts = (
+        "The arm is near home. The board lies on the stack, moved by up to 2 cm and turned by up "
+        "to 0.06 rad. The worker waits out of reach until it is pressed to the studs; without a "
+        "worker screws are driven by themselves."
+    )
+    ends = (
+        "When four screws hold the board and the cups have let go. A success: while screws were "
+        "driven it was never off its place by 5 mm or half a degree."
+    )
+    max_episode_steps = BUILT_IN[id].max_episode_steps
+    robot = "ur10e_cups"
+    needs_gripper = True
+    defaults: ClassVar = {
         "scene": {"sim_dt": 0.004},
         "motion": {"jobs": "drywall", "near_probability": 1.0, "near_radius_m": (1.7, 2.1)},
-    },
-)  # fmt: skip
+    }
+
+    def make_state(self, batch: int) -> Records:
+        return np.zeros(batch, DRYWALL)
+
+    def make_things(self) -> Things:
+        """Stack, board, studs, and where the worker stands who drives the screws."""
+        place = Workplace("board", "task", BESIDE_M, 0.75 * np.pi, SCREWS_M[0][1])
+        return Things(
+            Path(assets_dir() / "tasks" / "drywall.xml").read_text(),
+            (
+                Weld("cups_board", ("task/board_cups", "robot/tool_point")),
+                Weld("board_fixed", ("task/board_middle", "task/place")),
+            ),
+            (place,),
+        )
+
+    def reach_targets(self) -> list[ReachTarget]:
+        """Where the cups are when the board is in its place."""
+        front = R_PLACE @ [*CUPS_M, BOARD_M[2] / 2]
+        return [ReachTarget("the board's place", FOOT_WORLD + PLACE_M + front, (0.0, 1.0, 0.0))]
+
+    def reset(self, state: Records, ids: Ints, rngs: Rngs, world: World) -> None:
+        """Lay the board of environments `ids` onto the stack anew."""
+        state[ids] = np.zeros((), DRYWALL)
+        low, high = self.config.push_n
+        for b in ids.tolist():
+            n, draws = len(SCREWS_M), rngs[b].random(3)
+            off = MOVED_M * (2.0 * draws[:2] - 1.0)
+            half = 0.5 * (np.pi + TURNED_RAD * (2.0 * draws[2] - 1.0))
+            at = FOOT_WORLD + STACK_M + [*off, 0.0]
+            state["pose"][b] = (*at, np.cos(half), 0.0, 0.0, np.sin(half))
+            state["push_n"][b] = low + (high - low) * rngs[b].random(n)
+            way = 2.0 * np.pi * rngs[b].random(n)
+            state["shear"][b] = SHEAR * np.stack([np.cos(way), np.sin(way)], axis=1)
+        poses_ = state["pose"][ids]
+        state["left_m"][ids] = _left_m(
+            poses_[:, :3], matrix(poses_[:, 3:]), world.robot.tool_world, np.zeros(len(ids), bool)
+        )
+
+    def object_poses(self, state: Records, ids: Ints) -> Floats:
+        return state["pose"][ids][:, None]
+
+    def advance(self, state: Records, rngs: Rngs, world: World, dt_s: float) -> Records:
+        """Judge where the board is and what was screwed; (B,) of `DRYWALL_STEP`."""
+        board, step = needed(world.objects, "A board"), np.zeros(len(state), DRYWALL_STEP)
+        off_m, off_rad = off_place(board)
+        fine = (off_m < self.config.tolerance_m) & (off_rad < self.config.tolerance_rad)
+        pressed = fine & (board.held[:, 0] | (state["driven"] == len(SCREWS_M)))
+        state["pressed_s"] = np.where(pressed, state["pressed_s"] + dt_s, 0.0)
+        driven, boring = _screwed(state, world, dt_s)
+        step["driven"] = driven - state["driven"]
+        state["driven"], state["boring"] = driven, boring
+        state["worst_m"] = np.where(boring, np.maximum(state["worst_m"], off_m), state["worst_m"])
+        state["worst_rad"] = np.where(
+            boring, np.maximum(state["worst_rad"], off_rad), state["worst_rad"]
+        )
+        state["spoilt"] |= boring & ~fine
+        done = (driven == len(SCREWS_M)) & ~board.held[:, 0] & fine & ~state["spoilt"]
+        step["done"] = done & ~state["done"]
+        state["done"] |= done
+        at, R = board.position_world[:, 0], matrix(board.quaternion_wxyz[:, 0])
+        left_m = _left_m(at, R, world.robot.tool_world, board.held[:, 0] | (driven > 0))
+        step["progress_m"], state["left_m"] = state["left_m"] - left_m, left_m
+        return step
+
+    def effects(self, state: Records) -> Effects:
+        """A screw that is being driven pushes the board; four hold it."""
+        which = np.minimum(state["driven"], len(SCREWS_M) - 1)
+        rows = np.arange(len(state))
+        push_n = np.where(state["boring"], state["push_n"][rows, which], 0.0)
+        aside = state["shear"][rows, which]
+        force = push_n[:, None] * np.stack([aside[:, 0], np.ones(len(rows)), aside[:, 1]], axis=1)
+        x, z = (np.array(SCREWS_M) - np.array(PLACE_M)[[0, 2]]).T
+        arm = np.stack([x[which], np.zeros(len(rows)), z[which]], axis=1)
+        push = np.concatenate([force, np.cross(arm, force)], axis=1)
+        return Effects({"board_fixed": state["driven"] == len(SCREWS_M)}, push[:, None])
+
+    def signal(self, state: Records) -> Cue:
+        return Cue((state["pressed_s"] > 0.0).astype(int), np.full((len(state), 3), np.nan))
+
+    def is_load(self, state: Records) -> Bools:
+        return (state["pressed_s"] == 0.0)[:, None]
+
+    def allowed_contact(self, belief: Belief) -> Bools:
+        """Return the arms whose hands are near the screws while the board is held there."""
+        board = needed(belief.objects, "A board")
+        there = board.held[:, 0] & (off_place(board)[0] < THERE_M)
+        line = np.array([(x, WALL_Y_M, z) for x, z in (SCREWS_M[0], SCREWS_M[-1])])
+        lines = np.broadcast_to(FOOT_WORLD + line, (len(there), 2, 3))
+        return partners_arms(belief.estimate, BESIDE_M, lines, NEAR_M) & there[:, None, None]
+
+    def is_terminal(self, step: Records) -> Bools:
+        return step["done"]
+
+    def view(self, state: Records, ids: Ints) -> DrywallView:
+        return DrywallView(FOOT_WORLD + PLACE_M, state["driven"][ids].copy())
+
+    def info(self, state: Records) -> dict[str, Floats]:
+        """Return counts of screws and how far off the board was while they were driven, (B,) each.
+
+        It is a success if the board is fixed in its place and let go.
+        """
+        begun = (state["driven"] > 0) | state["boring"]
+        return {
+            "task/screws_driven": state["driven"].astype(float),
+            "task/screws_left": len(SCREWS_M) - state["driven"].astype(float),
+            "task/worst_m": np.where(begun, state["worst_m"], np.nan),
+            "task/worst_rad": np.where(begun, state["worst_rad"], np.nan),
+            "is_success": state["done"].astype(float),
+        }
+
+    def markers(self, view: DrywallView) -> Points3:
+        return np.broadcast_to(view.place_world, (len(view.driven), 1, 3))

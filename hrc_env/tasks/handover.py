@@ -1,8 +1,8 @@
 """Handover: the robot brings a tool to a worker, who comes, puts out a hand and takes it."""
 
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
@@ -10,14 +10,14 @@ from hrc_env.belief import Belief
 from hrc_env.core.errors import check_fields, needed
 from hrc_env.core.records import Cue, Deeds, Effects, ObjectState, Workplace, World
 from hrc_env.core.things import FOOT_WORLD, Things
-from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records
+from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records, Rngs
 from hrc_env.geometry.rotations import matrix
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm, check_kind, progress
-from hrc_env.tasks import LONGER
+from hrc_env.tasks import BUILT_IN
 from hrc_env.tasks.partner import partners_arms
-from hrc_env.tasks.spot import Spot
-from hrc_env.tasks.task import Rngs, Task
+from hrc_env.tasks.reach_target import ReachTarget
+from hrc_env.tasks.task import Task
 from hrc_env.worker.body import assets_dir
 
 BAR_M, BAR_KG = (0.03, 0.03, 0.40), 0.9
@@ -99,52 +99,6 @@ class HandoverView:
     """(B,) whether the worker has the tool, which the robot feels."""
 
 
-def things(config: HandoverConfig) -> Things:
-    """Stand and tool, and where the worker stands."""
-    place = Workplace("meeting", "task", BESIDE_M, np.pi, HAND_UP_M)
-    mjcf = Path(assets_dir() / "tasks" / "handover.xml").read_text()
-    return Things(mjcf, (), (place,))
-
-
-def reset(state: Records, ids: Ints, rngs: Rngs, world: World, config: HandoverConfig) -> None:
-    """Stand the tool of environments `ids` up anew."""
-    state[ids] = np.zeros((), HANDOVER)
-    for b in ids.tolist():
-        half = 0.5 * 0.05 * (2.0 * rngs[b].random() - 1.0)
-        at = FOOT_WORLD + STAND_M + [0.0, 0.0, BAR_M[2] / 2]
-        state["pose"][b] = (*at, np.cos(half), 0.0, 0.0, np.sin(half))
-    at = state["pose"][ids, :3]
-    handle = at + np.array([0.0, 0.0, HANDLE_UP_M])
-    state["handle_world"][ids] = handle
-    none = np.zeros(len(ids), bool)
-    state["left_m"][ids] = _left_m(at, handle, world.robot.tool_world, none, none)
-
-
-def advance(
-    state: Records, rngs: Rngs, world: World, dt_s: float, config: HandoverConfig
-) -> Records:
-    """Judge where tool and hand are, and let the hand close; (B,) of `HANDOVER_STEP`."""
-    tool, step = needed(world.objects, "A tool"), np.zeros(len(state), HANDOVER_STEP)
-    held, at = tool.held[:, 0], tool.position_world[:, 0]
-    handle, speed = _handle(tool)
-    state["handle_world"] = handle
-    state["lifted"] = held & (at[:, 2] > STAND_UP_M + LIFTED_M)
-    before = state["taken"].copy()
-    _close(state, needed(world.deeds, "What workers do"), handle, speed, dt_s)
-    _pull(state, needed(world.deeds, "What workers do"), tool, handle, speed, dt_s)
-    away_m = _fingers_away_m(world.robot.tool_world, at)
-    away = state["taken"] & ~held & (away_m > APART_M)
-    state["away_s"] = np.where(away, state["away_s"] + dt_s, 0.0)
-    state["dropped"] |= at[:, 2] < STAND_UP_M - 0.3
-    gentle = state["largest_n"] <= config.gentle_n
-    done = (state["away_s"] >= APART_S) & ~state["dropped"] & gentle
-    step["taken"], step["done"] = state["taken"] & ~before, done & ~state["done"]
-    state["done"] |= done
-    left_m = _left_m(at, handle, world.robot.tool_world, held, state["taken"])
-    step["progress_m"], state["left_m"] = state["left_m"] - left_m, left_m
-    return step
-
-
 def _handle(tool: ObjectState) -> tuple[Points3, Floats]:
     """(B, 3) where the handle is [m] and how fast [m/s]."""
     R, up = matrix(tool.quaternion_wxyz[:, 0]), np.array([0.0, 0.0, HANDLE_UP_M])
@@ -205,55 +159,24 @@ def _fingers_away_m(tool_world: Points3, at: Points3) -> Floats:
     return np.linalg.norm(at + np.array([0.0, 0.0, GRIP_UP_M]) - tool_world, axis=-1)
 
 
-def cue(state: Records) -> Cue:
-    """The worker comes when the tool is lifted, and goes on when it is theirs."""
-    stage = np.where(state["taken"], 2, np.where(state["lifted"], 1, 0))
-    return Cue(stage, np.where(state["lifted"][:, None], state["handle_world"], np.nan))
+class Handover(Task[HandoverConfig, Records]):
+    """Bring a tool to a worker, who puts out a hand and takes it; be gentle."""
 
-
-def welcome(now: Belief) -> Bools:
-    """(B, W, S) whose hand is near the handle, while the fingers are at the tool off its stand."""
-    tool = needed(now.objects, "A tool")
-    at, handle = tool.position_world[:, 0], _handle(tool)[0]
-    away_m = _fingers_away_m(now.robot.tool_world, at)
-    brought = (away_m < APART_M) & (at[:, 2] > STAND_UP_M + LIFTED_M)
-    ends = np.stack([handle, handle], axis=1)
-    return partners_arms(now.estimate, BESIDE_M, ends, NEAR_M) & brought[:, None, None]
-
-
-def info(state: Records) -> dict[str, Floats]:
-    """What the episode has come to so far, (B,) each; it is a success if the worker has the tool,
-    the robot has let go and gone, and the hand never felt more than is gentle."""
-    return {
-        "task/handed_over": state["done"].astype(float),
-        "task/not_handed_over": 1.0 - state["done"],
-        "task/dropped": state["dropped"].astype(float),
-        "task/largest_n": np.where(state["taken"], state["largest_n"], np.nan),
-        "is_success": state["done"].astype(float),
-    }
-
-
-TASK = Task(
-    id="HRCHandover-v0",
-    says="Bring a tool to a worker, who puts out a hand and takes it; be gentle.",
-    config=HandoverConfig,
-    init=partial(np.zeros, dtype=HANDOVER),
-    reset=reset,
-    advance=advance,
-    view=lambda state, ids, config: HandoverView(FOOT_WORLD + MEET_M, state["taken"][ids].copy()),
-    observations=(
+    id = "HRCHandover-v0"
+    config_type = HandoverConfig
+    observations = (
         ObservationTerm(
-            "meeting_from_tool", lambda of: 3, "m", "world", 3.0, 0.5,
+            "meeting_from_tool", 3, "m", "world", 3.0, 0.5,
             "From the tool point to about where a hand is put out.",
             lambda now: now.task.meet_world - now.robot.tool_world,
         ),
         ObservationTerm(
-            "object_taken", lambda of: 1, "-", "-", 1.0, 1.0,
+            "object_taken", 1, "-", "-", 1.0, 1.0,
             "1 when the worker has the tool.",
             lambda now: now.task.taken.astype(float),
         ),
-    ),
-    rewards=(
+    )  # fmt: skip
+    rewards = (
         progress(
             "Metres that the fingers came nearer to the tool, and its handle to about where a "
             "hand is put out"
@@ -268,28 +191,114 @@ TASK = Task(
             "`task.done_bonus` in the step in which it is handed over.",
             lambda now, step, previous, config: np.multiply(config.done_bonus, step["done"]),
         ),
-    ),
-    info=info,
-    achieved="task/handed_over",
-    failed="task/not_handed_over",
-    markers=lambda view: np.broadcast_to(view.meet_world, (len(view.taken), 1, 3)),
-    starts="The arm is near home, the fingers open. The tool stands upright in its stand. The "
-    "worker waits out of reach, and comes when the robot has lifted it.",
-    ends="When the worker has the tool, and the robot has let go and left it: that is the success, "
-    "if the hand never felt more than `task.gentle_n`.",
-    max_episode_steps=LONGER["HRCHandover-v0"],
-    robot="ur10e_gripper",
-    grips=True,
-    things=things,
-    spots=lambda config: [Spot("the place to meet", FOOT_WORLD + MEET_M)],
-    poses=lambda state, ids, config: state["pose"][ids][:, None],
-    effects=lambda state, config: Effects({}, state["push"][:, None].copy()),
-    cue=cue,
-    welcome=welcome,
-    loads=lambda state: ~(state["offered"] | state["taken"])[:, None],
-    over=lambda step: step["done"],
-    defaults={
+    )
+    achieved = "task/handed_over"
+    failed = "task/not_handed_over"
+    starts = (
+        "The arm is near home, the fingers open. The tool stands upright in its stand. The worker"
+        " waits out of reach, and comes when the robot has lifted it."
+    )
+    ends = (
+        "When the worker has the tool, and the robot has let go and left it: that is the success,"
+        " if the hand never felt more than `task.gentle_n`."
+    )
+    max_episode_steps = BUILT_IN[id].max_episode_steps
+    robot = "ur10e_gripper"
+    needs_gripper = True
+    defaults: ClassVar = {
         "scene": {"sim_dt": 0.004},
         "motion": {"jobs": "handover", "near_probability": 1.0, "near_radius_m": (1.7, 2.1)},
-    },
-)  # fmt: skip
+    }
+
+    def make_state(self, batch: int) -> Records:
+        return np.zeros(batch, HANDOVER)
+
+    def make_things(self) -> Things:
+        """Stand and tool, and where the worker stands."""
+        place = Workplace("meeting", "task", BESIDE_M, np.pi, HAND_UP_M)
+        mjcf = Path(assets_dir() / "tasks" / "handover.xml").read_text()
+        return Things(mjcf, (), (place,))
+
+    def reach_targets(self) -> list[ReachTarget]:
+        return [ReachTarget("the place to meet", FOOT_WORLD + MEET_M)]
+
+    def reset(self, state: Records, ids: Ints, rngs: Rngs, world: World) -> None:
+        """Stand the tool of environments `ids` up anew."""
+        state[ids] = np.zeros((), HANDOVER)
+        for b in ids.tolist():
+            half = 0.5 * 0.05 * (2.0 * rngs[b].random() - 1.0)
+            at = FOOT_WORLD + STAND_M + [0.0, 0.0, BAR_M[2] / 2]
+            state["pose"][b] = (*at, np.cos(half), 0.0, 0.0, np.sin(half))
+        at = state["pose"][ids, :3]
+        handle = at + np.array([0.0, 0.0, HANDLE_UP_M])
+        state["handle_world"][ids] = handle
+        none = np.zeros(len(ids), bool)
+        state["left_m"][ids] = _left_m(at, handle, world.robot.tool_world, none, none)
+
+    def object_poses(self, state: Records, ids: Ints) -> Floats:
+        return state["pose"][ids][:, None]
+
+    def advance(self, state: Records, rngs: Rngs, world: World, dt_s: float) -> Records:
+        """Judge where tool and hand are, and let the hand close; (B,) of `HANDOVER_STEP`."""
+        tool, step = needed(world.objects, "A tool"), np.zeros(len(state), HANDOVER_STEP)
+        held, at = tool.held[:, 0], tool.position_world[:, 0]
+        handle, speed = _handle(tool)
+        state["handle_world"] = handle
+        state["lifted"] = held & (at[:, 2] > STAND_UP_M + LIFTED_M)
+        before = state["taken"].copy()
+        _close(state, needed(world.deeds, "What workers do"), handle, speed, dt_s)
+        _pull(state, needed(world.deeds, "What workers do"), tool, handle, speed, dt_s)
+        away_m = _fingers_away_m(world.robot.tool_world, at)
+        away = state["taken"] & ~held & (away_m > APART_M)
+        state["away_s"] = np.where(away, state["away_s"] + dt_s, 0.0)
+        state["dropped"] |= at[:, 2] < STAND_UP_M - 0.3
+        gentle = state["largest_n"] <= self.config.gentle_n
+        done = (state["away_s"] >= APART_S) & ~state["dropped"] & gentle
+        step["taken"], step["done"] = state["taken"] & ~before, done & ~state["done"]
+        state["done"] |= done
+        left_m = _left_m(at, handle, world.robot.tool_world, held, state["taken"])
+        step["progress_m"], state["left_m"] = state["left_m"] - left_m, left_m
+        return step
+
+    def effects(self, state: Records) -> Effects:
+        return Effects({}, state["push"][:, None].copy())
+
+    def signal(self, state: Records) -> Cue:
+        """The worker comes when the tool is lifted, and goes on when it is theirs."""
+        stage = np.where(state["taken"], 2, np.where(state["lifted"], 1, 0))
+        return Cue(stage, np.where(state["lifted"][:, None], state["handle_world"], np.nan))
+
+    def is_load(self, state: Records) -> Bools:
+        return ~(state["offered"] | state["taken"])[:, None]
+
+    def allowed_contact(self, belief: Belief) -> Bools:
+        """Return the arms whose hands are near the handle while the robot brings the tool."""
+        tool = needed(belief.objects, "A tool")
+        at, handle = tool.position_world[:, 0], _handle(tool)[0]
+        away_m = _fingers_away_m(belief.robot.tool_world, at)
+        brought = (away_m < APART_M) & (at[:, 2] > STAND_UP_M + LIFTED_M)
+        ends = np.stack([handle, handle], axis=1)
+        return partners_arms(belief.estimate, BESIDE_M, ends, NEAR_M) & brought[:, None, None]
+
+    def is_terminal(self, step: Records) -> Bools:
+        return step["done"]
+
+    def view(self, state: Records, ids: Ints) -> HandoverView:
+        return HandoverView(FOOT_WORLD + MEET_M, state["taken"][ids].copy())
+
+    def info(self, state: Records) -> dict[str, Floats]:
+        """Return whether the tool was handed over or dropped and the largest force, (B,) each.
+
+        It is a success if the worker has the tool, the robot has let go and left, and the force on
+        the hand never exceeded `gentle_n`.
+        """
+        return {
+            "task/handed_over": state["done"].astype(float),
+            "task/not_handed_over": 1.0 - state["done"],
+            "task/dropped": state["dropped"].astype(float),
+            "task/largest_n": np.where(state["taken"], state["largest_n"], np.nan),
+            "is_success": state["done"].astype(float),
+        }
+
+    def markers(self, view: HandoverView) -> Points3:
+        return np.broadcast_to(view.meet_world, (len(view.taken), 1, 3))

@@ -1,21 +1,21 @@
 """Picking and placing: pieces of studs lie on a table, and belong into a rack on the other side."""
 
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
 from hrc_env.core.errors import check_fields, needed
 from hrc_env.core.records import ObjectState, Workplace, World
 from hrc_env.core.things import FOOT_WORLD, Things
-from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records
+from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records, Rngs
 from hrc_env.geometry.rotations import matrix
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm, check_kind, progress
-from hrc_env.tasks import LONGER
-from hrc_env.tasks.spot import Spot
-from hrc_env.tasks.task import Rngs, Task
+from hrc_env.tasks import BUILT_IN
+from hrc_env.tasks.reach_target import ReachTarget
+from hrc_env.tasks.task import Task
 from hrc_env.worker.body import assets_dir
 
 STUDS = 3
@@ -93,51 +93,6 @@ def places_world() -> Points3:
     return FOOT_WORLD + np.array(PLACES_M)
 
 
-def things(config: PlacedConfig) -> Things:
-    """Table, rack and pieces, and where the worker takes from the same table."""
-    mjcf = Path(assets_dir() / "tasks" / "pick_place.xml").read_text()
-    return Things(mjcf, (), (STACK, TRESTLE))
-
-
-def spots(config: PlacedConfig) -> list[Spot]:
-    """Where pieces go; they are gripped from above."""
-    down = (0.0, 0.0, -1.0)
-    return [Spot(f"the place of piece {k + 1}", at, down) for k, at in enumerate(places_world())]
-
-
-def reset(state: Records, ids: Ints, rngs: Rngs, world: World, config: PlacedConfig) -> None:
-    """Lay the pieces of environments `ids` out anew."""
-    state[ids] = np.zeros((), PICK_PLACE)
-    x, y = ROW_AT_M
-    for b in ids.tolist():
-        draws = 2.0 * rngs[b].random((STUDS, 3)) - 1.0
-        at = np.zeros((STUDS, 7))
-        at[:, 0] = x + ROW_M * (np.arange(STUDS) - 1)
-        at[:, 1] = y + ASIDE_M * draws[:, 1]
-        at[:, 2] = SURFACE_M + STUD_M[2] / 2
-        at[:, :3] += FOOT_WORLD
-        half = 0.5 * TURN_RAD * draws[:, 2]
-        at[:, 3], at[:, 6] = np.cos(half), np.sin(half)
-        state["poses"][b] = at
-    studs, none = state["poses"][ids, :, :3], np.zeros((len(ids), STUDS), bool)
-    state["left_m"][ids] = _left_m(studs, world.robot.tool_world, none)
-
-
-def advance(state: Records, rngs: Rngs, world: World, dt_s: float, config: PlacedConfig) -> Records:
-    """Judge where the pieces are; (B,) of `PICK_PLACE_STEP`."""
-    objects = needed(world.objects, "A loose object")
-    step = np.zeros(len(state), PICK_PLACE_STEP)
-    placed = in_place(objects, config)
-    left_m = _left_m(objects.position_world, world.robot.tool_world, placed)
-    step["progress_m"], state["left_m"] = state["left_m"] - left_m, left_m
-    step["placed"] = placed.sum(1) - state["placed"].sum(1)
-    step["done"] = placed.all(1)
-    state["placed"] = placed
-    lowest_m = FOOT_WORLD[2] + SURFACE_M
-    state["dropped"] |= (objects.position_world[..., 2] < lowest_m).any(1)
-    return step
-
-
 def in_place(objects: ObjectState, config: PlacedConfig) -> Bools:
     """(B, 3) which pieces rest in their places, let go."""
     off_m = np.linalg.norm(objects.position_world - places_world(), axis=-1)
@@ -158,39 +113,26 @@ def _left_m(studs_world: Points3, tool_world: Points3, placed: Bools) -> Floats:
     return np.where(placed, 0.0, away_m).sum(1) + reach_m
 
 
-def info(state: Records) -> dict[str, Floats]:
-    """What the episode has come to so far, (B,) each; it is a success if every piece is placed."""
-    placed = state["placed"].sum(1).astype(float)
-    return {
-        "task/studs_placed": placed,
-        "task/studs_left": STUDS - placed,
-        "task/dropped": state["dropped"].astype(float),
-        "is_success": (placed == STUDS).astype(float),
-    }
+class PickPlace(Task[PlacedConfig, Records]):
+    """Take pieces of studs from a table and lay them into a rack, while a worker takes from the
+    same table.
+    """
 
-
-TASK = Task(
-    id="HRCPickPlace-v0",
-    says="Take pieces of studs from a table and lay them into a rack, while a worker takes from "
-    "the same table.",
-    config=PickPlaceConfig,
-    init=partial(np.zeros, dtype=PICK_PLACE),
-    reset=reset,
-    advance=advance,
-    view=lambda state, ids, config: PickPlaceView(state["placed"][ids].copy(), places_world()),
-    observations=(
+    id = "HRCPickPlace-v0"
+    config_type = PickPlaceConfig
+    observations = (
         ObservationTerm(
-            "place_from_object", lambda of: 3 * STUDS, "m", "world", 3.0, 0.5,
+            "place_from_object", 3 * STUDS, "m", "world", 3.0, 0.5,
             "From each piece, as measured, to its place.",
             lambda now: now.task.places_world - needed(now.objects, "An object").position_world,
         ),
         ObservationTerm(
-            "object_placed", lambda of: STUDS, "-", "-", 1.0, 1.0,
+            "object_placed", STUDS, "-", "-", 1.0, 1.0,
             "1 for a piece that rests in its place, let go.",
             lambda now: now.task.placed.astype(float),
         ),
-    ),
-    rewards=(
+    )  # fmt: skip
+    rewards = (
         progress(
             "Metres that pieces came nearer to their places, and the tool to the first that is "
             "not placed"
@@ -200,24 +142,88 @@ TASK = Task(
             "`task.placed_bonus` for each piece that is placed in this step, less those that left.",
             lambda now, step, previous, config: config.placed_bonus * step["placed"],
         ),
-    ),
-    info=info,
-    achieved="task/studs_placed",
-    failed="task/studs_left",
-    markers=lambda view: np.broadcast_to(view.places_world, (len(view.placed), STUDS, 3)),
-    starts="The arm is near home, the fingers open. Three pieces stand on edge on the table, each "
-    "moved by up to 2 cm and turned by up to 0.2 rad; four more lie beside them, of which the "
-    "worker takes one after the other away.",
-    ends="When all three pieces rest in their places, let go: that is the success.",
-    max_episode_steps=LONGER["HRCPickPlace-v0"],
-    robot="ur10e_gripper",
-    grips=True,
-    things=things,
-    spots=spots,
-    poses=lambda state, ids, config: state["poses"][ids],
-    over=lambda step: step["done"],
-    defaults={
+    )
+    achieved = "task/studs_placed"
+    failed = "task/studs_left"
+    starts = (
+        "The arm is near home, the fingers open. Three pieces stand on edge on the table, each "
+        "moved by up to 2 cm and turned by up to 0.2 rad; four more lie beside them, of which the"
+        " worker takes one after the other away."
+    )
+    ends = "When all three pieces rest in their places, let go: that is the success."
+    max_episode_steps = BUILT_IN[id].max_episode_steps
+    robot = "ur10e_gripper"
+    needs_gripper = True
+    defaults: ClassVar = {
         "scene": {"sim_dt": 0.004},
         "motion": {"jobs": "stack", "near_probability": 0.2, "near_radius_m": (1.7, 2.1)},
-    },
-)  # fmt: skip
+    }
+
+    def make_state(self, batch: int) -> Records:
+        return np.zeros(batch, PICK_PLACE)
+
+    def make_things(self) -> Things:
+        """Table, rack and pieces, and where the worker takes from the same table."""
+        mjcf = Path(assets_dir() / "tasks" / "pick_place.xml").read_text()
+        return Things(mjcf, (), (STACK, TRESTLE))
+
+    def reach_targets(self) -> list[ReachTarget]:
+        """Where pieces go; they are gripped from above."""
+        down = (0.0, 0.0, -1.0)
+        return [
+            ReachTarget(f"the place of piece {k + 1}", at, down)
+            for k, at in enumerate(places_world())
+        ]
+
+    def reset(self, state: Records, ids: Ints, rngs: Rngs, world: World) -> None:
+        """Lay the pieces of environments `ids` out anew."""
+        state[ids] = np.zeros((), PICK_PLACE)
+        x, y = ROW_AT_M
+        for b in ids.tolist():
+            draws = 2.0 * rngs[b].random((STUDS, 3)) - 1.0
+            at = np.zeros((STUDS, 7))
+            at[:, 0] = x + ROW_M * (np.arange(STUDS) - 1)
+            at[:, 1] = y + ASIDE_M * draws[:, 1]
+            at[:, 2] = SURFACE_M + STUD_M[2] / 2
+            at[:, :3] += FOOT_WORLD
+            half = 0.5 * TURN_RAD * draws[:, 2]
+            at[:, 3], at[:, 6] = np.cos(half), np.sin(half)
+            state["poses"][b] = at
+        studs, none = state["poses"][ids, :, :3], np.zeros((len(ids), STUDS), bool)
+        state["left_m"][ids] = _left_m(studs, world.robot.tool_world, none)
+
+    def object_poses(self, state: Records, ids: Ints) -> Floats:
+        return state["poses"][ids]
+
+    def advance(self, state: Records, rngs: Rngs, world: World, dt_s: float) -> Records:
+        """Judge where the pieces are; (B,) of `PICK_PLACE_STEP`."""
+        objects = needed(world.objects, "A loose object")
+        step = np.zeros(len(state), PICK_PLACE_STEP)
+        placed = in_place(objects, self.config)
+        left_m = _left_m(objects.position_world, world.robot.tool_world, placed)
+        step["progress_m"], state["left_m"] = state["left_m"] - left_m, left_m
+        step["placed"] = placed.sum(1) - state["placed"].sum(1)
+        step["done"] = placed.all(1)
+        state["placed"] = placed
+        lowest_m = FOOT_WORLD[2] + SURFACE_M
+        state["dropped"] |= (objects.position_world[..., 2] < lowest_m).any(1)
+        return step
+
+    def is_terminal(self, step: Records) -> Bools | bool:
+        return step["done"]
+
+    def view(self, state: Records, ids: Ints) -> PickPlaceView:
+        return PickPlaceView(state["placed"][ids].copy(), places_world())
+
+    def info(self, state: Records) -> dict[str, Floats]:
+        """Return how many pieces are placed and left, (B,) each; all placed is a success."""
+        placed = state["placed"].sum(1).astype(float)
+        return {
+            "task/studs_placed": placed,
+            "task/studs_left": STUDS - placed,
+            "task/dropped": state["dropped"].astype(float),
+            "is_success": (placed == STUDS).astype(float),
+        }
+
+    def markers(self, view: PickPlaceView) -> Points3:
+        return np.broadcast_to(view.places_world, (len(view.placed), STUDS, 3))

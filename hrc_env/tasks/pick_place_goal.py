@@ -1,16 +1,15 @@
 """Picking and placing with goals apart from the observation: the form that HER learns from."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from hrc_env.belief import Belief
 from hrc_env.core.errors import ConfigError, check_fields, needed
 from hrc_env.core.typing import Floats
-from hrc_env.tasks import LONGER
+from hrc_env.tasks import BUILT_IN
 from hrc_env.tasks.goal import Goal
-from hrc_env.tasks.pick_place import STUDS, PlacedConfig
-from hrc_env.tasks.pick_place import TASK as PICK_PLACE
+from hrc_env.tasks.pick_place import STUDS, PickPlace, PlacedConfig
 from hrc_env.tasks.task import Task
 
 EACH, ALL = "each", "all"
@@ -51,18 +50,18 @@ def _places(now: Belief) -> Floats:
     return np.broadcast_to(now.task.places_world.ravel(), (len(now.action), 3 * STUDS))
 
 
-TASK: Task = replace(
-    PICK_PLACE,
-    id="HRCPickPlaceGoal-v0",
-    says="Bring pieces of studs from a table to where they are asked for, while a worker takes "
-    "from the same table.",
-    config=PickPlaceGoalConfig,
-    observations=(),
-    rewards=(),
-    ends="Not before the time is up. A success: all pieces rest in their places now.",
-    max_episode_steps=LONGER["HRCPickPlaceGoal-v0"],
-    over=None,
-    goal=Goal(
+class PickPlaceGoal(PickPlace):
+    """Bring pieces of studs from a table to where they are asked for, while a worker takes from
+    the same table.
+    """
+
+    id = "HRCPickPlaceGoal-v0"
+    config_type = PickPlaceGoalConfig
+    observations = ()
+    rewards = ()
+    ends = "Not before the time is up. A success: all pieces rest in their places now."
+    max_episode_steps = BUILT_IN[id].max_episode_steps
+    goal = Goal(
         size=3 * STUDS,
         bound=4.0,
         achieved=_measured,
@@ -71,5 +70,5 @@ TASK: Task = replace(
         doc="Minus the share of pieces that are not within `task.goal_m` of their places, as "
         'measured; -1 or 0 with `task.reward` "all". A success also asks whether they are let '
         "go and at rest.",
-    ),
-)
+    )
+    is_terminal = Task.is_terminal

@@ -2,17 +2,17 @@
 
 import math
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
 from hrc_env.core.errors import ConfigError, check_fields
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Floats, Ints, Points3, Records
+from hrc_env.core.records import World
+from hrc_env.core.typing import Floats, Ints, Points3, Records, Rngs
 from hrc_env.observations import ObservationTerm, directions
 from hrc_env.rewards import RewardTerm
-from hrc_env.tasks.spot import Spot
-from hrc_env.tasks.task import Rngs, Task, World
+from hrc_env.tasks.reach_target import ReachTarget
+from hrc_env.tasks.task import Task
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,40 +87,6 @@ class ReachView:
     """(B,) until the goal is missed."""
 
 
-def spots(config: TargetConfig) -> list[Spot]:
-    """Where the nearest goals are."""
-    (x, y), near_m = config.base_xy_world, config.distance_m[0]
-    (left, right), (low_m, high_m) = config.azimuth_rad, config.height_m
-    x, y = x + near_m * math.cos((left + right) / 2), y + near_m * math.sin((left + right) / 2)
-    return [Spot("the nearest goal", (x, y, (low_m + high_m) / 2), within_m=(high_m - low_m) / 2)]
-
-
-def reset(state: Records, ids: Ints, rngs: Rngs, world: World, config: ReachConfig) -> None:
-    """Start environments `ids` anew with a first goal each."""
-    state["n_reached"][ids] = state["n_missed"][ids] = 0
-    _new_goals(state, ids, rngs, world.robot.tool_world, config)
-
-
-def advance(state: Records, rngs: Rngs, world: World, dt_s: float, config: ReachConfig) -> Records:
-    """Judge the tool's new place and replace goals that are done; (B,) of `REACH_STEP`."""
-    tool_world, step = world.robot.tool_world, np.zeros(len(state), REACH_STEP)
-    if _judge(tool_world, dt_s, config.radius_m, config.time_limit_s, state, step):
-        done = np.flatnonzero(step["reached"] | step["missed"])
-        _new_goals(state, done, rngs, tool_world[done], config)
-    return step
-
-
-def info(state: Records) -> dict[str, Floats]:
-    """What the episode has come to so far, (B,) each; it is a success if every goal, and at least
-    one, was reached in time."""
-    succeeded = (state["n_reached"] > 0) & (state["n_missed"] == 0)
-    return {
-        "task/goals_reached": state["n_reached"].astype(float),
-        "task/goals_missed": state["n_missed"].astype(float),
-        "is_success": succeeded.astype(float),
-    }
-
-
 @kernel
 def _judge(tool_world, dt_s, radius_m, time_limit_s, state, step):
     """Move the state on and write what it brought; whether any goal is done."""
@@ -152,6 +118,15 @@ def _new_goals(
         state["distance_m"][b] = math.dist(goal, tool)
 
 
+def nearest_targets(config: TargetConfig) -> list[ReachTarget]:
+    """Return the places of the nearest goals."""
+    (x, y), near_m = config.base_xy_world, config.distance_m[0]
+    (left, right), (low_m, high_m) = config.azimuth_rad, config.height_m
+    x, y = x + near_m * math.cos((left + right) / 2), y + near_m * math.sin((left + right) / 2)
+    at, within_m = (x, y, (low_m + high_m) / 2), (high_m - low_m) / 2
+    return [ReachTarget("the nearest goal", at, within_m=within_m)]
+
+
 def drawn_goal(rng: np.random.Generator, config: TargetConfig) -> tuple[float, float, float]:
     """A place for the tool [m]."""
     x, y = config.base_xy_world
@@ -163,35 +138,29 @@ def drawn_goal(rng: np.random.Generator, config: TargetConfig) -> tuple[float, f
     return x + distance_m * math.cos(azimuth_rad), y + distance_m * math.sin(azimuth_rad), z
 
 
-TASK = Task(
-    id="HRCReach-v0",
-    says="Touch goals one after another with the tool, in a volume shared with a worker.",
-    config=ReachConfig,
-    init=partial(np.zeros, dtype=REACH),
-    reset=reset,
-    advance=advance,
-    view=lambda state, ids, config: ReachView(
-        state["goal_world"][ids], config.time_limit_s - state["goal_age_s"][ids]
-    ),
-    spots=spots,
-    observations=(
+class Reach(Task[ReachConfig, Records]):
+    """Touch goals one after another with the tool, in a volume shared with a worker."""
+
+    id = "HRCReach-v0"
+    config_type = ReachConfig
+    observations = (
         ObservationTerm(
-            "goal_from_tool", lambda of: 3, "m", "world", 3.0, 0.5,
+            "goal_from_tool", 3, "m", "world", 3.0, 0.5,
             "From the tool point to the goal.",
             lambda now: now.task.goal_world - now.robot.tool_world,
         ),
         ObservationTerm(
-            "goal_direction", lambda of: 3, "-", "world", 1.0, 1.0,
+            "goal_direction", 3, "-", "world", 1.0, 1.0,
             "The same, divided by its length plus 5 cm.",
             lambda now: directions(now.task.goal_world - now.robot.tool_world, 0.05),
         ),
         ObservationTerm(
-            "goal_time_left", lambda of: 1, "s", "-", 10.0, 4.0,
+            "goal_time_left", 1, "s", "-", 10.0, 4.0,
             "Time until the goal is missed.",
             lambda now: now.task.time_left_s,
         ),
-    ),
-    rewards=(
+    )  # fmt: skip
+    rewards = (
         RewardTerm(
             "progress",
             "Metres that the tool came nearer to its goal, times `task.progress_per_m`.",
@@ -202,12 +171,50 @@ TASK = Task(
             "`task.goal_bonus` in the step in which a goal is reached.",
             lambda now, step, previous, config: np.multiply(config.goal_bonus, step["reached"]),
         ),
-    ),
-    info=info,
-    achieved="task/goals_reached",
-    failed="task/goals_missed",
-    markers=lambda view: view.goal_world[:, None],
-    starts="The arm is near home, turned anywhere in front of its base. A first goal appears; the "
-    "next one when it is reached, or missed after `task.time_limit_s`.",
-    ends="Not before the time is up. A success: every goal so far, and at least one, was reached.",
-)  # fmt: skip
+    )
+    achieved = "task/goals_reached"
+    failed = "task/goals_missed"
+    starts = (
+        "The arm is near home, turned anywhere in front of its base. A first goal appears; the "
+        "next one when it is reached, or missed after `task.time_limit_s`."
+    )
+    ends = "Not before the time is up. A success: every goal so far, and at least one, was reached."
+
+    def make_state(self, batch: int) -> Records:
+        return np.zeros(batch, REACH)
+
+    def reach_targets(self) -> list[ReachTarget]:
+        return nearest_targets(self.config)
+
+    def reset(self, state: Records, ids: Ints, rngs: Rngs, world: World) -> None:
+        """Start environments `ids` anew with a first goal each."""
+        state["n_reached"][ids] = state["n_missed"][ids] = 0
+        _new_goals(state, ids, rngs, world.robot.tool_world, self.config)
+
+    def advance(self, state: Records, rngs: Rngs, world: World, dt_s: float) -> Records:
+        """Judge the tool's new place and replace goals that are done; (B,) of `REACH_STEP`."""
+        tool_world, step = world.robot.tool_world, np.zeros(len(state), REACH_STEP)
+        if _judge(tool_world, dt_s, self.config.radius_m, self.config.time_limit_s, state, step):
+            done = np.flatnonzero(step["reached"] | step["missed"])
+            _new_goals(state, done, rngs, tool_world[done], self.config)
+        return step
+
+    def view(self, state: Records, ids: Ints) -> ReachView:
+        return ReachView(
+            state["goal_world"][ids], self.config.time_limit_s - state["goal_age_s"][ids]
+        )
+
+    def info(self, state: Records) -> dict[str, Floats]:
+        """Return how many goals were reached and missed, (B,) each.
+
+        It is a success if every goal, and at least one, was reached in time.
+        """
+        succeeded = (state["n_reached"] > 0) & (state["n_missed"] == 0)
+        return {
+            "task/goals_reached": state["n_reached"].astype(float),
+            "task/goals_missed": state["n_missed"].astype(float),
+            "is_success": succeeded.astype(float),
+        }
+
+    def markers(self, view: ReachView) -> Points3:
+        return view.goal_world[:, None]

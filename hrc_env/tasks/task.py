@@ -1,214 +1,249 @@
-"""What a task is: a record of settings, functions over a batch, terms and names."""
+"""Tasks: the base class with its hooks, and the tasks that are known by an id."""
 
-import re
-from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, is_dataclass
+from collections.abc import Mapping, Sequence
 from importlib import import_module
-from typing import Any
+from inspect import getdoc
+from typing import Any, ClassVar, Generic, TypeVar, cast
 
 import numpy as np
 
 from hrc_env import observations, rewards
 from hrc_env.belief import Belief
-from hrc_env.core.errors import ConfigError, NoGoalError, check_shape, unknown
+from hrc_env.core.errors import ConfigError, NoGoalError, unknown
 from hrc_env.core.records import Cue, Effects, Grounds, World
 from hrc_env.core.registry import Registry
 from hrc_env.core.things import NOTHING, Things
-from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, Points3
+from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, Points3, Rngs
+from hrc_env.motion.starts import draw_near
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm
 from hrc_env.tasks import BUILT_IN, EPISODE_STEPS
 from hrc_env.tasks.goal import Goal, reward_terms
-from hrc_env.tasks.spot import Spot
+from hrc_env.tasks.reach_target import ReachTarget
 
-_ID = re.compile(r"[A-Za-z]\w*-v\d+")
-Rngs = Sequence[np.random.Generator]
+ConfigT = TypeVar("ConfigT")
+StateT = TypeVar("StateT")
 
 
-@dataclass(frozen=True, slots=True)
-class Task:
-    """A task. Rows of its state, a structured array or a dataclass of arrays, are environments.
+class Task(Generic[ConfigT, StateT]):
+    """What a robot is to achieve: derive from it, and register the class (`register_task`).
 
-    State, progress and view are of types of the task's own; `config` below is an instance of the
-    type of that name. `rngs` holds a generator for every environment of the batch; what happens
-    in environment b is drawn from its own only.
+    The first paragraph of a subclass's docstring describes the task. A subclass must define `id`,
+    `config_type`, `observations`, `rewards`, `achieved`, `failed`, and the methods `make_state`,
+    `reset`, `advance`, `view` and `info`; the other attributes and methods have defaults.
+
+    All methods work on a batch of environments. `state` is a structured array, or a dataclass of
+    arrays, with a row for every environment; `ids` are the rows in question, all rows where a
+    method has no such argument. `rngs` holds a generator for every environment of the batch, and
+    events in environment b draw from `rngs[b]` only. B is the number of environments in question,
+    O of the task's loose objects, W of worker slots, N of robot joints.
+
+    Args:
+        config: the task's settings, of `config_type`; None: its defaults.
     """
 
-    id: str
-    """As `gymnasium.make` knows it, "HRCName-v0"."""
-    says: str
-    """A sentence: what the robot has to do."""
-    config: type
-    """A frozen dataclass of settings, every one with a default."""
-    init: Callable[[int], Any]
-    """(batch) -> state, to be filled by `reset`."""
-    reset: Callable[[Any, Ints, Rngs, World, Any], None]
-    """(state, ids, rngs, world, config): start environments `ids` anew; world is of these."""
-    advance: Callable[[Any, Rngs, World, float, Any], Any]
-    """(state, rngs, world, dt_s, config) -> progress: move all environments on by a step."""
-    view: Callable[[Any, Ints, Any], Any]
-    """(state, ids, config) -> what robots `ids` know of their task: `Belief.task`."""
-    observations: tuple[ObservationTerm, ...]
-    """The task's part of the observation; terms read `Belief.task`."""
-    rewards: tuple[RewardTerm, ...]
-    """The task's part of the reward; the weights that these terms are given are `config`."""
-    info: Callable[[Any], Mapping[str, Floats]]
-    """(state) -> "task/..." values (B,) of the episode so far, and "is_success", 0 or 1."""
-    achieved: str
-    """The name in `info` that counts what was achieved,"""
-    failed: str
-    """and what was not, of as many attempts."""
-    markers: Callable[[Any], Points3]
-    """(view) -> (B, M, 3) points that pictures show [m]."""
-    starts: str = ""
-    """For its page: how episodes begin,"""
-    ends: str = ""
-    """and what ends them before the time limit."""
-    max_episode_steps: int = EPISODE_STEPS
-    robot: str | None = None
-    """Who does it unless somebody says otherwise; None: the default robot."""
-    grips: bool = False
-    """Whether that must be a robot with a hand."""
-    drives: bool = False
-    """Whether it must be one that drives; others must not."""
-    scene: str = "lab"
-    """Where, unless somebody says otherwise,"""
-    n_workers: int | tuple[int, int] = 1
-    """and beside how many workers."""
-    viewpoint: str = "beside"
-    """From where people look on: one of `scene.render.VIEWPOINTS`."""
-    survey: Callable[[Grounds, Any], Any] = lambda grounds, config: None
-    """(map, config) -> `World.place`: what the task makes of the place, once. It raises
-    `ConfigError` where there is no room for the task."""
-    start: Callable[[Rngs, Any, Any], JointAngles] | None = None
-    """(rngs, place, config) -> (n, N) where robots begin; None: near their pose at rest."""
-    things: Callable[[Any], Things] = lambda config: NOTHING
-    """(config) -> what the task puts there."""
-    spots: Callable[[Any], Sequence[Spot]] = lambda config: ()
-    """(config) -> where tools have to get to, besides what is loose: arms that are too short are
-    refused."""
-    poses: Callable[[Any, Ints, Any], Floats] | None = None
-    """(state, ids, config) -> (n, O, 7) where what is loose lies when `reset` is done: place in
-    the world [m] and quaternion; None: as in the MJCF."""
-    loads: Callable[[Any], Bools] | None = None
-    """(state) -> (B, O) which objects count as part of the robot while it holds them: in cost,
-    separations and belief; None: all."""
-    cue: Callable[[Any], Cue] | None = None
-    """(state) -> how far what workers wait for has come (`Job.waits`); None: they do not."""
-    effects: Callable[[Any, Any], Effects] | None = None
-    """(state, config) -> what is done to objects until the next step; None: nothing."""
-    welcome: Callable[[Belief], Bools] | None = None
-    """(belief) -> (B, W, S) which segments of estimated bodies may come to the robot's hand, as to
-    take what it brings: built-in shields let them (`safety.guard`); None: none."""
-    over: Callable[[Any], Bools] | None = None
-    """(progress) -> (B,) whether there is nothing more to do; None: there always is."""
-    defaults: Mapping[str, Any] = field(default_factory=dict)
-    """Settings of `HRCConfig` that differ from its defaults, nested, as `config=` takes them."""
+    id: ClassVar[str] = ""
+    """Its name in `gymnasium.make`, such as "HRCReach-v0"."""
+    config_type: ClassVar[type[Any]]
+    """A frozen dataclass of settings, each with a default: `config={"task": {...}}`."""
+    observations: ClassVar[tuple[ObservationTerm, ...]] = ()
+    """The task's terms of the observation; their functions read `Belief.task`."""
+    rewards: ClassVar[tuple[RewardTerm, ...]] = ()
+    """The task's terms of the reward; their functions are given the task's settings as weights."""
+    achieved: ClassVar[str] = ""
+    """The name in `info` that counts successful attempts."""
+    failed: ClassVar[str] = ""
+    """The name in `info` that counts failed attempts."""
+    starts: ClassVar[str] = ""
+    """How episodes begin, for the task's page."""
+    ends: ClassVar[str] = ""
+    """How episodes end before the time limit, for the task's page."""
+    max_episode_steps: ClassVar[int] = EPISODE_STEPS
+    """Time limit of an episode [control steps]."""
+    robot: ClassVar[str | None] = None
+    """Name of the robot that does it by default; None: the package's default robot."""
+    needs_gripper: ClassVar[bool] = False
+    """Whether the robot must have a hand or suction cups."""
+    needs_mobile_base: ClassVar[bool] = False
+    """Whether the robot must drive; where it is false the robot must not."""
+    scene: ClassVar[str] = "lab"
+    """Name of the scene by default."""
+    n_workers: ClassVar[int | tuple[int, int]] = 1
+    """Number of workers by default, or the fewest and the most of an episode."""
+    viewpoint: ClassVar[str] = "beside"
+    """From where pictures show it: one of `scene.render.VIEWPOINTS`."""
+    defaults: ClassVar[Mapping[str, Any]] = {}
+    """Values of `HRCConfig` that differ from its defaults, nested as `config=` takes them."""
+    goal: ClassVar[Goal | None] = None
+    """The goal, if it stands apart from the observation as hindsight replay (HER) needs it."""
 
-    goal: Goal | None = None
-    """What is wanted, where it stands apart from the observation, as HER asks for."""
+    config: ConfigT
+    """The task's settings."""
+
+    def __new__(cls, *args: Any, **kwargs: Any) -> "Task[ConfigT, StateT]":
+        if cls is Task:
+            raise ConfigError(
+                "Task is a base class. Write class MyTask(hrc_env.Task) with the attributes and "
+                "methods that its documentation names, and register the class "
+                "(docs/bring_your_own.md)."
+            )
+        return super().__new__(cls)
+
+    def __init__(self, config: ConfigT | None = None) -> None:
+        self.config = self.config_type() if config is None else config
+
+    def make_state(self, batch: int) -> StateT:
+        """Return the state of `batch` environments, to be filled by `reset`."""
+        raise NotImplementedError
+
+    def reset(self, state: StateT, ids: Ints, rngs: Rngs, world: World) -> None:
+        """Start environments `ids` anew: write their rows of `state`; `world` is of these only."""
+        raise NotImplementedError
+
+    def advance(self, state: StateT, rngs: Rngs, world: World, dt_s: float) -> Any:
+        """Advance every environment by one control step of dt_s [s].
+
+        Returns:
+            What the step brought, of a type of the task's own: reward terms and `is_terminal`
+            are given it.
+        """
+        raise NotImplementedError
+
+    def view(self, state: StateT, ids: Ints) -> Any:
+        """Return what the robots of environments `ids` know of their task: `Belief.task`."""
+        raise NotImplementedError
+
+    def info(self, state: StateT) -> Mapping[str, Floats]:
+        """Return numbers (B,) about the episode so far, by names that begin with "task/", and
+        "is_success", 0 or 1."""
+        raise NotImplementedError
+
+    def is_terminal(self, step: Any) -> Bools | bool:
+        """Return (B,) whether the task is over, given what `advance` returned; never by default."""
+        return False
+
+    def markers(self, view: Any) -> Points3:
+        """Return (B, M, 3) points that pictures show [m, world]; none by default."""
+        return np.zeros((1, 0, 3))
+
+    def survey(self, grounds: Grounds) -> Any:
+        """Return what the task needs to know of the place, once: `World.place`; by default None.
+
+        Raises:
+            ConfigError: the place has no room for the task.
+        """
+        return None
+
+    def draw_start(
+        self, rngs: Rngs, place: Any, home_q: JointAngles, spread_rad: Floats
+    ) -> JointAngles:
+        """Draw the joint angles (n, N) with which n robots start [rad, m of slides].
+
+        Args:
+            rngs: n generators, one for each robot.
+            place: what `survey` returned.
+            home_q: (N,) the robot's pose at rest; by default starts are near it.
+            spread_rad: (N,) how far from it they are at most.
+        """
+        return draw_near(home_q, spread_rad, rngs)
+
+    def make_things(self) -> Things:
+        """Return the task's part of the scene; by default nothing."""
+        return NOTHING
+
+    def reach_targets(self) -> Sequence[ReachTarget]:
+        """Return places that the tool has to get to, besides loose objects; a robot that is too
+        short for them is refused."""
+        return ()
+
+    def object_poses(self, state: StateT, ids: Ints) -> Floats | None:
+        """Return (n, O, 7) where loose objects lie after `reset`: position [m, world] and
+        quaternion (w, x, y, z); None, the default: as in the MJCF."""
+        return None
+
+    def is_load(self, state: StateT) -> Bools | bool:
+        """Return (B, O) which objects count as part of the robot while it holds them, in cost,
+        separation and belief; by default all."""
+        return True
+
+    def signal(self, state: StateT) -> Cue | None:
+        """Return what waiting workers are shown (`Job.waits`); None, the default: they do not
+        wait."""
+        return None
+
+    def effects(self, state: StateT) -> Effects | None:
+        """Return what is done to loose objects during the next step; by default nothing."""
+        return None
+
+    def allowed_contact(self, belief: Belief) -> Bools | None:
+        """Return (B, W, S) which segments of estimated bodies may touch the robot's hand, as to
+        take what it brings: built-in shields let them. None, the default: none of them."""
+        return None
+
+    @property
+    def description(self) -> str:
+        """The first paragraph of the class's docstring."""
+        return " ".join((getdoc(type(self)) or "").split("\n\n")[0].split())
 
     @property
     def observation_terms(self) -> tuple[ObservationTerm, ...]:
-        """All of the observation, in its order: the robot, the task, the workers."""
-        slides = observations.SLIDE_TERMS if self.drives else ()
+        """All terms of the observation in their order: robot, task, workers."""
+        slides = observations.SLIDE_TERMS if self.needs_mobile_base else ()
         return (*observations.ROBOT_TERMS, *slides, *self.observations, *observations.SHARED_TERMS)
 
     @property
     def own_rewards(self) -> tuple[RewardTerm, ...]:
-        """The task's part of the reward, first the goal's if there is one."""
+        """The task's terms of the reward; the goal's is the first, if there is one."""
         return (*reward_terms(self.goal), *self.rewards)
 
     @property
     def reward_terms(self) -> tuple[RewardTerm, ...]:
-        """All of the reward: the task's, and those that every task shares."""
+        """All terms of the reward: the task's, and those that every task shares."""
         return (*self.own_rewards, *rewards.SHARED_TERMS)
 
+    @property
+    def can_end(self) -> bool:
+        """Whether the task ends episodes before their time limit."""
+        return type(self).is_terminal is not Task.is_terminal
+
     def counts(self, info: Mapping[str, Any]) -> dict[str, Any]:
-        """What an info says of attempts, in words: {"goals reached": 3.0, "goals missed": 1.0}."""
+        """Return the attempts in an info, in words: {"goals reached": 3.0, "goals missed": 1.0}."""
         names = (self.achieved, self.failed)
         return {name.removeprefix("task/").replace("_", " "): info[name] for name in names}
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        """A task that is known by its id is pickled as that."""
-        if TASKS.get(self.id) is self:
-            return task_called, (self.id,)
-        return Task, tuple(getattr(self, each.name) for each in fields(self))
+
+TaskType = type[Task[Any, Any]]
+TASKS: Registry[TaskType] = Registry("task")
+"""Task classes by id: those that were asked for, and those that were registered."""
 
 
-TASKS: Registry[Task] = Registry("task")
-"""By id: those that have been asked for, and those that were registered."""
+def find_task(task: str | TaskType) -> TaskType:
+    """Return the class of a task, given that or its id.
 
-
-def task_called(task: str | Task) -> Task:
-    """A task by its id, or itself."""
-    if isinstance(task, Task):
+    Raises:
+        ConfigError: there is no such task; it names those that there are.
+    """
+    if isinstance(task, type) and issubclass(task, Task):
         return task
+    if not isinstance(task, str):
+        raise ConfigError(
+            f"task must be an id or a subclass of hrc_env.Task, got {type(task).__name__}."
+        )
     if task not in TASKS and task in BUILT_IN:
-        TASKS[task] = import_module(BUILT_IN[task]).TASK
+        module, name = BUILT_IN[task].where.split(":")
+        TASKS[task] = cast(TaskType, getattr(import_module(module), name))
     if task not in TASKS:
         raise unknown("task", task, sorted({*BUILT_IN, *TASKS}))
     return TASKS[task]
 
 
-def goal_of(task: Task) -> Goal:
-    """The goal of a task, or `NoGoalError`."""
+def goal_of(task: Task[Any, Any]) -> Goal:
+    """Return the goal of a task, or raise `NoGoalError`."""
     if task.goal is None:
-        known = [each for each in dict.fromkeys((*BUILT_IN, *TASKS)) if task_called(each).goal]
+        known = [each for each in dict.fromkeys((*BUILT_IN, *TASKS)) if find_task(each).goal]
         raise NoGoalError(
             f"{task.id} has no goals apart from its observation, so that nothing can be judged by "
             f"another goal (compute_reward, HER). {', '.join(known)} have: choose one of these, or "
             "a learner without HER."
         )
     return task.goal
-
-
-def check_task(task: Task) -> None:
-    """Raise `ConfigError` for what is missing or wrong in a task.
-
-    Shapes and values of its terms are checked when an environment of it is reset and steps.
-    """
-    if not isinstance(task, Task):
-        raise ConfigError(f"A task must be a hrc_env.tasks.task.Task, got {type(task).__name__}.")
-    if not isinstance(task.id, str) or not _ID.fullmatch(task.id):
-        raise ConfigError(f"A task's id must be like 'Name-v0', got {task.id!r}.")
-    for name in ("init", "reset", "advance", "view", "info", "markers"):
-        if not callable(getattr(task, name)):
-            raise ConfigError(f"{task.id}: {name} must be a function (see Task).")
-    if not (isinstance(task.config, type) and is_dataclass(task.config)):
-        raise ConfigError(f"{task.id}: config must be a dataclass, got {task.config!r}.")
-    try:
-        task.config()
-    except TypeError as error:
-        raise ConfigError(f"{task.id}: every field of config needs a default ({error}).") from error
-    for terms in (task.observation_terms, task.reward_terms):
-        name, times = Counter(term.name for term in terms).most_common(1)[0]
-        if times > 1:
-            raise ConfigError(f"{task.id}: there is a term {name!r} already; choose another name.")
-    if task.goal is not None and not isinstance(task.goal, Goal):
-        raise ConfigError(f"{task.id}: goal must be a Goal, got {type(task.goal).__name__}.")
-    _check_state(task)
-
-
-def _check_state(task: Task) -> None:
-    state = task.init(2)
-    if is_dataclass(state):
-        parts = {f"state.{each.name}": getattr(state, each.name) for each in fields(state)}
-    elif isinstance(state, np.ndarray):
-        parts = {"state": state}
-    else:
-        raise ConfigError(
-            f"{task.id}: init must give a structured array or a dataclass of arrays, "
-            f"got {type(state).__name__}."
-        )
-    for name, part in parts.items():
-        check_shape(f"{task.id}: {name}", np.shape(part)[:1], (2,), "a row an environment")
-    info = task.info(state)
-    for name in (task.achieved, task.failed, "is_success"):
-        if name not in info:
-            raise ConfigError(f"{task.id}: info must hold {name!r}, has {', '.join(info)}.")
-    for name, value in info.items():
-        if name != "is_success" and not name.startswith("task/"):
-            raise ConfigError(f"{task.id}: names in info must begin with 'task/', got {name!r}.")
-        check_shape(f"{task.id}: info[{name!r}]", np.shape(value), (2,), "a value an environment")

@@ -34,7 +34,7 @@ from hrc_env.rewards import RewardConfig
 from hrc_env.simulation import Simulation
 from hrc_env.step import Observation, StepResult, words_of
 from hrc_env.tasks import DEFAULT
-from hrc_env.tasks.task import TASKS, Task, task_called
+from hrc_env.tasks.task import TASKS, Task, find_task
 from hrc_env.vector.infos import InfoTable, table
 from hrc_env.vector.member import TOGETHER, Member
 from hrc_env.vector.options import (
@@ -223,7 +223,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
             setattr(self.member(k), name, value)
 
     @property
-    def task(self) -> Task:
+    def task(self) -> Task[Any, Any]:
         """The task of every robot."""
         return self._task
 
@@ -333,7 +333,7 @@ def make_vector(
     if kwargs.pop("num_threads", None) is not None:
         raise ConfigError('perception="pixels" is processes, not threads: leave out num_threads.')
     mode = kwargs.pop("autoreset_mode", AutoresetMode.NEXT_STEP)
-    task = task_called(kwargs.pop("task", DEFAULT))
+    task = find_task(kwargs.pop("task", DEFAULT))
     if TASKS.name_of(task) is None:  # not registered: it is pickled
         kwargs = {"max_episode_steps": task.max_episode_steps, **kwargs, "task": task}
     task_id = TASKS.name_of(task) or DEFAULT

@@ -71,7 +71,7 @@ from hrc_env.mocap.read import read_capture
 from hrc_env.mocap.record import Capture
 from hrc_env.mocap.retarget import adapted, fitted, retarget
 from hrc_env.motion import config as motion_config
-from hrc_env.motion import floorplan, lying, paths, repertoire, routes, schedule, starting
+from hrc_env.motion import floorplan, lying, paths, repertoire, routes, schedule, starting, starts
 from hrc_env.motion import generator as motion
 from hrc_env.motion.activities.pieces import stage, stocked
 from hrc_env.motion.anatomy import anatomy
@@ -95,7 +95,7 @@ from hrc_env.perception.faults import schedule as fault_schedule
 from hrc_env.pipeline import reacquisition
 from hrc_env.pipeline.bystanders import Bystanders
 from hrc_env.pipeline.pose_tracker import PoseTracker
-from hrc_env.safety import contact, incidents, separation, solver, starts
+from hrc_env.safety import contact, incidents, separation, solver
 from hrc_env.safety.config import PRESETS, ShieldConfig
 from hrc_env.safety.guard import constraints
 from hrc_env.safety.robot import RobotModel
@@ -111,8 +111,8 @@ from hrc_env.scene.rig import pinholes
 from hrc_env.scene.rigs import floor as floor_points
 from hrc_env.scene.robot import ROBOTS, chain_of
 from hrc_env.simulation import Simulation
-from hrc_env.tasks.spot import Spot, check_spots
-from hrc_env.tasks.task import task_called
+from hrc_env.tasks.reach_target import ReachTarget, check_reach
+from hrc_env.tasks.task import find_task
 from hrc_env.tracking import oracle, presence
 from hrc_env.tracking.calibration_monitor import forget_monitor, make_monitor, monitor
 from hrc_env.tracking.config import TrackerConfig
@@ -510,8 +510,8 @@ def presets() -> dict[str, NDArray[np.float64]]:
 def spots_of(env_id: str, fields: Mapping[str, Any]) -> NDArray[np.float64]:
     """Return where a task with some settings has the tool get to: (n, 7), a place [m], a direction
     (0 if any will do), and how near is near enough [m]."""
-    task = task_called(env_id)
-    spots = task.spots(task.config(**fields))
+    task = find_task(env_id)
+    spots = task(task.config_type(**fields)).reach_targets()
     rows = [[*each.place_world, *(each.along_world or (0, 0, 0)), each.within_m] for each in spots]
     return np.array(rows, float).reshape(-1, 7)
 
@@ -520,9 +520,9 @@ def can_reach(
     robot: str, place_m: NDArray[np.float64], along: tuple[float, ...] | None, within_m: float
 ) -> bool:
     """Return whether a robot at the origin is thought to get its tool to a place."""
-    spot = Spot("a place", place_m, along, within_m)
+    target = ReachTarget("a place", place_m, along, within_m)
     try:
-        check_spots("a probe", robot, chain_of(ROBOTS[robot], (0.0, 0.0, 0.0)), [spot])
+        check_reach("a probe", robot, chain_of(ROBOTS[robot], (0.0, 0.0, 0.0)), [target])
     except ConfigError:
         return False
     return True
@@ -2373,13 +2373,13 @@ class Guarded:
         model = RobotModel(made, numbers["fastest"], numbers["slew"], numbers["mass_kg"],
                            numbers["load_kg"])  # fmt: skip
         n, estimate = len(ends), _as_estimate(now)
-        nowhere, welcome = np.zeros((*now["held"].shape, 3)), now["welcome"]
+        nowhere = np.zeros((*now["held"].shape, 3))
         turn = np.zeros((*now["held"].shape, 4))
         self._now = Belief(
             robot=robot, estimate=estimate, task=None, action=np.zeros((n, 6)),
             separation=estimated_separation(robot, estimate), command=now["command"], model=model,
             objects=ObjectState(nowhere, turn, nowhere, nowhere, now["held"]),
-            welcome=None if welcome is None else lambda _: welcome,
+            allowed_contact=now["welcome"],
         )  # fmt: skip
         if "floor_m" in now:
             floor = Coverage(now["floor_m"], now["piece_m"], np.arange(len(now["floor_m"])),
@@ -2509,7 +2509,7 @@ class Watched:
 
 def start_near(home: NDArray[np.float64], spread: NDArray[np.float64], seeds: list[int]) -> Any:
     """Return starts of robots about their home, one for each seed."""
-    return starts.near(home, spread, [np.random.default_rng(seed) for seed in seeds])
+    return starts.draw_near(home, spread, [np.random.default_rng(seed) for seed in seeds])
 
 
 def start_apart(n: int, seed: int, spread_rad: float, people: str) -> dict[str, NDArray[Any]]:
@@ -2520,7 +2520,7 @@ def start_apart(n: int, seed: int, spread_rad: float, people: str) -> dict[str, 
     home = np.tile(np.zeros(chain.n_joints), (1, 1))[0]
     spread = np.full(chain.n_joints, spread_rad)
     q = starts.apart(
-        ids, lambda some: starts.near(home, spread, [rngs[b] for b in some]), state, rngs, chain,
-        simulation.bodies,
+        ids, lambda some: starts.draw_near(home, spread, [rngs[b] for b in some]), state, rngs,
+        chain, simulation.bodies,
     )  # fmt: skip
     return {"q": q, "gap_m": starts.gap_m(ids, q, state, chain, simulation.bodies)}

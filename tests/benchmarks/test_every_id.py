@@ -9,7 +9,7 @@ from hrc_env.experiments.impact.episodes import Stage
 from hrc_env.experiments.impact.experiment import ImpactConfig, config_for
 from hrc_env.experiments.impact.policies import Policy, maker
 from hrc_env.experiments.impact.setups import REFERENCE, setup_called
-from hrc_env.tasks.task import task_called
+from hrc_env.tasks.task import find_task
 
 pytestmark = pytest.mark.slow  # studies are played
 
@@ -28,7 +28,7 @@ def test_impact_plays_it(task, tmp_path):
 def test_an_episode_of_impact_is_as_long_as_the_tasks():
     for task in ("HRCReach-v0", *IDS):
         config = config_for(task=task)
-        assert (config.task, config.n_steps) == (task, task_called(task).max_episode_steps)
+        assert (config.task, config.n_steps) == (task, find_task(task).max_episode_steps)
     assert config_for(quick=True, task=IDS[0]).n_steps == 100
 
 

@@ -22,8 +22,11 @@ from hrc_env.tasks import delivery
 ID = "HRCDelivery-v0"
 BASE = chain_of(ROBOTS["mobile_base"], (0.0, 0.0, 0.0))
 SITE = build(name="site", robot="mobile_base")
-CONFIG = delivery.DeliveryConfig()
-PLACE = delivery.survey(SITE.map, CONFIG)
+TASK = delivery.Delivery()
+CONFIG = TASK.config
+PLACE = TASK.survey(SITE.map)
+ANYWHERE = np.zeros(3), np.zeros(3)
+"""Home and spread, which starts of bases do not depend on."""
 WALL = np.array([[1.0, 0.0, 0.1, 3.0, 0.0]])
 """A wall along y at x = 0.9 to 1.1."""
 
@@ -35,14 +38,14 @@ def world(*places: tuple[float, float, float], qd: float = 0.0, touched: bool = 
 
 
 def begun(*places: tuple[float, float, float]) -> np.ndarray:
-    state = delivery.TASK.init(len(places))
+    state = TASK.make_state(len(places))
     rngs = [np.random.default_rng(k) for k in range(len(places))]
-    delivery.reset(state, np.arange(len(places)), rngs, world(*places), CONFIG)
+    TASK.reset(state, np.arange(len(places)), rngs, world(*places))
     return state
 
 
-def moved(state: np.ndarray, now: World, config: delivery.DeliveryConfig = CONFIG) -> np.ndarray:
-    return delivery.advance(state, [np.random.default_rng(0)] * len(state), now, 0.04, config)
+def moved(state: np.ndarray, now: World, task: delivery.Delivery = TASK) -> np.ndarray:
+    return task.advance(state, [np.random.default_rng(0)] * len(state), now, 0.04)
 
 
 def at(zone: int) -> tuple[float, float, float]:
@@ -105,8 +108,8 @@ def test_zones_are_free_and_where_nobody_works():
 
 def test_starts_and_destinations_are_seeded_and_far_enough_apart():
     rngs = [np.random.default_rng(seed) for seed in range(20)]
-    starts = delivery.start(rngs, PLACE, CONFIG)
-    again = delivery.start([np.random.default_rng(seed) for seed in range(20)], PLACE, CONFIG)
+    starts = TASK.draw_start(rngs, PLACE, *ANYWHERE)
+    again = TASK.draw_start([np.random.default_rng(seed) for seed in range(20)], PLACE, *ANYWHERE)
     np.testing.assert_array_equal(starts, again)
     state = begun(*map(tuple, starts.tolist()))
     low, high = CONFIG.way_m
@@ -122,7 +125,7 @@ def test_the_material_is_delivered_when_the_base_stands_in_its_zone():
     assert not driving["delivered"].any()
     standing = moved(state, world(goal, at(0)))
     assert standing["delivered"].tolist() == [True, False]
-    info = delivery.info(state)
+    info = TASK.info(state)
     assert info["is_success"].tolist() == info["task/delivered"].tolist() == [1.0, 0.0]
     assert info["task/not_delivered"].tolist() == [0.0, 1.0]
 
@@ -136,7 +139,7 @@ def test_who_hits_something_has_not_delivered(what):
         step = moved(state, struck)
     assert not step["hit"][0]
     moved(state, world(at(int(state["zone"][0]))))
-    info = delivery.info(state)
+    info = TASK.info(state)
     assert info[f"task/{what}_hits"][0] == 1
     assert info["is_success"][0] == 0
 
@@ -211,7 +214,7 @@ def test_wild_driving_breaks_nothing():
         assert np.isfinite(reward).all()
     q = envs.unwrapped.shards.first.physics.q
     assert np.abs(q[:, :2]).max() < BASE.range_rad[0, 1]
-    hits = delivery.info(envs.unwrapped.shards.first.task_state)["task/fixed_hits"]
+    hits = TASK.info(envs.unwrapped.shards.first.task_state)["task/fixed_hits"]
     assert hits.max() > 0
     envs.close()
 
@@ -280,7 +283,7 @@ def test_no_reward_and_no_observation_reads_who_was_touched():
     calm, touched = (state.copy() for _ in range(2))
     steps = moved(calm, world(at(1))), moved(touched, world(at(1), touched=True))
     np.testing.assert_array_equal(*steps)
-    views = [delivery.view(each, np.array([0]), CONFIG) for each in (calm, touched)]
+    views = [TASK.view(each, np.array([0])) for each in (calm, touched)]
     for name in ("goal_world", "way_m", "way_direction", "ranges_m"):
         np.testing.assert_array_equal(*(getattr(each, name) for each in views))
 

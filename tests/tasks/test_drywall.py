@@ -12,12 +12,13 @@ from hrc_env.core.records import Deeds, ObjectState, World
 from hrc_env.core.things import FOOT_WORLD
 from hrc_env.motion import state as st
 from hrc_env.tasks import drywall
-from hrc_env.tasks.drywall import PLACE_M, SCREWS_M, DrywallConfig
+from hrc_env.tasks.drywall import PLACE_M, SCREWS_M
 
 ID = "HRCDrywall-v0"
 DT_S = 0.04
 AT_PLACE = np.array([np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0])
 """world_from_board where it belongs."""
+TASK = drywall.Drywall()
 
 
 def make(**kwargs):
@@ -41,15 +42,14 @@ def world(shift_m=(0.0, 0.0, 0.0), held=True, screws=0, boring=False, workers=0)
 
 def begun():
     """The state of an episode that begins."""
-    state, rngs = drywall.TASK.init(1), [np.random.default_rng(0)]
-    drywall.reset(state, np.array([0]), rngs, world(), DrywallConfig())
+    state, rngs = TASK.make_state(1), [np.random.default_rng(0)]
+    TASK.reset(state, np.array([0]), rngs, world())
     return state
 
 
 def go_on(state, now, seconds=DT_S):
-    config = DrywallConfig()
     for _ in range(round(seconds / DT_S)):
-        step = drywall.advance(state, [None], now, DT_S, config)
+        step = TASK.advance(state, [None], now, DT_S)
     return step
 
 
@@ -57,18 +57,18 @@ def test_without_a_worker_screws_are_driven_while_the_board_is_pressed():
     state = begun()
     go_on(state, world(), 0.5)
     assert state["driven"][0] == 0
-    assert not drywall.effects(state, DrywallConfig()).push_world.any()
+    assert not TASK.effects(state).push_world.any()
     go_on(state, world(), 0.3)
     assert state["boring"][0]
-    push = drywall.effects(state, DrywallConfig()).push_world[0, 0]
+    push = TASK.effects(state).push_world[0, 0]
     assert 20.0 <= push[1] <= 50.0
     assert np.hypot(push[0], push[2]) == pytest.approx(0.2 * push[1])
     go_on(state, world(), 5.0)
     assert state["driven"][0] == len(SCREWS_M)
-    assert drywall.effects(state, DrywallConfig()).welded["board_fixed"][0]
+    assert TASK.effects(state).welded["board_fixed"][0]
     step = go_on(state, world(held=False))
     assert step["done"][0]
-    assert drywall.info(state)["is_success"][0] == 1.0
+    assert TASK.info(state)["is_success"][0] == 1.0
 
 
 def test_a_worker_who_is_there_drives_them():
@@ -88,7 +88,7 @@ def test_a_board_that_moves_while_screws_are_driven_is_spoilt(off_m, spoils):
     assert state["worst_m"][0] == pytest.approx(off_m)
     go_on(state, world(screws=4, workers=1))
     go_on(state, world(held=False, screws=4, workers=1))
-    assert drywall.info(state)["is_success"][0] == float(not spoils)
+    assert TASK.info(state)["is_success"][0] == float(not spoils)
 
 
 def test_the_expert_hangs_the_board():

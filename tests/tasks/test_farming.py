@@ -8,10 +8,10 @@ from hrc_env.agents.experts import PickPlacer
 from hrc_env.core.records import ObjectState, World
 from hrc_env.env import HRCEnv
 from hrc_env.observations import split
-from hrc_env.tasks import pick_place
-from hrc_env.tasks.pick_place import PickPlaceConfig, places_world
+from hrc_env.tasks.pick_place import PickPlace, places_world
 
-CONFIG = PickPlaceConfig()
+TASK = PickPlace()
+CONFIG = TASK.config
 TASK_TERMS = ("reward/progress", "reward/placed")
 
 
@@ -23,10 +23,10 @@ class Robot:
 
 
 def begun(n: int = 1):
-    state = pick_place.TASK.init(n)
+    state = TASK.make_state(n)
     rngs = [np.random.default_rng(b) for b in range(n)]
     tool = np.tile([-0.3, 0.0, 1.2], (n, 1))
-    pick_place.reset(state, np.arange(n), rngs, World(Robot(tool)), CONFIG)
+    TASK.reset(state, np.arange(n), rngs, World(Robot(tool)))
     return state, rngs, tool
 
 
@@ -37,7 +37,7 @@ def worth(state, rngs, studs, tool, held=False):
     still = np.zeros_like(studs)
     hands = np.full(studs.shape[:2], held)
     world = World(Robot(tool), None, ObjectState(studs, straight, still, still, hands))
-    step = pick_place.advance(state, rngs, world, 0.04, CONFIG)
+    step = TASK.advance(state, rngs, world, 0.04)
     return CONFIG.progress_per_m * step["progress_m"] + CONFIG.placed_bonus * step["placed"]
 
 

@@ -11,7 +11,7 @@ from hrc_env.core.things import FOOT_WORLD
 from hrc_env.geometry.chains import SerialChain
 from hrc_env.scene.build import build
 from hrc_env.scene.robot import Robot, chain_of
-from hrc_env.tasks.spot import Spot, Triple, check_spots
+from hrc_env.tasks.reach_target import ReachTarget, Triple, check_reach
 
 FOOT = (0.1, -0.2, 0.3)
 UPPER_ARM_M, FOREARM_M = 0.5, 0.3
@@ -58,7 +58,7 @@ def farthest_m(chain: SerialChain, shoulder: Triple, way: Triple, **spot: object
         middle = 0.5 * (low + high)
         at = np.array(shoulder) + middle * np.array(way)
         try:
-            check_spots("T-v0", "own", chain, [Spot("it", at, **spot)])
+            check_reach("T-v0", "own", chain, [ReachTarget("it", at, **spot)])
             low = middle
         except ConfigError:
             high = middle
@@ -135,9 +135,9 @@ def test_a_spot_that_is_just_as_far_is_taken():
     """Of an arm of one joint, with its tool point on it, this is the joint itself."""
     chain = replace(arm_of(FREE), link_from_tool=np.eye(4))
     x, y, z = chain.T_world_from_base[:3, 3] + [0.0, 0.0, 0.1]
-    check_spots("T-v0", "own", chain, [Spot("it", (x, y, z))])
+    check_reach("T-v0", "own", chain, [ReachTarget("it", (x, y, z))])
     with pytest.raises(ConfigError, match="out of reach"):
-        check_spots("T-v0", "own", chain, [Spot("it", (x, y, z + 1e-12))])
+        check_reach("T-v0", "own", chain, [ReachTarget("it", (x, y, z + 1e-12))])
 
 
 def test_of_what_slides_nothing_is_said():
@@ -148,12 +148,12 @@ def test_of_what_slides_nothing_is_said():
 
 def test_one_spot_of_several_is_enough_and_is_told():
     x, y, z = SHOULDER
-    near, far = Spot("a", (x, y, z)), Spot("b", (x, y, z + 2.0))
-    check_spots("T-v0", "own", FOUR, [near, near])
-    check_spots("T-v0", "own", FOUR, [])
+    near, far = ReachTarget("a", (x, y, z)), ReachTarget("b", (x, y, z + 2.0))
+    check_reach("T-v0", "own", FOUR, [near, near])
+    check_reach("T-v0", "own", FOUR, [])
     for spots in ((near, far), (far, near)):
         with pytest.raises(ConfigError, match=r"T-v0: b at \(0\.10, -0\.20, 2\.60\) m is out of"):
-            check_spots("T-v0", "own", FOUR, spots)
+            check_reach("T-v0", "own", FOUR, spots)
 
 
 REACH_M = float(np.hypot(0.6127 + 0.57155 + 0.11985, 0.17415))

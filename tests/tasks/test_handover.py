@@ -15,12 +15,12 @@ from hrc_env.tasks.handover import (
     CLOSES_S,
     GRAVITY_M_S2,
     HANDLE_UP_M,
-    HandoverConfig,
 )
 
 ID = "HRCHandover-v0"
 DT_S = 0.04
 AT = np.array([0.0, 0.0, 1.2])
+TASK = handover.Handover()
 
 
 def make(**kwargs):
@@ -43,14 +43,14 @@ def world(gap_m=0.0, speed_m_s=0.0, held=True, takes=True, away_m=0.0):
 
 
 def begun():
-    state, rngs = handover.TASK.init(1), [np.random.default_rng(0)]
-    handover.reset(state, np.array([0]), rngs, world(), HandoverConfig())
+    state, rngs = TASK.make_state(1), [np.random.default_rng(0)]
+    TASK.reset(state, np.array([0]), rngs, world())
     return state
 
 
 def go_on(state, now, seconds):
     for _ in range(round(seconds / DT_S)):
-        step = handover.advance(state, [None], now, DT_S, HandoverConfig())
+        step = TASK.advance(state, [None], now, DT_S)
     return step
 
 
@@ -69,17 +69,17 @@ def test_a_hand_closes_that_has_been_at_the_handle_calmly(now, closes):
     assert not state["taken"][0]
     go_on(state, now, 2 * DT_S)
     assert state["taken"][0] == closes
-    assert handover.cue(state).stage[0] == (2 if closes else 1)
+    assert TASK.signal(state).stage[0] == (2 if closes else 1)
 
 
 def test_the_hand_takes_the_weight_over_and_pulls_like_a_spring():
     state = begun()
     go_on(state, world(), 1.0)
-    push = handover.TASK.effects(state, HandoverConfig()).push_world[0, 0]
+    push = TASK.effects(state).push_world[0, 0]
     np.testing.assert_allclose(push[:3], [0.0, 0.0, BAR_KG * GRAVITY_M_S2], atol=1e-9)
     np.testing.assert_allclose(push[3:], 0.0, atol=1e-9)
     go_on(state, world(0.10), DT_S)
-    assert handover.TASK.effects(state, HandoverConfig()).push_world[0, 0, 1] == pytest.approx(10.0)
+    assert TASK.effects(state).push_world[0, 0, 1] == pytest.approx(10.0)
     assert state["largest_n"][0] == pytest.approx(np.hypot(10.0, BAR_KG * GRAVITY_M_S2))
 
 

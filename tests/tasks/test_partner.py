@@ -9,6 +9,7 @@ import pytest
 from hrc_env.core.skeleton import JOINT
 from hrc_env.core.things import FOOT_WORLD
 from hrc_env.tasks import drywall, handover
+from hrc_env.tasks.task import find_task
 
 RIGHT = [7, 15]
 """Forearm and hand."""
@@ -59,7 +60,7 @@ def beliefs(task, stands_off_m, hand_off_m, tracked=(True, True)):
 )
 def test_the_arm_of_who_takes_part_is_welcome(task, stands_off_m, hand_off_m, tracked, who):
     now = beliefs(task, stands_off_m, hand_off_m, tracked)
-    welcome = now.welcome(now)
+    welcome = find_task(task)().allowed_contact(now)
     assert welcome.shape == (1, 2, 16)
     expected = np.zeros((1, 2, 16), bool)
     if who is not None:
@@ -77,7 +78,7 @@ def test_nobody_is_while_nothing_is_held_for_them(task):
         {"objects": replace(now.objects, held=np.array([[False]])), "robot": away},
     ):
         alone = replace(now, **other)
-        assert not alone.welcome(alone).any()
+        assert not find_task(task)().allowed_contact(alone).any()
 
 
 @pytest.mark.parametrize("task", AT)
@@ -85,4 +86,4 @@ def test_without_workers_nobody_is(task):
     env = gymnasium.make(task, perception="none", n_workers=0)
     env.reset(seed=1)
     now = env.unwrapped.simulation.belief
-    assert now.welcome(now).shape == (1, 0, 16)
+    assert now.allowed_contact.shape == (1, 0, 16)

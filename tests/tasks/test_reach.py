@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from hrc_env.core.errors import ConfigError
+from hrc_env.core.records import World
 from hrc_env.tasks import reach
-from hrc_env.tasks.task import World
 
-CONFIG = reach.ReachConfig()
+TASK = reach.Reach()
+CONFIG = TASK.config
 
 
 def tools_at(tool_world):
@@ -20,16 +21,16 @@ EVERYONE = np.array([0, 1])
 
 
 def two_environments():
-    state = reach.TASK.init(2)
+    state = TASK.make_state(2)
     rngs = [np.random.default_rng(seed) for seed in (1, 2)]
-    reach.reset(state, EVERYONE, rngs, tools_at(np.zeros((2, 3))), CONFIG)
+    TASK.reset(state, EVERYONE, rngs, tools_at(np.zeros((2, 3))))
     return state, rngs
 
 
 def test_goals_lie_in_the_stated_volume():
     state, rngs = two_environments()
     for _ in range(200):
-        reach.reset(state, EVERYONE, rngs, tools_at(np.zeros((2, 3))), CONFIG)
+        TASK.reset(state, EVERYONE, rngs, tools_at(np.zeros((2, 3))))
         offset = state["goal_world"][:, :2] - CONFIG.base_xy_world
         distance, azimuth = np.hypot(*offset.T), np.arctan2(offset[:, 1], offset[:, 0])
         assert ((distance >= 0.5) & (distance <= 0.95)).all()
@@ -41,7 +42,7 @@ def test_a_goal_that_is_touched_counts_and_is_replaced():
     state, rngs = two_environments()
     old = state["goal_world"].copy()
     tools = np.array([old[0] + [0.03, 0, 0], np.zeros(3)])
-    step = reach.advance(state, rngs, tools_at(tools), 0.04, CONFIG)
+    step = TASK.advance(state, rngs, tools_at(tools), 0.04)
     assert step["reached"].tolist() == [True, False]
     assert state["n_reached"].tolist() == [1, 0]
     assert (state["goal_world"][0] != old[0]).any()
@@ -52,27 +53,24 @@ def test_progress_is_by_how_much_the_tool_came_nearer():
     state, rngs = two_environments()
     before = np.linalg.norm(state["goal_world"], axis=1)
     tools = 0.25 * state["goal_world"]
-    step = reach.advance(state, rngs, tools_at(tools), 0.04, CONFIG)
+    step = TASK.advance(state, rngs, tools_at(tools), 0.04)
     np.testing.assert_allclose(step["progress_m"], 0.25 * before)
 
 
 def test_a_goal_is_missed_after_its_time_and_not_a_step_earlier():
     state, rngs = two_environments()
     missed = [
-        reach.advance(state, rngs, tools_at(np.zeros((2, 3))), 0.04, CONFIG)["missed"]
-        for _ in range(100)
+        TASK.advance(state, rngs, tools_at(np.zeros((2, 3))), 0.04)["missed"] for _ in range(100)
     ]
     assert [bool(each[0]) for each in missed] == [False] * 99 + [True]
     assert state["n_missed"].tolist() == [1, 1]
-    assert not reach.info(state)["is_success"].any()
+    assert not TASK.info(state)["is_success"].any()
 
 
 def test_an_environment_draws_from_its_own_stream_only():
     both, _ = two_environments()
-    alone = reach.TASK.init(1)
-    reach.reset(
-        alone, np.array([0]), [np.random.default_rng(2)], tools_at(np.zeros((1, 3))), CONFIG
-    )
+    alone = TASK.make_state(1)
+    TASK.reset(alone, np.array([0]), [np.random.default_rng(2)], tools_at(np.zeros((1, 3))))
     np.testing.assert_array_equal(alone["goal_world"][0], both["goal_world"][1])
 
 

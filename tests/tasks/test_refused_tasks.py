@@ -12,14 +12,16 @@ from hrc_env.observations import SHARED_TERMS
 from hrc_env.rewards import SHARED_TERMS as SHARED_REWARDS
 from hrc_env.scene.build import build
 from hrc_env.tasks import delivery
-from hrc_env.tasks.delivery import DeliveryConfig
+from hrc_env.tasks.check import REQUIRED, check_task
+from hrc_env.tasks.delivery import Delivery, DeliveryConfig
 from hrc_env.tasks.drywall import DrywallConfig
 from hrc_env.tasks.goal import judged
 from hrc_env.tasks.pick_place_goal import PickPlaceGoalConfig
 from hrc_env.tasks.reach import ReachConfig
-from hrc_env.tasks.task import Task, check_task, goal_of, task_called
+from hrc_env.tasks.task import TaskType, find_task, goal_of
+from tests.tasks.variants import vary
 
-REACH, WITH_GOAL = task_called("HRCReach-v0"), task_called("HRCReachGoal-v0")
+REACH, WITH_GOAL = find_task("HRCReach-v0"), find_task("HRCReachGoal-v0")
 
 
 @dataclass
@@ -30,59 +32,63 @@ class Arrays:
     second: np.ndarray
 
 
-def state_of(first: int, second: int) -> Task:
+def state_of(first: int, second: int) -> TaskType:
     """Return a task whose state is two arrays of so many rows."""
     info = {name: np.zeros(2) for name in (REACH.achieved, REACH.failed, "is_success")}
-    return replace(
+    return vary(
         REACH,
-        init=lambda batch: Arrays(np.zeros((first, 3)), np.zeros(second)),
-        info=lambda state: info,
+        make_state=lambda self, batch: Arrays(np.zeros((first, 3)), np.zeros(second)),
+        info=lambda self, state: info,
     )
 
 
-def saying(without: str = "", **others: object) -> Task:
+def saying(without: str = "", **others: object) -> TaskType:
     """Return a task whose info lacks something or says more."""
 
-    def info(state: np.ndarray) -> dict[str, object]:
-        said = {name: value for name, value in REACH.info(state).items() if name != without}
+    def info(self, state: np.ndarray) -> dict[str, object]:
+        said = {name: value for name, value in REACH().info(state).items() if name != without}
         return said | {name.replace("_at_", "/"): value for name, value in others.items()}
 
-    return replace(REACH, info=info)
+    return vary(REACH, info=info)
 
 
 @pytest.mark.parametrize(
     "task",
     [REACH, WITH_GOAL, state_of(2, 2), saying(task_at_more=np.zeros(2)),
-     replace(REACH, id="Other-v12")],
+     vary(REACH, id="Other-v12")],
 )  # fmt: skip
 def test_a_task_in_which_nothing_is_wrong_is_taken(task):
     check_task(task)
 
 
 REFUSED = {
-    "no task": ("HRCReach-v0", "must be a hrc_env.tasks.task.Task, got str"),
-    "an id that is no text": (replace(REACH, id=3), "must be like"),
-    "an id without a version": (replace(REACH, id="Tend"), "must be like"),
-    "an id with something behind": (replace(REACH, id="Tend-v0 "), "must be like"),
-    "an id with something before": (replace(REACH, id=" Tend-v0"), "must be like"),
+    "no task": ("HRCReach-v0", "must be a class that derives from hrc_env.Task, got str"),
+    "an id that is no text": (vary(REACH, id=3), "must be like"),
+    "an id without a version": (vary(REACH, id="Tend"), "must be like"),
+    "an id with something behind": (vary(REACH, id="Tend-v0 "), "must be like"),
+    "an id with something before": (vary(REACH, id=" Tend-v0"), "must be like"),
     **{
-        f"no {name}": (replace(REACH, **{name: None}), f"{name} must be a function")
-        for name in ("init", "reset", "advance", "view", "info", "markers")
+        f"no {name}": (vary(REACH, **{name: None}), f"{name} must be a method")
+        for name in (*REQUIRED, "markers", "is_terminal")
     },
-    "settings that are an object": (replace(REACH, config=ReachConfig()), "must be a dataclass"),
-    "settings of another kind": (replace(REACH, config=dict), "must be a dataclass"),
+    "settings that are an object": (vary(REACH, config_type=ReachConfig()), "must be a dataclass"),
+    "settings of another kind": (vary(REACH, config_type=dict), "must be a dataclass"),
     "settings without a default": (
-        replace(REACH, config=make_dataclass("Own", ["x"])), "needs a default"),
+        vary(REACH, config_type=make_dataclass("Own", ["x"])), "needs a default"),
     "an observation twice": (
-        replace(REACH, observations=(*REACH.observations, SHARED_TERMS[0])),
+        vary(REACH, observations=(*REACH.observations, SHARED_TERMS[0])),
         f"term {SHARED_TERMS[0].name!r} already"),
     "a reward twice": (
-        replace(REACH, rewards=(*REACH.rewards, SHARED_REWARDS[-1])),
+        vary(REACH, rewards=(*REACH.rewards, SHARED_REWARDS[-1])),
         f"term {SHARED_REWARDS[-1].name!r} already"),
     "another goal": (
-        replace(WITH_GOAL, goal=SimpleNamespace(doc="near")), "goal must be a Goal, got Simple"),
-    "a state that is a list": (replace(REACH, init=lambda batch: [0.0] * batch), "got list"),
-    "a state of fewer rows": (replace(REACH, init=lambda batch: REACH.init(1)), "state must have"),
+        vary(WITH_GOAL, goal=SimpleNamespace(doc="near")), "goal must be a Goal, got Simple"),
+    "a state that is a list": (
+        vary(REACH, make_state=lambda self, batch: [0.0] * batch), "got list"
+    ),
+    "a state of fewer rows": (
+        vary(REACH, make_state=lambda self, batch: np.zeros(1)), "state must have"
+    ),
     "a first array of fewer rows": (state_of(1, 2), r"state\.first must have shape \(2,\)"),
     "a second array of more rows": (state_of(2, 3), r"state\.second must have shape \(2,\)"),
     **{
@@ -105,13 +111,13 @@ def test_a_task_in_which_one_thing_is_wrong_is_refused(name):
 @pytest.mark.parametrize("name", ["HRCReech-v0", "", "HRCReach"])
 def test_a_task_that_there_is_not_is_refused(name):
     with pytest.raises(ConfigError, match="Unknown task"):
-        task_called(name)
+        find_task(name)
 
 
 def test_goals_are_those_of_tasks_that_have_some():
-    assert goal_of(WITH_GOAL) is WITH_GOAL.goal
+    assert goal_of(WITH_GOAL()) is WITH_GOAL.goal
     with pytest.raises(NoGoalError, match="HRCReach-v0 has no goals"):
-        goal_of(REACH)
+        goal_of(REACH())
 
 
 @pytest.mark.parametrize(
@@ -129,12 +135,12 @@ def test_goals_are_those_of_tasks_that_have_some():
 )
 def test_goals_that_cannot_be_compared_are_refused(achieved, desired):
     with pytest.raises(ConfigError, match=r"must (both have|have|be finite)"):
-        judged(WITH_GOAL.goal, achieved, desired, None, WITH_GOAL.config())
+        judged(WITH_GOAL.goal, achieved, desired, None, WITH_GOAL.config_type())
 
 
 @pytest.mark.parametrize("shape", [(3,), (1, 3), (4, 3)])
 def test_goals_that_can_be_compared_are(shape):
-    value = judged(WITH_GOAL.goal, np.zeros(shape), np.zeros(shape), None, WITH_GOAL.config())
+    value = judged(WITH_GOAL.goal, np.zeros(shape), np.zeros(shape), None, WITH_GOAL.config_type())
     assert np.shape(value) == shape[:-1]
 
 
@@ -164,26 +170,26 @@ def test_ranges_end_where_they_begin_at_the_earliest(config, name, refused, take
 def test_a_place_for_deliveries_has_one_way_that_is_as_long_as_is_asked():
     """Neither too short nor too long, both ends included."""
     grounds = build(name="site", robot="mobile_base").map
-    lengths = delivery.survey(grounds, DeliveryConfig()).lengths
+    lengths = Delivery().survey(grounds).lengths
     ways_m = np.unique(lengths[np.isfinite(lengths) & (lengths > 0.0)])
     shortest, longest = float(ways_m[0]), float(ways_m[-1])
     gap = int(np.argmax(np.diff(ways_m)))
     below, above = float(ways_m[gap]), float(ways_m[gap + 1])
     tiny = 1e-9
     for taken in ((longest, longest + 1.0), (0.5 * shortest, shortest), (below, above - tiny)):
-        delivery.survey(grounds, DeliveryConfig(way_m=taken))
+        Delivery(DeliveryConfig(way_m=taken)).survey(grounds)
     for refused in (
         (longest + tiny, longest + 1.0), (0.5 * shortest, shortest - tiny),
         (below + tiny, above - tiny),
     ):  # fmt: skip
-        said = rf"there are {len(lengths)} zones, and the longest way is {longest:.1f} m"
+        said = rf"here are {len(lengths)} zones, and the longest way is {longest:.1f} m"
         with pytest.raises(ConfigError, match=said):
-            delivery.survey(grounds, DeliveryConfig(way_m=refused))
+            Delivery(DeliveryConfig(way_m=refused)).survey(grounds)
 
 
 def test_ways_between_zones_are_those_that_are_looked_up_there():
     grounds = build(name="site", robot="mobile_base").map
-    site = delivery.survey(grounds, DeliveryConfig())
+    site = Delivery().survey(grounds)
     for one, at in enumerate(site.zones.tolist()):
         for other, ways in enumerate(site.ways):
             found_m = value_at(*at, ways, site.origin, delivery.CELL_M)
@@ -193,5 +199,5 @@ def test_ways_between_zones_are_those_that_are_looked_up_there():
 def test_a_place_without_zones_has_no_ways():
     grounds = build(name="site", robot="mobile_base").map
     full = replace(grounds, blocked=np.array([[0.0, 0.0, 99.0, 99.0, 0.0]]))
-    with pytest.raises(ConfigError, match=r"here there are 0 zones, and the longest way is 0\.0 m"):
-        delivery.survey(full, DeliveryConfig())
+    with pytest.raises(ConfigError, match=r"here are 0 zones, and the longest way is 0\.0 m"):
+        Delivery().survey(full)

@@ -7,24 +7,24 @@ import pytest
 from hrc_env.tasks import drywall, handover, pick_place
 
 
-def compiled(task, config):
+def compiled(task):
     """The task's MJCF on its own, its origin the middle of the robot's foot."""
-    return mujoco.MjModel.from_xml_string(task.things(config).mjcf)
+    return mujoco.MjModel.from_xml_string(task.make_things().mjcf)
 
 
 @pytest.fixture(scope="module")
 def drywall_model():
-    return compiled(drywall, drywall.DrywallConfig())
+    return compiled(drywall.Drywall())
 
 
 @pytest.fixture(scope="module")
 def handover_model():
-    return compiled(handover, handover.HandoverConfig())
+    return compiled(handover.Handover())
 
 
 @pytest.fixture(scope="module")
 def pick_place_model():
-    return compiled(pick_place, pick_place.PickPlaceConfig())
+    return compiled(pick_place.PickPlace())
 
 
 def loose(model, name):

@@ -5,7 +5,7 @@ from typing import Any
 
 from hrc_env.experiments.impact.setups import PerceptionSetup
 from hrc_env.scene.rigs import RIGS
-from hrc_env.tasks.task import task_called
+from hrc_env.tasks.task import find_task
 
 VERSION = 1
 """Of the conditions, seeds and counts: numbers of different versions do not compare."""
@@ -41,7 +41,7 @@ class Condition:
 
     def keywords(self, task: str) -> list[dict[str, Any]]:
         """Arguments of environments, in which episodes take turns."""
-        (_, setup), rig = EYES[self.eyes], RIGS[task_called(task).scene]
+        (_, setup), rig = EYES[self.eyes], RIGS[find_task(task).scene]
         kwargs = {"task": task, "perception": setup.level, "people": self.people}
         if self.shield is not None:
             kwargs["shield"] = self.shield

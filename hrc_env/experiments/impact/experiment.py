@@ -25,7 +25,7 @@ from hrc_env.experiments.study.runner import Study, at_least_one, changed
 from hrc_env.experiments.study.versions import key_of, source_digest
 from hrc_env.safety.shield import shield_called
 from hrc_env.tasks import DEFAULT
-from hrc_env.tasks.task import task_called
+from hrc_env.tasks.task import find_task
 from hrc_env.tracking.estimators import estimator_called
 
 DEPENDS = ("env", "tracker", "emulator", "detector", "motion", "shield", "agents")
@@ -59,7 +59,7 @@ class ImpactConfig:
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for what cannot work."""
-        task_called(self.task)
+        find_task(self.task)
         shield_called(self.shield)
         at_least_one(self, "n_seeds", "n_pixels", "n_steps", "learning_steps")
         check_names("policy", self.policies, POLICIES)
@@ -113,7 +113,7 @@ def config_for(
 ) -> ImpactConfig:
     """The settings that the command line asks for; if estimators are named, only these, the
     reference, the truth and nothing are compared."""
-    whole = ImpactConfig(n_steps=task_called(task).max_episode_steps)
+    whole = ImpactConfig(n_steps=find_task(task).max_episode_steps)
     config = changed(ImpactConfig(**QUICK) if quick else whole, task=task, shield=shield)
     asked = [PerceptionSetup(estimator=estimator_called(name).name).name for name in estimator]
     setups = tuple(dict.fromkeys(("truth", "none", REFERENCE, *asked))) if asked else None

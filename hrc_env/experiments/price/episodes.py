@@ -23,7 +23,7 @@ from hrc_env.experiments.study.cache import PartProgress
 from hrc_env.experiments.study.rigs import Turn
 from hrc_env.motion import generator
 from hrc_env.simulation import Simulation
-from hrc_env.tasks.task import task_called
+from hrc_env.tasks.task import find_task
 from hrc_env.vector.shards import Shards
 from hrc_env.worker.body import worker_truth
 
@@ -52,7 +52,7 @@ class Stage:
         """Sums of every episode, in the order of the seeds, of which the k-th has turn k modulo
         their number; the shield keeps `margin_m` more than it does by itself."""
         self._shield.margin_m = margin_m
-        rows, turns = Rows(), self.eyes.turns(task_called(self.task).scene)
+        rows, turns = Rows(), self.eyes.turns(find_task(self.task).scene)
         for k, turn in enumerate(turns[: len(seeds)]):
             mine = np.arange(k, len(seeds), len(turns))
             for ids in np.array_split(mine, -(-len(mine) // TOGETHER)):

@@ -30,7 +30,7 @@ from hrc_env.experiments.study.cache import PartCache
 from hrc_env.experiments.study.runner import Study, at_least_one, changed
 from hrc_env.experiments.study.versions import key_of, source_digest
 from hrc_env.tasks import BUILT_IN, DEFAULT
-from hrc_env.tasks.task import task_called
+from hrc_env.tasks.task import Task, find_task
 from hrc_env.tracking.estimators import estimator_called
 
 DEPENDS = ("env", "tracker", "emulator", "detector", "motion", "shield", "agents")
@@ -91,17 +91,17 @@ class PriceConfig:
 
     def steps_of(self, task: str) -> int:
         """Control steps of an episode."""
-        return self.n_steps or task_called(task).max_episode_steps
+        return self.n_steps or find_task(task).max_episode_steps
 
     def seeds(self, task: str, n: int, first: int = FIRST_SEED) -> list[int]:
         """One an episode: as many as last as long as `n` of the first task's."""
-        share = task_called(DEFAULT).max_episode_steps / task_called(task).max_episode_steps
+        share = find_task(DEFAULT).max_episode_steps / find_task(task).max_episode_steps
         return [first + k for k in range(max(round(n * share), 1))]
 
 
 def _check_task(task: str) -> None:
     """Raise `ConfigError` for a task that the study cannot play."""
-    task_called(task)
+    find_task(task)
     if task not in EXPERTS:
         raise ConfigError(
             f"The price is that of a scripted robot, and there is none for {task}; there is for "
@@ -241,7 +241,7 @@ def replay(config: PriceConfig, cache: PartCache, margins_m: Mapping[str, float]
 
 def check_walks(task: str, alone: Rows, row: Row) -> None:
     """Raise unless workers walked as beside the unshielded robot, where nobody waits for it."""
-    if task_called(task).cue is None and row.fresh["walk"] != alone["walk"]:
+    if find_task(task).signal is Task.signal and row.fresh["walk"] != alone["walk"]:
         raise HRCError(
             f"In {task} workers walked otherwise than beside other robots: nothing can be "
             "compared. Delete the folder's parts and start again."

@@ -8,8 +8,7 @@ from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError
 from hrc_env.geometry import chains
 from hrc_env.geometry.distances import least_separation
-from hrc_env.motion import generator
-from hrc_env.safety import starts
+from hrc_env.motion import generator, starts
 from hrc_env.simulation import Simulation
 from hrc_env.worker.body import worker_truth
 

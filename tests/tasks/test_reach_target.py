@@ -1,7 +1,5 @@
 """Where tools have to get to: an arm that is too short is refused before anything happens."""
 
-from dataclasses import replace
-
 import gymnasium
 import numpy as np
 import pytest
@@ -11,8 +9,8 @@ from hrc_env.core.things import FOOT_WORLD, Things
 from hrc_env.env import HRCEnv
 from hrc_env.scene.build import build
 from hrc_env.tasks import pick_place
-from hrc_env.tasks.spot import Spot, check_spots, wrist_reach
-from hrc_env.tasks.task import task_called
+from hrc_env.tasks.reach_target import ReachTarget, check_reach, wrist_reach
+from tests.tasks.variants import vary
 
 ARM = build(robot="ur10e_gripper").chain
 
@@ -33,12 +31,12 @@ def test_a_wrist_gets_as_far_as_the_data_sheet_says():
     ],
 )  # fmt: skip
 def test_it_depends_on_where_the_tool_points(x_m, along, fits):
-    spot = Spot("the thing", wrist_reach(ARM)[0] + [x_m, 0.0, 0.0], along)
+    spot = ReachTarget("the thing", wrist_reach(ARM)[0] + [x_m, 0.0, 0.0], along)
     if fits:
-        check_spots("T-v0", "arm", ARM, [spot])
+        check_reach("T-v0", "arm", ARM, [spot])
         return
     with pytest.raises(ConfigError, match=r"T-v0: the thing at \(.* out of reach .*'arm'.*1\.32 m"):
-        check_spots("T-v0", "arm", ARM, [spot])
+        check_reach("T-v0", "arm", ARM, [spot])
 
 
 def test_goals_too_far_away_are_refused():
@@ -49,9 +47,9 @@ def test_goals_too_far_away_are_refused():
 
 
 def test_so_is_what_a_task_puts_too_far_away():
-    mjcf = pick_place.things(pick_place.PickPlaceConfig()).mjcf
+    mjcf = pick_place.PickPlace().make_things().mjcf
     far = Things(mjcf.replace('name="stud_1" pos="0.2', 'name="stud_1" pos="2.2'))
-    task = replace(task_called("HRCPickPlace-v0"), id="Far-v0", things=lambda config: far)
+    task = vary(pick_place.PickPlace, id="Far-v0", make_things=lambda self: far)
     with pytest.raises(ConfigError, match=r"Far-v0: object 'stud_1' at \(1\.47"):
         HRCEnv(task, perception="none")
 

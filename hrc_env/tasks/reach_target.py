@@ -14,7 +14,7 @@ Triple = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Spot:
+class ReachTarget:
     """A place that the tool point has to get to."""
 
     name: str
@@ -27,25 +27,26 @@ class Spot:
     """It will do to be so near to it [m]."""
 
 
-def check_spots(who: str, robot: str, chain: SerialChain, spots: Iterable[Spot]) -> None:
-    """Raise `ConfigError` for a spot that an arm is too short for: its last joint would have to be
+def check_reach(who: str, robot: str, chain: SerialChain, targets: Iterable[ReachTarget]) -> None:
+    """Raise `ConfigError` for a place that an arm is too short for: its last joint would have to be
     farther from its second one than it ever is."""
     if chain.slides.any():
         return
     shoulder_world, most_m = wrist_reach(chain)
     R, p = chain.link_from_tool[:3, :3], chain.link_from_tool[:3, 3]
     wrist = -R.T @ p
-    for spot in spots:
-        at, slack_m = np.asarray(spot.place_world, float), float(np.linalg.norm(wrist))
-        if spot.along_world is not None:
-            at, slack_m = at + wrist[2] * np.array(spot.along_world), float(np.hypot(*wrist[:2]))
-        away_m = float(np.linalg.norm(at - shoulder_world)) - slack_m - spot.within_m
+    for target in targets:
+        at, slack_m = np.asarray(target.place_world, float), float(np.linalg.norm(wrist))
+        if target.along_world is not None:
+            at, slack_m = at + wrist[2] * np.array(target.along_world), float(np.hypot(*wrist[:2]))
+        away_m = float(np.linalg.norm(at - shoulder_world)) - slack_m - target.within_m
         if away_m > most_m:
-            x, y, z = np.asarray(spot.place_world, float)
+            x, y, z = np.asarray(target.place_world, float)
             raise ConfigError(
-                f"{who}: {spot.name} at ({x:.2f}, {y:.2f}, {z:.2f}) m is out of reach of the robot "
-                f"{robot!r}, whose wrist would be {away_m:.2f} m from its shoulder and can be "
-                f"{most_m:.2f} m away at most. Put it nearer to the robot, or choose a longer arm."
+                f"{who}: {target.name} at ({x:.2f}, {y:.2f}, {z:.2f}) m is out of reach of "
+                f"the robot {robot!r}, whose wrist would be {away_m:.2f} m from its shoulder "
+                f"and can be {most_m:.2f} m away at most. Put it nearer to the robot, or choose a "
+                "longer arm."
             )
 
 

@@ -50,8 +50,8 @@ def apart(
     )
 
 
-def near(home_q: JointAngles, spread_rad: Floats, rngs: Rngs) -> JointAngles:
-    """(len(rngs), N) joints, each within so much of home."""
+def draw_near(home_q: JointAngles, spread_rad: Floats, rngs: Rngs) -> JointAngles:
+    """Draw joints (len(rngs), N), each within `spread_rad` (N,) of home."""
     angles = [home_q + rng.uniform(-1, 1, len(spread_rad)) * spread_rad for rng in rngs]
     return np.array(angles).reshape(len(rngs), -1)
 

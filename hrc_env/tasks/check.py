@@ -1,0 +1,137 @@
+"""Check a task that a user brings, before an environment of it is made."""
+
+import inspect
+import re
+from collections import Counter
+from dataclasses import fields, is_dataclass
+from difflib import get_close_matches
+from typing import Any
+
+import numpy as np
+
+from hrc_env.core.errors import ConfigError, check_shape
+from hrc_env.observations import ObservationTerm
+from hrc_env.rewards import RewardTerm
+from hrc_env.tasks.goal import Goal
+from hrc_env.tasks.task import Task, TaskType
+
+_ID = re.compile(r"[A-Za-z]\w*-v\d+")
+REQUIRED = ("make_state", "reset", "advance", "view", "info")
+"""The methods that every task must define."""
+RENAMED = {
+    "init": "make_state", "says": "the class's docstring", "config": "config_type",
+    "things": "make_things", "spots": "reach_targets", "poses": "object_poses",
+    "loads": "is_load", "cue": "signal", "welcome": "allowed_contact", "over": "is_terminal",
+    "start": "draw_start", "grips": "needs_gripper", "drives": "needs_mobile_base",
+}  # fmt: skip
+"""Former names of a task's parts, and what they are called now."""
+_HOOKS = [name for name, _ in inspect.getmembers(Task, inspect.isfunction) if name[0] != "_"]
+
+
+def check_task(task: TaskType) -> None:
+    """Raise `ConfigError` for what is missing or wrong in a task's class.
+
+    Shapes and values of its terms are checked when an environment of it is reset and steps.
+    """
+    if not (isinstance(task, type) and issubclass(task, Task)):
+        raise ConfigError(
+            f"A task must be a class that derives from hrc_env.Task, got {_described(task)}."
+        )
+    if not isinstance(task.id, str) or not _ID.fullmatch(task.id):
+        raise ConfigError(f"A task's id must be like 'Name-v0', got {task.id!r}.")
+    _check_names(task)
+    _check_methods(task)
+    config_type = getattr(task, "config_type", None)
+    if not (isinstance(config_type, type) and is_dataclass(config_type)):
+        raise ConfigError(f"{task.id}: config_type must be a dataclass, got {config_type!r}.")
+    try:
+        made = task()
+    except TypeError as error:
+        raise ConfigError(f"{task.id}: every field of config needs a default ({error}).") from error
+    if task.goal is not None and not isinstance(task.goal, Goal):
+        raise ConfigError(f"{task.id}: goal must be a Goal, got {type(task.goal).__name__}.")
+    _check_terms(made)
+    _check_state(made)
+
+
+def _described(task: object) -> str:
+    if isinstance(task, Task):
+        return f"an object of it: register the class {type(task).__name__} itself"
+    return task.__name__ if isinstance(task, type) else type(task).__name__
+
+
+def _check_names(task: TaskType) -> None:
+    """Refuse former names, and methods whose names are nearly those of hooks."""
+    own = [name for each in task.__mro__[: task.__mro__.index(Task)] for name in vars(each)]
+    for name in own:
+        if name in RENAMED:
+            raise ConfigError(
+                f"{task.id}: {name} is called {RENAMED[name]} now (see hrc_env.Task)."
+            )
+        unknown = name[0] != "_" and not hasattr(Task, name) and callable(getattr(task, name))
+        meant = get_close_matches(name, set(_HOOKS) - set(own), 1, 0.85) if unknown else []
+        if meant:
+            raise ConfigError(
+                f"{task.id}: {name} is never called. Is {meant[0]} meant? A method that is your "
+                f"own needs a name that is farther from it."
+            )
+
+
+def _check_methods(task: TaskType) -> None:
+    """Refuse hooks that are missing, no functions, or of other arguments."""
+    for name in _HOOKS:
+        hook, expected = getattr(task, name), getattr(Task, name)
+        if name in REQUIRED and hook is expected:
+            raise ConfigError(f"{task.id}: the method {name} is missing (see hrc_env.Task).")
+        if not callable(hook):
+            raise ConfigError(f"{task.id}: {name} must be a method, got {hook!r}.")
+        wanted = list(inspect.signature(expected).parameters)
+        try:
+            signature = inspect.signature(inspect.getattr_static(task, name))
+        except (TypeError, ValueError):  # a static method, or one that is written in C
+            continue
+        try:
+            signature.bind(*wanted)
+        except TypeError as error:
+            raise ConfigError(
+                f"{task.id}: {name} must be a method of ({', '.join(wanted)}), got one of "
+                f"{signature}: {error}."
+            ) from error
+
+
+def _check_terms(task: Task[Any, Any]) -> None:
+    for name, kind in (("observations", ObservationTerm), ("rewards", RewardTerm)):
+        terms = getattr(task, name)
+        if not isinstance(terms, tuple) or not all(isinstance(term, kind) for term in terms):
+            raise ConfigError(f"{task.id}: {name} must be a tuple of {kind.__name__}.")
+    for all_terms in (task.observation_terms, task.reward_terms):
+        name, times = Counter(term.name for term in all_terms).most_common(1)[0]
+        if times > 1:
+            raise ConfigError(f"{task.id}: there is a term {name!r} already; choose another name.")
+
+
+def _check_state(task: Task[Any, Any]) -> None:
+    state = task.make_state(2)
+    if is_dataclass(state) and not isinstance(state, type):
+        parts = {f"state.{each.name}": getattr(state, each.name) for each in fields(state)}
+    elif isinstance(state, np.ndarray):
+        parts = {"state": state}
+    else:
+        raise ConfigError(
+            f"{task.id}: make_state must give a structured array or a dataclass of arrays, "
+            f"got {type(state).__name__}."
+        )
+    for name, part in parts.items():
+        check_shape(f"{task.id}: {name}", np.shape(part)[:1], (2,), "a row an environment")
+    _check_info(task, task.info(state), 2)
+
+
+def _check_info(task: Task[Any, Any], info: Any, batch: int) -> None:
+    """Raise `ConfigError` for an info of a task that lacks names or has other shapes."""
+    for name in (task.achieved, task.failed, "is_success"):
+        if name not in info:
+            raise ConfigError(f"{task.id}: info must hold {name!r}, has {', '.join(info)}.")
+    for name, value in info.items():
+        if name != "is_success" and not name.startswith("task/"):
+            raise ConfigError(f"{task.id}: names in info must begin with 'task/', got {name!r}.")
+        check_shape(f"{task.id}: info[{name!r}]", np.shape(value), (batch,), "one an environment")
