@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.control import ControlConfig
-from hrc_env.core.records import Grounds
 from hrc_env.geometry.chains import SerialChain
 from hrc_env.observations import ObservationLayout
+from hrc_env.world import Grounds
 
 if TYPE_CHECKING:
     from hrc_env.simulation import Simulation

@@ -69,15 +69,15 @@ def played(shield: Any, n_steps: int = N_STEPS, num_threads: int = 2) -> tuple[f
     seen, _ = envs.reset(seed=SEED)
     for _ in range(3):  # until everything is compiled
         seen, *_ = envs.step(agent.act(seen))
-    command, commanding = Simulation._command, list[float]()
+    command, commanding = Simulation._act, list[float]()
 
-    def timed(part: Simulation) -> Any:
+    def timed(part: Simulation, action: Any) -> Any:
         started_s = time.thread_time()
-        result = command(part)
+        result = command(part, action)
         commanding.append(time.thread_time() - started_s)
         return result
 
-    with patch.object(Simulation, "_command", timed):
+    with patch.object(Simulation, "_act", timed):
         started_s = time.process_time()
         for _ in range(n_steps):
             seen, *_ = envs.step(agent.act(seen))

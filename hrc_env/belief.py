@@ -10,15 +10,14 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.records import HandState, ObjectState, PoseEstimate, RobotState
 from hrc_env.core.skeleton import SEGMENT_RADIUS_M
 from hrc_env.core.typing import Bools, Floats, Ints, JointVelocities, Points3
-from hrc_env.core.vacancy import EMPTY, POSSIBLE, STATURE_M, Coverage, Others, Vacancy
+from hrc_env.core.vacancy import EMPTY, POSSIBLE, STATURE_M, WALKING_M_S, Coverage, Others, Vacancy
 from hrc_env.geometry.distances import (
     Separation,
     closest_parameters,
     least_separation,
     segments,
 )
-from hrc_env.safety.robot import RobotModel
-from hrc_env.safety.separation import WALKING_M_S
+from hrc_env.geometry.robot_model import RobotModel
 
 PERSON_M = 0.5
 """Distance of the floor that people take up from their hips [m]."""

@@ -17,7 +17,6 @@ from hrc_env.core.errors import ConfigError, check_names, unknown
 from hrc_env.core.mapping import PRESETS, from_mapping, plain, read_toml, restored, to_toml
 from hrc_env.core.results import write_whole
 from hrc_env.geometry.camera_config import CameraConfig, camera_of, read_rig
-from hrc_env.metrics import CostConfig
 from hrc_env.motion.generator import PEOPLE, MotionConfig, PeopleConfig
 from hrc_env.motion.schedule import WORK, Job
 from hrc_env.observations import UNCERTAINTY
@@ -25,6 +24,7 @@ from hrc_env.perception.detector import DetectorConfig
 from hrc_env.perception.emulator import EmulatorConfig
 from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.rewards import RewardConfig
+from hrc_env.safety.cost import CostConfig
 from hrc_env.safety.shield import Shield, shield_called
 from hrc_env.scene.build import Scene, SceneConfig
 from hrc_env.scene.domain_randomization import APPEARANCES, AppearanceConfig

@@ -22,6 +22,7 @@ from hrc_env.core.errors import ConfigError, NoAttributeError, unknown, whole
 from hrc_env.core.infos import Words, worded
 from hrc_env.core.registry import share
 from hrc_env.core.typing import Floats
+from hrc_env.infos import words_of
 from hrc_env.motion.generator import Clip, PeopleConfig
 from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.registration import HasSpec
@@ -31,7 +32,7 @@ from hrc_env.safety.shield import ShieldChoice
 from hrc_env.scene.domain_randomization import AppearanceConfig
 from hrc_env.scene.robot import Robot
 from hrc_env.simulation import Simulation
-from hrc_env.step import Observation, words_of
+from hrc_env.step_result import Observation
 from hrc_env.tasks import DEFAULT, goal
 from hrc_env.tasks.task import TaskType, goal_of
 from hrc_env.tracking.estimators import EstimatorChoice

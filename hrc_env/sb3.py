@@ -21,7 +21,7 @@ from hrc_env.env import ENDLESS
 from hrc_env.evaluation.sums import EpisodeSums, value_of_step
 from hrc_env.rewards import RewardConfig
 from hrc_env.simulation import Simulation
-from hrc_env.step import Observation
+from hrc_env.step_result import Observation
 from hrc_env.tasks.goal import TERM
 from hrc_env.vector.env import HRCVectorEnv
 from hrc_env.vector.member import TOGETHER, Member, info_of

@@ -208,10 +208,12 @@ def displaced(change: Callable[[Any], Any], shown: bool = True, told: bool = Tru
             joints, capsules = change(true.joints_world), change(true.capsules_world)
             return dataclasses.replace(true, joints_world=joints, capsules_world=capsules)
 
-        def expose(self: Simulation, ids: Any, motion: Any, _: Any) -> None:
+        def expose(self: Simulation, world: simulation.Truth) -> None:
+            motion = world.motion
             true = (truth if shown else worker_truth)(self.bodies, motion)
             places = change(motion.position_world) if shown else motion.position_world
-            really(self, ids, dataclasses.replace(motion, position_world=places), true)
+            seen = dataclasses.replace(motion, position_world=places)
+            really(self, dataclasses.replace(world, motion=seen, workers=true))
 
         really = Simulation._expose
         patch.setattr(Simulation, "_expose", expose)

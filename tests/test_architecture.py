@@ -18,10 +18,9 @@ ALL_SOURCES = [*SOURCES, *sorted((ROOT / "agents").glob("*.py")), ROOT / "train.
 TRUTH_READERS = {
     "hrc_env/core/records.py": "declares it",
     "hrc_env/worker/body.py": "makes it from the worker's motion",
-    "hrc_env/step.py": "gives errors against it their names",
+    "hrc_env/infos.py": "gives errors against it their names",
     "hrc_env/simulation.py": "carries it to cost, metrics and perception",
     "hrc_env/pipeline/sensor_input.py": "hands it to the sensors of `keypoints` and `truth`",
-    "hrc_env/metrics.py": "counts cost and errors",
     "hrc_env/experiments/impact/episodes.py": "counts what came of beliefs",
     "hrc_env/experiments/price/episodes.py": "counts what came of beliefs",
     "hrc_env/perception/emulator.py": "projects it into emulated cameras",
@@ -89,7 +88,7 @@ def test_only_these_files_know_the_truth():
     """Whoever is not in the list, with a reason, does not even name the record of truth."""
     knowing = {relative(path) for path in SOURCES if "WorkerTruth" in identifiers(path)}
     assert knowing == set(TRUTH_READERS) & knowing
-    assert knowing >= {"hrc_env/metrics.py", "hrc_env/tracking/oracle.py"}
+    assert knowing >= {"hrc_env/simulation.py", "hrc_env/tracking/oracle.py"}
 
 
 @pytest.mark.parametrize("name", ["belief", "observations", "rewards", "control", "tasks/reach"])
@@ -118,7 +117,7 @@ def test_who_chooses_windows_and_tracks_is_not_shown_the_world():
 
 def test_agents_do_not_touch_simulator_state():
     """An agent knows the robot and the observation: no physics, no motion, no truth."""
-    state = {"hrc_env.simulation", "hrc_env.motion", "hrc_env.scene", "hrc_env.metrics"}
+    state = {"hrc_env.simulation", "hrc_env.motion", "hrc_env.scene", "hrc_env.infos"}
     for path in (ROOT / "agents").glob("*.py"):
         assert not identifiers(path) & {"truth", "motion", "physics", "worker_truth"}, path
         if relative(path) != "agents/env_info.py":  # which reads a simulation
@@ -160,7 +159,6 @@ def test_no_general_module_knows_a_task():
         "task",
         "goal",
         "check",
-        "reach_target",
     }
     files = {f"hrc_env/tasks/{name}.py" for name in modules} | {"hrc_env/tasks/__init__.py"}
     for path in SOURCES:

@@ -5,8 +5,9 @@ import pytest
 
 from hrc_env.core.records import PoseEstimate, WorkerTruth
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.metrics import Cost, CostConfig, cost, no_identities, tracking_error
 from hrc_env.safety import incidents
+from hrc_env.safety.cost import Cost, CostConfig, cost
+from hrc_env.tracking.metrics import no_identities, tracking_error
 
 
 def costs(distance_m: list[float], n_workers: int = 1) -> Cost:
@@ -69,7 +70,9 @@ def errors(steps, present=None):
     for people, tracks, tracked in steps:
         joints = bodies_at(people)
         truth = WorkerTruth(joints, joints, np.zeros((1, n_workers, 1, 2, 3)), np.ones(1))
-        found.append(tracking_error(estimate(tracks, tracked), truth, there, identities)[0])
+        found.append(
+            tracking_error(estimate(tracks, tracked), truth.joints_world, there, identities)[0]
+        )
     return found
 
 

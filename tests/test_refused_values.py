@@ -10,7 +10,6 @@ from hrc_env.config import settle
 from hrc_env.control import checked_action, n_actions
 from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCEnv
-from hrc_env.metrics import COMPONENTS, CostConfig
 from hrc_env.observations import ObservationLayout, ObservationTerm, observe
 from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.pipeline import levels
@@ -19,6 +18,7 @@ from hrc_env.pipeline.sensor_input import SensorInput, TrueSensorInput, with_tru
 from hrc_env.rewards import check_kind, total
 from hrc_env.safety.config import ShieldConfig
 from hrc_env.safety.contact import contact_force, effective_mass, region_called
+from hrc_env.safety.cost import COMPONENTS, CostConfig
 from hrc_env.safety.separation import protective_distance
 from hrc_env.safety.shield import SHIELDS, shield_called, shielded
 from hrc_env.scene.build import build

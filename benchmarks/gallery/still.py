@@ -6,13 +6,14 @@ from typing import Any
 import numpy as np
 
 from hrc_env.core.batching import one
-from hrc_env.core.records import Held, WorkerMotion, Workplace
+from hrc_env.core.records import Held, WorkerMotion
 from hrc_env.core.typing import Image, Points3
 from hrc_env.geometry.cameras import PinholeCamera, pinhole
 from hrc_env.motion.repertoire import REPERTOIRE, alone, perform
 from hrc_env.scene.build import Scene, build
 from hrc_env.scene.render import PictureRenderer
 from hrc_env.worker.body import load_body
+from hrc_env.world import Workplace
 
 EYE_M = 1.45
 """How high above the floor the cameras that look at somebody are [m]."""

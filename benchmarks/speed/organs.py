@@ -8,14 +8,14 @@ from collections.abc import Mapping, Sequence
 
 from benchmarks.speed.contenders import Contender
 from benchmarks.speed.stopwatch import Place, Stopwatch
-from hrc_env import observations, rewards, simulation, step
+from hrc_env import infos as step_infos
+from hrc_env import observations, rewards, simulation
 from hrc_env.core.errors import HRCError
 from hrc_env.geometry import chains
 from hrc_env.motion import generator
 from hrc_env.perception import emulator
 from hrc_env.pipeline.tracking import PoseTracking
 from hrc_env.safety import incidents
-from hrc_env.safety.watch import Watch
 from hrc_env.scene.physics import Physics
 from hrc_env.vector import env, infos
 
@@ -35,13 +35,13 @@ ORGANS: Mapping[str, Sequence[Place]] = {
         (chains, "robot_along"),
         (simulation, "estimated_separation"),
         (incidents, "measured"),
-        (Watch, "step"),
+        (incidents.IncidentMonitor, "step"),
     ),
     "observation": ((observations, "observe"),),
     "reward": ((rewards, "evaluated"), (rewards, "total")),
     "info": (
-        (step, "tracking_info"),
-        (step, "cost_info"),
+        (step_infos, "tracking_info"),
+        (step_infos, "cost_info"),
         (simulation.Simulation, "_episode_info"),
         (simulation.StepResult, "info_of"),
         (env, "table"),

@@ -71,10 +71,10 @@ class ImportMotion:
             raise ConfigError("--out is the recording itself; give the clip another name.")
         if self.picture is not None:
             writable_file(self.picture, ".png", "--picture")
-        from hrc_env import room
-        from hrc_env.config import HRCConfig
         from hrc_env.mocap.retarget import retarget
+        from hrc_env.motion import fit
         from hrc_env.motion.clip import save_clip
+        from hrc_env.scene.build import all_grounds
         from hrc_env.worker.body import ANY, load_body
 
         body, console = load_body(self.worker), Console()
@@ -86,10 +86,10 @@ class ImportMotion:
         with progress_bar(console, name) as say:
             clip, error = retarget(capture, body, lambda share: say(share, name))
         tell_error(console, capture, clip, error)
-        played = room.played_s(clip, HRCConfig(worker=ANY))
+        played = fit.played_s(clip, all_grounds(), ANY)
         save_clip(clip, self.out)
         ready = f"play it with motions=[{str(self.out)!r}]. " if any(played.values()) else ""
-        console.print(f"In [bold]{self.out}[/]: {ready}{room.told(clip, played)}")
+        console.print(f"In [bold]{self.out}[/]: {ready}{fit.describe_fit(clip, played)}")
         if self.picture is not None:
             import imageio.v2 as imageio
 

@@ -11,6 +11,8 @@ POSSIBLE, PROBABLY_EMPTY, EMPTY = 0, 1, 2
 cameras have."""
 STATURE_M = 1.8
 """Height of the space above a piece of floor that a person may take up [m]."""
+WALKING_M_S = 1.6
+"""Speed at which people walk towards a robot, by ISO 13855 [m/s]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

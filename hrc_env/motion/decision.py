@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.core.records import WORKPLACE_KINDS
 from hrc_env.core.typing import Bools, Floats, Records
 from hrc_env.motion import lying
 from hrc_env.motion import state as st
@@ -28,6 +27,7 @@ from hrc_env.motion.state import (
 )
 from hrc_env.motion.traffic import AHEAD_M, APART_M, FALL_M, HANDS_M
 from hrc_env.worker.props import PROP_NAMES
+from hrc_env.world import WORKPLACE_KINDS
 
 NEXT, BOW, LASTS, DELAY, REACTION, REACTION_S, EVENT, DWELL = range(N_START, N_START + 8)
 """Which draw decides what; the first N_START are the activity's own."""

@@ -7,8 +7,8 @@ import numpy as np
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.kernels import kernel
-from hrc_env.core.records import Grounds
 from hrc_env.core.typing import Floats
+from hrc_env.world import Grounds
 
 BODY_M, STAND_M = 0.40, 0.22
 """Walkers keep so far from what stands there: half their width, swinging arms included; those who

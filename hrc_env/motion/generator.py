@@ -10,7 +10,7 @@ import numpy as np
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.kernels import kernel
-from hrc_env.core.records import Cue, Deeds, Grounds, Held, WorkerMotion, WorkerPath, Workplace
+from hrc_env.core.records import Held, WorkerMotion, WorkerPath
 from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records, Velocities3
 from hrc_env.geometry.rotations import matrix
 from hrc_env.motion import state as st
@@ -30,6 +30,7 @@ from hrc_env.motion.reactions import attend, notice
 from hrc_env.motion.schedule import schedule_at
 from hrc_env.motion.state import Worker, Workers
 from hrc_env.worker.body import N_SEGMENTS, Body
+from hrc_env.world import FOOT_M, Grounds, WorkerProgress, WorkerSignal, Workplace
 
 __all__ = [
     "ABSENT", "PEOPLE", "Clip", "MotionConfig", "MotionState", "PeopleConfig", "activity",
@@ -53,7 +54,7 @@ OPEN_FLOOR = Grounds(
         Workplace("aside", "open", (1.0, -1.5), -1.2, 0.0),
         Workplace("behind", "open", (1.9, 0.0), 0.0, 0.0),
     ),
-    robot_xy_m=(-0.75, 0.0),
+    robot_xy_m=FOOT_M[:2],
     robot_clearance_m=0.8,
 )
 """Where workers are whom no scene holds: the laboratory's walkway without its furniture."""
@@ -130,7 +131,7 @@ def advance(
 
 def watch(
     state: MotionState, elbow_and_tool_world: Floats, motion: WorkerMotion, dt_s: float,
-    cue: Cue | None = None,
+    cue: WorkerSignal | None = None,
 ) -> None:  # fmt: skip
     """Let the workers see where elbow and tool, or front and back (B, 2, 3), of the robot are, dt_s
     after the last look, and how far what they wait for has come."""
@@ -142,13 +143,15 @@ def watch(
     notice(dt_s, settings, elbow_and_tool_world, *bodies, state.workers)
 
 
-def deeds(state: MotionState, motion: WorkerMotion) -> Deeds:
+def progress(state: MotionState, motion: WorkerMotion) -> WorkerProgress:
     """What workers, whose bodies are in `motion`, have done in the activity that they are in."""
     workers = state.workers
     takes = (workers["activity"] == st.TAKE) & (workers["time_s"] > workers["out_at"])
     screws, boring = np.zeros(workers.shape, np.int64), np.zeros(workers.shape, np.bool_)
     _deeds(workers, screws, boring)
-    return Deeds(workers["present"].copy(), screws, boring, takes, *_gripping(workers, motion))
+    return WorkerProgress(
+        workers["present"].copy(), screws, boring, takes, *_gripping(workers, motion)
+    )
 
 
 def _gripping(workers: Workers, motion: WorkerMotion) -> tuple[Points3, Velocities3]:

@@ -10,7 +10,6 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from hrc_env.core.errors import unknown
-from hrc_env.core.records import AWAY_M, WORKPLACE_KINDS, Workplace
 from hrc_env.core.typing import Bools, Floats, Records
 from hrc_env.motion import controls as c
 from hrc_env.motion.activities.going import CART, WHEELBARROW
@@ -20,6 +19,7 @@ from hrc_env.motion.holding import N_HELD, prop_pose
 from hrc_env.motion.schedule import Job
 from hrc_env.motion.state import NOWHERE, Place, Worker
 from hrc_env.worker.props import BOUNDS_M, PROP_NAMES
+from hrc_env.world import AWAY_M, WORKPLACE_KINDS, Workplace
 
 LOAD = np.dtype(
     [

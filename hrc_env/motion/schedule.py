@@ -5,9 +5,9 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 from hrc_env.core.errors import ConfigError, unknown
-from hrc_env.core.records import WORKPLACE_KINDS
 from hrc_env.motion.state import ACTIVITY_NAMES, WAYS
 from hrc_env.worker.props import PROP_NAMES
+from hrc_env.world import WORKPLACE_KINDS
 
 HERE, ROUTES = "here", ("walk", "push")
 """As a kind of place: wherever the worker is; how workers go to a job."""

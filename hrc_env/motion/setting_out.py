@@ -5,7 +5,6 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from hrc_env.core.records import WORKPLACE_KINDS
 from hrc_env.core.typing import Floats
 from hrc_env.motion import lying
 from hrc_env.motion import state as st
@@ -21,6 +20,7 @@ from hrc_env.motion.starting import start_going, start_here
 from hrc_env.motion.state import N_START, NOWHERE, ON_STAGE, THERE, UNDER_WAY, WAITING, Place
 from hrc_env.motion.traffic import APART_M, meets
 from hrc_env.worker.props import PROP_NAMES
+from hrc_env.world import WORKPLACE_KINDS
 
 WISHED_CLIP, WHICH_CLIP = N_START - 2, N_START - 1
 """Of an activity's own draws: whether to play a clip instead of it, and which."""

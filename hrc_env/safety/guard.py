@@ -24,14 +24,14 @@ from hrc_env.belief import Belief
 from hrc_env.core.errors import needed
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats, Ints, JointVelocities
+from hrc_env.core.vacancy import WALKING_M_S
 from hrc_env.geometry import chains
 from hrc_env.geometry.chains import lever
 from hrc_env.geometry.distances import segments
+from hrc_env.geometry.robot_model import RobotModel
 from hrc_env.safety.config import ShieldConfig
 from hrc_env.safety.contact import SEGMENT_REGIONS, permitted_contact_speed
-from hrc_env.safety.robot import RobotModel
 from hrc_env.safety.rows import ABSENT_M, MOST_ROWS, floor_rows, tightest_rows
-from hrc_env.safety.separation import WALKING_M_S
 from hrc_env.safety.solver import exceeded, solve
 from hrc_env.safety.unseen import HAND_M, limit_m_s, unseen
 

@@ -14,11 +14,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hrc_env.core.batching import Stateful
 from hrc_env.core.kernels import kernel
+from hrc_env.core.records import RobotState
 from hrc_env.core.typing import Capsules, Floats, Ints, Records
 from hrc_env.geometry.distances import least_separation
+from hrc_env.geometry.robot_model import RobotModel
 from hrc_env.safety.contact import REGIONS, contact_force
 from hrc_env.safety.separation import protective_distance
+from hrc_env.world import World
 
 KINDS = ("towards", "fleeing", "standing")
 MOVING_M_S = 0.05
@@ -262,3 +266,32 @@ def _sum_up(found, state, told):
 def _more(value, other):
     """The greater, of one that is no number the other."""
     return other if not value >= other and other == other else value
+
+
+class IncidentMonitor(Stateful):
+    """Detects incidents step after step, and keeps what episodes have known of each worker."""
+
+    CHANGES = ("known",)
+
+    def __init__(
+        self, batch: int, n_workers: int, capsule_names: tuple[str, ...], model: RobotModel,
+        dt_s: float,
+    ) -> None:  # fmt: skip
+        self.known = nothing_yet(batch, n_workers)
+        """(B, W) of `WATCH`."""
+        self.regions, self.model, self.dt_s = regions_of(capsule_names), model, dt_s
+
+    def reset(self, ids: Ints) -> None:
+        """Begin environments `ids` anew."""
+        self.known[ids] = nothing_yet(*self.known[ids].shape)
+
+    def step(self, world: World, paths: Paths) -> Records:
+        """(B, W) of `INCIDENT`: what happened in a step in which bodies went so."""
+        hits_kg, stop_s = np.full(len(self.known), self.model.mass_kg), self.stop_s(world.robot)
+        if world.objects is not None:
+            hits_kg += world.objects.held @ self.model.load_kg
+        return noted(self.known, paths, self.regions, hits_kg, stop_s, self.dt_s)
+
+    def stop_s(self, robot: RobotState) -> Floats:
+        """(B,) how long robots take to stand still [s], as fast as commands may change."""
+        return (np.abs(robot.qd) / self.model.slew_rad_s2).max(axis=1)

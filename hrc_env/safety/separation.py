@@ -14,9 +14,7 @@ import numpy as np
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.typing import Floats
-
-WALKING_M_S = 1.6
-"""ISO 13855: how fast a walking body comes."""
+from hrc_env.core.vacancy import WALKING_M_S
 
 
 def protective_distance(

@@ -8,9 +8,9 @@ from hrc_env.belief import Belief, estimated_separation
 from hrc_env.core.records import PoseEstimate
 from hrc_env.core.skeleton import JOINT
 from hrc_env.core.typing import Bools, Floats
+from hrc_env.core.vacancy import WALKING_M_S
 from hrc_env.geometry.distances import least_separation
 from hrc_env.safety.config import ShieldConfig
-from hrc_env.safety.separation import WALKING_M_S
 
 NEAR_M, FAR_M = 0.25, 1.0
 """Distances from a lost worker's last place at which a robot stands, and begins to slow [m]."""

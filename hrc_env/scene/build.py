@@ -9,8 +9,7 @@ import mujoco
 import numpy as np
 
 from hrc_env.core.errors import check_fields, check_names
-from hrc_env.core.records import Grounds, Held
-from hrc_env.core.things import NOTHING, Things
+from hrc_env.core.records import Held
 from hrc_env.core.typing import Floats, Ints, JointAngles
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.geometry.chains import SerialChain, capsules
@@ -39,6 +38,7 @@ from hrc_env.scene.worker_visuals import WorkerVisuals, add_props, add_visuals, 
 from hrc_env.worker.body import assets_dir, load_body, pool
 from hrc_env.worker.mesh import load_mesh
 from hrc_env.worker.props import held_shapes
+from hrc_env.world import NOTHING, Grounds, TaskScene
 
 ARENA_BYTES = 2**20
 """Memory of one simulation for contacts; the arm in a pile of them takes a tenth."""
@@ -85,7 +85,7 @@ class Recipe(NamedTuple):
     bodies: tuple[str, ...]
     cameras: tuple[str, ...]
     robot: Robot
-    things: Things
+    task_scene: TaskScene
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,7 +127,7 @@ class Scene:
     """Its cups; likewise."""
     object_bodies: Ints
     """(O,) the loose objects' bodies in the model."""
-    things: Things
+    task_scene: TaskScene
     """What a task puts there, loose and fixed."""
 
     @property
@@ -150,7 +150,7 @@ class Scene:
         """What `build` makes it from."""
         use = tuple(camera.name for camera in self.cameras)
         return Recipe(
-            self.config, self.name, self.n_workers, self.bodies, use, self.robot, self.things
+            self.config, self.name, self.n_workers, self.bodies, use, self.robot, self.task_scene
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -164,7 +164,7 @@ def build(
     bodies: str | tuple[str, ...] = "worker_1",
     cameras: Sequence[int | str] | None = None,
     robot: str | Robot = DEFAULT,
-    things: Things = NOTHING,
+    task_scene: TaskScene = NOTHING,
 ) -> Scene:
     """The scene of these settings, compiled once and kept.
 
@@ -175,7 +175,7 @@ def build(
         bodies: the baked body of all of them, or those that they can have; "any": all.
         cameras: names or indices of the cameras that are used; None: all.
         robot: a name or itself.
-        things: what a task adds.
+        task_scene: what a task adds.
 
     Raises:
         ConfigError: an unknown scene, body, camera or robot.
@@ -186,12 +186,17 @@ def build(
         config = replace(config, cameras=SCENES[name].cameras)
     use = tuple(camera.name for camera in select(config.cameras, cameras))
     robot = robot_called(robot)
-    return _build(Recipe(config, name, n_workers, pool(bodies), use, robot, things))
+    return _build(Recipe(config, name, n_workers, pool(bodies), use, robot, task_scene))
+
+
+def all_grounds(config: SceneConfig | None = None) -> dict[str, Grounds]:
+    """Return where people can walk in each scene, by its name."""
+    return {name: build(config, name).grounds for name in SCENES}
 
 
 @lru_cache(maxsize=8)
 def _build(recipe: Recipe) -> Scene:
-    config, name, n_workers, bodies, use, robot, things = recipe
+    config, name, n_workers, bodies, use, robot, task_scene = recipe
     room = SCENES[name]
     chain = chain_of(robot, _foot_world(robot, name))
     spec = _spec(recipe)
@@ -204,7 +209,7 @@ def _build(recipe: Recipe) -> Scene:
     rows = [mocap_ids(model, prefix) for prefix in prefixes]
     touched = [capsule_geom_ids(model, body, prefix) for prefix in prefixes]
     still = obstacles(model)
-    grounds = room.grounds(still, config.clutter, things.places)
+    grounds = room.grounds(still, config.clutter, task_scene.places)
     return Scene(
         config=config,
         name=name,
@@ -226,7 +231,7 @@ def _build(recipe: Recipe) -> Scene:
         grip=grip_of(robot, model),
         cups=cups_of(robot, model, loose, PREFIX),
         object_bodies=np.array([model.body(objects.PREFIX + name).id for name in loose.names], int),
-        things=things,
+        task_scene=task_scene,
     )
 
 
@@ -255,7 +260,7 @@ def visuals(scene: Scene) -> WorkerVisuals:
 
 def _spec(recipe: Recipe) -> mujoco.MjSpec:
     """Everything but the workers' looks and what they hold."""
-    config, name, n_workers, bodies, use, robot, things = recipe
+    config, name, n_workers, bodies, use, robot, task_scene = recipe
     path = assets_dir() / "scenes" / f"{name}{'' if config.clutter else '_bare'}.xml"
     spec = mujoco.MjSpec.from_file(str(path))
     spec.option.timestep = config.sim_dt
@@ -265,11 +270,11 @@ def _spec(recipe: Recipe) -> mujoco.MjSpec:
     spec.nuserdata = len(robot.joints) + n_workers + robot.grips
     foot_world = _foot_world(robot, name)
     add_robot(spec, robot, foot_world)
-    objects.add_things(spec, things, foot_world)
+    objects.add_task_scene(spec, task_scene, foot_world)
     add_cameras(spec, pinholes(select(config.cameras, use)))
     for prefix in _prefixes(n_workers):
         add_worker(spec, load_body(bodies[0]), prefix)
-    objects.add_welds(spec, things)
+    objects.add_welds(spec, task_scene)
     return spec
 
 

@@ -11,10 +11,10 @@ import mujoco
 import numpy as np
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.records import Grounds
 from hrc_env.core.typing import Floats
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.scene.worker_visuals import HIDDEN, WorkerVisuals
+from hrc_env.world import Grounds
 
 LEAST_FALL = 0.4
 """Light comes from above: it falls by at least this share of its way."""

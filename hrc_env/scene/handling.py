@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hrc_env.core.errors import check_fields
-from hrc_env.core.records import ObjectState, RobotState, World
+from hrc_env.core.records import ObjectState, RobotState
 from hrc_env.core.typing import Bools, Capsules, Floats, Ints, Rngs
 from hrc_env.scene.build import Scene
 from hrc_env.scene.objects import object_state, with_load
 from hrc_env.scene.physics import Physics
+from hrc_env.world import World
 
 
 @dataclass(frozen=True, slots=True)

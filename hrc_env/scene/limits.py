@@ -1,8 +1,10 @@
-"""How a scene's robot can be commanded, and how hard it hits."""
+"""What a scene's robot can do: how it can be commanded, how hard it hits, what it has to reach."""
 
 import numpy as np
 
 from hrc_env.core.typing import Floats
+from hrc_env.geometry.reach import ReachTarget
+from hrc_env.geometry.robot_model import RobotModel
 from hrc_env.scene.build import Scene
 from hrc_env.scene.robot import PREFIX
 
@@ -25,3 +27,21 @@ def hitting_kg(scene: Scene) -> float:
 def load_kg(scene: Scene) -> Floats:
     """(O,) masses of what is loose."""
     return scene.model.body_mass[scene.object_bodies].copy()
+
+
+def robot_model(scene: Scene, fastest_rad_s: Floats) -> RobotModel:
+    """Return what the scene's robot knows of itself for good.
+
+    Args:
+        scene: with the robot.
+        fastest_rad_s: (N,) the greatest velocity that an action asks of each joint [rad/s].
+    """
+    slew, hits_kg, carries_kg = slew_rad_s2(scene), hitting_kg(scene), load_kg(scene)
+    return RobotModel(scene.chain, fastest_rad_s, slew, hits_kg, carries_kg)
+
+
+def object_targets(scene: Scene) -> list[ReachTarget]:
+    """Return where loose objects lie at first, for the robot's tool to get to."""
+    loose, size_m = scene.objects, np.linalg.norm(scene.objects.half_size_m, axis=1)
+    places = zip(loose.names, scene.model.body_pos[scene.object_bodies], size_m, strict=True)
+    return [ReachTarget(f"object {name!r}", at, within_m=size) for name, at, size in places]

@@ -14,12 +14,12 @@ import numpy as np
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import HandState, ObjectState, RobotState
-from hrc_env.core.things import Things
 from hrc_env.core.typing import Bools, Capsules, Floats, Points3
 from hrc_env.geometry.rotations import turned
 from hrc_env.geometry.shapes import BOX, WIDTH, absent, shape
 from hrc_env.scene.primitives import DECORATION, OBJECT_BIT
 from hrc_env.worker.props import placed
+from hrc_env.world import TaskScene
 
 PREFIX = "task/"
 """What the names of a task's parts begin with in a scene."""
@@ -33,22 +33,22 @@ GRIP_M = 0.01
 """What the fingers hold has the tool point inside, or so near [m]."""
 
 
-def add_things(spec: Any, things: Things, foot_world: Sequence[float]) -> None:
+def add_task_scene(spec: Any, task_scene: TaskScene, foot_world: Sequence[float]) -> None:
     """Put them into a scene that is being built. Grips slip least with elliptic cones (5 kg shaken
     at 3 m/s^2: 8 mm in 6 s; with MuJoCo's defaults 31)."""
-    if things.mjcf:
+    if task_scene.mjcf:
         spec.option.cone, spec.option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 10.0
-        child = mujoco.MjSpec.from_string(things.mjcf)
+        child = mujoco.MjSpec.from_string(task_scene.mjcf)
         for geom in (each for body in child.bodies if _is_free(body) for each in body.geoms):
             geom.group = DECORATION  # what is solid stands still
         frame = spec.worldbody.add_frame(pos=list(foot_world))
         spec.attach(child, prefix=PREFIX, frame=frame)
 
 
-def add_welds(spec: Any, things: Things) -> None:
+def add_welds(spec: Any, task_scene: TaskScene) -> None:
     """Its welds, when all sites are there."""
     kinds = {True: mujoco.mjtEq.mjEQ_WELD, False: mujoco.mjtEq.mjEQ_CONNECT}
-    for weld in things.welds:
+    for weld in task_scene.welds:
         one, other = weld.sites
         spec.add_equality(
             type=kinds[weld.turns], objtype=mujoco.mjtObj.mjOBJ_SITE, name=weld.name, name1=one,

@@ -12,7 +12,7 @@ from mujoco.batch import Batch
 
 from hrc_env.core.errors import ConfigError, HRCError, check_shape
 from hrc_env.core.kernels import kernel
-from hrc_env.core.records import Effects, HandState, WorkerPath
+from hrc_env.core.records import HandState, WorkerPath
 from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, JointVelocities, Points3, Records
 from hrc_env.geometry.chains import tool
 from hrc_env.scene.build import Scene, without_workers
@@ -20,6 +20,7 @@ from hrc_env.scene.cups import Cups, load_n, seals
 from hrc_env.scene.limits import slew_rad_s2
 from hrc_env.scene.objects import held_by
 from hrc_env.scene.worker import CAPSULE_FIELDS, capsule_shapes
+from hrc_env.world import Effects
 
 COMMANDS = int(mujoco.mjtState.mjSTATE_CTRL)
 """What a substep without workers is given: servo commands."""

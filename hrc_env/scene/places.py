@@ -9,7 +9,6 @@ import numpy as np
 
 from hrc_env.core.errors import HRCError
 from hrc_env.core.mapping import from_mapping, read_toml
-from hrc_env.core.records import Grounds, Workplace
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.geometry.shapes import (
@@ -27,6 +26,7 @@ from hrc_env.geometry.shapes import (
 from hrc_env.scene.primitives import SOLID
 from hrc_env.worker.body import assets_dir
 from hrc_env.worker.props import BOUNDS_M, PROP_NAMES
+from hrc_env.world import Grounds, Workplace
 
 ROBOT_CLEARANCE_M = 0.8
 HEADROOM_M = 2.1

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from hrc_env.core.records import Grounds
 from hrc_env.core.typing import Bools, Floats, Points3
 from hrc_env.core.vacancy import Coverage
 from hrc_env.geometry.camera_config import CameraConfig, made
@@ -21,6 +20,7 @@ from hrc_env.geometry.sight import hidden, nothing
 from hrc_env.scene.build import Scene
 from hrc_env.scene.places import within
 from hrc_env.scene.rig import LAB_CAMERAS, SITE_CAMERAS
+from hrc_env.world import Grounds
 
 RIGS: dict[str, tuple[CameraConfig, ...]] = {
     "lab": LAB_CAMERAS,

@@ -21,7 +21,7 @@ from hrc_env.worker.props import PROP_NAMES
 SKIN_SPECULAR, SKIN_SHININESS = 0.08, 0.15
 HAT_SPECULAR, HAT_SHININESS = 0.45, 0.55
 SHOWN, HIDDEN = DECORATION, WORKER_CAPSULES
-"""Groups of skins, hats and things."""
+"""Groups of skins, hats and task_scene."""
 PARKED_M = (0.0, 0.0, -30.0)
 """Where things are that nobody holds [m]."""
 LOAD = "load_"

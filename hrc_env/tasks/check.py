@@ -20,7 +20,7 @@ REQUIRED = ("make_state", "reset", "advance", "view", "info")
 """The methods that every task must define."""
 RENAMED = {
     "init": "make_state", "says": "the class's docstring", "config": "config_type",
-    "things": "make_things", "spots": "reach_targets", "poses": "object_poses",
+    "things": "make_scene", "spots": "reach_targets", "poses": "object_poses",
     "loads": "is_load", "cue": "signal", "welcome": "allowed_contact", "over": "is_terminal",
     "start": "draw_start", "grips": "needs_gripper", "drives": "needs_mobile_base",
 }  # fmt: skip

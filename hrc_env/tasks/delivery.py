@@ -15,13 +15,14 @@ import numpy as np
 
 from hrc_env.core.errors import ConfigError, check_fields
 from hrc_env.core.kernels import kernel
-from hrc_env.core.records import Grounds, RobotState, World
+from hrc_env.core.records import RobotState
 from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, Points3, Records, Rngs
 from hrc_env.geometry.ways import gaps_m, met, nearest_point, ranges_m, spread_out, value_at, ways_m
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm, check_kind, progress
 from hrc_env.tasks import BUILT_IN
 from hrc_env.tasks.task import Task
+from hrc_env.world import Grounds, World
 
 CELL_M, AROUND_M = 0.2, 3.0
 """Grid of the map; how far beyond where people walk the base may drive [m]."""

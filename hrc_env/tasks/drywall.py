@@ -8,17 +8,17 @@ import numpy as np
 
 from hrc_env.belief import Belief
 from hrc_env.core.errors import ConfigError, check_fields, needed
-from hrc_env.core.records import Cue, Effects, ObjectState, Workplace, World
-from hrc_env.core.things import FOOT_WORLD, Things, Weld
+from hrc_env.core.records import ObjectState
 from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records, Rngs, Rotations
+from hrc_env.geometry.reach import ReachTarget
 from hrc_env.geometry.rotations import matrix
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm, check_kind, progress
 from hrc_env.tasks import BUILT_IN
 from hrc_env.tasks.partner import partners_arms
-from hrc_env.tasks.reach_target import ReachTarget
 from hrc_env.tasks.task import Task
 from hrc_env.worker.body import assets_dir
+from hrc_env.world import FOOT_WORLD, Effects, TaskScene, Weld, WorkerSignal, Workplace, World
 
 BOARD_M, BOARD_KG = (0.6, 1.2, 0.0125), 6.12
 """Edges of the board along its x, y and z, which is the normal of its front [m]; 680 kg/m^3."""
@@ -127,7 +127,7 @@ def _screwed(state: Records, world: World, dt_s: float) -> tuple[Ints, Bools]:
     """(B,) screws that are driven, and whether one is being driven: by the worker, or, where nobody
     is, by themselves while the board is pressed."""
     n, driven = len(SCREWS_M), state["driven"]
-    deeds = needed(world.deeds, "What workers do")
+    deeds = needed(world.workers, "What workers do")
     alone = ~deeds.present.any(axis=1)
     theirs = np.maximum(driven, deeds.screws.max(axis=1, initial=0))
     since_s = state["pressed_s"] - PAUSE_S * (driven + 1) - ALONE_S * driven
@@ -192,10 +192,10 @@ class Drywall(Task[DrywallConfig, Records]):
     def make_state(self, batch: int) -> Records:
         return np.zeros(batch, DRYWALL)
 
-    def make_things(self) -> Things:
+    def make_scene(self) -> TaskScene:
         """Stack, board, studs, and where the worker stands who drives the screws."""
         place = Workplace("board", "task", BESIDE_M, 0.75 * np.pi, SCREWS_M[0][1])
-        return Things(
+        return TaskScene(
             Path(assets_dir() / "tasks" / "drywall.xml").read_text(),
             (
                 Weld("cups_board", ("task/board_cups", "robot/tool_point")),
@@ -265,8 +265,10 @@ class Drywall(Task[DrywallConfig, Records]):
         push = np.concatenate([force, np.cross(arm, force)], axis=1)
         return Effects({"board_fixed": state["driven"] == len(SCREWS_M)}, push[:, None])
 
-    def signal(self, state: Records) -> Cue:
-        return Cue((state["pressed_s"] > 0.0).astype(int), np.full((len(state), 3), np.nan))
+    def signal(self, state: Records) -> WorkerSignal:
+        return WorkerSignal(
+            (state["pressed_s"] > 0.0).astype(int), np.full((len(state), 3), np.nan)
+        )
 
     def is_load(self, state: Records) -> Bools:
         return (state["pressed_s"] == 0.0)[:, None]

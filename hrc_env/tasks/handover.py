@@ -8,17 +8,25 @@ import numpy as np
 
 from hrc_env.belief import Belief
 from hrc_env.core.errors import check_fields, needed
-from hrc_env.core.records import Cue, Deeds, Effects, ObjectState, Workplace, World
-from hrc_env.core.things import FOOT_WORLD, Things
+from hrc_env.core.records import ObjectState
 from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records, Rngs
+from hrc_env.geometry.reach import ReachTarget
 from hrc_env.geometry.rotations import matrix
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm, check_kind, progress
 from hrc_env.tasks import BUILT_IN
 from hrc_env.tasks.partner import partners_arms
-from hrc_env.tasks.reach_target import ReachTarget
 from hrc_env.tasks.task import Task
 from hrc_env.worker.body import assets_dir
+from hrc_env.world import (
+    FOOT_WORLD,
+    Effects,
+    TaskScene,
+    WorkerProgress,
+    WorkerSignal,
+    Workplace,
+    World,
+)
 
 BAR_M, BAR_KG = (0.03, 0.03, 0.40), 0.9
 """Edges of the tool, a bar that stands upright, and its mass [kg]."""
@@ -107,7 +115,9 @@ def _handle(tool: ObjectState) -> tuple[Points3, Floats]:
     return tool.position_world[:, 0] + R @ up, speed
 
 
-def _close(state: Records, deeds: Deeds, handle: Points3, speed: Floats, dt_s: float) -> None:
+def _close(
+    state: Records, deeds: WorkerProgress, handle: Points3, speed: Floats, dt_s: float
+) -> None:
     """Let a hand close that has been at the handle for a while."""
     if not deeds.takes.shape[1]:
         return
@@ -123,7 +133,12 @@ def _close(state: Records, deeds: Deeds, handle: Points3, speed: Floats, dt_s: f
 
 
 def _pull(
-    state: Records, deeds: Deeds, tool: ObjectState, handle: Points3, speed: Floats, dt_s: float
+    state: Records,
+    deeds: WorkerProgress,
+    tool: ObjectState,
+    handle: Points3,
+    speed: Floats,
+    dt_s: float,
 ) -> None:
     """What the hand that has the tool does to it: a spring with damping to where it grips."""
     state["push"] = 0.0
@@ -213,11 +228,11 @@ class Handover(Task[HandoverConfig, Records]):
     def make_state(self, batch: int) -> Records:
         return np.zeros(batch, HANDOVER)
 
-    def make_things(self) -> Things:
+    def make_scene(self) -> TaskScene:
         """Stand and tool, and where the worker stands."""
         place = Workplace("meeting", "task", BESIDE_M, np.pi, HAND_UP_M)
         mjcf = Path(assets_dir() / "tasks" / "handover.xml").read_text()
-        return Things(mjcf, (), (place,))
+        return TaskScene(mjcf, (), (place,))
 
     def reach_targets(self) -> list[ReachTarget]:
         return [ReachTarget("the place to meet", FOOT_WORLD + MEET_M)]
@@ -246,8 +261,8 @@ class Handover(Task[HandoverConfig, Records]):
         state["handle_world"] = handle
         state["lifted"] = held & (at[:, 2] > STAND_UP_M + LIFTED_M)
         before = state["taken"].copy()
-        _close(state, needed(world.deeds, "What workers do"), handle, speed, dt_s)
-        _pull(state, needed(world.deeds, "What workers do"), tool, handle, speed, dt_s)
+        _close(state, needed(world.workers, "What workers do"), handle, speed, dt_s)
+        _pull(state, needed(world.workers, "What workers do"), tool, handle, speed, dt_s)
         away_m = _fingers_away_m(world.robot.tool_world, at)
         away = state["taken"] & ~held & (away_m > APART_M)
         state["away_s"] = np.where(away, state["away_s"] + dt_s, 0.0)
@@ -263,10 +278,12 @@ class Handover(Task[HandoverConfig, Records]):
     def effects(self, state: Records) -> Effects:
         return Effects({}, state["push"][:, None].copy())
 
-    def signal(self, state: Records) -> Cue:
+    def signal(self, state: Records) -> WorkerSignal:
         """The worker comes when the tool is lifted, and goes on when it is theirs."""
         stage = np.where(state["taken"], 2, np.where(state["lifted"], 1, 0))
-        return Cue(stage, np.where(state["lifted"][:, None], state["handle_world"], np.nan))
+        return WorkerSignal(
+            stage, np.where(state["lifted"][:, None], state["handle_world"], np.nan)
+        )
 
     def is_load(self, state: Records) -> Bools:
         return ~(state["offered"] | state["taken"])[:, None]

@@ -4,9 +4,9 @@ import numpy as np
 
 from hrc_env.core.records import PoseEstimate
 from hrc_env.core.skeleton import HAND_SEGMENTS, TORSO
-from hrc_env.core.things import FOOT_WORLD
 from hrc_env.core.typing import Bools, Capsules
 from hrc_env.geometry.distances import least_separation, segments
+from hrc_env.world import FOOT_WORLD
 
 ARMS = ((6, 14), (7, 15))
 """Forearm and hand of either side, among `geometry.distances.segments`."""

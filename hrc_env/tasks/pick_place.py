@@ -7,16 +7,16 @@ from typing import ClassVar
 import numpy as np
 
 from hrc_env.core.errors import check_fields, needed
-from hrc_env.core.records import ObjectState, Workplace, World
-from hrc_env.core.things import FOOT_WORLD, Things
+from hrc_env.core.records import ObjectState
 from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records, Rngs
+from hrc_env.geometry.reach import ReachTarget
 from hrc_env.geometry.rotations import matrix
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm, check_kind, progress
 from hrc_env.tasks import BUILT_IN
-from hrc_env.tasks.reach_target import ReachTarget
 from hrc_env.tasks.task import Task
 from hrc_env.worker.body import assets_dir
+from hrc_env.world import FOOT_WORLD, TaskScene, Workplace, World
 
 STUDS = 3
 STUD_M, STUD_KG = (0.038, 0.300, 0.089), 0.5
@@ -162,10 +162,10 @@ class PickPlace(Task[PlacedConfig, Records]):
     def make_state(self, batch: int) -> Records:
         return np.zeros(batch, PICK_PLACE)
 
-    def make_things(self) -> Things:
+    def make_scene(self) -> TaskScene:
         """Table, rack and pieces, and where the worker takes from the same table."""
         mjcf = Path(assets_dir() / "tasks" / "pick_place.xml").read_text()
-        return Things(mjcf, (), (STACK, TRESTLE))
+        return TaskScene(mjcf, (), (STACK, TRESTLE))
 
     def reach_targets(self) -> list[ReachTarget]:
         """Where pieces go; they are gripped from above."""

@@ -7,12 +7,12 @@ import numpy as np
 
 from hrc_env.core.errors import ConfigError, check_fields
 from hrc_env.core.kernels import kernel
-from hrc_env.core.records import World
 from hrc_env.core.typing import Floats, Ints, Points3, Records, Rngs
+from hrc_env.geometry.reach import ReachTarget
 from hrc_env.observations import ObservationTerm, directions
 from hrc_env.rewards import RewardTerm
-from hrc_env.tasks.reach_target import ReachTarget
 from hrc_env.tasks.task import Task
+from hrc_env.world import FOOT_M, World
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +21,7 @@ class TargetConfig:
 
     radius_m: float = 0.05
     """A goal is reached when the tool point is nearer than this [m]."""
-    base_xy_world: tuple[float, float] = (-0.75, 0.0)
+    base_xy_world: tuple[float, float] = FOOT_M[:2]
     """Axis of the robot's first joint [m]; goals are drawn round it."""
     distance_m: tuple[float, float] = (0.5, 0.95)
     """Range of the goals' horizontal distance from that axis [m]."""

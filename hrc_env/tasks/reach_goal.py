@@ -5,13 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.core.records import World
 from hrc_env.core.typing import Floats, Ints, Points3, Records, Rngs
+from hrc_env.geometry.reach import ReachTarget
 from hrc_env.tasks import BUILT_IN
 from hrc_env.tasks.goal import Goal
 from hrc_env.tasks.reach import TargetConfig, drawn_goal, nearest_targets
-from hrc_env.tasks.reach_target import ReachTarget
 from hrc_env.tasks.task import Task
+from hrc_env.world import World
 
 
 @dataclass(frozen=True, slots=True)

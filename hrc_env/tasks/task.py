@@ -10,16 +10,15 @@ import numpy as np
 from hrc_env import observations, rewards
 from hrc_env.belief import Belief
 from hrc_env.core.errors import ConfigError, NoGoalError, unknown
-from hrc_env.core.records import Cue, Effects, Grounds, World
 from hrc_env.core.registry import Registry
-from hrc_env.core.things import NOTHING, Things
 from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, Points3, Rngs
+from hrc_env.geometry.reach import ReachTarget
 from hrc_env.motion.starts import draw_near
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm
 from hrc_env.tasks import BUILT_IN, EPISODE_STEPS
 from hrc_env.tasks.goal import Goal, reward_terms
-from hrc_env.tasks.reach_target import ReachTarget
+from hrc_env.world import NOTHING, Effects, Grounds, TaskScene, WorkerSignal, World
 
 ConfigT = TypeVar("ConfigT")
 StateT = TypeVar("StateT")
@@ -147,7 +146,7 @@ class Task(Generic[ConfigT, StateT]):
         """
         return draw_near(home_q, spread_rad, rngs)
 
-    def make_things(self) -> Things:
+    def make_scene(self) -> TaskScene:
         """Return the task's part of the scene; by default nothing."""
         return NOTHING
 
@@ -166,7 +165,7 @@ class Task(Generic[ConfigT, StateT]):
         separation and belief; by default all."""
         return True
 
-    def signal(self, state: StateT) -> Cue | None:
+    def signal(self, state: StateT) -> WorkerSignal | None:
         """Return what waiting workers are shown (`Job.waits`); None, the default: they do not
         wait."""
         return None

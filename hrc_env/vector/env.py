@@ -28,11 +28,12 @@ from hrc_env.core.infos import worded
 from hrc_env.core.machine import n_cores
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.env import RENDER_MODES, EnvBase, spaces
+from hrc_env.infos import words_of
 from hrc_env.registration import HasSpec
 from hrc_env.render.views import PICTURE_SIZE
 from hrc_env.rewards import RewardConfig
 from hrc_env.simulation import Simulation
-from hrc_env.step import Observation, StepResult, words_of
+from hrc_env.step_result import Observation, StepResult
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import TASKS, Task, find_task
 from hrc_env.vector.infos import InfoTable, table

@@ -11,7 +11,7 @@ import numpy as np
 
 from hrc_env.core.infos import published
 from hrc_env.core.typing import Bools, Floats, Ints
-from hrc_env.step import StepResult
+from hrc_env.step_result import StepResult
 
 
 @dataclass(frozen=True, slots=True)

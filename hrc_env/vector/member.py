@@ -16,7 +16,7 @@ from hrc_env.core.errors import ConfigError, NoAttributeError, unknown
 from hrc_env.core.mapping import plain
 from hrc_env.core.typing import Floats
 from hrc_env.env import ENDLESS, HRCEnv
-from hrc_env.step import Observation
+from hrc_env.step_result import Observation
 from hrc_env.vector.options import steps_behind
 
 if TYPE_CHECKING:

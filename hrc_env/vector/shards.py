@@ -15,7 +15,7 @@ from hrc_env.core.batching import State
 from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.simulation import Simulation
-from hrc_env.step import StepResult, joined
+from hrc_env.step_result import StepResult, joined
 
 
 class Shards:

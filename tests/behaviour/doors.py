@@ -25,7 +25,6 @@ from rich.console import Console
 
 import hrc_env
 from assets.recordings.written import ORDERS, Y_UP, cmu_name, write_acclaim, write_bvh
-from hrc_env import metrics
 from hrc_env.agents import policies as trained
 from hrc_env.agents.env_info import env_info
 from hrc_env.agents.registry import control_of, make_agent
@@ -41,7 +40,6 @@ from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.infos import ENTRIES
 from hrc_env.core.records import (
-    Cue,
     HandState,
     Held,
     Keypoints,
@@ -51,8 +49,6 @@ from hrc_env.core.records import (
     WorkerMotion,
     WorkerPath,
     WorkerTruth,
-    Workplace,
-    World,
 )
 from hrc_env.core.skeleton import JOINTS
 from hrc_env.core.vacancy import Coverage, Others, Vacancy, no_others
@@ -62,6 +58,8 @@ from hrc_env.geometry import rotations as turns
 from hrc_env.geometry.assignment import assign_rows
 from hrc_env.geometry.camera_config import MAKES, CameraConfig, made
 from hrc_env.geometry.lens import Lens, lens_row
+from hrc_env.geometry.reach import ReachTarget, check_reach
+from hrc_env.geometry.robot_model import RobotModel
 from hrc_env.geometry.rotations import matrix
 from hrc_env.geometry.triangulation import linear_point, triangulate
 from hrc_env.mocap import footing, person, repair, stance
@@ -98,9 +96,7 @@ from hrc_env.pipeline.pose_tracker import PoseTracker
 from hrc_env.safety import contact, incidents, separation, solver
 from hrc_env.safety.config import PRESETS, ShieldConfig
 from hrc_env.safety.guard import constraints
-from hrc_env.safety.robot import RobotModel
 from hrc_env.safety.shield import shield_called, shielded
-from hrc_env.safety.watch import Watch
 from hrc_env.scene import domain_randomization as looks
 from hrc_env.scene import rigs
 from hrc_env.scene.build import SceneConfig, drawing_model, visuals
@@ -111,9 +107,8 @@ from hrc_env.scene.rig import pinholes
 from hrc_env.scene.rigs import floor as floor_points
 from hrc_env.scene.robot import ROBOTS, chain_of
 from hrc_env.simulation import Simulation
-from hrc_env.tasks.reach_target import ReachTarget, check_reach
 from hrc_env.tasks.task import find_task
-from hrc_env.tracking import oracle, presence
+from hrc_env.tracking import metrics, oracle, presence
 from hrc_env.tracking.calibration_monitor import forget_monitor, make_monitor, monitor
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.contradiction import Shown, find_unexplained
@@ -130,6 +125,7 @@ from hrc_env.tracking.smoother import smooth
 from hrc_env.vector.env import HRCVectorEnv
 from hrc_env.worker import body as bodies
 from hrc_env.worker import props
+from hrc_env.world import WorkerSignal, Workplace, World
 
 # --- Versions (accept.py) ------------------------------------------------------------------------
 
@@ -566,7 +562,9 @@ def compare_tracks(
         estimate = dataclasses.replace(prior, mean_world=mean[None], tracked=known[None])
         capsules = np.zeros((1, n_workers, 1, 2, 3)), np.zeros((1, n_workers, 1))
         truth = WorkerTruth(joints[None], np.zeros_like(joints[None]), *capsules)
-        found.append(metrics.tracking_error(estimate, truth, there[None], identities)[0])
+        found.append(
+            metrics.tracking_error(estimate, truth.joints_world, there[None], identities)[0]
+        )
     return {name: np.array([each[name] for each in found]) for name in metrics.TRACKING.names}
 
 
@@ -1094,7 +1092,7 @@ class Crew:
         offered_m: Any = None,
     ) -> None:
         """Show everybody two points of the robot (B, 2, 3), and how far the task has come (B,)."""
-        cue = None if stage is None else Cue(stage, offered_m)
+        cue = None if stage is None else WorkerSignal(stage, offered_m)
         motion.watch(self._state, points_m, self._now, since_s, cue)
 
     def move(self) -> Arrays:
@@ -1115,7 +1113,7 @@ class Crew:
 
     def list_deeds(self) -> Arrays:
         """Return what they have done for a task, (B, W, ...)."""
-        done = motion.deeds(self._state, self._now)
+        done = motion.progress(self._state, self._now)
         return {
             "present": done.present, "screws": done.screws, "boring": done.boring,
             "takes": done.takes, "grip_m": done.grip_world,
@@ -2481,7 +2479,7 @@ class Watched:
         """Begin episodes of a batch."""
         model = RobotModel(chain._made, numbers["fastest"], numbers["slew"], numbers["mass_kg"],
                            numbers["load_kg"])  # fmt: skip
-        self._watch = Watch(batch, n_workers, capsule_names, model, step_s)
+        self._watch = incidents.IncidentMonitor(batch, n_workers, capsule_names, model, step_s)
         self._chain = chain._made
 
     def reset(self, places: NDArray[np.int64]) -> None:

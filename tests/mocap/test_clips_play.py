@@ -8,7 +8,6 @@ from strides import FORMS, FPS, N_STRIDES, stride, written_as
 
 from benchmarks.tracking.walks import walk
 from hrc_env.cli.import_motion import ImportMotion
-from hrc_env.config import HRCConfig
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import JOINT, JOINTS
 from hrc_env.mocap.record import Capture
@@ -17,8 +16,8 @@ from hrc_env.motion import controls as c
 from hrc_env.motion import generator
 from hrc_env.motion import state as st
 from hrc_env.motion.clip import load_clip, placed_at_origin
-from hrc_env.room import played_s, told
-from hrc_env.scene.build import build
+from hrc_env.motion.fit import describe_fit, played_s
+from hrc_env.scene.build import all_grounds, build
 from hrc_env.scene.places import SCENES
 from hrc_env.worker.body import load_body
 
@@ -57,7 +56,7 @@ def test_every_walk_in_every_form_plays_in_every_scene(tmp_path, seed, form, cap
     path = written_as(form, stride(seed), tmp_path, seed)
     clip = imported(path, FPS if form == "amc" else None)
     said = " ".join(capsys.readouterr().out.split())
-    played = played_s(load_clip(clip), HRCConfig(worker="any"))
+    played = played_s(load_clip(clip), all_grounds(), "any")
     assert set(played) == set(SCENES)
     for scene, seconds in played.items():
         assert seconds > 1.0
@@ -128,7 +127,7 @@ def retargeted(joints):
 @pytest.mark.parametrize(("seconds", "area_m"), [(30, (40.0, 40.0)), (60, (3.0, 3.0))])
 def test_long_clips_are_played_in_pieces_that_fit(seconds, area_m):
     clip = retargeted(walk(area_m, [seconds], seconds * 25)[:, 0])
-    for scene, played in played_s(clip).items():
+    for scene, played in played_s(clip, all_grounds()).items():
         assert played > 0.9 * seconds
         assert plays(clip, scene)
 
@@ -146,11 +145,11 @@ def leap(length_m):
 
 def test_a_clip_without_room_is_refused_with_the_scenes_that_have_it():
     clip = leap(5.5)
-    assert played_s(clip)["lab"] == 0.0
+    assert played_s(clip, all_grounds())["lab"] == 0.0
     with pytest.raises(ConfigError, match=r"leap: there is no room.*plays in site \(.*lab\."):
         gymnasium.make("HRCReach-v0", perception="none", motions=[clip])
     assert plays(clip, "site")
     far = leap(30.0)
-    assert told(far, played_s(far)) == "It has no room in lab, site."
+    assert describe_fit(far, played_s(far, all_grounds())) == "It has no room in lab, site."
     with pytest.raises(ConfigError, match="leap: there is no room"):
         gymnasium.make("HRCReach-v0", perception="none", scene="site", motions=[far])

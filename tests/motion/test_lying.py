@@ -9,7 +9,6 @@ import pytest
 
 from hrc_env.core.batching import copied
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.records import Workplace
 from hrc_env.motion import generator, lying
 from hrc_env.motion import state as st
 from hrc_env.motion.activities.going import CART_AHEAD_M
@@ -18,6 +17,7 @@ from hrc_env.scene.build import build, drawing_model
 from hrc_env.scene.worker_visuals import PARKED_M
 from hrc_env.worker.body import load_body
 from hrc_env.worker.props import BOUNDS_M, PROP_NAMES
+from hrc_env.world import Workplace
 
 BOARD, BOX, STUD = map(PROP_NAMES.index, ("board", "box", "stud"))
 PILE = Workplace("pile", "pile", (1.4, 0.9), 0.6, 0.4, loads=("box", "box"))

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.records import Grounds, Workplace
 from hrc_env.motion import controls as c
 from hrc_env.motion import generator
 from hrc_env.motion.activities.pieces import stage, stocked
@@ -17,6 +16,7 @@ from hrc_env.motion.config import PeopleConfig
 from hrc_env.motion.floorplan import CELL_M, floorplan, room_for
 from hrc_env.motion.schedule import Job, check_jobs
 from hrc_env.worker.body import load_body
+from hrc_env.world import Grounds, Workplace
 
 SIZE = generator.anatomies(load_body()).size[0]
 STILL = Clip(np.zeros((3, c.N_CONTROLS)), 100.0, np.ones((3, 2), bool), SIZE, "still")

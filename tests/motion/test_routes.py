@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.records import Grounds, Workplace
 from hrc_env.motion import state as st
 from hrc_env.motion.floorplan import BODY_M, floorplan, room_for
 from hrc_env.motion.paths import along
 from hrc_env.motion.routes import route
+from hrc_env.world import Grounds, Workplace
 
 WALL = (2.0, 0.0, 0.1, 1.5, 0.0)
 """Across the straight way from (0, 0) to (4, 0)."""

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from figures import Figure, count
 
-from hrc_env.core.records import Grounds
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.geometry.cameras import project, projections
 from hrc_env.geometry.sight import hidden
 from hrc_env.scene.build import Scene, SceneConfig, build
+from hrc_env.world import Grounds
 
 HEAD_M, HALF_BODY_M = (1.60, 1.75), 0.25
 SITE = build(name="site")

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from hrc_env.core.records import WORKPLACE_KINDS
 from hrc_env.motion.generator import OPEN_FLOOR
 from hrc_env.scene.build import SceneConfig, build
 from hrc_env.scene.places import SCENES, footprints
+from hrc_env.world import WORKPLACE_KINDS
 
 BODY_M = 0.2
 """Half the depth of a person [m]."""

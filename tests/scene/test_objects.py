@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.records import Effects, HandState
-from hrc_env.core.things import FOOT_WORLD, Things, Weld
+from hrc_env.core.records import HandState
 from hrc_env.geometry.chains import robot_along, tool
 from hrc_env.scene.build import HARD, SceneConfig, build
 from hrc_env.scene.cups import seals
 from hrc_env.scene.objects import box_capsules, held_by, surfaces, with_load
 from hrc_env.scene.physics import Physics, no_workers
 from hrc_env.scene.places import SCENES
+from hrc_env.world import FOOT_WORLD, Effects, TaskScene, Weld
 
 TABLE = '<body pos="0.7 0 -0.02"><geom type="box" size="0.3 0.3 0.02" contype="1"/></body>'
 BLOCK = (
@@ -22,13 +22,13 @@ BLOCK = (
     'size="0.02 0.1 0.05" contype="16" conaffinity="17"/>'
     '<site name="top" pos="0 0 0.05" quat="0 1 0 0"/></body>'
 )
-THINGS = Things(f"<mujoco><worldbody>{TABLE}{BLOCK}</worldbody></mujoco>")
+THINGS = TaskScene(f"<mujoco><worldbody>{TABLE}{BLOCK}</worldbody></mujoco>")
 FINE = SceneConfig(sim_dt=0.004)
 T = 10
 
 
-def scene(robot="ur10e_gripper", things=THINGS):
-    return build(FINE, robot=robot, things=things)
+def scene(robot="ur10e_gripper", task_scene=THINGS):
+    return build(FINE, robot=robot, task_scene=task_scene)
 
 
 def test_capsules_stand_for_a_box_to_a_centimetre():
@@ -95,7 +95,7 @@ def test_an_object_must_be_of_boxes_round_its_origin():
     )
     for body, said in ((ball, "must be of boxes"), (off, "middle at its origin")):
         with pytest.raises(ConfigError, match=said):
-            scene(things=Things(f"<mujoco><worldbody>{body}</worldbody></mujoco>"))
+            scene(task_scene=TaskScene(f"<mujoco><worldbody>{body}</worldbody></mujoco>"))
 
 
 def test_what_is_light_is_not_pressed_into_what_it_lies_on():
@@ -122,7 +122,7 @@ def test_whatever_meets_pads_or_wood_meets_it_hard():
     assert (model.pair_solimp[light, 1] == HARD["solimp"][1]).all()
 
 
-CUPS = Things(THINGS.mjcf, (Weld("cups_block", ("task/top", "robot/tool_point")),))
+CUPS = TaskScene(THINGS.mjcf, (Weld("cups_block", ("task/top", "robot/tool_point")),))
 
 
 def test_cups_seal_only_where_they_sit():

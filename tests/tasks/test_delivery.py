@@ -10,7 +10,6 @@ from hrc_env.agents.env_info import env_info
 from hrc_env.agents.experts import expert
 from hrc_env.agents.scripted import Yielding
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.records import World
 from hrc_env.geometry import chains
 from hrc_env.geometry.ways import gaps_m, met, ranges_m, value_at, ways_m
 from hrc_env.motion import generator
@@ -18,6 +17,7 @@ from hrc_env.motion.anatomy import CHEST
 from hrc_env.scene.build import build
 from hrc_env.scene.robot import ROBOTS, chain_of
 from hrc_env.tasks import delivery
+from hrc_env.world import World
 
 ID = "HRCDelivery-v0"
 BASE = chain_of(ROBOTS["mobile_base"], (0.0, 0.0, 0.0))

@@ -8,11 +8,11 @@ import hrc_env  # noqa: F401  # registers the ids
 from hrc_env.agents.env_info import env_info
 from hrc_env.agents.experts import expert
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.records import Deeds, ObjectState, World
-from hrc_env.core.things import FOOT_WORLD
+from hrc_env.core.records import ObjectState
 from hrc_env.motion import state as st
 from hrc_env.tasks import drywall
 from hrc_env.tasks.drywall import PLACE_M, SCREWS_M
+from hrc_env.world import FOOT_WORLD, WorkerProgress, World
 
 ID = "HRCDrywall-v0"
 DT_S = 0.04
@@ -33,7 +33,7 @@ def world(shift_m=(0.0, 0.0, 0.0), held=True, screws=0, boring=False, workers=0)
         np.array([[held]]),
     )  # fmt: skip
     robot = type("Robot", (), {"tool_world": np.zeros((1, 3))})()
-    deeds = Deeds(
+    deeds = WorkerProgress(
         np.ones((1, workers), bool), np.full((1, workers), screws), np.full((1, workers), boring),
         np.zeros((1, workers), bool), np.zeros((1, workers, 3)), np.zeros((1, workers, 3)),
     )  # fmt: skip

@@ -5,10 +5,11 @@ import pytest
 
 from hrc_env.agents.env_info import env_info
 from hrc_env.agents.experts import PickPlacer
-from hrc_env.core.records import ObjectState, World
+from hrc_env.core.records import ObjectState
 from hrc_env.env import HRCEnv
 from hrc_env.observations import split
 from hrc_env.tasks.pick_place import PickPlace, places_world
+from hrc_env.world import World
 
 TASK = PickPlace()
 CONFIG = TASK.config

@@ -8,7 +8,7 @@ import hrc_env  # noqa: F401  # registers the ids
 from hrc_env.agents.env_info import env_info
 from hrc_env.agents.experts import expert
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.records import Deeds, ObjectState, World
+from hrc_env.core.records import ObjectState
 from hrc_env.tasks import handover
 from hrc_env.tasks.handover import (
     BAR_KG,
@@ -16,6 +16,7 @@ from hrc_env.tasks.handover import (
     GRAVITY_M_S2,
     HANDLE_UP_M,
 )
+from hrc_env.world import WorkerProgress, World
 
 ID = "HRCHandover-v0"
 DT_S = 0.04
@@ -34,7 +35,7 @@ def world(gap_m=0.0, speed_m_s=0.0, held=True, takes=True, away_m=0.0):
         AT[None, None], np.array([1.0, 0, 0, 0])[None, None], still, still, np.array([[held]])
     )
     grip = AT + np.array([0.0, gap_m, HANDLE_UP_M])
-    deeds = Deeds(
+    deeds = WorkerProgress(
         np.ones((1, 1), bool), np.zeros((1, 1), int), np.zeros((1, 1), bool),
         np.array([[takes]]), grip[None, None], np.array([[[speed_m_s, 0.0, 0.0]]]),
     )  # fmt: skip

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from hrc_env.core.skeleton import JOINT
-from hrc_env.core.things import FOOT_WORLD
 from hrc_env.tasks import drywall, handover
 from hrc_env.tasks.task import find_task
+from hrc_env.world import FOOT_WORLD
 
 RIGHT = [7, 15]
 """Forearm and hand."""

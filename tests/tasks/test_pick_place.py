@@ -9,12 +9,12 @@ from hrc_env.agents.env_info import env_info
 from hrc_env.agents.experts import expert
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import ObjectState
-from hrc_env.core.things import FOOT_WORLD
 from hrc_env.motion import generator
 from hrc_env.tasks import pick_place
 from hrc_env.tasks.pick_place import PickPlaceConfig
 from hrc_env.worker.body import SEGMENT
 from hrc_env.worker.props import PROP_NAMES
+from hrc_env.world import FOOT_WORLD
 
 ID = "HRCPickPlace-v0"
 HANDS = [SEGMENT["left_hand"], SEGMENT["right_hand"]]

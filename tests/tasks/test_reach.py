@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.records import World
 from hrc_env.tasks import reach
+from hrc_env.world import World
 
 TASK = reach.Reach()
 CONFIG = TASK.config

@@ -9,7 +9,7 @@ from hrc_env.tasks import drywall, handover, pick_place
 
 def compiled(task):
     """The task's MJCF on its own, its origin the middle of the robot's foot."""
-    return mujoco.MjModel.from_xml_string(task.make_things().mjcf)
+    return mujoco.MjModel.from_xml_string(task.make_scene().mjcf)
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import pytest
 from hrc_env.core.infos import MISCALIBRATED, MORE_PEOPLE
 from hrc_env.core.vacancy import Coverage, Vacancy, no_others
 from hrc_env.env import HRCEnv
-from hrc_env.step import perception_info
+from hrc_env.infos import perception_info
 from hrc_env.vector.env import HRCVectorEnv
 
 KNOCKED = ({"kind": "knocked", "cameras": ["camera_3"]},)

@@ -23,7 +23,6 @@ from hrc_env.experiments.ablations.ablation import Setting
 from hrc_env.experiments.ablations.handicaps import handicap, lengths_m
 from hrc_env.experiments.study.cache import PartProgress
 from hrc_env.experiments.study.rigs import N_WARM_UP, Turn
-from hrc_env.metrics import no_identities, tracking_error
 from hrc_env.motion import generator
 from hrc_env.perception.emulator import lines_of_sight
 from hrc_env.perception.sightlines import SEEN
@@ -31,6 +30,7 @@ from hrc_env.pipeline.levels import make_pipeline
 from hrc_env.pipeline.sensor_input import Generators, TrueSensorInput
 from hrc_env.pipeline.tracking import PoseTracking
 from hrc_env.scene.build import Scene, build
+from hrc_env.tracking.metrics import no_identities, tracking_error
 from hrc_env.worker.body import Body, pool, stack, worker_truth
 
 LEVEL = "keypoints"
@@ -111,7 +111,7 @@ def _episodes(setting: Setting, turn: Turn, walks: Walks, seeds: Sequence[int], 
         squares = np.einsum("...i,...i->...", off, np.linalg.solve(cov, off[..., None])[..., 0])
         inside.append(squares < INSIDE_95)
         lost.append(~said.tracked[episode, order])
-        known.append(tracking_error(said, now.truth, now.present, identities))
+        known.append(tracking_error(said, joints_world, now.present, identities))
         if setting.by_sight:
             seeing.append(n_seeing(now, scene, turn))
     error_m, is_inside, is_lost = (np.stack(each, 1) for each in (errors, inside, lost))

@@ -30,7 +30,7 @@ from hrc_env.geometry.distances import least_separation
 from hrc_env.motion import generator
 from hrc_env.safety.incidents import KINDS, MOVING_M_S
 from hrc_env.simulation import Simulation
-from hrc_env.step import Observation
+from hrc_env.step_result import Observation
 from hrc_env.tasks import DEFAULT
 from hrc_env.vector.shards import Shards
 from hrc_env.worker.body import worker_truth

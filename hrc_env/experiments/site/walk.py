@@ -3,13 +3,14 @@
 import numpy as np
 
 from hrc_env.core.batching import rows
-from hrc_env.core.records import WORKPLACE_KINDS, WorkerMotion
+from hrc_env.core.records import WorkerMotion
 from hrc_env.experiments.study.recording import concatenated
 from hrc_env.motion import generator
 from hrc_env.motion.config import MotionConfig
 from hrc_env.motion.schedule import Job
 from hrc_env.scene.build import Scene
 from hrc_env.worker.body import load_body
+from hrc_env.world import WORKPLACE_KINDS
 
 PASSING = MotionConfig(
     near_probability=0.0,

@@ -6,7 +6,6 @@ Recorded lifts: pelvis 0.57 to 1.01 m high, wrists at 1.3 m/s at most in the med
 import math
 
 from hrc_env.core.kernels import kernel
-from hrc_env.core.records import AWAY_M
 from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion.activities import planning as to
@@ -19,6 +18,7 @@ from hrc_env.motion.kinematics import pose
 from hrc_env.motion.posture import from_here, lean, look_at, stand
 from hrc_env.motion.state import Triple, Worker
 from hrc_env.worker.props import PROP_NAMES
+from hrc_env.world import AWAY_M
 
 BOX, BOARD = PROP_NAMES.index("box"), PROP_NAMES.index("board")
 BOX_HELD, BOARD_HELD, GIVEN = (0.37, 1.10), (0.27, 0.96), (0.60, 1.14)

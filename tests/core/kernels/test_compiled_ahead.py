@@ -30,7 +30,7 @@ print(json.dumps([[name, [encode(each) for each in args]] for name, kernel in KE
 def two_kernels(tmp_path, monkeypatch):
     """A folder in which nothing is compiled, and two small kernels that are to be."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    names = ("hrc_env.observations:_scale", "hrc_env.metrics:_tracking_error")
+    names = ("hrc_env.observations:_scale", "hrc_env.tracking.metrics:_tracking_error")
     some = [each for each in signatures.recorded("truth") if each.kernel in names]
     monkeypatch.setattr(signatures, "PATH", tmp_path / "signatures.json")
     signatures.write(some)

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.things import FOOT_WORLD
 from hrc_env.geometry.chains import SerialChain
+from hrc_env.geometry.reach import ReachTarget, Triple, check_reach
 from hrc_env.scene.build import build
 from hrc_env.scene.robot import Robot, chain_of
-from hrc_env.tasks.reach_target import ReachTarget, Triple, check_reach
+from hrc_env.world import FOOT_WORLD
 
 FOOT = (0.1, -0.2, 0.3)
 UPPER_ARM_M, FOREARM_M = 0.5, 0.3

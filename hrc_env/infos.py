@@ -1,83 +1,28 @@
-"""What a step or a reset gives: observation, reward, end, and infos by name."""
+"""The infos of a step or a reset: cost, incidents, tracking, workers and cameras, by name."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hrc_env import metrics
-from hrc_env.core.errors import ConfigError
-from hrc_env.core.infos import MISCALIBRATED, MORE_PEOPLE, Info, of_workers, published
+from hrc_env.core.infos import MISCALIBRATED, MORE_PEOPLE, Info, of_workers
 from hrc_env.core.records import PoseEstimate, RobotState, WorkerTruth
-from hrc_env.core.typing import Bools, Floats, Ints, Records
+from hrc_env.core.typing import Bools, Ints, Records
 from hrc_env.core.vacancy import Vacancy
 from hrc_env.geometry.distances import least_separation
-from hrc_env.metrics import CostConfig
 from hrc_env.motion import generator
 from hrc_env.rewards import RewardTerm
+from hrc_env.safety import cost as costs
 from hrc_env.safety import incidents
-from hrc_env.safety.watch import Watch
-
-Observation = NDArray[np.float32] | dict[str, NDArray[np.float32]]
-"""(B, n), or such arrays by name where goals stand apart (`hrc_env.tasks.goal`)."""
-
-
-@dataclass(frozen=True, slots=True)
-class StepResult:
-    """What a step or a reset gives, per environment."""
-
-    observation: Observation
-    reward: Floats
-    """(B,)."""
-    terminated: Bools
-    """(B,)."""
-    info: Info
-
-    def info_of(self, b: int) -> dict[str, Any]:
-        """Return the info of one environment, as NumPy scalars."""
-        return {name: value[b] for name, value in published(self.info).items()}
+from hrc_env.safety.cost import Cost, CostConfig
+from hrc_env.safety.incidents import IncidentMonitor
+from hrc_env.tracking import metrics
 
 
-def agreed(keys: list[str], info: Info) -> Info:
-    """Return an info with the `keys` of the first one, which fills the list; `ConfigError` for
-    another, as of a shield or a task whose names come and go."""
-    if not keys:
-        keys.extend(info)
-    if list(info) != keys and info.keys() != set(keys):
-        came, gone = sorted(info.keys() - set(keys)), sorted(set(keys) - info.keys())
-        raise ConfigError(
-            "Infos must have the same keys at every reset and step: what a shield says, and a "
-            f"task's info, under the same names each time. New: {', '.join(came) or 'none'}; "
-            f"missing: {', '.join(gone) or 'none'}. Give NaN where there is no number."
-        )
-    return info
-
-
-def joined(results: Sequence[StepResult]) -> StepResult:
-    """Results of ranges of a batch, one after the other."""
-    if len(results) == 1:
-        return results[0]
-    parts = zip(*((r.observation, r.reward, r.terminated) for r in results), strict=True)
-    info = {name: np.concatenate([each.info[name] for each in results]) for name in results[0].info}
-    observations, *others = parts
-    reward, terminated = map(np.concatenate, others)
-    return StepResult(_joined(observations), reward, terminated, info)
-
-
-def _joined(parts: Sequence[Any]) -> Any:
-    """Observations one after the other."""
-    if not isinstance(parts[0], dict):
-        return np.concatenate(parts)
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-
-
-def cost_info(cost: metrics.Cost, happened: Records, present: Bools, config: CostConfig) -> Info:
+def cost_info(cost: Cost, happened: Records, present: Bools, config: CostConfig) -> Info:
     """The cost by the names that safe-RL libraries read, with its parts, and the separation from
     who is there."""
-    parts = metrics.parts(cost, happened, config)
-    total = metrics.total(parts, config)
+    parts = costs.parts(cost, happened, config)
+    total = costs.total(parts, config)
     return {
         "cost": total,
         "cost_sum": total,
@@ -94,25 +39,25 @@ def reset_info(
     n = len(present)
     capsules = robot.capsules_world, robot.capsule_radius_m
     gaps_m = least_separation(*capsules, truth.capsules_world, truth.capsule_radius_m).distance_m
-    costs = ("", "_sum", *(f"_{name}" for name in ("proximity", "contact", *config.components)))
+    names = ("", "_sum", *(f"_{name}" for name in ("proximity", "contact", *config.components)))
     happened = dict.fromkeys(incidents.SUMMARY.names or (), 0.0)
     happened |= dict.fromkeys(incidents.AT_TIMES, np.nan)
     nearest_m = gaps_m.min(1, initial=np.inf, where=present)
     return {
         **{f"reward/{term.name}": np.zeros(n) for term in terms},
-        **{f"cost{name}": np.zeros(n) for name in costs},
+        **{f"cost{name}": np.zeros(n) for name in names},
         "safety/min_separation_m": np.where(present.any(1), nearest_m, np.nan),
         **{f"safety/{name}": np.full(n, value) for name, value in happened.items()},
         "safety/time_to_stop_s": np.zeros(n),
     }
 
 
-def incident_info(happened: Records, watch: Watch, robot: RobotState) -> Info:
+def incident_info(happened: Records, monitor: IncidentMonitor, robot: RobotState) -> Info:
     """What happened to people in a step, (B, W) `incidents.INCIDENT`, and in its episode."""
-    told = incidents.summed_up(happened, watch.known)
+    told = incidents.summed_up(happened, monitor.known)
     return {
         **{f"safety/{name}": told[name] for name in incidents.SUMMARY.names or ()},
-        "safety/time_to_stop_s": watch.stop_s(robot),
+        "safety/time_to_stop_s": monitor.stop_s(robot),
     }
 
 
@@ -121,7 +66,7 @@ def tracking_info(
 ) -> Info:
     """How far the belief is from the truth, and whether it takes one worker for another; no error
     is given where nobody is tracked."""
-    found = metrics.tracking_error(estimate, truth, present, identities)
+    found = metrics.tracking_error(estimate, truth.joints_world, present, identities)
     return {f"tracking/{name}": found[name] for name in metrics.TRACKING.names or ()}
 
 

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.things import FOOT_WORLD, Things
 from hrc_env.env import HRCEnv
+from hrc_env.geometry.reach import ReachTarget, check_reach, wrist_reach
 from hrc_env.scene.build import build
 from hrc_env.tasks import pick_place
-from hrc_env.tasks.reach_target import ReachTarget, check_reach, wrist_reach
+from hrc_env.world import FOOT_WORLD, TaskScene
 from tests.tasks.variants import vary
 
 ARM = build(robot="ur10e_gripper").chain
@@ -47,9 +47,9 @@ def test_goals_too_far_away_are_refused():
 
 
 def test_so_is_what_a_task_puts_too_far_away():
-    mjcf = pick_place.PickPlace().make_things().mjcf
-    far = Things(mjcf.replace('name="stud_1" pos="0.2', 'name="stud_1" pos="2.2'))
-    task = vary(pick_place.PickPlace, id="Far-v0", make_things=lambda self: far)
+    mjcf = pick_place.PickPlace().make_scene().mjcf
+    far = TaskScene(mjcf.replace('name="stud_1" pos="0.2', 'name="stud_1" pos="2.2'))
+    task = vary(pick_place.PickPlace, id="Far-v0", make_scene=lambda self: far)
     with pytest.raises(ConfigError, match=r"Far-v0: object 'stud_1' at \(1\.47"):
         HRCEnv(task, perception="none")
 
