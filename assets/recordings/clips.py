@@ -21,7 +21,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.typing import Points3
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.mocap.person import across
-from hrc_env.mocap.read import read_capture
+from hrc_env.mocap.read import read_recording
 from hrc_env.mocap.record import Capture
 from hrc_env.mocap.retarget import RetargetError, retarget
 from hrc_env.motion.clip import Clip
@@ -97,9 +97,9 @@ def capture_of(recorded: Recorded, folder: Path) -> Capture:
         with tempfile.TemporaryDirectory() as scratch:
             place = Path(scratch) / f"{recorded.name}.npz"
             np.savez(place, joints=joints[_rows(recorded, len(joints), fps)], fps=fps)
-            return read_capture(place, min(fps, FASTEST_HZ))
-    whole = read_capture(path)
-    whole = read_capture(path, min(whole.fps, FASTEST_HZ))
+            return read_recording(place, min(fps, FASTEST_HZ))
+    whole = read_recording(path)
+    whole = read_recording(path, min(whole.fps, FASTEST_HZ))
     rows = _rows(recorded, len(whole.joints_world), whole.fps)
     return replace(whole, joints_world=whole.joints_world[rows])
 

@@ -15,7 +15,7 @@ from assets.recordings.written import ORDERS, Y_UP, write_acclaim, write_bvh
 from assets.rotations import matrix_from_quaternion
 from hrc_env.core.typing import Floats, Points3, Rotations
 from hrc_env.geometry.rotations import about_axis
-from hrc_env.mocap.read import read_capture
+from hrc_env.mocap.read import read_recording
 from hrc_env.mocap.record import forward
 from hrc_env.mocap.retarget import RetargetError, retarget
 from hrc_env.motion.clip import Clip
@@ -75,7 +75,7 @@ def made_of(
         if role in (None, style.role):
             with tempfile.TemporaryDirectory() as scratch:
                 path = write(style, Path(scratch), number)
-                capture = read_capture(path, source_fps=FPS * style.pace)
+                capture = read_recording(path, source_fps=FPS * style.pace)
             clip, error = retarget(capture, body or load_body())
             yield style, replace(clip, source=style.name), error
 

@@ -27,7 +27,7 @@ from hrc_env.perception.windows import window_from_joints
 from hrc_env.core.records import Roi, WorkerMotion
 from hrc_env.scene.build import SceneConfig, build
 from hrc_env.scene.render import CropRenderer
-from hrc_env.scene.rig import LAB_CAMERAS, pinholes
+from hrc_env.scene.rig import LAB_CAMERAS, make_cameras
 from hrc_env.core.skeleton import BLAZEPOSE_INDEX, JOINTS, MIRROR, N_JOINTS
 
 PLACES = (((0.3, 0.0), 0.4), ((1.1, 0.6), 2.1), ((0.5, -0.7), -1.8), ((1.5, -0.2), 3.6))
@@ -132,7 +132,7 @@ def calibrate(name: str) -> Calibration:
     """Look at a worker in all poses and places."""
     body = load_body(name)
     motions, px, sigma = observe(name)
-    points = triangulate(projections(pinholes(LAB_CAMERAS)), px, sigma, 5.0).points_world[:, 0]
+    points = triangulate(projections(make_cameras(LAB_CAMERAS)), px, sigma, 5.0).points_world[:, 0]
     local = in_segments(body, motions, points, body.joint_segment)
     anatomical = anatomical_offset(name)
     held_out = np.arange(len(motions)) % 2 == 1

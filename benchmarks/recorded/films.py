@@ -9,7 +9,7 @@ import numpy as np
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Roi
 from hrc_env.core.typing import Image
-from hrc_env.perception.blazepose import sample_window
+from hrc_env.perception.blazepose import crop_window
 
 
 class Films:
@@ -54,7 +54,7 @@ class Films:
 
     def crop(self, camera_index: int, window: Roi) -> Image:
         """The window of a camera's open frame, upright, (256, 256, 3) RGB."""
-        return sample_window(self.frames[camera_index], window)
+        return crop_window(self.frames[camera_index], window)
 
     def close(self) -> None:
         """Close the files."""

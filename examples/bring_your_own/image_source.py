@@ -10,7 +10,7 @@ import imageio.v2 as imageio
 import numpy as np
 
 from hrc_env.geometry.camera_config import read_rig
-from hrc_env.perception.blazepose import sample_window
+from hrc_env.perception.blazepose import crop_window
 from hrc_env.pipeline.pose_tracker import PoseTracker
 from hrc_env.scene.rig import pinholes
 
@@ -22,7 +22,7 @@ class Frames:
         self.images = images
 
     def crop(self, camera_index, window):
-        return sample_window(self.images[camera_index], window)
+        return crop_window(self.images[camera_index], window)
 
 
 def poses(rig, films):

@@ -100,9 +100,9 @@ class ImportMotion:
 
     def _read(self, fps: float | None) -> "Capture":
         from hrc_env.mocap.names import names_given
-        from hrc_env.mocap.read import read_capture
+        from hrc_env.mocap.read import read_recording
 
-        return read_capture(
+        return read_recording(
             self.file, fps, self.source_fps, self.skeleton, self.allow_off_floor,
             names_given(self.joint), self.up,
         )  # fmt: skip

@@ -86,6 +86,28 @@ class CameraConfig:
         _check_image(self, intrinsics(self))
 
     @classmethod
+    def from_make(
+        cls,
+        make: str,
+        name: str,
+        eye_world: tuple[float, float, float],
+        target_world: tuple[float, float, float] = (0.2, 0.0, 1.0),
+    ) -> "CameraConfig":
+        """Return a camera as it can be bought, at a place.
+
+        Args:
+            make: a key of `MAKES`; "gopro_hero8_wide" is the paper's camera.
+            name: of the camera, unique in its rig.
+            eye_world: where it hangs [m], world frame.
+            target_world: the point that it looks at [m], world frame.
+
+        Raises:
+            ConfigError: there is no such make.
+        """
+        check_names("make of camera", [make], MAKES)
+        return replace(MAKES[make], name=name, eye_world=eye_world, target_world=target_world)
+
+    @classmethod
     def from_matrices(
         cls, name: str, K: Floats, T_world_from_cam: Transforms, size_px: tuple[int, int],
         distortion: Lens | Sequence[float] = (), fisheye: bool = False,
@@ -230,20 +252,9 @@ MAKES: dict[str, CameraConfig] = {
         "gopro_hero8_wide", (0.0, 0.0, 2.4), hfov_deg=118.2, lens=Lens("kannala_brandt", (0.0667,))
     )
 }
-"""Cameras as they are made, to be hung up with `made`. The GoPro HERO8 Black with its wide lens
+"""Cameras as they are made (`CameraConfig.from_make`). The GoPro HERO8 Black with its wide lens
 is the paper's: 118.2 x 69.5 degrees on 1920 x 1080. No pinhole with square pixels has both; the
 fisheye polynomial with this coefficient does."""
-
-
-def made(
-    make: str,
-    name: str,
-    eye_world: tuple[float, float, float],
-    target_world: tuple[float, float, float] = (0.2, 0.0, 1.0),
-) -> CameraConfig:
-    """A camera of a make (a key of `MAKES`), hung up somewhere."""
-    check_names("make of camera", [make], MAKES)
-    return replace(MAKES[make], name=name, eye_world=eye_world, target_world=target_world)
 
 
 def read_rig(path: Path | str) -> tuple[CameraConfig, ...]:

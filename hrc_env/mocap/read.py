@@ -40,7 +40,7 @@ class _Content(NamedTuple):
     """(3,) from hips to shoulders of the skeleton at rest, NaN if it does not stand."""
 
 
-def read_capture(
+def read_recording(
     path: Path, fps: float | None = None, source_fps: float | None = None,
     skeleton: Path | None = None, allow_off_floor: bool = False,
     joints: Mapping[str, str] | None = None, up: str | None = None,

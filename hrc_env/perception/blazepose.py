@@ -64,7 +64,7 @@ def window_from_points(centre_px: Points2, rim_px: Points2) -> Roi:
     return Roi((float(centre_px[0]), float(centre_px[1])), side_px, rotation)
 
 
-def sample_window(image: Image, window: Roi, side: int = LANDMARK_SIDE) -> Image:
+def crop_window(image: Image, window: Roi, side: int = LANDMARK_SIDE) -> Image:
     """The turned square of an image as an upright (side, side, 3) picture, bilinear, corner to
     corner; the image's border is continued outside, as MediaPipe does. `ConfigError` for an image
     that is not of uint8."""

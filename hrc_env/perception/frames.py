@@ -9,7 +9,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Roi
 from hrc_env.core.typing import Image
 from hrc_env.geometry.cameras import PinholeCamera
-from hrc_env.perception.blazepose import sample_window
+from hrc_env.perception.blazepose import crop_window
 
 
 class Frames:
@@ -37,4 +37,4 @@ class Frames:
 
     def crop(self, camera_index: int, window: Roi) -> Image:
         """Return a window of a camera's image, (256, 256, 3)."""
-        return sample_window(self.images[camera_index], window)
+        return crop_window(self.images[camera_index], window)

@@ -20,7 +20,7 @@ from hrc_env.scene.cups import Cups, cups_of
 from hrc_env.scene.objects import Objects, objects_of, surfaces
 from hrc_env.scene.places import SCENES, obstacles, to_drive_in
 from hrc_env.scene.primitives import OBJECT_BIT, PAD_BIT, ROBOT_BIT, SCENE_BIT, SOLID
-from hrc_env.scene.rig import CameraConfig, add_cameras, pinholes, select
+from hrc_env.scene.rig import CameraConfig, add_cameras, make_cameras, select
 from hrc_env.scene.robot import (
     DEFAULT,
     PREFIX,
@@ -218,7 +218,7 @@ def _build(recipe: Recipe) -> Scene:
         bodies=bodies,
         model=model,
         chain=chain,
-        cameras=pinholes(select(config.cameras, use)),
+        cameras=make_cameras(select(config.cameras, use)),
         home_q=np.array(robot.home_q),
         servo_lead_s=servo_lead_s(robot, model),
         watched=np.array([robot.capsules.index(name) for name in robot.watched]),
@@ -271,7 +271,7 @@ def _spec(recipe: Recipe) -> mujoco.MjSpec:
     foot_world = _foot_world(robot, name)
     add_robot(spec, robot, foot_world)
     objects.add_task_scene(spec, task_scene, foot_world)
-    add_cameras(spec, pinholes(select(config.cameras, use)))
+    add_cameras(spec, make_cameras(select(config.cameras, use)))
     for prefix in _prefixes(n_workers):
         add_worker(spec, load_body(bodies[0]), prefix)
     objects.add_welds(spec, task_scene)

@@ -58,7 +58,7 @@ def _index(choice: int | str, names: list[str]) -> int:
     return names.index(choice)
 
 
-def pinholes(cameras: tuple[CameraConfig, ...]) -> tuple[PinholeCamera, ...]:
+def make_cameras(cameras: tuple[CameraConfig, ...]) -> tuple[PinholeCamera, ...]:
     """The cameras of a rig."""
     return tuple(map(_hung, cameras))
 

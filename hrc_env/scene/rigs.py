@@ -7,7 +7,7 @@ import numpy as np
 
 from hrc_env.core.typing import Bools, Floats, Points3
 from hrc_env.core.vacancy import Coverage
-from hrc_env.geometry.camera_config import CameraConfig, made
+from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.geometry.cameras import (
     PinholeCamera,
     image_from_pinhole,
@@ -25,7 +25,8 @@ from hrc_env.world import Grounds
 RIGS: dict[str, tuple[CameraConfig, ...]] = {
     "lab": LAB_CAMERAS,
     "lab_gopro": tuple(
-        made("gopro_hero8_wide", camera.name, camera.eye_world) for camera in LAB_CAMERAS
+        CameraConfig.from_make("gopro_hero8_wide", camera.name, camera.eye_world)
+        for camera in LAB_CAMERAS
     ),
     "site": SITE_CAMERAS,
 }

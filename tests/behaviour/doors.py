@@ -56,7 +56,7 @@ from hrc_env.geometry import cameras, chains, distances, shapes, sight, ways
 from hrc_env.geometry import lines_of_sight as lines
 from hrc_env.geometry import rotations as turns
 from hrc_env.geometry.assignment import assign_rows
-from hrc_env.geometry.camera_config import MAKES, CameraConfig, made
+from hrc_env.geometry.camera_config import MAKES, CameraConfig
 from hrc_env.geometry.lens import Lens, lens_row
 from hrc_env.geometry.reach import ReachTarget, check_reach
 from hrc_env.geometry.robot_model import RobotModel
@@ -65,7 +65,7 @@ from hrc_env.geometry.triangulation import linear_point, triangulate
 from hrc_env.mocap import footing, person, repair, stance
 from hrc_env.mocap.guess import first_guess
 from hrc_env.mocap.poses import joints_in, marks_of, posed
-from hrc_env.mocap.read import read_capture
+from hrc_env.mocap.read import read_recording as read_capture
 from hrc_env.mocap.record import Capture
 from hrc_env.mocap.retarget import adapted, fitted, retarget
 from hrc_env.motion import config as motion_config
@@ -103,7 +103,7 @@ from hrc_env.scene.build import SceneConfig, drawing_model, visuals
 from hrc_env.scene.build import build as build_scene
 from hrc_env.scene.objects import held_by
 from hrc_env.scene.render import CropRenderer
-from hrc_env.scene.rig import pinholes
+from hrc_env.scene.rig import make_cameras
 from hrc_env.scene.rigs import floor as floor_points
 from hrc_env.scene.robot import ROBOTS, chain_of
 from hrc_env.simulation import Simulation
@@ -1391,7 +1391,7 @@ class Camera:
         names = CAMERA_FIELDS | {"focal_px": "focal_px", "centre_px": "centre_px"}
         fields = {names[name]: value for name, value in described.items()}
         config = CameraConfig(name="probe", lens=Lens(lens, coefficients), **fields)
-        self._made = pinholes((config,))[0]
+        self._made = make_cameras((config,))[0]
         self.K, self.P = self._made.K, self._made.P
         self.pose, self.eye_world = self._made.T_world_from_cam, self._made.eye_world
         self.lens_row = lens_row(config.lens).copy()
@@ -1633,7 +1633,9 @@ LENS_FIELDS = {"exposure_s": "exposure_s", "focal_px": "focal_px", "centre_px": 
 
 def _camera_config(camera: Mapping[str, Any]) -> CameraConfig:
     if "make" in camera:
-        return made(camera["make"], camera["name"], camera["eye_m"], camera["target_m"])
+        return CameraConfig.from_make(
+            camera["make"], camera["name"], camera["eye_m"], camera["target_m"]
+        )
     plain = {name: value for name, value in camera.items() if name != "lens"}
     lens = Lens(*camera["lens"]) if "lens" in camera else Lens()
     return CameraConfig(**_renamed(plain, {**CAMERA_FIELDS, **LENS_FIELDS}), lens=lens)
@@ -2132,7 +2134,7 @@ def view_through_lens(rig: Rig, drawn: Drawn, c: int, window: Window) -> Picture
 
 def sample_picture(picture: Picture, window: Window, side_px: int) -> Picture:
     """Return an upright picture of a window of an image."""
-    return blazepose.sample_window(picture, _roi(window), side_px)
+    return blazepose.crop_window(picture, _roi(window), side_px)
 
 
 def feed_detector(picture: Picture) -> tuple[NDArray[Any], Window]:

@@ -9,7 +9,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.geometry.camera_config import CameraConfig, read_rig, write_rig
 from hrc_env.geometry.cameras import image_from_pinhole, project
 from hrc_env.geometry.rotations import about_axis, from_rotation_vector, look_at
-from hrc_env.scene.rig import pinholes
+from hrc_env.scene.rig import make_cameras
 
 K = np.array([[905.0, 0.0, 948.0], [0.0, 912.0, 551.0], [0.0, 0.0, 1.0]])
 BROWN = (-0.21, 0.06, 0.001, -0.002, -0.004)
@@ -46,7 +46,7 @@ def by_opencv(points_world, T_world_from_cam, distortion, fisheye):
 
 
 def by_us(points_world, camera):
-    (hung,) = pinholes((camera,))
+    (hung,) = make_cameras((camera,))
     return image_from_pinhole(hung, project(hung.P[None], points_world[None])[0][0, 0])
 
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.geometry.camera_config import MAKES, CameraConfig, intrinsics, made
+from hrc_env.geometry.camera_config import MAKES, CameraConfig, intrinsics
 from hrc_env.geometry.lens import Lens, distort, magnification, rays_cam, undistort
 
 GOPRO = MAKES["gopro_hero8_wide"]
@@ -76,7 +76,7 @@ def test_the_gopro_sees_what_the_paper_says():
 
 def test_a_camera_of_an_unknown_make_is_told_those_that_there_are():
     with pytest.raises(ConfigError, match="gopro_hero8_wide"):
-        made("gopro", "left", (0.0, 0.0, 2.0))
+        CameraConfig.from_make("gopro", "left", (0.0, 0.0, 2.0))
 
 
 @pytest.mark.parametrize(

@@ -8,12 +8,12 @@ import pytest
 from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCEnv
-from hrc_env.geometry.camera_config import CameraConfig, made, read_rig, write_rig
+from hrc_env.geometry.camera_config import CameraConfig, read_rig, write_rig
 from hrc_env.scene.build import SceneConfig, build
 from hrc_env.scene.rigs import RIGS, findings, sees, workspace
 
 ODD = replace(
-    made("gopro_hero8_wide", 'the "left" one\\', (1.0, -2.0, 2.25)),
+    CameraConfig.from_make("gopro_hero8_wide", 'the "left" one\\', (1.0, -2.0, 2.25)),
     roll_deg=12.5, centre_px=(950.0, 530.5),
 )  # fmt: skip
 

@@ -12,7 +12,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import JOINTS
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.mocap.bvh import read_bvh
-from hrc_env.mocap.read import read_capture
+from hrc_env.mocap.read import read_recording
 from hrc_env.mocap.skeleton import HEAD, SIDED
 
 KNOWN = [j for j, joint in enumerate(JOINTS) if not joint.endswith(("nose", "foot"))]
@@ -23,7 +23,7 @@ def written(work, folder, **traps):
 
 
 def test_a_bvh_file_reads_back(work, tmp_path):
-    capture = read_capture(written(work, tmp_path))
+    capture = read_recording(written(work, tmp_path))
     assert capture.repaired == ()
     assert capture.fps == work.fps
     assert np.abs(capture.joints_world - work.centres)[:, KNOWN].max() < 1e-4
@@ -34,7 +34,7 @@ def test_a_bvh_file_full_of_traps_reads_the_same_and_says_what_it_met(work, tmp_
         work, tmp_path, unit_m=0.01, axes=Y_UP, orders=ORDERS, rest_first=True,
         name=lambda segment: cmu_name(segment, "mixamorig:"),
     )  # fmt: skip
-    capture = read_capture(path)
+    capture = read_recording(path)
     assert np.abs(capture.joints_world - work.centres)[:, KNOWN].max() < 1e-4
     said = " ".join(capture.repaired)
     for trap in ("centimetres", "T-pose", "+y axis"):
@@ -44,31 +44,31 @@ def test_a_bvh_file_full_of_traps_reads_the_same_and_says_what_it_met(work, tmp_
 
 def test_acclaim_files_read_back_in_cmus_unit(work, tmp_path):
     path = write_acclaim(tmp_path, work.position, work.rotation)
-    capture = read_capture(path, source_fps=work.fps)
+    capture = read_recording(path, source_fps=work.fps)
     assert np.abs(capture.joints_world - work.centres)[:, KNOWN].max() < 1e-4
     assert "inches" in " ".join(capture.repaired)
 
 
 def test_acclaim_files_without_a_rate_are_taken_to_be_of_120_hz(work, tmp_path):
-    capture = read_capture(write_acclaim(tmp_path, work.position, work.rotation))
+    capture = read_recording(write_acclaim(tmp_path, work.position, work.rotation))
     assert capture.fps == 120.0
     assert "120 Hz" in " ".join(capture.repaired)
 
 
 def test_joints_in_an_npz_file_are_the_projects_own(work, tmp_path):
     np.savez(tmp_path / "walk.npz", joints=work.joints, fps=work.fps)
-    capture = read_capture(tmp_path / "walk.npz")
+    capture = read_recording(tmp_path / "walk.npz")
     assert capture.landmarks
     assert np.array_equal(capture.joints_world, work.joints)
 
 
 def test_a_nose_is_made_where_a_skeleton_has_only_a_head(work, tmp_path):
-    nose = read_capture(written(work, tmp_path)).joints_world[:, 0]
+    nose = read_recording(written(work, tmp_path)).joints_world[:, 0]
     assert np.linalg.norm(nose - work.joints[:, 0], axis=-1).max() < 0.03
 
 
 def test_foot_tips_are_the_end_sites_of_the_toes(work, tmp_path):
-    capture = read_capture(written(work, tmp_path))
+    capture = read_recording(written(work, tmp_path))
     assert np.abs(capture.joints_world - work.joints)[:, -2:].max() < 1e-4
 
 
@@ -92,7 +92,7 @@ def test_what_a_file_means_does_not_depend_on_its_channel_orders(
     part = write_bvh(
         folder / "part.bvh", work.position[:40], work.rotation[:40], 50.0, unit_m, orders=orders
     )
-    joints = read_capture(part).joints_world
+    joints = read_recording(part).joints_world
     assert np.abs(joints - work.centres[:40])[:, KNOWN].max() < 1e-4
 
 
@@ -114,16 +114,16 @@ def shortened(path, keep):
 
 def test_a_file_that_is_cut_off_in_its_skeleton_is_refused(work, tmp_path):
     with pytest.raises(ConfigError, match=r"walk\.bvh.*(cut off|expected)"):
-        read_capture(shortened(written(work, tmp_path), 0.003))
+        read_recording(shortened(written(work, tmp_path), 0.003))
 
 
 def test_a_file_with_too_few_of_its_frames_is_refused(work, tmp_path):
     with pytest.raises(ConfigError, match=r"announces \d+ frames"):
-        read_capture(shortened(written(work, tmp_path), 0.3))
+        read_recording(shortened(written(work, tmp_path), 0.3))
 
 
 def test_a_file_that_lost_its_last_frames_is_read_with_a_warning(work, tmp_path):
-    capture = read_capture(shortened(written(work, tmp_path), 0.9))
+    capture = read_recording(shortened(written(work, tmp_path), 0.9))
     assert 0.8 < len(capture.joints_world) / len(work.joints) < 1.0
     assert "frames are announced" in " ".join(capture.repaired)
 
@@ -144,7 +144,7 @@ def test_a_damaged_or_unknown_file_is_refused_in_words(work, tmp_path, old, new,
     path = written(work, tmp_path)
     path.write_text(path.read_text().replace(old, new))
     with pytest.raises(ConfigError, match=told):
-        read_capture(path)
+        read_recording(path)
 
 
 def test_a_frame_with_a_word_or_a_missing_number_is_refused(work, tmp_path):
@@ -152,17 +152,17 @@ def test_a_frame_with_a_word_or_a_missing_number_is_refused(work, tmp_path):
     for broken, told in (("1.0 2.0", "has 2"), (lines[-20] + "x", "expected numbers")):
         (tmp_path / "broken.bvh").write_text("\n".join([*lines[:-20], broken, *lines[-19:]]))
         with pytest.raises(ConfigError, match=told):
-            read_capture(tmp_path / "broken.bvh")
+            read_recording(tmp_path / "broken.bvh")
 
 
 def test_a_motion_without_its_skeleton_is_refused(work, tmp_path):
     path = write_acclaim(tmp_path, work.position[:50], work.rotation[:50])
     (tmp_path / "walk.asf").unlink()
     with pytest.raises(ConfigError, match="needs its skeleton"):
-        read_capture(path)
+        read_recording(path)
     (tmp_path / "walk.fbx").write_text("")
     with pytest.raises(ConfigError, match=r"ends in \.bvh, \.amc, \.npz"):
-        read_capture(tmp_path / "walk.fbx")
+        read_recording(tmp_path / "walk.fbx")
 
 
 def test_an_npz_file_of_another_shape_is_refused_with_the_right_one(work, tmp_path):
@@ -175,10 +175,10 @@ def test_an_npz_file_of_another_shape_is_refused_with_the_right_one(work, tmp_pa
     ):
         np.savez(path, **arrays)
         with pytest.raises(ConfigError, match=told):
-            read_capture(path)
+            read_recording(path)
     path.write_bytes(path.read_bytes()[:200])
     with pytest.raises(ConfigError, match="cut off"):
-        read_capture(path)
+        read_recording(path)
 
 
 def test_the_page_has_every_name_that_is_understood():

@@ -10,7 +10,7 @@ from hrc_env.core.skeleton import JOINT, MIRROR
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.mocap import repair
 from hrc_env.mocap.person import resampled, smoothed
-from hrc_env.mocap.read import read_capture
+from hrc_env.mocap.read import read_recording
 
 UPS = {
     "+y": about_axis("x", -np.pi / 2), "-y": about_axis("x", np.pi / 2),
@@ -21,7 +21,7 @@ UPS = {
 
 def imported(folder, joints, wished_fps=None):
     np.savez(folder / "joints.npz", joints=joints, fps=50.0)
-    return read_capture(folder / "joints.npz", wished_fps)
+    return read_recording(folder / "joints.npz", wished_fps)
 
 
 def distances(joints):

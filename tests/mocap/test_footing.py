@@ -11,7 +11,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import JOINT
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.mocap.footing import floor_height, off_floor
-from hrc_env.mocap.read import read_capture
+from hrc_env.mocap.read import read_recording
 from hrc_env.mocap.retarget import retarget
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import ANKLE_Z
@@ -38,7 +38,7 @@ def times(joints):
 @pytest.mark.parametrize("floor_m", [-0.9, -0.08, 0.05, 0.12, 1.0])
 def test_resting_feet_are_on_the_floor_wherever_the_files_floor_is(work, tmp_path, floor_m):
     path = saved(tmp_path, work.joints + floor_m * UP)
-    clip, _ = retarget(read_capture(path), load_body())
+    clip, _ = retarget(read_recording(path), load_body())
     for side in range(2):
         feet = footprints(clip.controls[:, c.ANKLE + 6 * side :], clip.size)
         above = feet[clip.contacts[:, side], 2] - clip.size[ANKLE_Z]
@@ -48,7 +48,7 @@ def test_resting_feet_are_on_the_floor_wherever_the_files_floor_is(work, tmp_pat
 @pytest.mark.parametrize("degrees", [-3.0, 1.5, 3.5])
 def test_a_floor_that_is_slightly_aslant_is_levelled_and_said(work, tmp_path, degrees):
     aslant = work.joints @ about_axis("y", np.radians(degrees)).T
-    capture = read_capture(saved(tmp_path, aslant))
+    capture = read_recording(saved(tmp_path, aslant))
     assert re.search(rf"aslant by {abs(degrees):.1f} degrees", " ".join(capture.repaired))
     assert np.abs(capture.joints_world - work.joints)[..., 2].max() < 0.03
 
@@ -92,8 +92,8 @@ def trampoline(t):
 def test_who_is_off_the_floor_is_refused_unless_that_is_accepted(work, tmp_path, height, told):
     path = saved(tmp_path, raised(work.joints, height(times(work.joints))))
     with pytest.raises(ConfigError, match=rf"joints\.npz: .*({told}).*--allow-off-floor"):
-        read_capture(path)
-    capture = read_capture(path, allow_off_floor=True)
+        read_recording(path)
+    capture = read_recording(path, allow_off_floor=True)
     assert re.search(told, " ".join(capture.repaired))
 
 
@@ -105,15 +105,15 @@ def test_who_hangs_above_the_files_floor_is_refused(work, tmp_path):
                 height_m * UP
             )
     with pytest.raises(ConfigError, match=r"feet 0\.5\d m above the file's floor"):
-        read_capture(saved(tmp_path, hanging))
-    read_capture(saved(tmp_path, hanging - 0.5 * UP))  # works overhead
+        read_recording(saved(tmp_path, hanging))
+    read_recording(saved(tmp_path, hanging - 0.5 * UP))  # works overhead
 
 
 def test_feet_that_are_never_still_are_refused(work, tmp_path):
     t = times(work.joints)
     path = saved(tmp_path, raised(work.joints, 0.06 * np.sin(20.0 * t)))
     with pytest.raises(ConfigError, match=r"rests for \d % of the time"):
-        read_capture(path)
+        read_recording(path)
 
 
 @pytest.fixture
@@ -130,13 +130,13 @@ def test_a_skeleton_of_other_lengths_is_refused(acclaim, share):
     )
     skeleton.write_text(longer)
     with pytest.raises(ConfigError, match=r"With this skeleton, feet stand [+-]0\.\d\d m above"):
-        read_capture(acclaim, source_fps=FPS)
-    assert read_capture(acclaim, source_fps=FPS, allow_off_floor=True).repaired
+        read_recording(acclaim, source_fps=FPS)
+    assert read_recording(acclaim, source_fps=FPS, allow_off_floor=True).repaired
 
 
 def test_the_own_skeleton_is_not_refused(tmp_path):
     for seed in range(N_STRIDES):
-        capture = read_capture(written_as("amc", stride(seed), tmp_path), source_fps=FPS)
+        capture = read_recording(written_as("amc", stride(seed), tmp_path), source_fps=FPS)
         assert abs(floor_height(capture.joints_world, FPS)) < 0.06
 
 
@@ -151,7 +151,7 @@ def test_the_own_skeleton_is_not_refused(tmp_path):
 def test_a_motion_of_other_bones_or_freedoms_is_refused(acclaim, old, new, told):
     acclaim.write_text(re.sub(old, new, acclaim.read_text()))
     with pytest.raises(ConfigError, match=told):
-        read_capture(acclaim)
+        read_recording(acclaim)
 
 
 def test_a_skeleton_that_says_to_be_another_subjects_is_refused(tmp_path):
@@ -160,6 +160,6 @@ def test_a_skeleton_that_says_to_be_another_subjects_is_refused(tmp_path):
     skeleton = path.with_suffix(".asf").rename(tmp_path / "35.asf")
     for given in (None, skeleton):
         with pytest.raises(ConfigError, match=r"of subject 2, 35\.asf the skeleton of subject 35"):
-            read_capture(path, skeleton=given)
+            read_recording(path, skeleton=given)
     skeleton.rename(tmp_path / "2.asf")
-    assert read_capture(path, source_fps=FPS).fps == FPS
+    assert read_recording(path, source_fps=FPS).fps == FPS

@@ -12,7 +12,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import JOINT, JOINTS
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.mocap.names import names_given
-from hrc_env.mocap.read import read_capture
+from hrc_env.mocap.read import read_recording
 from hrc_env.worker.body import SEGMENT, SEGMENTS
 
 PARTS = ("clavicle", "upper_arm", "forearm", "hand", "thigh", "shank", "foot", "toes")
@@ -81,17 +81,17 @@ def written(work, folder, **traps):
 
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_files_that_differ_in_names_alone_are_the_same_person(work, tmp_path, program):
-    usual = read_capture(written(work, tmp_path)[0])
-    other = read_capture(written(work, tmp_path, name=segment_names(*PROGRAMS[program]))[0])
+    usual = read_recording(written(work, tmp_path)[0])
+    other = read_recording(written(work, tmp_path, name=segment_names(*PROGRAMS[program]))[0])
     assert np.array_equal(other.joints_world, usual.joints_world)
 
 
 def test_what_hangs_where_an_unknown_name_stands_is_said(work, tmp_path):
     called = segment_names(*PROGRAMS["a program of its own"])
-    said = " ".join(read_capture(written(work, tmp_path, name=called)[0]).repaired)
+    said = " ".join(read_recording(written(work, tmp_path, name=called)[0]).repaired)
     assert "left_elbow was taken to be L_Cubitus, which hangs between L_UpperArm and L_Ha" in said
     called = segment_names(*PROGRAMS["Rigify"])
-    said = " ".join(read_capture(written(work, tmp_path, name=called)[0]).repaired)
+    said = " ".join(read_recording(written(work, tmp_path, name=called)[0]).repaired)
     assert "The head was taken to be spine.006" in said
 
 
@@ -113,10 +113,10 @@ BY_HAND = {
 def test_names_that_say_nothing_are_told_by_hand(work, tmp_path):
     path, _ = written(work, tmp_path, name=numbered)
     with pytest.raises(ConfigError, match=r"Missed: left_shoulder.*--joint left_shoulder=NAME"):
-        read_capture(path)
-    capture = read_capture(path, joints=BY_HAND)
+        read_recording(path)
+    capture = read_recording(path, joints=BY_HAND)
     assert capture.found[JOINT["left_knee"]] == BY_HAND["left_knee"]
-    usual = read_capture(written(work, tmp_path)[0]).joints_world
+    usual = read_recording(written(work, tmp_path)[0]).joints_world
     known = [j for j, joint in enumerate(JOINTS) if not joint.endswith(("nose", "foot"))]
     assert np.allclose(capture.joints_world[:, known], usual[:, known])
 
@@ -143,7 +143,7 @@ def test_the_command_takes_names_one_by_one_or_from_a_file(work, tmp_path):
 def test_names_by_hand_that_cannot_be_are_refused(work, tmp_path, joints, told):
     path, _ = written(work, tmp_path)
     with pytest.raises(ConfigError, match=told):
-        read_capture(path, joints=joints)
+        read_recording(path, joints=joints)
 
 
 def test_an_entry_that_is_no_name_and_no_file_is_refused():
@@ -182,9 +182,9 @@ TEXTS = {
 @pytest.mark.parametrize("form", TEXTS)
 def test_a_file_is_read_however_its_text_is_written(work, tmp_path, form):
     path, text = written(work, tmp_path)
-    usual = read_capture(path)
+    usual = read_recording(path)
     path.write_bytes(TEXTS[form](text))
-    other = read_capture(path)
+    other = read_recording(path)
     assert np.array_equal(other.joints_world, usual.joints_world)
     assert (other.fps, other.repaired) == (usual.fps, usual.repaired)
 
@@ -192,11 +192,11 @@ def test_a_file_is_read_however_its_text_is_written(work, tmp_path, form):
 @pytest.mark.parametrize("nothing", ["nan", "-nan(ind)", "-1.#IND", "inf"])
 def test_numbers_that_are_none_are_missing_joints_and_never_0(work, tmp_path, nothing):
     path, text = written(work, tmp_path)
-    usual, lines = read_capture(path), text.splitlines()
+    usual, lines = read_recording(path), text.splitlines()
     words = lines[-30].split()
     lines[-30] = " ".join([*words[:6], nothing, *words[7:]])
     path.write_text("\n".join(lines))
-    mended = read_capture(path)
+    mended = read_recording(path)
     assert "were filled in" in mended.repaired[0]
     assert np.abs(mended.joints_world - usual.joints_world).max() < 0.02
 
@@ -234,25 +234,25 @@ def under_a_root(text, offset):
 @pytest.mark.parametrize("offset", ["0.8 94 -452", "-11.3 91.3 32.6", "3 310 20"])
 def test_places_stand_for_offset_and_nobody_is_said_to_hang(work, tmp_path, offset):
     path, text = written(work, tmp_path, segments=hands_up(work))
-    usual = read_capture(path)
+    usual = read_recording(path)
     wrists, nose = usual.joints_world[:, [JOINT["left_wrist"], JOINT["right_wrist"]], 2], 0
     assert (wrists.min(1) > usual.joints_world[:, nose, 2]).mean() > 0.5
     path.write_text(under_a_root(text, offset))
-    other = read_capture(path)
+    other = read_recording(path)
     assert np.allclose(other.joints_world, usual.joints_world)
     assert other.repaired == usual.repaired
 
 
 def test_places_that_are_0_at_rest_are_added_to_offset_and_that_is_said(work, tmp_path):
     path, text = written(work, tmp_path)
-    usual, (head, motion) = read_capture(path), text.split("MOTION\n")
+    usual, (head, motion) = read_recording(path), text.split("MOTION\n")
     rows = motion.splitlines()
     for k, row in enumerate(rows[2:], 2):
         x, y, z, rest = row.split(maxsplit=3)
         rows[k] = f"{x} {float(y) - 95.0} {z} {rest}"
     head = re.sub(r"OFFSET.*", "OFFSET 0 95 0", head, count=1)
     path.write_text(f"{head}MOTION\n" + "\n".join(rows))
-    other = read_capture(path)
+    other = read_recording(path)
     assert np.allclose(other.joints_world, usual.joints_world)
     assert "Places were added to OFFSET" in " ".join(other.repaired)
 
@@ -271,7 +271,7 @@ def test_who_falls_is_known_to_have_stood_up_before(work, tmp_path, axes):
     foot = work.position[:, SEGMENT["pelvis"]] * [1.0, 1.0, 0.0]
     segments = turned(work, rising(work, "y", 90.0, 1.0, 0.6), foot)
     path, _ = written(work, tmp_path, segments=segments, axes=axes)
-    nose_m = read_capture(path, allow_off_floor=True).joints_world[:, 0, 2]
+    nose_m = read_recording(path, allow_off_floor=True).joints_world[:, 0, 2]
     assert nose_m[:40].min() > 1.4
     assert nose_m[-40:].max() < 0.5
 
@@ -283,7 +283,7 @@ def test_who_turns_a_cartwheel_is_upright_before_and_after(work, tmp_path):
     path, _ = written(
         work, tmp_path, segments=turned(raised, rising(work, "x", 360.0, 1.0, 1.2), middle)
     )
-    nose_m = read_capture(path).joints_world[:, 0, 2]
+    nose_m = read_recording(path).joints_world[:, 0, 2]
     assert min(nose_m[0], nose_m[-1]) > 1.4
     assert nose_m.min() < 0.6
 
@@ -291,11 +291,11 @@ def test_who_turns_a_cartwheel_is_upright_before_and_after(work, tmp_path):
 def test_the_upward_axis_can_be_said(work, tmp_path):
     lying = work.joints @ about_axis("x", np.pi / 2).T
     np.savez(tmp_path / "lying.npz", joints=lying, fps=work.fps)
-    assert read_capture(tmp_path / "lying.npz").joints_world[0, 0, 2] > 1.4
-    said = read_capture(tmp_path / "lying.npz", up="+z", allow_off_floor=True)
+    assert read_recording(tmp_path / "lying.npz").joints_world[0, 0, 2] > 1.4
+    said = read_recording(tmp_path / "lying.npz", up="+z", allow_off_floor=True)
     assert np.ptp(said.joints_world[0, :, 2]) < 0.7
     with pytest.raises(ConfigError, match=r"must be one of \+z, .*got '\+w'"):
-        read_capture(tmp_path / "lying.npz", up="w")
+        read_recording(tmp_path / "lying.npz", up="w")
 
 
 def test_who_runs_need_not_rest_a_foot(work, tmp_path, capsys):
@@ -303,7 +303,7 @@ def test_who_runs_need_not_rest_a_foot(work, tmp_path, capsys):
     joints = work.joints + bounce[:, None, None] * [0.0, 0.0, 1.0]
     np.savez(tmp_path / "slow.npz", joints=joints, fps=50.0)
     with pytest.raises(ConfigError, match="rests for"):
-        read_capture(tmp_path / "slow.npz")
+        read_recording(tmp_path / "slow.npz")
     np.savez(tmp_path / "fast.npz", joints=joints, fps=125.0)
     assert ImportMotion(tmp_path / "fast.npz", tmp_path / "clip.npz").run() == 0
     assert "nan" not in capsys.readouterr().out

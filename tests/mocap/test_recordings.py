@@ -25,7 +25,7 @@ from hrc_env.core.records import WorkerMotion
 from hrc_env.core.skeleton import JOINT
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.mocap.person import length, middle
-from hrc_env.mocap.read import read_capture
+from hrc_env.mocap.read import read_recording
 from hrc_env.motion import generator
 from hrc_env.motion import state as st
 from hrc_env.motion.fit import played_s
@@ -256,7 +256,7 @@ def test_a_synthetic_person_stands_on_the_floor_with_legs_and_arms_of_their_own(
     style = Style("tall", "walk 1.1 m/s", "fitted", "worker_1", legs=1.2, arms=0.8, stoop_rad=0.3)
     usual = replace(style, legs=1.0, arms=1.0, stoop_rad=0.0)
     tall, same = (
-        read_capture(write(each, tmp_path, number)).joints_world for each in (style, usual)
+        read_recording(write(each, tmp_path, number)).joints_world for each in (style, usual)
     )
     for first, second, share in (("hip", "knee", 1.2), ("shoulder", "elbow", 0.8)):
         assert length(tall, first, second) == pytest.approx(

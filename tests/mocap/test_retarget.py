@@ -8,7 +8,7 @@ from written import BODY, write_bvh
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.mocap.poses import joints_in, marks_of, posed
-from hrc_env.mocap.read import read_capture
+from hrc_env.mocap.read import read_recording
 from hrc_env.mocap.retarget import aligned_errors, retarget
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import LEG, anatomy
@@ -19,7 +19,7 @@ from hrc_env.worker.body import SEGMENT, load_body, worker_names
 @pytest.fixture(scope="module")
 def capture(work, tmp_path_factory):
     path = tmp_path_factory.mktemp("bvh") / "walk.bvh"
-    return read_capture(write_bvh(path, work.position, work.rotation, work.fps))
+    return read_recording(write_bvh(path, work.position, work.rotation, work.fps))
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +43,7 @@ def test_every_body_follows_within_a_few_centimetres(capture, name):
 
 def test_joints_of_the_projects_own_sense_are_followed_in_that_sense(work, tmp_path):
     np.savez(tmp_path / "joints.npz", joints=work.joints, fps=work.fps)
-    _, error = retarget(read_capture(tmp_path / "joints.npz"), BODY)
+    _, error = retarget(read_recording(tmp_path / "joints.npz"), BODY)
     assert error.mean_m.max() < 0.02
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hrc_env.perception.blazepose import sample_window
+from hrc_env.perception.blazepose import crop_window
 
 DATA = Path(__file__).parent / "data"
 PICTURES = sorted(path.name for path in DATA.glob("*.png"))
@@ -17,7 +17,7 @@ class Stills:
         self.images = list(images)
 
     def crop(self, camera_index, window):
-        return sample_window(self.images[camera_index], window)
+        return crop_window(self.images[camera_index], window)
 
 
 def hung_in_a_room(picture, left, top, width=1920, height=1080):

@@ -25,7 +25,7 @@ def find(picture, detect, landmark):
     image, square = bp.detector_input(picture)
     person = bp.decode_people(*detect(image))[0]
     window = bp.person_window(person, square)
-    points, flag, heat = landmark(bp.landmark_input(bp.sample_window(picture, window)))
+    points, flag, heat = landmark(bp.landmark_input(bp.crop_window(picture, window)))
     found = bp.decode_landmarks(points, heat)
     found[:, :2] = bp.to_image(found[:, :2], window)
     return found, flag
@@ -48,7 +48,7 @@ def test_a_region_of_interest_found_again_from_its_landmarks_finds_the_same(
     landmark = load_landmarker()
     found, _ = find(pictures["walk.png"], load_person_detector(), landmark)
     window = bp.window_from_points(found[33, :2], found[34, :2])
-    picture = bp.sample_window(pictures["walk.png"], window)
+    picture = bp.crop_window(pictures["walk.png"], window)
     points, _, heat = landmark(bp.landmark_input(picture))
     again = bp.to_image(bp.decode_landmarks(points, heat)[:33, :2], window)
     stature_px = np.ptp(reference["walk.png"][:, 1])
@@ -94,7 +94,7 @@ def test_turning_the_window_turns_the_crop_back(angle):
     rows, columns = np.mgrid[:300, :300] + 0.0
     dot = np.exp(-((columns - x) ** 2 + (rows - y) ** 2) / 50)
     picture = np.repeat((255 * dot).astype(np.uint8)[:, :, None], 3, axis=2)
-    crop = bp.sample_window(picture, window)[:, :, 0].astype(float)
+    crop = bp.crop_window(picture, window)[:, :, 0].astype(float)
     rows, columns = np.mgrid[:256, :256] + 0.0
     centre = np.array([(crop * columns).sum(), (crop * rows).sum()]) / crop.sum()
     np.testing.assert_allclose(centre / 256, place, atol=0.002)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hrc_env.core.records import Keypoints, Roi
-from hrc_env.geometry.camera_config import made
+from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.geometry.cameras import (
     image_from_pinhole,
     pinhole_from_image,
@@ -23,9 +23,9 @@ from hrc_env.perception.lensed import Lensed, pinhole_keypoints
 from hrc_env.scene.build import SceneConfig, build
 from hrc_env.scene.primitives import SOLID
 from hrc_env.scene.render import CropRenderer
-from hrc_env.scene.rig import LAB_CAMERAS, pinholes
+from hrc_env.scene.rig import LAB_CAMERAS, make_cameras
 
-GOPRO = made("gopro_hero8_wide", "gopro", LAB_CAMERAS[0].eye_world)
+GOPRO = CameraConfig.from_make("gopro_hero8_wide", "gopro", LAB_CAMERAS[0].eye_world)
 BROWN = replace(GOPRO, name="brown", lens=Lens("brown_conrady", (-0.1, 0.01)), hfov_deg=90.0)
 BALLS = np.array([[0.2, 0.0, 1.0], [-0.4, -1.8, 0.6], [1.9, -1.6, 1.9], [-1.2, 2.5, 0.4]])
 SHIFT_PX = np.array([6.0, -4.0])
@@ -86,7 +86,7 @@ class Plain:
 
 @pytest.mark.parametrize("config", [GOPRO, BROWN], ids=lambda config: config.name)
 def test_every_pixel_shows_the_light_that_the_lens_brings_there(config):
-    (camera,) = pinholes((config,))
+    (camera,) = make_cameras((config,))
     window = Roi((700.0, 500.0), 620.0, 0.4)
     crop = Lensed(Plain(), (camera,)).crop(0, window)
     middles = (np.arange(64) + 0.5) / 64
@@ -95,20 +95,20 @@ def test_every_pixel_shows_the_light_that_the_lens_brings_there(config):
 
 
 def test_outside_the_image_it_is_black():
-    (camera,) = pinholes((GOPRO,))
+    (camera,) = make_cameras((GOPRO,))
     crop = Lensed(Plain(), (camera,)).crop(0, Roi((0.0, 540.0), 400.0, 0.0))
     assert (crop[:, :31] == 0).all()
     assert (crop[:, 33:] > 0).any()
 
 
 def test_where_the_lens_shows_nothing_it_is_black():
-    (camera,) = pinholes((GOPRO,))
+    (camera,) = make_cameras((GOPRO,))
     crop = Lensed(Plain(), (camera,)).crop(0, Roi((5000.0, 540.0), 400.0, 0.0))
     assert not crop.any()
 
 
 def test_a_camera_without_lens_is_the_renderers_own():
-    (camera,) = pinholes(LAB_CAMERAS[:1])
+    (camera,) = make_cameras(LAB_CAMERAS[:1])
     window = Roi((900.0, 500.0), 300.0, 0.3)
     np.testing.assert_array_equal(
         Lensed(Plain(), (camera,)).crop(0, window), Plain().view(camera, window)
@@ -116,7 +116,7 @@ def test_a_camera_without_lens_is_the_renderers_own():
 
 
 def test_maps_are_kept_and_not_without_end():
-    (camera,) = pinholes((GOPRO,))
+    (camera,) = make_cameras((GOPRO,))
     images = Lensed(Plain(), (camera,))
     for k in range(lensed.MAPS_KEPT + 8):
         images.crop(0, Roi((700.0 + k, 500.0), 300.0, 0.0))
@@ -124,7 +124,7 @@ def test_maps_are_kept_and_not_without_end():
 
 
 def test_keypoints_go_to_the_tracker_in_pinhole_pixels_with_their_deviations_stretched():
-    cameras = pinholes((LAB_CAMERAS[1], GOPRO))
+    cameras = make_cameras((LAB_CAMERAS[1], GOPRO))
     px = np.random.default_rng(0).uniform([100, 100], [1800, 980], (1, 2, 1, 15, 2))
     px[0, 1, 0, 3] = np.nan
     bent = Keypoints(px, np.ones(px.shape[:-1]), np.full(px.shape[:-1], 3.0))
@@ -140,4 +140,4 @@ def test_keypoints_go_to_the_tracker_in_pinhole_pixels_with_their_deviations_str
 
 def test_without_a_lens_keypoints_are_left_alone():
     found = Keypoints(np.zeros((1, 4, 1, 15, 2)), np.ones((1, 4, 1, 15)), np.ones((1, 4, 1, 15)))
-    assert pinhole_keypoints(found, pinholes(LAB_CAMERAS)) is found
+    assert pinhole_keypoints(found, make_cameras(LAB_CAMERAS)) is found

@@ -4,7 +4,7 @@ import numpy as np
 
 from hrc_env.core.records import Roi
 from hrc_env.perception import network
-from hrc_env.perception.blazepose import detector_input, landmark_input, sample_window
+from hrc_env.perception.blazepose import crop_window, detector_input, landmark_input
 from hrc_env.perception.network import LANDMARK_OUTPUTS, load_landmarker, load_person_detector
 
 MIDDLE = Roi((118.0, 138.0), 220.0, 0.1)
@@ -15,7 +15,7 @@ def test_the_pruned_network_gives_the_bits_of_the_whole_one(weights, pictures):
     whole = network.load_tflite(content, LANDMARK_OUTPUTS)
     pruned = network.load_tflite(network.prune(content, LANDMARK_OUTPUTS), LANDMARK_OUTPUTS)
     for picture in pictures.values():
-        image = landmark_input(sample_window(picture, MIDDLE))
+        image = landmark_input(crop_window(picture, MIDDLE))
         for ours, theirs in zip(pruned(image), whole(image), strict=True):
             np.testing.assert_array_equal(ours, theirs)
 
@@ -36,7 +36,7 @@ def test_two_copies_of_a_network_agree_bit_for_bit(weights, pictures):
 
 def test_results_do_not_change_when_the_network_runs_again(weights, pictures):
     landmark = load_landmarker()
-    images = [landmark_input(sample_window(picture, MIDDLE)) for picture in pictures.values()]
+    images = [landmark_input(crop_window(picture, MIDDLE)) for picture in pictures.values()]
     first = landmark(images[0])[0].copy()
     kept = landmark(images[0])[0]
     landmark(images[1])

@@ -10,7 +10,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Roi
 from hrc_env.geometry.cameras import pinhole
 from hrc_env.perception import vino
-from hrc_env.perception.blazepose import decode_landmarks, landmark_input, sample_window
+from hrc_env.perception.blazepose import crop_window, decode_landmarks, landmark_input
 from hrc_env.perception.detector import DetectorConfig, PoseDetector
 from hrc_env.perception.network import LANDMARK_OUTPUTS, chosen_runtime, load_landmarker
 
@@ -23,7 +23,7 @@ needs_openvino = pytest.mark.skipif(
 @pytest.fixture(scope="module")
 def shift_px(weights, pictures):
     """(pictures, 33) how far landmarks on OpenVINO are from LiteRT's [px of 256], by precision."""
-    crops = [landmark_input(sample_window(picture, MIDDLE)) for picture in pictures.values()]
+    crops = [landmark_input(crop_window(picture, MIDDLE)) for picture in pictures.values()]
     official = [_places(*load_landmarker()(crop)) for crop in crops]
 
     def measure(bits):
@@ -55,7 +55,7 @@ def test_in_16_bits_landmarks_move_by_a_fraction_of_a_pixel(shift_px):
 @needs_openvino
 def test_two_copies_agree_bit_for_bit_and_keep_what_they_said(weights, pictures):
     ours, theirs = load_landmarker(runtime="openvino"), load_landmarker(runtime="openvino")
-    first, second = (landmark_input(sample_window(p, MIDDLE)) for p in list(pictures.values())[:2])
+    first, second = (landmark_input(crop_window(p, MIDDLE)) for p in list(pictures.values())[:2])
     kept = ours(first)
     ours(second)
     for a, b in zip(kept, theirs(first), strict=True):

@@ -105,9 +105,9 @@ def meet_robots(rng):
 def meet_trackers(rng):
     """Arguments and images of a tracker of poses."""
     from hrc_env.pipeline.pose_tracker import PoseTracker
-    from hrc_env.scene.rig import LAB_CAMERAS, pinholes
+    from hrc_env.scene.rig import LAB_CAMERAS, make_cameras
 
-    given = {"cameras": pinholes(LAB_CAMERAS)[:2], "estimator": "kalman"}
+    given = {"cameras": make_cameras(LAB_CAMERAS)[:2], "estimator": "kalman"}
     names = ["cameras", "n_workers", "dt_s", "estimator", "tracker", "detector", "floor_world"]
     if rng.random() < 0.7:
         for name in rng.choice(names, rng.integers(1, 3), replace=False):

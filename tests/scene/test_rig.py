@@ -6,7 +6,7 @@ import pytest
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.scene.build import build, drawing_model
-from hrc_env.scene.rig import LAB_CAMERAS, CameraConfig, glcam_axes, pinholes, select
+from hrc_env.scene.rig import LAB_CAMERAS, CameraConfig, glcam_axes, make_cameras, select
 
 NAMES = [camera.name for camera in LAB_CAMERAS]
 
@@ -61,6 +61,6 @@ def test_mujocos_camera_has_the_axes_of_the_pinhole_turned_to_opengl():
 
 
 def test_every_camera_has_the_shared_workspace_in_view():
-    for camera in pinholes(LAB_CAMERAS):
+    for camera in make_cameras(LAB_CAMERAS):
         ahead = np.array([0.0, 0.0, 1.1]) - camera.eye_world
         assert ahead @ camera.T_world_from_cam[:3, 2] > 1.0

@@ -11,10 +11,10 @@ from hrc_env.perception.faults.corruptions import Shown, spoil
 from hrc_env.perception.faults.fault import KINDS, FaultConfig
 from hrc_env.perception.faults.schedule import Schedule
 from hrc_env.perception.lensed import Lensed
-from hrc_env.scene.rig import LAB_CAMERAS, pinholes
+from hrc_env.scene.rig import LAB_CAMERAS, make_cameras
 from hrc_env.worker.body import load_body
 
-CAMERA = pinholes(LAB_CAMERAS[:1])[0]
+CAMERA = make_cameras(LAB_CAMERAS[:1])[0]
 WHOLE = Roi((960.0, 540.0), 1920.0, 0.0)
 CLOSE = Roi((960.0, 540.0), 256.0, 0.0)
 SEEDS = (5, 0, 0, 3)
@@ -109,7 +109,7 @@ def film(*faults):
     body = load_body("worker_1")
     motions = [mapped(rest_motion(body), lambda a: a[None].copy()) for _ in range(2)]
     motions[0].position_world[..., 0], motions[1].position_world[..., 0] = 0.4, 0.8
-    rig = pinholes(LAB_CAMERAS)
+    rig = make_cameras(LAB_CAMERAS)
     shown = CameraFilm(Lensed(FakeStage(), rig), Schedule(LAB_CAMERAS, faults, 0.04))
     q = np.zeros(6)
     shown.show([Shot(5, q, motions[1], (q, motions[0]), rig), None, None, None], seed=1)

@@ -11,7 +11,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCEnv
 from hrc_env.perception.faults.fault import KINDS, FaultConfig
 from hrc_env.perception.faults.schedule import Frame, Schedule
-from hrc_env.scene.rig import LAB_CAMERAS, pinholes
+from hrc_env.scene.rig import LAB_CAMERAS, make_cameras
 from hrc_env.vector.env import HRCVectorEnv
 
 RIG = LAB_CAMERAS[:2]
@@ -113,7 +113,7 @@ def test_a_slow_camera_gives_images_at_its_rate_and_latency():
 
 
 def test_wrong_calibrations_are_as_large_as_said_and_drawn_for_the_episode():
-    rig = pinholes(RIG)
+    rig = make_cameras(RIG)
     amounts = {"wrong_rotation": 0.1, "wrong_translation": 0.2, "wrong_focal": 0.1, "knocked": 0.3}
     for kind, amount in amounts.items():
         plan = schedule(first(kind, amount, from_s=1.0))
