@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.control import ControlConfig
+from hrc_env.core.errors import ConfigError
 from hrc_env.geometry.chains import SerialChain
 from hrc_env.observations import ObservationLayout
 from hrc_env.world import Grounds
@@ -21,10 +22,10 @@ Observation = NDArray[np.float32] | Mapping[str, NDArray[np.float32]]
 
 
 class Agent(Protocol):
-    """A policy."""
+    """A policy: all that an evaluation asks of it is `act`."""
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
-        """Actions (..., A) in [-1, 1] for observations (..., n)."""
+        """Return actions (..., A) in [-1, 1] for observations (..., n)."""
         ...
 
 
@@ -33,11 +34,17 @@ class EnvInfo:
     """What an agent may know beforehand: the robot and how to read an observation."""
 
     layout: ObservationLayout
+    """Which entries of an observation belong to which term, and their scales."""
     chain: SerialChain
+    """The robot's kinematics, from its foot to its tool."""
     home_q: NDArray[np.float64]
+    """(N,) the robot's pose at rest [rad], of slides [m]."""
     control: str
+    """What an action means: "joint", "tool" or "twist"."""
     control_config: ControlConfig
+    """The velocities that actions of 1 stand for."""
     n_actions: int
+    """Entries of an action."""
     task: str
     """The task's id."""
     map: Grounds
@@ -46,8 +53,21 @@ class EnvInfo:
     """Entries of a goal that stands apart from the observation; 0: there is none."""
 
 
-def env_info(simulation: "Simulation") -> EnvInfo:
-    """That of an environment's `simulation`."""
+def env_info(env: object) -> EnvInfo:
+    """Return what an agent may know of an environment beforehand.
+
+    Args:
+        env: a single or vector environment of this package, wrapped or not, or its simulation.
+
+    Raises:
+        ConfigError: it is none.
+    """
+    inner = getattr(env, "unwrapped", env)
+    simulation: Simulation = getattr(inner, "simulation", inner)
+    if not hasattr(simulation, "chain"):
+        raise ConfigError(
+            f"env must be an environment of hrc_env or its simulation, got {type(env).__name__}."
+        )
     return EnvInfo(
         layout=simulation.layout,
         chain=simulation.chain,

@@ -14,9 +14,14 @@ AGENTS = ("random", "scripted", "scripted_slowed")
 
 
 def make_agent(name: str, env_info: EnvInfo, seed: int = 0) -> Agent:
-    """An agent by name ("random", "scripted", "scripted_slowed", "hrc://HRCReach-v0/NAME"), from a
-    file, a policy (.safetensors) or a checkpoint (.zip), or what "module:function" makes of the
-    `EnvInfo`.
+    """Return an agent by name, from a file, or as a function makes it.
+
+    Args:
+        name: "random", "scripted", "scripted_slowed"; a policy that comes with the package,
+            "hrc://HRCReach-v0/NAME"; the path of a policy (.safetensors) or checkpoint (.zip); or
+            "module:function", which is given the `EnvInfo`.
+        env_info: of the environment that it acts in, as of `hrc_env.env_info`.
+        seed: of an agent that draws.
 
     Raises:
         ConfigError: neither an agent nor a file.

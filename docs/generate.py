@@ -15,7 +15,7 @@ from pathlib import Path
 
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # where benchmarks/ and docs/ are
 
-from docs import leaderboard, reference, tables
+from docs import leaderboard, names, reference, tables
 from hrc_env.tasks import BUILT_IN
 
 DOCS = Path(__file__).resolve().parent
@@ -30,6 +30,7 @@ REFERENCE: dict[Path, Callable[[], str]] = {
     DOCS / "reference" / "recordings.md": reference.recordings,
     DOCS / "reference" / "shields.md": reference.shields,
     DOCS / "reference" / "leaderboard.md": leaderboard.page,
+    DOCS / "reference" / "names.md": names.page,
 }
 """Generated whole."""
 

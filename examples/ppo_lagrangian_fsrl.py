@@ -28,9 +28,7 @@ from fsrl.agent import PPOLagAgent  # noqa: E402
 from fsrl.utils import BaseLogger  # noqa: E402
 from tianshou.env import DummyVectorEnv  # noqa: E402
 
-import hrc_env  # noqa: E402, F401  registers the ids
-from hrc_env.agents.registry import make_agent  # noqa: E402
-from hrc_env.evaluation.episodes import evaluate  # noqa: E402
+from hrc_env import evaluate, make_agent  # noqa: E402  registers the ids, too
 
 
 @dataclass(frozen=True)

@@ -1,32 +1,212 @@
 """hrc_env: learn to work beside people whom a robot sees through cameras only.
 
 Importing this package registers the environments; `gymnasium.make("hrc_env:HRCReach-v0")`
-does both. See `hrc_env.env` for the arguments, `hrc_env.config` for everything else, and
-`hrc_env.registration` for tasks, estimators and more of your own.
+does both. `PUBLIC` lists the names for users, with the modules that define them; they are imported
+when they are first asked for. Everything else may change without notice.
 """
 
-from hrc_env.registration import (
-    IDS,
-    adopt,
-    import_files,
-    register_detector,
-    register_environment,
-    register_estimator,
-    register_robot,
-    register_shield,
-    register_task,
-)
+import difflib
+from importlib import import_module
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
+
+from hrc_env.registration import adopt, import_files, register_environment
 from hrc_env.tasks import BUILT_IN
 
+if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
+    from hrc_env.agents.env_info import Agent as Agent
+    from hrc_env.agents.env_info import EnvInfo as EnvInfo
+    from hrc_env.agents.env_info import env_info as env_info
+    from hrc_env.agents.registry import make_agent as make_agent
+    from hrc_env.belief import Belief as Belief
+    from hrc_env.belief import standard_deviation_m as standard_deviation_m
+    from hrc_env.config import HRCConfig as HRCConfig
+    from hrc_env.config import save_config as save_config
+    from hrc_env.core.errors import ConfigError as ConfigError
+    from hrc_env.core.errors import HRCError as HRCError
+    from hrc_env.core.records import Keypoints as Keypoints
+    from hrc_env.core.records import PoseEstimate as PoseEstimate
+    from hrc_env.core.records import Roi as Roi
+    from hrc_env.core.results import Metric as Metric
+    from hrc_env.core.skeleton import BLAZEPOSE_INDEX as BLAZEPOSE_INDEX
+    from hrc_env.core.skeleton import JOINTS as JOINTS
+    from hrc_env.core.skeleton import MIRROR as MIRROR
+    from hrc_env.env import HRCEnv as HRCEnv
+    from hrc_env.evaluation.episodes import Score as Score
+    from hrc_env.evaluation.episodes import evaluate as evaluate
+    from hrc_env.evaluation.intervals import mean_over as mean_over
+    from hrc_env.evaluation.intervals import paired as paired
+    from hrc_env.evaluation.intervals import rate_of as rate_of
+    from hrc_env.evaluation.intervals import share_of as share_of
+    from hrc_env.evaluation.rollout import Transition as Transition
+    from hrc_env.evaluation.rollout import rollout as rollout
+    from hrc_env.geometry.camera_config import CameraConfig as CameraConfig
+    from hrc_env.geometry.camera_config import read_rig as read_rig
+    from hrc_env.geometry.camera_config import write_rig as write_rig
+    from hrc_env.geometry.lens import Lens as Lens
+    from hrc_env.mocap.read import read_recording as read_recording
+    from hrc_env.mocap.retarget import retarget as retarget
+    from hrc_env.motion.clip import Clip as Clip
+    from hrc_env.motion.clip import load_clip as load_clip
+    from hrc_env.motion.clip import save_clip as save_clip
+    from hrc_env.motion.config import PeopleConfig as PeopleConfig
+    from hrc_env.observations import ObservationTerm as ObservationTerm
+    from hrc_env.perception.blazepose import crop_window as crop_window
+    from hrc_env.perception.blazepose import load_blazepose as load_blazepose
+    from hrc_env.perception.detector import DetectorConfig as DetectorConfig
+    from hrc_env.perception.faults.fault import FaultConfig as FaultConfig
+    from hrc_env.perception.searching import ImageSource as ImageSource
+    from hrc_env.pipeline.pose_tracker import PoseTracker as PoseTracker
+    from hrc_env.registration import IDS as IDS
+    from hrc_env.registration import import_files as import_files
+    from hrc_env.registration import register_detector as register_detector
+    from hrc_env.registration import register_estimator as register_estimator
+    from hrc_env.registration import register_robot as register_robot
+    from hrc_env.registration import register_shield as register_shield
+    from hrc_env.registration import register_task as register_task
+    from hrc_env.rewards import RewardTerm as RewardTerm
+    from hrc_env.safety.config import ShieldConfig as ShieldConfig
+    from hrc_env.safety.shield import Shield as Shield
+    from hrc_env.sb3 import HRCVecEnv as HRCVecEnv
+    from hrc_env.scene.domain_randomization import AppearanceConfig as AppearanceConfig
+    from hrc_env.scene.rig import make_cameras as make_cameras
+    from hrc_env.scene.rigs import RIGS as RIGS
+    from hrc_env.scene.robot import ROBOTS as ROBOTS
+    from hrc_env.scene.robot import Hand as Hand
+    from hrc_env.scene.robot import Robot as Robot
+    from hrc_env.scene.robot import Suction as Suction
+    from hrc_env.scene.robot_import import robot_from_mjcf as robot_from_mjcf
+    from hrc_env.tasks.task import Task as Task
+    from hrc_env.tracking.config import TrackerConfig as TrackerConfig
+    from hrc_env.tracking.estimators import Estimator as Estimator
+    from hrc_env.tracking.estimators import EstimatorSpec as EstimatorSpec
+    from hrc_env.tracking.estimators import make_estimator as make_estimator
+    from hrc_env.tracking.forecast import forecast as forecast
+    from hrc_env.tracking.smoother import smooth as smooth
+    from hrc_env.vector.env import HRCVectorEnv as HRCVectorEnv
+    from hrc_env.vector.env import make_vector as make_vector
+
 __version__ = "0.1.0"
-__all__ = [
-    "IDS",
-    "register_detector",
-    "register_estimator",
-    "register_robot",
-    "register_shield",
-    "register_task",
-]
+
+PUBLIC = {
+    # environments and their settings
+    "AppearanceConfig": "hrc_env.scene.domain_randomization",
+    "FaultConfig": "hrc_env.perception.faults.fault",
+    "HRCConfig": "hrc_env.config",
+    "HRCEnv": "hrc_env.env",
+    "HRCVecEnv": "hrc_env.sb3",
+    "HRCVectorEnv": "hrc_env.vector.env",
+    "IDS": "hrc_env.registration",
+    "PeopleConfig": "hrc_env.motion.config",
+    "make_vector": "hrc_env.vector.env",
+    "save_config": "hrc_env.config",
+    # tasks
+    "Belief": "hrc_env.belief",
+    "ObservationTerm": "hrc_env.observations",
+    "RewardTerm": "hrc_env.rewards",
+    "Task": "hrc_env.tasks.task",
+    "register_task": "hrc_env.registration",
+    # robots and shields
+    "Hand": "hrc_env.scene.robot",
+    "ROBOTS": "hrc_env.scene.robot",
+    "Robot": "hrc_env.scene.robot",
+    "Shield": "hrc_env.safety.shield",
+    "ShieldConfig": "hrc_env.safety.config",
+    "Suction": "hrc_env.scene.robot",
+    "register_robot": "hrc_env.registration",
+    "register_shield": "hrc_env.registration",
+    "robot_from_mjcf": "hrc_env.scene.robot_import",
+    # cameras
+    "CameraConfig": "hrc_env.geometry.camera_config",
+    "Lens": "hrc_env.geometry.lens",
+    "RIGS": "hrc_env.scene.rigs",
+    "make_cameras": "hrc_env.scene.rig",
+    "read_rig": "hrc_env.geometry.camera_config",
+    "write_rig": "hrc_env.geometry.camera_config",
+    # from images to keypoints
+    "BLAZEPOSE_INDEX": "hrc_env.core.skeleton",
+    "DetectorConfig": "hrc_env.perception.detector",
+    "ImageSource": "hrc_env.perception.searching",
+    "JOINTS": "hrc_env.core.skeleton",
+    "Keypoints": "hrc_env.core.records",
+    "MIRROR": "hrc_env.core.skeleton",
+    "Roi": "hrc_env.core.records",
+    "crop_window": "hrc_env.perception.blazepose",
+    "load_blazepose": "hrc_env.perception.blazepose",
+    "register_detector": "hrc_env.registration",
+    # from keypoints to poses
+    "Estimator": "hrc_env.tracking.estimators",
+    "EstimatorSpec": "hrc_env.tracking.estimators",
+    "PoseEstimate": "hrc_env.core.records",
+    "PoseTracker": "hrc_env.pipeline.pose_tracker",
+    "TrackerConfig": "hrc_env.tracking.config",
+    "forecast": "hrc_env.tracking.forecast",
+    "make_estimator": "hrc_env.tracking.estimators",
+    "register_estimator": "hrc_env.registration",
+    "smooth": "hrc_env.tracking.smoother",
+    "standard_deviation_m": "hrc_env.belief",
+    # recordings of people
+    "Clip": "hrc_env.motion.clip",
+    "load_clip": "hrc_env.motion.clip",
+    "read_recording": "hrc_env.mocap.read",
+    "retarget": "hrc_env.mocap.retarget",
+    "save_clip": "hrc_env.motion.clip",
+    # agents and what their episodes come to
+    "Agent": "hrc_env.agents.env_info",
+    "EnvInfo": "hrc_env.agents.env_info",
+    "Metric": "hrc_env.core.results",
+    "Score": "hrc_env.evaluation.episodes",
+    "Transition": "hrc_env.evaluation.rollout",
+    "env_info": "hrc_env.agents.env_info",
+    "evaluate": "hrc_env.evaluation.episodes",
+    "make_agent": "hrc_env.agents.registry",
+    "mean_over": "hrc_env.evaluation.intervals",
+    "paired": "hrc_env.evaluation.intervals",
+    "rate_of": "hrc_env.evaluation.intervals",
+    "rollout": "hrc_env.evaluation.rollout",
+    "share_of": "hrc_env.evaluation.intervals",
+    # files of your own, and errors
+    "ConfigError": "hrc_env.core.errors",
+    "HRCError": "hrc_env.core.errors",
+    "import_files": "hrc_env.registration",
+}
+"""Public names, and the modules that define them."""
+RENAMED = {
+    "pinholes": "make_cameras",
+    "read_capture": "read_recording",
+    "sample_window": "crop_window",
+}
+"""Former public names, and the present ones."""
+EXTRAS = {"HRCVecEnv": "stable_baselines3"}
+"""Public names that need a package which an extra installs."""
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first asked for (PEP 562).
+
+    Raises:
+        AttributeError: there is no such name, with the nearest one.
+        ImportError: the name is a former one, with the present one. An `AttributeError` would not
+            be shown by `from hrc_env import ...`.
+    """
+    if name in PUBLIC:
+        value = globals()[name] = getattr(import_module(PUBLIC[name]), name)
+        return value
+    if name in RENAMED:
+        raise ImportError(f"hrc_env.{name} is called hrc_env.{RENAMED[name]} now.")
+    lower = {each.lower(): each for each in PUBLIC}
+    near = difflib.get_close_matches(name.lower(), lower, n=1)
+    hint = f" Did you mean {lower[near[0]]!r}?" if near else ""
+    raise AttributeError(f"hrc_env has no attribute {name!r}.{hint} Public names: dir(hrc_env).")
+
+
+def __dir__() -> list[str]:
+    """List the public names; those of an extra only where it is installed."""
+    return [*__all__, "__version__"]
+
+
+if not TYPE_CHECKING:  # type checkers read the imports above
+    __all__ = [name for name in PUBLIC if name not in EXTRAS or find_spec(EXTRAS[name])]
 
 for _id, _task in BUILT_IN.items():
     register_environment(_id, _task.max_episode_steps)

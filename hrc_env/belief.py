@@ -50,7 +50,9 @@ class Belief:
     """Everything a robot may know in one step: itself, its task, and the estimate."""
 
     robot: RobotState
+    """Joints, tool and surface of the robot, by its own encoders."""
     estimate: PoseEstimate
+    """The workers as the cameras show them: (B, W, ...)."""
     separation: Separation
     """(B, W) narrowest place between the robot and each *estimated* body."""
     task: Any
@@ -152,7 +154,10 @@ def _nearest_floor(capsules, radius, floor, piece_m, level, gaps):
 
 
 def standard_deviation_m(estimate: PoseEstimate) -> Floats:
-    """(B, W, J) root of the mean variance over the axes [m]."""
+    """Return the standard deviation of each joint [m], (B, W, J).
+
+    It is the root of the mean variance over the axes.
+    """
     cov = estimate.cov_world
     return np.sqrt((cov[..., 0, 0] + cov[..., 1, 1] + cov[..., 2, 2]) / 3.0)
 

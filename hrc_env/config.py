@@ -232,8 +232,11 @@ def _merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any
 
 
 def save_config(config: HRCConfig, path: str | Path) -> None:
-    """Write every setting to a TOML file, which `config=` and `--config` take; `ConfigError` for a
-    clip in memory, which has no such form."""
+    """Write every setting to a TOML file, which `config=` and `--config` take.
+
+    Raises:
+        ConfigError: `motion.motions` holds a clip in memory, which has no such form.
+    """
     for motion in config.motion.motions:
         if not isinstance(motion, str):
             raise ConfigError(f"The clip {motion.source!r} cannot be written: give its file.")

@@ -131,8 +131,8 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         scene: name of the place: "lab", a workshop, or "site", a construction site; None: that
             which the task is made for.
         robot: a name ("ur10e_like", "ur10e_gripper", "ur10e_cups", "mobile_base"), one that was
-            registered, a `hrc_env.scene.robot.Robot` or a mapping of its fields; None: the one
-            that the task is made for.
+            registered, a `Robot` or a mapping of its fields; None: the one that the task is
+            made for.
         n_workers: 0 or more workers, None: as the task is made for; (fewest, most): each
             episode's number is drawn, and the observation has room for the most.
         people: how the workers are with the robot: "attentive", "hurried", "unaware", a
@@ -141,20 +141,20 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
             (docs/people_and_scenes.md); None for those of the config (none).
         faults: what goes wrong with cameras, `FaultConfig`s or mappings
             (docs/perception_and_estimators.md); None for those of the config (none).
-        appearance: how scene and workers look, drawn for every episode: "varied" or another of
-            `hrc_env.scene.domain_randomization.APPEARANCES`, an `AppearanceConfig` or a mapping;
+        appearance: how scene and workers look, drawn for every episode: a name
+            (docs/perception_and_estimators.md), as "varied", an `AppearanceConfig` or a mapping;
             None for that of the config (as built). Level "pixels"; "keypoints" knows the strength
             of the light.
         control: "joint" (joint velocities), "tool" (tool velocity) or "twist" (that and the
             tool's turn rate); a robot with a hand has one entry more, -1 open to 1 closed.
         shield: what may change a command before the arm gets it: "qp", "ssm", "pfl", a
             `ShieldConfig` or a mapping (docs/reference/shields.md), a name that was registered or a
-            function (`hrc_env.safety.shield.Shield`); None: nothing.
+            function (`hrc_env.Shield`); None: nothing.
         render_mode: "rgb_array", "depth_array" or None; `gymnasium.make` also takes "human", a
             window (docs/start.md).
         width, height: of what `render` gives [px].
         config: an `HRCConfig`, a nested mapping of changes to the default, or the path of a TOML
-            file of such (`hrc_env.config.save_config` writes one).
+            file of such (`hrc_env.save_config` writes one).
 
     Raises:
         ConfigError: a name, index or value that is not valid, with those that are.
@@ -244,19 +244,19 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         self.simulation.set_reward(weights)
 
     def render(self) -> NDArray[Any] | None:  # type: ignore[override]
-        """The scene from a good viewpoint, as the render mode says."""
+        """Return the scene from a good viewpoint, (H, W, 3) of uint8 or (H, W) metres of depth."""
         self.refuse_closed()
         if self.render_mode is None:
             return None
         return self.views.picture(self.render_mode == "depth_array", size=self._size)
 
     def mosaic(self) -> NDArray[np.uint8]:
-        """The four cameras with crops, detected keypoints and the estimated skeleton."""
+        """Return the images of the cameras with crops, keypoints and the estimated skeleton."""
         self.refuse_closed()
         return self.views.mosaic()
 
     def split_observation(self, observation: Observation) -> dict[str, Floats]:
-        """An observation's terms by name, in metres, seconds and radians, goals too."""
+        """Return an observation's terms by name, in metres, seconds and radians, goals too."""
         return observations.split(observation, self.simulation.layout)
 
     def close(self) -> None:

@@ -55,18 +55,22 @@ class Sizes:
 
 @dataclass(frozen=True, slots=True)
 class ObservationTerm:
-    """One block of the flat observation: value = clip(function, -bound, bound) / scale."""
+    """One block of the flat observation: clip(function, -bound, bound) / scale."""
 
     name: str
+    """By which `split_observation` and the environment's page know it."""
     size: int | Callable[[Sizes], int]
     """Number of entries, or a function of what it depends on."""
     unit: str
+    """Of what the function returns: "m", "rad", ..., or "-"."""
     frame: str
+    """In which vectors are given: "world", "base", ..., or "-"."""
     bound: float
     """Largest magnitude, in `unit`; larger values are clipped."""
     scale: float
     """What one unit of the observation stands for, in `unit`."""
     doc: str
+    """A sentence for the environment's page."""
     function: Callable[[Belief], Floats]
     """Belief -> (B, ...), flattened per environment; not asked where it has no entries."""
 

@@ -68,8 +68,10 @@ def _play_briefly(task: "TaskType") -> None:
 
 
 def register_estimator(spec: "EstimatorSpec") -> None:
-    """Make an estimator known by its name: wherever `estimator=` or `--estimator` is taken. Its
-    estimates must be finite and of the right shapes."""
+    """Make an estimator known by its name, wherever `estimator=` or `--estimator` is taken.
+
+    Its estimates must be finite and of the shapes of `PoseEstimate`.
+    """
     from hrc_env.tracking.estimators import ESTIMATORS, check_estimator
 
     check_estimator(spec)
@@ -77,8 +79,11 @@ def register_estimator(spec: "EstimatorSpec") -> None:
 
 
 def register_robot(robot: "Robot") -> None:
-    """Make a robot known by its name: wherever `robot=` or `--robot` is taken. A warning says where
-    what cameras see of it and what distances count differ."""
+    """Make a robot known by its name, wherever `robot=` or `--robot` is taken.
+
+    A warning says where its looks, which cameras see, reach out of its capsules, which distances
+    count.
+    """
     from hrc_env.scene.robot import ROBOTS, Robot, robot_called
     from hrc_env.scene.robot_looks import warn_of_looks
 
@@ -93,14 +98,21 @@ def register_robot(robot: "Robot") -> None:
 
 def register_detector(name: str, make: "Callable[[], KeypointFunction]") -> None:
     """Make a pose detector known: `config={"detector": {"keypoints": name}}`, level "pixels".
-    `make` is called once for each thread that detects."""
+
+    Args:
+        name: of the detector.
+        make: called once for each thread that detects. It returns a function of a crop
+            (256, 256, 3), RGB of uint8, that returns (15, 3): x, y [px] from the crop's corner and
+            confidence in [0, 1] of `JOINTS`, NaN, NaN, 0 of one that was not found; or None where
+            nobody is.
+    """
     from hrc_env.perception.detector import DETECTORS
 
     _add(DETECTORS, name, make, is_function=True)
 
 
 def register_shield(name: str, shield: "Shield") -> None:
-    """Make a shield (`hrc_env.safety.shield.Shield`) known: `shield=name` of every environment."""
+    """Make a shield, a function as `hrc_env.Shield`, known: `shield=name` of every environment."""
     from hrc_env.safety.shield import SHIELDS
 
     _add(SHIELDS, name, shield, is_function=True)
@@ -122,8 +134,14 @@ def register_environment(task_id: str, max_episode_steps: int = EPISODE_STEPS) -
 
 
 def import_files(paths: str | None = None) -> None:
-    """Import Python files, each once, which register things, here and in child processes;
-    separated as in PATH; None: those of the environment variable `IMPORT`."""
+    """Import Python files that register things, each once, here and in child processes.
+
+    Args:
+        paths: separated as in PATH; None: those of the environment variable `IMPORT`.
+
+    Raises:
+        ConfigError: there is no such file.
+    """
     given = os.environ.get(IMPORT, "") if paths is None else paths
     for path in (Path(each).resolve() for each in given.split(os.pathsep) if each):
         _import_file(path, recorded=paths is not None)
@@ -189,7 +207,7 @@ ADVICE = {
 """For arguments that JSON cannot hold, by name."""
 OTHERWISE = (
     "Give text, numbers, lists, records or mappings of these; of a clip in memory the path of its "
-    "file (hrc_env.motion.clip.save_clip writes one)."
+    "file (hrc_env.save_clip writes one)."
 )
 """The advice for other arguments."""
 

@@ -42,7 +42,9 @@ class RewardTerm:
     """One summand of the reward."""
 
     name: str
+    """It stands in `info` as "reward/NAME"."""
     doc: str
+    """A sentence for the environment's page."""
     function: Callable[[Belief, Any, Floats, Any], Floats]
     """(belief, the task's progress, previous action (B, A), weights) -> (B,). The weights are a
     `RewardConfig`; those of a task's term are the task's settings."""

@@ -1,6 +1,6 @@
 """For Stable-Baselines3: the vector environment as a `VecEnv`.
 
-from hrc_env.sb3 import HRCVecEnv
+from hrc_env import HRCVecEnv
 PPO("MlpPolicy", HRCVecEnv(64, stagger=True, perception="keypoints"))
 """
 
@@ -45,6 +45,7 @@ class HRCVecEnv(VecEnv):
     done. Attributes and methods of one environment are those of `hrc_env.vector.member.Member`.
 
     Args:
+        num_envs: how many environments step together.
         stagger: after a `seed()`, let each environment's first episode end early at a random
             time, so that a short rollout sees all phases of an episode. Not for evaluation.
         seed: of the first reset.
@@ -84,8 +85,11 @@ class HRCVecEnv(VecEnv):
         return seeds
 
     def set_options(self, options: Any = None) -> None:
-        """Take options for the next reset: "steps_left" or "elapsed_steps", as of
-        `HRCVectorEnv.reset` a number each; one mapping for all environments or a list of them.
+        """Take options for the next reset.
+
+        Args:
+            options: "steps_left" or "elapsed_steps", as of `HRCVectorEnv.reset` a number each; one
+                mapping for all environments or a list of them.
 
         Raises:
             ConfigError: an unknown option, a value that cannot work, or a list of another
@@ -156,8 +160,10 @@ class HRCVecEnv(VecEnv):
         self.env.close()
 
     def get_images(self) -> list[NDArray[np.uint8] | None]:
-        """Return a picture of every environment; None of each, with a warning, unless the render
-        mode is "rgb_array"."""
+        """Return a picture of every environment.
+
+        None of each, with a warning, unless the render mode is "rgb_array".
+        """
         if self.render_mode != "rgb_array":
             said = f"Images take render_mode='rgb_array', this one is {self.render_mode!r}."
             warnings.warn(said, stacklevel=2)

@@ -9,9 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 import hrc_env
-from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.estimators import EstimatorSpec, make_estimator
-from hrc_env.tracking.forecast import forecast
+from hrc_env import EstimatorSpec, TrackerConfig, forecast, make_estimator
 
 
 @dataclass(frozen=True)

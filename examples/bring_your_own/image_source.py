@@ -9,10 +9,7 @@ from pathlib import Path
 import imageio.v2 as imageio
 import numpy as np
 
-from hrc_env.geometry.camera_config import read_rig
-from hrc_env.perception.blazepose import crop_window
-from hrc_env.pipeline.pose_tracker import PoseTracker
-from hrc_env.scene.rig import pinholes
+from hrc_env import PoseTracker, crop_window, read_rig
 
 
 class Frames:
@@ -27,7 +24,7 @@ class Frames:
 
 def poses(rig, films):
     """The middle of the body (3,) and its deviation [m] in every set of frames; None: nobody."""
-    tracker = PoseTracker(pinholes(read_rig(rig)), dt_s=1 / 25)
+    tracker = PoseTracker(read_rig(rig), dt_s=1 / 25)
     for images in zip(*(imageio.get_reader(film) for film in films), strict=False):
         estimate = tracker.update(Frames(images))
         if not estimate.tracked[0, 0]:

@@ -5,7 +5,7 @@ python -m hrc_env --import examples/bring_your_own/robot.py play --perception ke
 """
 
 import hrc_env
-from hrc_env.scene.robot import Robot
+from hrc_env import Robot
 
 LINK = '<inertial pos="0 0 .2" mass="4" diaginertia=".06 .06 .01"/>'
 HINGE = 'armature=".5" actuatorfrcrange="-150 150"'

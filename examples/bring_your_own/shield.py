@@ -7,7 +7,7 @@ python -m hrc_env --import examples/bring_your_own/shield.py play --perception k
 import numpy as np
 
 import hrc_env
-from hrc_env.belief import standard_deviation_m
+from hrc_env import standard_deviation_m
 
 STOP_M, FREE_M = 0.1, 0.6
 

@@ -8,9 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import hrc_env
-from hrc_env.observations import ObservationTerm
-from hrc_env.rewards import RewardTerm
-from hrc_env.tasks.task import Task
+from hrc_env import ObservationTerm, RewardTerm, Task
 
 STATE = np.dtype([("next_station", "i8"), ("n_visits", "i8")])
 

@@ -113,11 +113,12 @@ def check_kind(what: str, value: object, *kinds: type | None) -> None:
         raise ConfigError(f"{what} must be a {names}, got {described(value)}.")
 
 
-def check_kinds(what: str, values: object, kind: type) -> None:
-    """Raise `ConfigError` unless there is a sequence of at least one value of this kind."""
+def check_kinds(what: str, values: object, *kinds: type) -> None:
+    """Raise `ConfigError` unless there is a sequence of at least one value of these kinds."""
     if not isinstance(values, list | tuple) or not values:
+        names = " or ".join(kind.__name__ for kind in kinds)
         raise ConfigError(
-            f"{what} must be a list of at least one {kind.__name__}, got {described(values)}."
+            f"{what} must be a list of at least one {names}, got {described(values)}."
         )
     for k, value in enumerate(values):
-        check_kind(f"{what}[{k}]", value, kind)
+        check_kind(f"{what}[{k}]", value, *kinds)

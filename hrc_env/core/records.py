@@ -30,7 +30,7 @@ from hrc_env.core.typing import (
 
 @dataclass(frozen=True, slots=True)
 class Keypoints:
-    """2D joints as a detector (or its emulator) reports them, in full-image pixels.
+    """Joints in the images, as a detector or its emulator reports them [px].
 
     A joint that was not found is NaN with confidence 0: data, not an error.
     """
@@ -51,14 +51,16 @@ class Roi:
     """A square region of one camera's image, turned about its centre."""
 
     centre_px: tuple[float, float]
+    """x and y of its middle [px], from the image's top-left corner."""
     side_px: float
+    """Length of its sides [px]."""
     rotation_rad: float
     """Turn of the window's upright, clockwise in the image; 0 is the image's own upright."""
 
 
 @dataclass(frozen=True, slots=True)
 class PoseEstimate:
-    """What the robot believes about the workers (the only worker it may look at)."""
+    """The belief about the workers: all that reward, observation, shield and agent know of them."""
 
     mean_world: Points3
     """(B, W, J, 3) [m]; of a worker not yet acquired: the documented prior."""

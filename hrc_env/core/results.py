@@ -22,14 +22,16 @@ PACKAGES = ("numpy", "numba", "scipy", "mujoco", "gymnasium", "stable-baselines3
 
 @dataclass(frozen=True, slots=True)
 class Metric:
-    """A number with its spread."""
+    """A number with its spread, and what it is made of."""
 
     value: float
+    """The mean, rate, share or median."""
     low: float
     """Lower end of a 95 % interval, or the smallest of the runs; see the benchmark."""
     high: float
     """Upper end, or the largest."""
     unit: str
+    """Of the three numbers, as "m" or "1/min"; "1" of a number without one."""
     n: int
     """How many observations it is made of."""
 

@@ -20,11 +20,12 @@ JOINTS: tuple[str, ...] = (
     "left_ankle", "right_ankle",
     "left_foot", "right_foot",
 )  # fmt: skip
+"""Names of the joints in the order of every array (..., J, ...); left is the worker's left."""
 N_JOINTS = len(JOINTS)
 JOINT: dict[str, int] = {name: index for index, name in enumerate(JOINTS)}
 
 BLAZEPOSE_INDEX: Ints = np.array([0, 11, 12, 13, 14, 15, 16, 23, 24, 25, 26, 27, 28, 31, 32])
-"""Row of each joint in BlazePose's 33 landmarks (31, 32 are its foot tips)."""
+"""Row of each of `JOINTS` in BlazePose's 33 landmarks (31, 32 are its foot tips)."""
 
 MIRROR: Ints = np.array([0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13])
 """Joint that takes this joint's place when left and right are exchanged."""

@@ -24,25 +24,37 @@ EVALUATION_SEED = 1_000_000
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """Means over episodes."""
+    """The score of an agent: means over episodes."""
 
     episodes: int
+    """How many were played."""
     success_rate: float
     """Of all attempts (`Task.achieved` and `Task.failed`)."""
     goals_per_minute: float
+    """Goals reached in a minute of all episodes together [1/min]."""
     contacts_per_episode: float
     """Touches of the true worker; one that lasts counts once."""
     cost_per_episode: float
+    """Mean sum of `info["cost"]`, which is counted on the truth."""
     close_steps_per_episode: float
     """Steps nearer than the proximity limit to the true worker."""
     median_min_separation_m: float
+    """Median of the least distance to the true worker in an episode [m]."""
     return_mean: float
+    """Mean sum of the rewards."""
 
 
 def evaluate(
     make: Callable[[Any], Agent], n_episodes: int = 64, seed: int = EVALUATION_SEED, **kwargs: Any
 ) -> Score:
-    """Return the score of an agent; arguments as of `play_episodes`."""
+    """Return the score of an agent over whole episodes with fixed seeds.
+
+    Args:
+        make: builds the agent for an `EnvInfo`.
+        n_episodes: how many episodes; the k-th begins with `reset(seed=seed + k)`.
+        seed: of the first.
+        kwargs: the environment's, as of `HRCVectorEnv`: task, perception, estimator, ...
+    """
     return summarize(play_episodes(make, n_episodes, seed, **kwargs))
 
 

@@ -38,11 +38,19 @@ def bootstrap(statistic: Statistic, n: int, unit: str, n_draws: int = 4000) -> M
 
 
 def paired(name: str, statistic: Statistic, n: int, unit: str, n_draws: int = 4000) -> Metrics:
-    """A statistic of a row less that of another with the same n seeds; it is given weights of 2n
-    seeds, one row's and then the other's, as in `rmse_of([*ours, *theirs], counts)`.
+    """Return the difference of a statistic between two rows with the same seeds.
 
-    `difference.NAME` has its interval over draws of whole pairs; `p.NAME` is two-sided, by
-    exchanging the rows in each pair at random (Fisher), below .05 with 6 seeds at least.
+    Args:
+        name: of the statistic.
+        statistic: it is given weights of 2n seeds, one row's and then the other's, as
+            `rmse_of([*ours, *theirs], counts)` is.
+        n: number of seeds of a row.
+        unit: of the statistic.
+        n_draws: how often seeds are drawn.
+
+    Returns:
+        "difference.NAME" with its 95 % interval over draws of whole pairs; and "p.NAME", two-sided,
+        by exchanging the rows in each pair at random (Fisher 1935), below .05 with 6 seeds or more.
     """
 
     def off(ours: Ints, theirs: Ints) -> Floats:
@@ -92,8 +100,10 @@ def ratio_over(above: Numbers, below: Numbers, unit: str) -> Metric:
 
 
 def rate_of(counts: Numbers, exposure: Numbers | float, unit: str) -> Metric:
-    """How often something rare happened, with the exact interval of a Poisson count: it says how
-    often an event that did not happen still may (Garwood 1936, doi:10.2307/2333958).
+    """Return how often something rare happened, with its exact 95 % interval.
+
+    That of a Poisson count says how often an event that did not happen still may (Garwood 1936,
+    doi:10.2307/2333958).
 
     Args:
         counts: (n,) how often it happened with each seed.
@@ -111,8 +121,11 @@ def rate_of(counts: Numbers, exposure: Numbers | float, unit: str) -> Metric:
 
 
 def share_of(seen: Sequence[bool]) -> Metric:
-    """The share of trials in which something was seen, with its exact binomial interval (Clopper
-    and Pearson 1934, doi:10.1093/biomet/26.4.404); NaN of no trials."""
+    """Return the share of trials in which something was seen, with its exact 95 % interval.
+
+    The interval is binomial (Clopper and Pearson 1934, doi:10.1093/biomet/26.4.404); NaN of no
+    trials.
+    """
     n = len(seen)
     if n == 0:
         return Metric(np.nan, np.nan, np.nan, "share", 0)
@@ -146,7 +159,7 @@ def excess_of(ours: Metric, theirs: Metric) -> Metric:
 
 
 def mean_over(values: Numbers, unit: str) -> Metric:
-    """The mean of one number a seed."""
+    """Return the mean of one number a seed with its 95 % bootstrap interval."""
     return ratio_over(values, np.ones(len(values)), unit)
 
 

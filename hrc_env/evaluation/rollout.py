@@ -27,9 +27,13 @@ class Transition:
     observation: Observation
     """The observation after the step (..., n)."""
     reward: Any
+    """Of the step: a number, or (B,)."""
     terminated: Any
+    """Whether the step ended the episode, or (B,)."""
     truncated: Any
+    """Whether the time limit did, or (B,)."""
     info: Mapping[str, Any]
+    """What the environment says of the step (docs/reference/infos.md)."""
     is_playing: Bools
     """(B,), or () of a single environment: the step belongs to the first episode."""
 

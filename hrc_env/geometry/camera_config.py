@@ -258,8 +258,16 @@ fisheye polynomial with this coefficient does."""
 
 
 def read_rig(path: Path | str) -> tuple[CameraConfig, ...]:
-    """The cameras of a rig file, or of a calibration file of another tool (see `calibrations`).
-    Raises `ConfigError` for a bad file or a bad field."""
+    """Return the cameras of a rig file, or of a calibration file of another tool.
+
+    Args:
+        path: a TOML file: a [[camera]] for each camera with the fields of `CameraConfig`, or with
+            K, distortion and T_world_from_cam (`CameraConfig.from_matrices`); or a file as anipose,
+            FreeMoCap, Caliscope and Pose2Sim write it.
+
+    Raises:
+        ConfigError: a file that cannot be read, or a field that cannot be.
+    """
     from hrc_env.geometry import calibrations  # it makes cameras
 
     content = read_toml(path)

@@ -45,13 +45,20 @@ def read_recording(
     skeleton: Path | None = None, allow_off_floor: bool = False,
     joints: Mapping[str, str] | None = None, up: str | None = None,
 ) -> Capture:  # fmt: skip
-    """Read, mend and resample a recording: a .bvh, .amc or .npz file of a person in motion.
+    """Read, mend and resample a recording of a person in motion.
 
-    `fps` is the result's rate (None: the file's), `source_fps` the file's own, where it has none or
-    a wrong one; `skeleton` the .asf file of an .amc file (None: looked for beside it). Who is not
-    on one level floor (stairs, terrain, long in the air) is refused, or accepted as if they were.
-    `joints` maps joints (`names.NAMED`) to their names in the file, `up` is its upward axis ("+y");
-    both are needed only for a file in which they are not recognized.
+    Args:
+        path: a .bvh, .amc or .npz file (docs/people_and_scenes.md).
+        fps: frames a second of the result; None: the file's.
+        source_fps: the file's true rate, where it has none or a wrong one.
+        skeleton: the .asf file of an .amc file; None: it is looked for beside it.
+        allow_off_floor: accept people who are not on one level floor (stairs, terrain, long in the
+            air) as if they were.
+        joints: names in the file of joints that are not recognized, as {"left_shoulder": "lShldr"}.
+        up: the file's upward axis, as "+y", where it is not recognized.
+
+    Returns:
+        The person's joints (T, 15, 3) [m], +z up, the floor at 0, and what was mended.
 
     Raises:
         ConfigError: it is no such file, damaged beyond repair, of another's skeleton or off the

@@ -20,7 +20,7 @@ from hrc_env.mocap.record import Capture
 from hrc_env.mocap.stance import locked, slip
 from hrc_env.motion import controls as c
 from hrc_env.motion.clip import Clip, placed_at_origin
-from hrc_env.worker.body import Body
+from hrc_env.worker.body import Body, load_body
 
 STILL_M_S, LOW_SHARE = 0.15, 40.0
 """An ankle slower than this [m/s] and below this percentile of its heights stands."""
@@ -68,9 +68,22 @@ class RetargetError:
 
 
 def retarget(
-    capture: Capture, body: Body, say: Say = lambda share: None
+    capture: Capture, body: Body | str = "worker_1", say: Say = lambda share: None
 ) -> tuple[Clip, RetargetError]:
-    """Let a worker do what a person did; `say` is told how the work goes on."""
+    """Fit a worker's body to a recorded person, so that workers can do what the person did.
+
+    Args:
+        capture: the recording, as of `read_recording`.
+        body: the worker, or a name; others play the clip, too, scaled to their legs and arms.
+        say: called with the share of the work that is done.
+
+    Returns:
+        The clip, and the distances of the worker's joints from the person's [m].
+
+    Raises:
+        ConfigError: there is no worker of that name.
+    """
+    body = load_body(body) if isinstance(body, str) else body
     marks = marks_of(body, capture.landmarks)
     target = adapted(capture.joints_world, capture.fps, marks)
     size = marks.anatomy.size

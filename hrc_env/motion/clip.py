@@ -91,7 +91,7 @@ def fitted_to(clip: Clip, size: Floats) -> Floats:
 
 
 def save_clip(clip: Clip, path: Path) -> None:
-    """Write a clip; the file is there whole or not at all."""
+    """Write a clip to an .npz file, whole or not at all."""
     arrays = {item.name: getattr(clip, item.name) for item in fields(clip)}
     arrays["controls"] = clip.controls[:, RECORDED]
     file = io.BytesIO()
@@ -100,7 +100,11 @@ def save_clip(clip: Clip, path: Path) -> None:
 
 
 def load_clip(path: Path) -> Clip:
-    """Read a clip; `ConfigError` where it is none, damaged or of another version."""
+    """Read a clip from a file that `save_clip` or `import-motion` wrote.
+
+    Raises:
+        ConfigError: the file is no clip, damaged or of another version.
+    """
     names = {item.name for item in fields(Clip)}
     try:
         with np.load(path, allow_pickle=False) as file:

@@ -5,6 +5,7 @@ On-device Real-time Body Pose tracking (2020), arXiv:2006.10204.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import cv2
@@ -13,8 +14,9 @@ import numpy as np
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Roi
+from hrc_env.core.skeleton import BLAZEPOSE_INDEX
 from hrc_env.core.typing import Floats, Image, Points2, Tensor
-from hrc_env.perception.network import DETECTOR_SIDE, LANDMARK_SIDE
+from hrc_env.perception.network import DETECTOR_SIDE, LANDMARK_SIDE, load_landmarker
 
 MIN_SCORE = 0.5
 """Detector score and person flag from which MediaPipe believes in a person."""
@@ -65,9 +67,19 @@ def window_from_points(centre_px: Points2, rim_px: Points2) -> Roi:
 
 
 def crop_window(image: Image, window: Roi, side: int = LANDMARK_SIDE) -> Image:
-    """The turned square of an image as an upright (side, side, 3) picture, bilinear, corner to
-    corner; the image's border is continued outside, as MediaPipe does. `ConfigError` for an image
-    that is not of uint8."""
+    """Return a window of an image as an upright picture, as MediaPipe does.
+
+    Args:
+        image: (H, W, 3) RGB of uint8; outside, its border is continued.
+        window: the turned square of it that is asked for [px].
+        side: of the picture [px].
+
+    Returns:
+        (side, side, 3) of uint8, interpolated bilinearly, corner to corner.
+
+    Raises:
+        ConfigError: the image is not of uint8.
+    """
     if image.dtype != np.uint8:
         raise ConfigError(
             f"An image must be of uint8, 0 to 255, got {image.dtype}. Scale it and convert it: "
@@ -148,6 +160,31 @@ def decode_landmarks(points: Tensor, heat: Tensor) -> Floats:
     out = np.empty((_N_USED, 3))
     refine(np.ascontiguousarray(points), np.ascontiguousarray(heat), out)
     return out
+
+
+def load_blazepose(network: str = "full") -> Callable[[Image], Floats | None]:
+    """Return BlazePose's landmark network as a function that `register_detector` can build on.
+
+    Args:
+        network: "lite", "full" or "heavy".
+
+    Returns:
+        A crop (256, 256, 3), RGB of uint8, to (15, 3): x, y [px] from its corner and confidence in
+        [0, 1] of `JOINTS`; None where it shows nobody.
+
+    Raises:
+        WeightsError: the network's weights are missing.
+    """
+    run = load_landmarker(network)
+
+    def find_joints(crop: Image) -> Floats | None:
+        points, presence, heat = run(landmark_input(crop))
+        if presence < MIN_SCORE:
+            return None
+        joints = decode_landmarks(points, heat)[BLAZEPOSE_INDEX]
+        return joints * (LANDMARK_SIDE, LANDMARK_SIDE, 1.0)
+
+    return find_joints
 
 
 @kernel

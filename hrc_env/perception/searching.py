@@ -52,10 +52,10 @@ Found = tuple[int, float, Roi]
 
 
 class ImageSource(Protocol):
-    """What gives pictures: a renderer, a camera, a recorded film."""
+    """A source of the present images of all cameras: a renderer, a camera, a recorded film."""
 
     def crop(self, camera_index: int, window: Roi) -> Image:
-        """The window of a camera's present image, upright, (256, 256, 3) RGB."""
+        """Return a window of a camera's present image, upright, (256, 256, 3) RGB of uint8."""
         ...
 
 

@@ -23,6 +23,7 @@ from hrc_env.core.brought import (
 from hrc_env.core.errors import needed, whole
 from hrc_env.core.records import PoseEstimate, Roi
 from hrc_env.core.typing import Bools, Capsules, Image, Points3
+from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.geometry.cameras import PinholeCamera, projections
 from hrc_env.geometry.shapes import WIDTH
 from hrc_env.perception.detector import DetectorConfig
@@ -32,6 +33,7 @@ from hrc_env.perception.noise import our_joints
 from hrc_env.perception.searching import ImageSource, image_crop
 from hrc_env.pipeline.looking import Looking
 from hrc_env.pipeline.tracking import no_keypoints
+from hrc_env.scene.rig import make_cameras
 from hrc_env.scene.rigs import common_views, coverage_of
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.contradiction import find_unexplained
@@ -77,22 +79,26 @@ class _Watched:
 
 
 class PoseTracker:
-    """Follows the workers before a rig; what level `pixels` does, for one place. Raises
-    `WeightsError` without the network's weights.
+    """Follow people in images of a rig, without a simulator, as level `pixels` does.
 
     Args:
-        cameras: the rig, as of `geometry.cameras.pinhole`.
+        cameras: the rig: `CameraConfig`s, as `read_rig` returns them, of which the place, the image
+            and the lens count; or cameras as of `make_cameras`.
         n_workers: how many are followed at most.
         dt_s: the usual time between two sets of frames [s].
         estimator: as of an environment.
         tracker, detector: settings; None: the defaults.
         floor_world: (N, 3) points of the floor where people may be, some 0.25 m apart [m]; absence
             is claimed once cameras see all of it empty. None: the views of several cameras.
+
+    Raises:
+        ConfigError: an argument that cannot work.
+        WeightsError: the network's weights are missing.
     """
 
     def __init__(
         self,
-        cameras: Sequence[PinholeCamera],
+        cameras: Sequence[CameraConfig] | Sequence[PinholeCamera],
         n_workers: int = 1,
         dt_s: float = 0.04,
         estimator: EstimatorChoice = "particle",
@@ -100,15 +106,17 @@ class PoseTracker:
         detector: DetectorConfig | None = None,
         floor_world: Points3 | None = None,
     ) -> None:
-        """Raise `ConfigError` for arguments that cannot work."""
-        check_kinds("cameras", cameras, PinholeCamera)
+        check_kinds("cameras", cameras, CameraConfig, PinholeCamera)
         check_kind("tracker", tracker, TrackerConfig, None)
         check_kind("detector", detector, DetectorConfig, None)
         n_workers = whole("n_workers", n_workers, 1, MOST_WORKERS)
         dt_s = positive("dt_s", dt_s, "s")
         if floor_world is not None:
             floor_world = points_of("floor_world [m]", floor_world)
-        self.cameras, self.n_workers, self.dt_s = tuple(cameras), n_workers, dt_s
+        self.n_workers, self.dt_s = n_workers, dt_s
+        self.cameras = tuple(
+            make_cameras([each])[0] if isinstance(each, CameraConfig) else each for each in cameras
+        )
         self.P = projections(self.cameras)
         self.focal_px = np.array([camera.K[0, 0] for camera in self.cameras])
         self.estimator = make_estimator(estimator, self.P, dt_s, tracker)
@@ -129,7 +137,7 @@ class PoseTracker:
         rngs: Sequence[np.random.Generator] = (),
         robot_world: Capsules | None = None,
     ) -> PoseEstimate:
-        """Take the present frames in; workers (1, W, J, ...) in the frame of the cameras' poses.
+        """Take the present images in and return the belief about the people in them.
 
         Args:
             source: the images of all cameras, (H, W, 3) RGB of uint8 each, or what gives windows of
@@ -138,6 +146,9 @@ class PoseTracker:
             rngs: one generator, for estimators that draw; none: one with seed 0.
             robot_world: the robot's capsules (K, 2, 3) [m]: of more people than `n_workers` those
                 nearest to it are followed. None: those who were followed first.
+
+        Returns:
+            Workers (1, W, J, ...) in the frame of the cameras' poses.
         """
         if isinstance(rngs, tuple | list) and not rngs:
             rngs = [np.random.default_rng(0)]
@@ -176,7 +187,7 @@ class PoseTracker:
         return bool(self.presence.vacancy(np.arange(1)).others.any[0])
 
     def forget(self) -> None:
-        """Nobody is known any more."""
+        """Forget everybody, as at the beginning."""
         self.estimator.reset(self.state, np.arange(1), [np.random.default_rng(0)])
         self.presence.forget(np.arange(1))
         self.looking.forget(0)

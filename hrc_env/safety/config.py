@@ -21,8 +21,10 @@ SETTINGS = np.dtype([(name, "f8") for name in NUMBERS], align=True)
 
 @dataclass(frozen=True, slots=True)
 class ShieldConfig:
-    """What a built-in shield keeps. D is what is clear between a robot's capsule and a segment of
-    an estimated body: the gap of their surfaces, less a margin, less Z_d, less the worker's travel.
+    """Settings of a built-in shield: its kind, margins and limits.
+
+    D is the clearance between a robot's capsule and a segment of an estimated body: the gap of
+    their surfaces, less a margin, less Z_d, less the worker's travel.
     """
 
     kind: str = "qp"
@@ -90,7 +92,7 @@ class ShieldConfig:
         check_fields(self, "not be negative", *given)
 
     def record(self) -> Records:
-        """(1,) of `SETTINGS`; a speed that is None is not a number."""
+        """Return the settings as one row of `SETTINGS`; a speed that is None is NaN."""
         numbers = (getattr(self, name) for name in NUMBERS)
         return np.array([tuple(math.nan if x is None else x for x in numbers)], SETTINGS)
 

@@ -16,8 +16,10 @@ from hrc_env.safety.config import PRESETS, ShieldConfig
 from hrc_env.safety.guard import guarded
 
 Shield = Callable[[Belief, JointVelocities, float], tuple[JointVelocities, Mapping[str, Floats]]]
-"""(belief, joint velocities (B, N) that the agent asks for [rad/s], time until the next command
-[s]) -> the velocities that the arm gets, and what there is to say, (B,) by name, which becomes
+"""A function that may change a command: (belief, velocities, dt_s) -> (allowed, values).
+
+`velocities` and `allowed` (B, N) [rad/s] are the joint velocities that the agent asks for and that
+the arm gets, `dt_s` is the time until the next command [s]. `values` (B,) by name become
 "shield/NAME" in info. It keeps nothing from step to step."""
 ShieldChoice = str | ShieldConfig | Mapping[str, Any] | Shield | None
 SHIELDS: Registry[Shield] = Registry(

@@ -58,8 +58,12 @@ def _index(choice: int | str, names: list[str]) -> int:
     return names.index(choice)
 
 
-def make_cameras(cameras: tuple[CameraConfig, ...]) -> tuple[PinholeCamera, ...]:
-    """The cameras of a rig."""
+def make_cameras(cameras: Iterable[CameraConfig]) -> tuple[PinholeCamera, ...]:
+    """Return the cameras of a rig with their matrices, as trackers and renderers need them.
+
+    Each has `K` (3, 3) [px], `T_world_from_cam` (4, 4), `P` (3, 4), which projects world points [m]
+    to pinhole pixels, and the lens between these and the pixels of its image.
+    """
     return tuple(map(_hung, cameras))
 
 

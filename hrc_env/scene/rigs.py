@@ -30,7 +30,7 @@ RIGS: dict[str, tuple[CameraConfig, ...]] = {
     ),
     "site": SITE_CAMERAS,
 }
-"""Rigs by name: those of the scenes, and the laboratory's with the paper's lens."""
+"""Rigs that `cameras=` knows by name: the scenes', and the lab's with the paper's lens."""
 POOR_SHARE = 0.1
 """A camera that sees less of the workspace is hardly worth its cable."""
 HEIGHTS_M = (0.2, 0.6, 1.0, 1.4, 1.8)

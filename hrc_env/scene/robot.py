@@ -92,8 +92,9 @@ class Robot:
     never_touch: tuple[tuple[str, str], ...] = ()
     """(capsule, geom of a scene) that no pose brings together, near as they may always be."""
     hand: Hand | None = None
+    """The fingers that it grips with; None: none."""
     suction: Suction | None = None
-    """What it grips with: fingers, or cups; None: nothing."""
+    """The cups that it grips with; None: none."""
     drives: bool = False
     """Whether it moves about on the floor, its foot the world's origin; else its foot is on the
     scene's pedestal."""

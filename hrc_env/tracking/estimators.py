@@ -57,27 +57,45 @@ class Estimator(Protocol[State]):
         ...
 
     def init(self, batch: int, n_workers: int) -> State:
-        """A state in which no worker has been seen."""
+        """Return a state in which no worker has been seen."""
         ...
 
     def reset(self, state: State, ids: Ints, rngs: Rngs) -> None:
-        """Start environments `ids` anew."""
+        """Start environments `ids` anew.
+
+        Args:
+            state: as `init` made it; changed in place.
+            ids: rows of the environments.
+            rngs: one generator for each environment of the batch.
+        """
         ...
 
     def predict(self, state: State, dt_s: float, rngs: Rngs) -> None:
-        """Let `dt_s` seconds pass (Algorithm 1, line 7)."""
+        """Let time pass (Algorithm 1, line 7).
+
+        Args:
+            state: changed in place.
+            dt_s: time since the last call [s].
+            rngs: one generator for each environment of the batch.
+        """
         ...
 
     def update(self, state: State, keypoints: Keypoints, rngs: Rngs) -> None:
-        """Take one set of frames in (lines 8 to 17); whatever they show, it does not raise."""
+        """Take one set of frames in (lines 8 to 17); whatever they show, it does not raise.
+
+        Args:
+            state: changed in place.
+            keypoints: (B, C, W, J) in pinhole pixels, NaN where a joint was not found.
+            rngs: one generator for each environment of the batch.
+        """
         ...
 
     def estimate(self, state: State) -> PoseEstimate:
-        """What is believed now, in arrays of its own."""
+        """Return what is believed now, in arrays of its own."""
         ...
 
     def forecast(self, state: State, horizon_s: float) -> PoseEstimate:
-        """What is expected in `horizon_s`, in (0, 1] [s], if nobody looks; the state stays."""
+        """Return what is expected in `horizon_s`, in (0, 1] [s]; the state stays as it is."""
         ...
 
 
@@ -86,6 +104,7 @@ class EstimatorSpec:
     """An estimator by name: how it is made, and what may be set."""
 
     name: str
+    """By which `estimator=` and `--estimator` know it."""
     make: Callable[[Floats, float, Any], Estimator[Any]]
     """(P (C, 3, 4), time between updates [s], settings) -> estimator."""
     config: type[TrackerConfig] = TrackerConfig
@@ -162,11 +181,18 @@ def make_estimator(
     ctrl_dt: float,
     config: TrackerConfig | None = None,
 ) -> Estimator[Any]:
-    """An estimator for cameras with projections P (C, 3, 4), usually updated every `ctrl_dt` [s].
+    """Return an estimator for a rig of cameras.
 
-    Of another estimator's settings those that all share count; None: the defaults. With
-    `longest_delay_s` an `out_of_sequence.OutOfSequence` uses late frames at their own time. Raises
-    `ConfigError` for an estimator that there is not, a rig of another shape, or no positive time.
+    Args:
+        estimator: a name ("particle", "kalman", "paper", "paper_restarts", "triangulation",
+            "ransac" or one that was registered), an `EstimatorSpec`, or a function as its `make`.
+        P: (C, 3, 4) projections of world points [m] to pinhole pixels, as of `make_cameras`.
+        ctrl_dt: the usual time between two updates [s].
+        config: its settings; of another estimator's those that all share count. None: the defaults.
+            With `longest_delay_s` late frames are used at their own time.
+
+    Raises:
+        ConfigError: there is no such estimator, P has another shape, or no positive time.
     """
     spec = estimator_called(estimator)
     P = np.ascontiguousarray(P, dtype=float)

@@ -149,8 +149,18 @@ def make_scratch(network):
 
 
 def forecast(now: PoseEstimate, horizon_s: float, config: TrackerConfig) -> PoseEstimate:
-    """What is expected of the workers in `horizon_s`, if no camera sees them until then; `now`
-    stays, `config` is of the estimator that said so. Raises `ConfigError` unless it is in (0, 1] s.
+    """Return where workers are expected if no camera sees them until then.
+
+    Args:
+        now: the present belief; it stays as it is.
+        horizon_s: time ahead, in (0, 1] [s].
+        config: settings of the estimator that made `now`.
+
+    Returns:
+        The belief of that time, with wider covariances (docs/tracking.md, "Ahead").
+
+    Raises:
+        ConfigError: the horizon is not in (0, 1] s.
     """
     if not 0 < horizon_s <= LONGEST_S:
         raise ConfigError(f"A horizon must be in (0, {LONGEST_S:g}] s, got {horizon_s}.")

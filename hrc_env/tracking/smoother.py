@@ -65,13 +65,14 @@ class _Smoothed(NamedTuple):
 def smooth(
     P: Floats, clip: Sequence[Keypoints], dt_s: float, config: TrackerConfig | None = None
 ) -> PoseEstimate:
-    """The best belief of every frame, in view of the whole clip.
+    """Return the best belief of every frame, in view of the whole clip.
 
     Args:
         P: (C, 3, 4) projections.
         clip: keypoints of T frames, each (B, C, W, J, ...), in order of time; their `time_s` is
             not looked at.
         dt_s: time between two frames [s].
+        config: settings of the estimator "kalman"; None: the defaults.
 
     Returns:
         Arrays (T, B, W, ...). A worker whom the filter followed in neither direction is where

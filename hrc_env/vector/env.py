@@ -57,9 +57,13 @@ Step = tuple[Observation, NDArray[np.float64], Bools, Bools, dict[str, Any]]
 class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
     EnvBase, VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]
 ):
-    """`num_envs` robots, each beside a worker of its own, stepped at once.
+    """A vector environment: robots, each beside workers of its own, stepped at once.
+
+    Environment k of `reset(seed=s)` is the single environment after `reset(seed=s + k)`, to the
+    bit. Actions are (num_envs, A), observations (num_envs, n).
 
     Args:
+        num_envs: how many environments step together.
         perception: "keypoints", "truth" or "none"; pictures have no batched form.
         max_episode_steps: the time limit; None is the task's, -1 none.
         autoreset_mode: when an environment whose episode is over starts anew: at the next
@@ -67,7 +71,11 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         num_threads: threads that share the environments; all cores if None.
         render_mode: of `HRCEnv`, or with "_list" behind it: `render` gives every environment's
             pictures of all steps since the last `render` or the beginning of the episode.
-        arguments: of `HRCEnv`, as are `width` and `height`.
+        width, height: of pictures [px].
+        arguments: the others of `HRCEnv`.
+
+    Raises:
+        ConfigError: a name, index or value that is not valid, with those that are.
     """
 
     CHANGES = ("shards", "_streams", "_steps", "_ended", "_observation")
@@ -125,7 +133,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         seed: int | Sequence[int | None] | None = None,
         options: Mapping[str, Any] | None = None,
     ) -> tuple[Observation, dict[str, Any]]:
-        """Start episodes.
+        """Start episodes of all environments, or of some.
 
         Args:
             seed: environment k gets `seed + k`, or the k-th of a list; with None its random
@@ -182,8 +190,14 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         return copied(observation), reward, terminated, truncated, infos
 
     def words(self, infos: Mapping[str, Any]) -> dict[str, NDArray[np.object_]]:
-        """Return in words what infos say of workers, contacts and cameras, (num_envs,) tuples each:
-        see `hrc_env.core.infos.worded`."""
+        """Return in words what infos say of workers, contacts and cameras.
+
+        Args:
+            infos: as `reset` and `step` return them.
+
+        Returns:
+            (num_envs,) tuples of words by the names of docs/reference/infos.md.
+        """
         return _worded(infos, self.num_envs, self.shards.first.bodies.names)
 
     def set_reward(self, weights: RewardConfig) -> None:
@@ -192,8 +206,10 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
             part.set_reward(weights)
 
     def render(self) -> tuple[Any, ...] | None:  # type: ignore[override]
-        """Return every environment's picture, one after the other (slow), or its list of pictures,
-        by the render mode."""
+        """Return every environment's picture, or its list of pictures, by the render mode.
+
+        They are drawn one after the other, which is slow.
+        """
         self.refuse_closed()
         if self.render_mode is None:
             return None
@@ -204,8 +220,13 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         return Member(self, k)
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
-        """Return the result of a method, or the value of an attribute, of every environment; the
-        methods `TOGETHER` are called once."""
+        """Return the result of a method, or the value of an attribute, of every environment.
+
+        Args:
+            name: of the method or attribute; the methods `TOGETHER` are called once.
+            args: of the method.
+            kwargs: of the method.
+        """
         if name in TOGETHER:
             return (getattr(self, name)(*args, **kwargs),) * self.num_envs
         said = [getattr(self.member(k), name) for k in range(self.num_envs)]
@@ -216,12 +237,21 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         return self.call(name)
 
     def set_attr(self, name: str, values: Any) -> None:
-        """Set an attribute of your own of every environment, to the values of a list or tuple or
-        to one value; see `Member`."""
+        """Set an attribute of your own of every environment; see `Member`.
+
+        Args:
+            name: of the attribute.
+            values: one for all environments, or a list or tuple of one for each.
+        """
         each = values if isinstance(values, (list, tuple)) else [values] * self.num_envs
         check_shape(f"values of {name!r}", (len(each),), (self.num_envs,), "one an environment")
         for k, value in enumerate(each):
             setattr(self.member(k), name, value)
+
+    @property
+    def simulation(self) -> Simulation:
+        """The environments' simulation; of several, the first."""
+        return self.shards.first
 
     @property
     def task(self) -> Task[Any, Any]:
@@ -312,11 +342,19 @@ def _worded(
 def make_vector(
     num_envs: int = 1, *, perception: str = "pixels", force: bool = False, **kwargs: Any
 ) -> VectorEnv[Any, Any, Any]:
-    """An `HRCVectorEnv`; for "pixels" gymnasium's `AsyncVectorEnv`, a process an environment.
+    """Make a vector environment at any perception level, as `gymnasium.make_vec` does.
 
     Args:
-        force: allow more processes than two for each core.
+        num_envs: how many environments step together.
+        perception: as of `HRCEnv`.
+        force: with "pixels" allow more processes than two for each core.
         kwargs: of `HRCVectorEnv`; no `num_threads` with "pixels".
+
+    Returns:
+        An `HRCVectorEnv`; for "pixels" gymnasium's `AsyncVectorEnv`, a process an environment.
+
+    Raises:
+        ConfigError: a value that is not valid, or more processes than make sense.
     """
     if perception != "pixels":
         if kwargs.get("render_mode") != "human":

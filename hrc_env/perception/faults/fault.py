@@ -96,7 +96,7 @@ class FaultConfig:
         return KINDS[self.kind].usual if self.amount is None else self.amount
 
     def active(self, time_s: float) -> bool:
-        """Whether an image of this time of the episode has it; half a millisecond is nothing."""
+        """Return whether an image of this time of the episode has it; 0.5 ms are nothing."""
         return self.from_s - 5e-4 <= time_s < self.until_s - 5e-4
 
 
