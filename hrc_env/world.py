@@ -72,6 +72,7 @@ class Weld:
     """Two sites that can be held together, as wide as they are apart; off at first."""
 
     name: str
+    """By which `Effects.welded` knows it."""
     sites: tuple[str, str]
     """By their names in the scene: "robot/...", "task/...", "worker_1/..."."""
     solref: tuple[float, float] = (0.02, 1.0)
@@ -87,6 +88,7 @@ class TaskScene:
     mjcf: str = ""
     """Bodies of boxes, loose with a free joint and contype 16, fixed with contype 1."""
     welds: tuple[Weld, ...] = ()
+    """What can be held together."""
     places: tuple[Workplace, ...] = ()
     """Where workers work at them; kind "task"."""
 
@@ -127,6 +129,7 @@ class World:
     """What a task judges, and what the robot feels; rows are the environments in question."""
 
     robot: RobotState
+    """Joints and tool, by the robot's own encoders."""
     hand: HandState | None = None
     """Of an arm with a gripper."""
     objects: ObjectState | None = None

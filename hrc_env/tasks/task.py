@@ -34,7 +34,8 @@ class Task(Generic[ConfigT, StateT]):
     All methods work on a batch of environments. `state` is a structured array, or a dataclass of
     arrays, with a row for every environment; `ids` are the rows in question, all rows where a
     method has no such argument. `rngs` holds a generator for every environment of the batch, and
-    events in environment b draw from `rngs[b]` only. B is the number of environments in question,
+    events in environment b draw from `rngs[b]` only. `world` is the robot, its hand and the objects
+    as they are. B is the number of environments in question,
     O of the task's loose objects, W of worker slots, N of robot joints.
 
     Args:
@@ -113,8 +114,10 @@ class Task(Generic[ConfigT, StateT]):
         raise NotImplementedError
 
     def info(self, state: StateT) -> Mapping[str, Floats]:
-        """Return numbers (B,) about the episode so far, by names that begin with "task/", and
-        "is_success", 0 or 1."""
+        """Return numbers (B,) about the episode so far, by name.
+
+        Names begin with "task/"; beside them stands "is_success", 0 or 1.
+        """
         raise NotImplementedError
 
     def is_terminal(self, step: Any) -> Bools | bool:
@@ -151,23 +154,31 @@ class Task(Generic[ConfigT, StateT]):
         return NOTHING
 
     def reach_targets(self) -> Sequence[ReachTarget]:
-        """Return places that the tool has to get to, besides loose objects; a robot that is too
-        short for them is refused."""
+        """Return places that the tool has to get to, besides loose objects.
+
+        A robot that is too short for them is refused.
+        """
         return ()
 
     def object_poses(self, state: StateT, ids: Ints) -> Floats | None:
-        """Return (n, O, 7) where loose objects lie after `reset`: position [m, world] and
-        quaternion (w, x, y, z); None, the default: as in the MJCF."""
+        """Return (n, O, 7) where loose objects lie after `reset`.
+
+        Position [m, world] and quaternion (w, x, y, z); None, the default: as in the MJCF.
+        """
         return None
 
     def is_load(self, state: StateT) -> Bools | bool:
-        """Return (B, O) which objects count as part of the robot while it holds them, in cost,
-        separation and belief; by default all."""
+        """Return (B, O) which objects count as part of the robot while it holds them.
+
+        They do so in cost, separation and belief; by default all.
+        """
         return True
 
     def signal(self, state: StateT) -> WorkerSignal | None:
-        """Return what waiting workers are shown (`Job.waits`); None, the default: they do not
-        wait."""
+        """Return what waiting workers are shown (`Job.waits`).
+
+        None, the default: they do not wait.
+        """
         return None
 
     def effects(self, state: StateT) -> Effects | None:
@@ -175,8 +186,10 @@ class Task(Generic[ConfigT, StateT]):
         return None
 
     def allowed_contact(self, belief: Belief) -> Bools | None:
-        """Return (B, W, S) which segments of estimated bodies may touch the robot's hand, as to
-        take what it brings: built-in shields let them. None, the default: none of them."""
+        """Return (B, W, S) which segments of estimated bodies may touch the robot's hand.
+
+        So workers take what it brings: built-in shields let them. None, the default: none of them.
+        """
         return None
 
     @property
