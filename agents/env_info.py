@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,7 +63,7 @@ def env_info(env: object) -> EnvInfo:
         ConfigError: it is none.
     """
     inner = getattr(env, "unwrapped", env)
-    simulation: Simulation = getattr(inner, "simulation", inner)
+    simulation = cast("Simulation", getattr(inner, "simulation", inner))
     if not hasattr(simulation, "chain"):
         raise ConfigError(
             f"env must be an environment of hrc_env or its simulation, got {type(env).__name__}."

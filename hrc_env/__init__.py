@@ -92,7 +92,7 @@ if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
     from hrc_env.tracking.forecast import forecast as forecast
     from hrc_env.tracking.smoother import smooth as smooth
     from hrc_env.vector.env import HRCVectorEnv as HRCVectorEnv
-    from hrc_env.vector.env import make_vector as make_vector
+    from hrc_env.vector.make import make_vector as make_vector
 
 __version__ = "0.1.0"
 
@@ -106,7 +106,7 @@ PUBLIC = {
     "HRCVectorEnv": "hrc_env.vector.env",
     "IDS": "hrc_env.registration",
     "PeopleConfig": "hrc_env.motion.config",
-    "make_vector": "hrc_env.vector.env",
+    "make_vector": "hrc_env.vector.make",
     "save_config": "hrc_env.config",
     # tasks
     "Belief": "hrc_env.belief",
@@ -218,11 +218,12 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     """List the public names; those of an extra only where it is installed."""
-    return [*__all__, "__version__"]
+    here = [name for name in PUBLIC if name not in EXTRAS or find_spec(EXTRAS[name])]
+    return [*here, "__version__"]
 
 
 if not TYPE_CHECKING:  # type checkers read the imports above
-    __all__ = [name for name in PUBLIC if name not in EXTRAS or find_spec(EXTRAS[name])]
+    __all__ = __dir__()
 
 for _id, _task in BUILT_IN.items():
     register_environment(_id, _task.max_episode_steps)

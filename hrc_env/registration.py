@@ -126,7 +126,7 @@ def register_environment(task_id: str, max_episode_steps: int = EPISODE_STEPS) -
     register(
         id=task_id,
         entry_point="hrc_env.env:HRCEnv",
-        vector_entry_point="hrc_env.vector.env:make_vector",
+        vector_entry_point="hrc_env.vector.make:make_vector",
         max_episode_steps=max_episode_steps,
         kwargs={"task": task_id},
     )

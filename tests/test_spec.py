@@ -12,7 +12,7 @@ from gymnasium.vector import AutoresetMode
 import hrc_env  # noqa: F401  registers the ids
 from hrc_env.config import HRCConfig
 from hrc_env.core.errors import ConfigError
-from hrc_env.geometry.camera_config import made, write_rig
+from hrc_env.geometry.camera_config import CameraConfig, write_rig
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import STAND_Z, anatomies
 from hrc_env.motion.clip import Clip, save_clip
@@ -44,7 +44,11 @@ PLACES = [(2.9, 2.6, 2.4), (-2.9, 2.6, 2.4)]
         {"cameras": PLACES},
         {"cameras": np.array(PLACES)},
         {"cameras": "lab_gopro"},
-        {"cameras": [made("gopro_hero8_wide", f"c{k}", p) for k, p in enumerate(PLACES)]},
+        {
+            "cameras": [
+                CameraConfig.from_make("gopro_hero8_wide", f"c{k}", p) for k, p in enumerate(PLACES)
+            ]
+        },
         {"cameras": [{"name": f"c{k}", "eye_world": p} for k, p in enumerate(PLACES)]},
         {"n_workers": (0, 2), "estimator": "kalman", "scene": "site", "control": "tool"},
         {"n_workers": np.int64(2)},

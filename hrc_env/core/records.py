@@ -51,7 +51,7 @@ class Roi:
     """A square region of one camera's image, turned about its centre."""
 
     centre_px: tuple[float, float]
-    """x and y of its middle [px], from the image's top-left corner."""
+    """Place of its middle, x and y [px] from the image's top-left corner."""
     side_px: float
     """Length of its sides [px]."""
     rotation_rad: float

@@ -12,31 +12,24 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
-import gymnasium
 import numpy as np
 from gymnasium.utils import seeding
-from gymnasium.vector import AsyncVectorEnv, AutoresetMode, VectorEnv
+from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
-from gymnasium.wrappers.vector import HumanRendering
 from numpy.typing import NDArray
 
 from hrc_env.config import settle
 from hrc_env.control import checked_action
 from hrc_env.core.batching import copied, mapped, one, write_rows
 from hrc_env.core.errors import ConfigError, check_shape, whole
-from hrc_env.core.infos import worded
-from hrc_env.core.machine import n_cores
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.env import RENDER_MODES, EnvBase, spaces
-from hrc_env.infos import words_of
-from hrc_env.registration import HasSpec
 from hrc_env.render.views import PICTURE_SIZE
 from hrc_env.rewards import RewardConfig
 from hrc_env.simulation import Simulation
 from hrc_env.step_result import Observation, StepResult
-from hrc_env.tasks import DEFAULT
-from hrc_env.tasks.task import TASKS, Task, find_task
-from hrc_env.vector.infos import InfoTable, table
+from hrc_env.tasks.task import Task
+from hrc_env.vector.infos import InfoTable, table, words_of_infos
 from hrc_env.vector.member import TOGETHER, Member
 from hrc_env.vector.options import (
     MAX_ENVS,
@@ -49,8 +42,6 @@ from hrc_env.vector.options import (
 from hrc_env.vector.pictures import LISTS, Pictures
 from hrc_env.vector.shards import Shards
 
-PROCESSES_PER_CORE = 2
-"""More processes that render and run networks only wait for each other."""
 Step = tuple[Observation, NDArray[np.float64], Bools, Bools, dict[str, Any]]
 
 
@@ -198,7 +189,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         Returns:
             (num_envs,) tuples of words by the names of docs/reference/infos.md.
         """
-        return _worded(infos, self.num_envs, self.shards.first.bodies.names)
+        return words_of_infos(infos, self.num_envs, self.shards.first.bodies.names)
 
     def set_reward(self, weights: RewardConfig) -> None:
         """Weigh the reward's terms so from the next step on, in every environment."""
@@ -317,64 +308,3 @@ def _finals(observation: Observation, info: InfoTable, who: Bools) -> dict[str, 
         last[b] = copied(one(observation, int(b)))
     final_info = {"final_info": info.arrays(who), "_final_info": who.copy()}
     return {"final_obs": last, "_final_obs": who.copy(), **final_info}
-
-
-class PixelVectorEnv(HasSpec, AsyncVectorEnv):  # type: ignore[misc]  # `spec` is a property
-    """Environments at level "pixels", a process for each."""
-
-    def words(self, infos: Mapping[str, Any]) -> dict[str, NDArray[np.object_]]:
-        """Return in words what infos say, as `HRCVectorEnv.words` does."""
-        return _worded(infos, self.num_envs, self.get_attr("body_names")[0])
-
-
-def _worded(
-    infos: Mapping[str, Any], num_envs: int, bodies: tuple[str, ...]
-) -> dict[str, NDArray[np.object_]]:
-    words = words_of(bodies)
-    numbers = {name: infos[name] for name in infos if not name.startswith(("_", "final_"))}
-    said = [
-        worded({name: values[b] for name, values in numbers.items()}, words)
-        for b in range(num_envs)
-    ]
-    return {name: np.fromiter((each[name] for each in said), object) for name in said[0]}
-
-
-def make_vector(
-    num_envs: int = 1, *, perception: str = "pixels", force: bool = False, **kwargs: Any
-) -> VectorEnv[Any, Any, Any]:
-    """Make a vector environment at any perception level, as `gymnasium.make_vec` does.
-
-    Args:
-        num_envs: how many environments step together.
-        perception: as of `HRCEnv`.
-        force: with "pixels" allow more processes than two for each core.
-        kwargs: of `HRCVectorEnv`; no `num_threads` with "pixels".
-
-    Returns:
-        An `HRCVectorEnv`; for "pixels" gymnasium's `AsyncVectorEnv`, a process an environment.
-
-    Raises:
-        ConfigError: a value that is not valid, or more processes than make sense.
-    """
-    if perception != "pixels":
-        if kwargs.get("render_mode") != "human":
-            return HRCVectorEnv(num_envs, perception=perception, **kwargs)
-        drawn = {**kwargs, "render_mode": "rgb_array"}
-        return HumanRendering(HRCVectorEnv(num_envs, perception=perception, **drawn))
-    limit = PROCESSES_PER_CORE * n_cores()
-    if num_envs > limit and not force:
-        raise ConfigError(
-            f'num_envs={num_envs} with perception="pixels" are as many processes, each with a '
-            f"renderer and a network; on {n_cores()} cores no more than {limit} make sense. "
-            'Use perception="keypoints", which emulates the detector and steps thousands of '
-            "environments in one process, or force=True."
-        )
-    if kwargs.pop("num_threads", None) is not None:
-        raise ConfigError('perception="pixels" is processes, not threads: leave out num_threads.')
-    mode = kwargs.pop("autoreset_mode", AutoresetMode.NEXT_STEP)
-    task = find_task(kwargs.pop("task", DEFAULT))
-    if TASKS.name_of(task) is None:  # not registered: it is pickled
-        kwargs = {"max_episode_steps": task.max_episode_steps, **kwargs, "task": task}
-    task_id = TASKS.name_of(task) or DEFAULT
-    make = partial(gymnasium.make, f"hrc_env:{task_id}", perception="pixels", **kwargs)
-    return PixelVectorEnv([make] * num_envs, context="spawn", autoreset_mode=mode)

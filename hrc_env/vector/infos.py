@@ -4,13 +4,16 @@ The layout is that of gymnasium's `VectorEnv._add_info`. Names are the same in e
 mask is false an environment has no info now, and the value is zero.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from hrc_env.core.infos import published
+from hrc_env.core.infos import published, worded
 from hrc_env.core.typing import Bools, Floats, Ints
+from hrc_env.infos import words_of
 from hrc_env.step_result import StepResult
 
 
@@ -45,3 +48,25 @@ def table(result: StepResult, ids: Ints | slice, batch: int) -> InfoTable:
 def _unknown(batch: int, values: Any) -> Any:
     """Return (B,) entries of the type of `values`, NaN if that has one."""
     return np.full(batch, np.nan if values.dtype.kind == "f" else -1, values.dtype)
+
+
+def words_of_infos(
+    infos: Mapping[str, Any], num_envs: int, bodies: tuple[str, ...]
+) -> dict[str, NDArray[np.object_]]:
+    """Return in words what infos of a batch say.
+
+    Args:
+        infos: arrays (num_envs,) by name.
+        num_envs: number of environments.
+        bodies: names of the workers' bodies.
+
+    Returns:
+        (num_envs,) tuples of words by name.
+    """
+    words = words_of(bodies)
+    numbers = {name: infos[name] for name in infos if not name.startswith(("_", "final_"))}
+    said = [
+        worded({name: values[b] for name, values in numbers.items()}, words)
+        for b in range(num_envs)
+    ]
+    return {name: np.fromiter((each[name] for each in said), object) for name in said[0]}

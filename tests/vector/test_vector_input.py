@@ -6,8 +6,7 @@ import pytest
 
 import hrc_env  # noqa: F401  registers the ids
 from hrc_env.core.errors import ConfigError, HRCError
-from hrc_env.vector import env as vector_env
-from hrc_env.vector import options
+from hrc_env.vector import make, options
 from hrc_env.vector.env import HRCVectorEnv
 
 
@@ -120,7 +119,7 @@ def test_the_order_of_calls():
 
 
 def test_too_many_processes_name_the_fast_level(monkeypatch):
-    monkeypatch.setattr(vector_env, "n_cores", lambda: 2)
+    monkeypatch.setattr(make, "n_cores", lambda: 2)
     with pytest.raises(ConfigError, match=r'perception="keypoints".*force=True'):
         gymnasium.make_vec("HRCReach-v0", num_envs=5)
     with pytest.raises(ConfigError, match="num_threads"):
@@ -129,9 +128,9 @@ def test_too_many_processes_name_the_fast_level(monkeypatch):
 
 def test_force_is_taken_at_its_word(monkeypatch):
     made = []
-    monkeypatch.setattr(vector_env, "n_cores", lambda: 2)
-    monkeypatch.setattr(vector_env, "PixelVectorEnv", lambda makers, **kwargs: made.extend(makers))
-    vector_env.make_vector(5, perception="pixels", force=True)
+    monkeypatch.setattr(make, "n_cores", lambda: 2)
+    monkeypatch.setattr(make, "PixelVectorEnv", lambda makers, **kwargs: made.extend(makers))
+    make.make_vector(5, perception="pixels", force=True)
     assert len(made) == 5
 
 

@@ -1,0 +1,71 @@
+"""Making of vector environments: one batch, or at level "pixels" a process for each environment."""
+
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import AsyncVectorEnv, AutoresetMode, VectorEnv
+from gymnasium.wrappers.vector import HumanRendering
+from numpy.typing import NDArray
+
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.machine import n_cores
+from hrc_env.registration import HasSpec
+from hrc_env.tasks import DEFAULT
+from hrc_env.tasks.task import TASKS, find_task
+from hrc_env.vector.env import HRCVectorEnv
+from hrc_env.vector.infos import words_of_infos
+
+PROCESSES_PER_CORE = 2
+"""More processes that render and run networks only wait for each other."""
+
+
+class PixelVectorEnv(HasSpec, AsyncVectorEnv):  # type: ignore[misc]  # `spec` is a property
+    """Environments at level "pixels", a process for each."""
+
+    def words(self, infos: Mapping[str, Any]) -> dict[str, NDArray[np.object_]]:
+        """Return in words what infos say, as `HRCVectorEnv.words` does."""
+        return words_of_infos(infos, self.num_envs, self.get_attr("body_names")[0])
+
+
+def make_vector(
+    num_envs: int = 1, *, perception: str = "pixels", force: bool = False, **kwargs: Any
+) -> VectorEnv[Any, Any, Any]:
+    """Make a vector environment at any perception level, as `gymnasium.make_vec` does.
+
+    Args:
+        num_envs: how many environments step together.
+        perception: as of `HRCEnv`.
+        force: with "pixels" allow more processes than two for each core.
+        kwargs: of `HRCVectorEnv`; no `num_threads` with "pixels".
+
+    Returns:
+        An `HRCVectorEnv`; for "pixels" gymnasium's `AsyncVectorEnv`, a process an environment.
+
+    Raises:
+        ConfigError: a value that is not valid, or more processes than make sense.
+    """
+    if perception != "pixels":
+        if kwargs.get("render_mode") != "human":
+            return HRCVectorEnv(num_envs, perception=perception, **kwargs)
+        drawn = {**kwargs, "render_mode": "rgb_array"}
+        return HumanRendering(HRCVectorEnv(num_envs, perception=perception, **drawn))
+    limit = PROCESSES_PER_CORE * n_cores()
+    if num_envs > limit and not force:
+        raise ConfigError(
+            f'num_envs={num_envs} with perception="pixels" are as many processes, each with a '
+            f"renderer and a network; on {n_cores()} cores no more than {limit} make sense. "
+            'Use perception="keypoints", which emulates the detector and steps thousands of '
+            "environments in one process, or force=True."
+        )
+    if kwargs.pop("num_threads", None) is not None:
+        raise ConfigError('perception="pixels" is processes, not threads: leave out num_threads.')
+    mode = kwargs.pop("autoreset_mode", AutoresetMode.NEXT_STEP)
+    task = find_task(kwargs.pop("task", DEFAULT))
+    if TASKS.name_of(task) is None:  # not registered: it is pickled
+        kwargs = {"max_episode_steps": task.max_episode_steps, **kwargs, "task": task}
+    task_id = TASKS.name_of(task) or DEFAULT
+    make = partial(gymnasium.make, f"hrc_env:{task_id}", perception="pixels", **kwargs)
+    return PixelVectorEnv([make] * num_envs, context="spawn", autoreset_mode=mode)
