@@ -24,19 +24,13 @@ if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
     from hrc_env.config import save_config as save_config
     from hrc_env.core.errors import ConfigError as ConfigError
     from hrc_env.core.errors import HRCError as HRCError
-    from hrc_env.core.records import Cue as Cue
-    from hrc_env.core.records import Effects as Effects
     from hrc_env.core.records import Keypoints as Keypoints
     from hrc_env.core.records import PoseEstimate as PoseEstimate
     from hrc_env.core.records import Roi as Roi
-    from hrc_env.core.records import Workplace as Workplace
-    from hrc_env.core.records import World as World
     from hrc_env.core.results import Metric as Metric
     from hrc_env.core.skeleton import BLAZEPOSE_INDEX as BLAZEPOSE_INDEX
     from hrc_env.core.skeleton import JOINTS as JOINTS
     from hrc_env.core.skeleton import MIRROR as MIRROR
-    from hrc_env.core.things import Things as Things
-    from hrc_env.core.things import Weld as Weld
     from hrc_env.env import HRCEnv as HRCEnv
     from hrc_env.evaluation.episodes import Score as Score
     from hrc_env.evaluation.episodes import evaluate as evaluate
@@ -50,6 +44,7 @@ if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
     from hrc_env.geometry.camera_config import read_rig as read_rig
     from hrc_env.geometry.camera_config import write_rig as write_rig
     from hrc_env.geometry.lens import Lens as Lens
+    from hrc_env.geometry.reach import ReachTarget as ReachTarget
     from hrc_env.mocap.read import read_recording as read_recording
     from hrc_env.mocap.retarget import retarget as retarget
     from hrc_env.motion.clip import Clip as Clip
@@ -83,7 +78,6 @@ if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
     from hrc_env.scene.robot import Suction as Suction
     from hrc_env.scene.robot_import import robot_from_mjcf as robot_from_mjcf
     from hrc_env.tasks.goal import Goal as Goal
-    from hrc_env.tasks.reach_target import ReachTarget as ReachTarget
     from hrc_env.tasks.task import Task as Task
     from hrc_env.tracking.config import TrackerConfig as TrackerConfig
     from hrc_env.tracking.estimators import Estimator as Estimator
@@ -93,6 +87,12 @@ if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
     from hrc_env.tracking.smoother import smooth as smooth
     from hrc_env.vector.env import HRCVectorEnv as HRCVectorEnv
     from hrc_env.vector.make import make_vector as make_vector
+    from hrc_env.world import Effects as Effects
+    from hrc_env.world import TaskScene as TaskScene
+    from hrc_env.world import Weld as Weld
+    from hrc_env.world import WorkerSignal as WorkerSignal
+    from hrc_env.world import Workplace as Workplace
+    from hrc_env.world import World as World
 
 __version__ = "0.1.0"
 
@@ -110,17 +110,17 @@ PUBLIC = {
     "save_config": "hrc_env.config",
     # tasks
     "Belief": "hrc_env.belief",
-    "Cue": "hrc_env.core.records",
-    "Effects": "hrc_env.core.records",
+    "Effects": "hrc_env.world",
     "Goal": "hrc_env.tasks.goal",
     "ObservationTerm": "hrc_env.observations",
-    "ReachTarget": "hrc_env.tasks.reach_target",
+    "ReachTarget": "hrc_env.geometry.reach",
     "RewardTerm": "hrc_env.rewards",
     "Task": "hrc_env.tasks.task",
-    "Things": "hrc_env.core.things",
-    "Weld": "hrc_env.core.things",
-    "Workplace": "hrc_env.core.records",
-    "World": "hrc_env.core.records",
+    "TaskScene": "hrc_env.world",
+    "Weld": "hrc_env.world",
+    "WorkerSignal": "hrc_env.world",
+    "Workplace": "hrc_env.world",
+    "World": "hrc_env.world",
     "register_task": "hrc_env.registration",
     # robots and shields
     "Hand": "hrc_env.scene.robot",
