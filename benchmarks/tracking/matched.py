@@ -14,8 +14,8 @@ import numpy as np
 from benchmarks.tracking.rigs import DT_S
 from hrc_env.core.skeleton import N_JOINTS, TORSO
 from hrc_env.core.typing import Floats, Points3
-from hrc_env.tracking.models.acquisition import STANDING_M
-from hrc_env.tracking.models.motion import damped_joints
+from hrc_env.tracking.tree.predict import damped_joints
+from hrc_env.tracking.tree.state import STANDING_M
 
 N_STATES = 6 * N_JOINTS
 N_PLACES = 3 * N_JOINTS
@@ -40,7 +40,7 @@ class MatchedModel:
 
 
 def matched_model(damping: float, root_acceleration: float) -> MatchedModel:
-    """The motion model of `tracking.models.motion` as one of the whole body at 25 Hz; the settings
+    """The motion model of `tracking.tree.predict` as one of the whole body at 25 Hz; the settings
     are those of `ParticleConfig`."""
     F, own = damped_joints(DT_S, damping, 0.0)
     average = np.zeros((N_JOINTS, N_JOINTS))

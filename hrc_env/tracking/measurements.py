@@ -15,7 +15,7 @@ from hrc_env.core.records import Keypoints
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.geometry.triangulation import FURTHEST_PX, NEAREST_DEPTH_M, pixel_of
-from hrc_env.tracking.tree.cameras import LANES, N_VIEW
+from hrc_env.tracking.tree.state import LANES, N_VIEW
 
 MIN_SIGMA_PX = 0.25
 """No detector is believed to be better than this [px]."""

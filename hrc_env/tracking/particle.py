@@ -19,14 +19,12 @@ from hrc_env.tracking.config import ParticleConfig
 from hrc_env.tracking.forecast import forecast, mixed
 from hrc_env.tracking.hypotheses.filter import predict_all, update_all
 from hrc_env.tracking.hypotheses.mixture import estimate_all
-from hrc_env.tracking.hypotheses.pace import PACE
-from hrc_env.tracking.hypotheses.slots import Hypotheses
 from hrc_env.tracking.measurements import arrays_of
 from hrc_env.tracking.models.noise import noise_model
 from hrc_env.tracking.settings import settings_of
 from hrc_env.tracking.tracks import bounded
-from hrc_env.tracking.tree.state import NOISE, TREE, VIEW, forget_trees, motion
-from hrc_env.tracking.tree.work import WORK
+from hrc_env.tracking.tree.predict import motion
+from hrc_env.tracking.tree.state import NOISE, PACE, TREE, VIEW, WORK, Hypotheses, forget_trees
 
 
 @dataclass(frozen=True, slots=True)

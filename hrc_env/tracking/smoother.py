@@ -29,7 +29,7 @@ from hrc_env.tracking.config import ParticleConfig, TrackerConfig, of_kind
 from hrc_env.tracking.particle import ParticleEstimator
 from hrc_env.tracking.tracks import bounded
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT
-from hrc_env.tracking.tree.state import motion
+from hrc_env.tracking.tree.predict import motion
 
 _N = 6 * N_JOINTS
 Moments: TypeAlias = tuple[Floats, Floats]

@@ -6,7 +6,7 @@ from hrc_env.core.records import Roi
 from hrc_env.geometry.cameras import pinhole, project, projections
 from hrc_env.perception.believing import is_body, stands
 from hrc_env.perception.searching import agreed_windows, apart_from, proposals
-from hrc_env.tracking.models.acquisition import STANDING_M
+from hrc_env.tracking.tree.state import STANDING_M
 
 CAMERAS = tuple(
     pinhole(f"camera_{k}", np.array([x, y, 2.45]), np.array([0.2, 0, 1.0]), 90, 1920, 1080)

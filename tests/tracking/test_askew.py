@@ -10,7 +10,6 @@ from hrc_env.geometry.cameras import pinhole, project, projections
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.tracking.measurements import make_seen
 from hrc_env.tracking.models.askew import (
-    PAIR,
     TURN_STD_RAD,
     _gaps,
     displacement,
@@ -18,7 +17,7 @@ from hrc_env.tracking.models.askew import (
     turn_camera,
 )
 from hrc_env.tracking.smoother import smooth
-from hrc_env.tracking.tree.state import TREE
+from hrc_env.tracking.tree.state import PAIR, TREE
 
 TWO = LAB[:2]
 FAR_OPPOSITE = projections(

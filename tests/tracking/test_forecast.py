@@ -12,8 +12,8 @@ from hrc_env.geometry.rotations import about_axis
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import ESTIMATORS, make_estimator
 from hrc_env.tracking.forecast import forecast, mixed
-from hrc_env.tracking.models.acquisition import STANDING_M
 from hrc_env.tracking.oracle import prior
+from hrc_env.tracking.tree.state import STANDING_M
 
 CONFIG = TrackerConfig()
 

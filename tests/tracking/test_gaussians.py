@@ -6,9 +6,9 @@ from simulated import DT, LAB, Damage, detections, generators, keypoints, track,
 
 from hrc_env.core.skeleton import MIRROR
 from hrc_env.tracking.estimators import make_estimator
-from hrc_env.tracking.models.motion import SPEED_M_S, SPREAD_M, damped_joints
 from hrc_env.tracking.tracks import least_eigenvalue
 from hrc_env.tracking.tree.gaussian import PARENT
+from hrc_env.tracking.tree.predict import SPEED_M_S, SPREAD_M, damped_joints
 
 gaussian = pytest.mark.parametrize("name", ["kalman", "particle"])
 

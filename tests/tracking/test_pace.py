@@ -6,13 +6,8 @@ import pytest
 from benchmarks.tracking.rigs import DT_S, make_rig
 from benchmarks.tracking.sequences import make_sequences
 from hrc_env.tracking.estimators import make_estimator
-from hrc_env.tracking.hypotheses.pace import (
-    MOST_MOVING,
-    PACE,
-    forget_pace,
-    update_pace,
-    widening,
-)
+from hrc_env.tracking.hypotheses.pace import MOST_MOVING, forget_pace, update_pace, widening
+from hrc_env.tracking.tree.state import PACE
 
 STANDS = np.zeros((15, 6))
 STANDS[[1, 3, 5, 7, 9, 11, 13], 1], STANDS[[2, 4, 6, 8, 10, 12, 14], 1] = 0.2, -0.2

@@ -9,11 +9,11 @@ from hrc_env.tracking.config import ParticleConfig
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.tracking.hypotheses.anatomy import anatomy
 from hrc_env.tracking.hypotheses.depth_flip import eye_of, lone_camera, open_depth, reflect
-from hrc_env.tracking.hypotheses.slots import Hypotheses, exchange_slots, merge, normalise
+from hrc_env.tracking.hypotheses.slots import exchange_slots, merge, normalise
 from hrc_env.tracking.hypotheses.yaw_flip import heads_like, turn_body, turn_of
 from hrc_env.tracking.tree.evidence import tree_measure
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT
-from hrc_env.tracking.tree.work import WORK
+from hrc_env.tracking.tree.state import WORK, Hypotheses
 
 EYES = -np.linalg.solve(LAB[:, :, :3], LAB[:, :, 3:])[..., 0]
 

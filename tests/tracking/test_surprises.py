@@ -8,7 +8,7 @@ from hrc_env.core.skeleton import JOINT, MIRROR
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.tracking.config import ParticleConfig
 from hrc_env.tracking.estimators import make_estimator
-from hrc_env.tracking.models.axes import leaning, set_axes
+from hrc_env.tracking.tree.predict import leaning, set_axes
 
 gaussian = pytest.mark.parametrize("name", ["kalman", "particle"])
 WRIST, N = JOINT["left_wrist"], 60

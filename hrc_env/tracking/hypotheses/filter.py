@@ -1,7 +1,7 @@
 """The kernels of `particle`: one loop over environments, workers and hypotheses.
 
 `own` are a worker's `slots.Hypotheses`, `s` are `settings.Settings`, `seen` is `measurements.Seen`,
-`work` is a record of `tree.work.WORK`; what happens to one hypothesis is `tree.filter`'s.
+`work` is a record of `tree.state.WORK`; what happens to one hypothesis is `tree.filter`'s.
 """
 
 import numpy as np
@@ -12,7 +12,7 @@ from hrc_env.tracking.hypotheses.branching import branch, is_ambiguous
 from hrc_env.tracking.hypotheses.one_view import begin_from_one
 from hrc_env.tracking.hypotheses.pace import forget_pace, update_pace
 from hrc_env.tracking.hypotheses.sides import agree_on_sides
-from hrc_env.tracking.hypotheses.slots import Hypotheses, drop, merge, normalise, worker_slots
+from hrc_env.tracking.hypotheses.slots import drop, merge, normalise, worker_slots
 from hrc_env.tracking.measurements import make_seen, read_worker
 from hrc_env.tracking.models.acquisition import WIDEST_STD_M, heading
 from hrc_env.tracking.models.askew import (
@@ -31,6 +31,7 @@ from hrc_env.tracking.tracks import count_up
 from hrc_env.tracking.tree.evidence import log_evidence
 from hrc_env.tracking.tree.filter import condition, correct_mean, keep_positions, recover
 from hrc_env.tracking.tree.predict import predict_tree
+from hrc_env.tracking.tree.state import Hypotheses
 
 _TORSO = (1, 2, 7, 8)
 _CLOSE = 2.0
@@ -102,7 +103,7 @@ def update_all(state, P, measured, s, noise, works, prior):
         P: (C, 3, 4).
         measured: of all workers, as `measurements.arrays_of` gives it.
         s, noise: plain tuples of `Settings` and of `noise.NoiseModel`.
-        works: (1,) scratch, records of `tree.work.WORK`.
+        works: (1,) scratch, records of `tree.state.WORK`.
         prior: (1,) records of `tree.state.TREE`: room for a hypothesis before its update.
     """
     state, s, noise = Hypotheses(*state), Settings(*s), NoiseModel(*noise)

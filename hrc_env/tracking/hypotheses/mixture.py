@@ -4,10 +4,10 @@ import math
 
 from hrc_env.core.kernels import kernel
 from hrc_env.tracking.hypotheses.pace import MOST, widening
-from hrc_env.tracking.hypotheses.slots import Hypotheses
-from hrc_env.tracking.models.axes import leaning
 from hrc_env.tracking.settings import Settings
 from hrc_env.tracking.tracks import bound
+from hrc_env.tracking.tree.predict import leaning
+from hrc_env.tracking.tree.state import Hypotheses
 
 _FORGOTTEN_UPDATES = 8
 """A camera that has not seen the worker for longer no longer counts as a view of them."""

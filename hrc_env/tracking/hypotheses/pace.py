@@ -7,22 +7,8 @@ turned, and that is found late. `widening` says by how much.
 
 import math
 
-import numpy as np
-
 from hrc_env.core.kernels import kernel
 
-PACE = np.dtype(
-    [
-        # directions in the last update, of the line across hips and shoulders on the floor, and of
-        # the trunk; time since then [s]; whether there are any
-        ("across", "f8", 2), ("up", "f8", 3), ("since_s", "f8"), ("known", "?"),
-        # rates of turning about the vertical and of tipping [rad/s], speed of the trunk [m/s], each
-        # a mean over the last `LASTS_S`
-        ("turns", "f8"), ("tips", "f8"), ("travels", "f8"),
-    ],
-    align=True,
-)  # fmt: skip
-"""How one worker has moved lately."""
 LASTS_S = 0.7
 """Time constant of these means [s]."""
 MOST_RAD_S = 15.0

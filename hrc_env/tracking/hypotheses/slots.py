@@ -4,30 +4,12 @@ A worker has H slots, of which the first `n_alive` are in use, the heaviest firs
 """
 
 import math
-from typing import Any, NamedTuple
 
 import numpy as np
 
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Floats, Ints
 from hrc_env.tracking.tree.evidence import distance_between
-
-
-class Hypotheses(NamedTuple):
-    """Hypotheses about each worker; arrays changed in place."""
-
-    trees: Any
-    """(B, W, H) records of `tree.state.TREE`; log-weights of those in use sum to one."""
-    views: Any
-    """(B, W, H, C) records of `tree.state.VIEW`."""
-    noise: Any
-    """(B, W, H, J, C) records of `tree.state.NOISE`."""
-    n_alive: Ints
-    """(B, W) slots in use, at least one."""
-    waited_s: Floats
-    """(B, W) time since other hypotheses were looked for [s]."""
-    pace: Any
-    """(B, W) records of `pace.PACE`."""
+from hrc_env.tracking.tree.state import Hypotheses
 
 
 @kernel(makes_arrays=True)

@@ -8,22 +8,9 @@ import math
 import numpy as np
 
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Floats
 from hrc_env.geometry.triangulation import consensus_point
+from hrc_env.tracking.tree.state import STANDING_M
 
-STANDING_M: Floats = np.array(
-    [
-        (0.12, 0.00, 0.42),
-        (0.00, 0.18, 0.25), (0.00, -0.18, 0.25),
-        (0.00, 0.24, -0.02), (0.00, -0.24, -0.02),
-        (0.08, 0.25, -0.27), (0.08, -0.25, -0.27),
-        (0.00, 0.11, -0.25), (0.00, -0.11, -0.25),
-        (0.02, 0.11, -0.67), (0.02, -0.11, -0.67),
-        (0.00, 0.11, -1.08), (0.00, -0.11, -1.08),
-        (0.14, 0.11, -1.14), (0.14, -0.11, -1.14),
-    ]
-)  # fmt: skip
-"""Joints of a standing adult from the middle of the torso [m]: forward, left, up."""
 WIDEST_STD_M = 0.5
 """A triangulated joint that is less certain than this is no find [m]."""
 _GUESS_STD_M, _GUESS_STD_WITHOUT_HEADING_M = 0.3, 0.6

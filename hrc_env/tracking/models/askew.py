@@ -19,19 +19,6 @@ from hrc_env.geometry.lines_of_sight import CAMERA, eye_of, look, model_cameras,
 from hrc_env.geometry.triangulation import inverse3
 from hrc_env.tracking.tree.gaussian import invert, multiply, multiply_transposed
 
-PAIR = np.dtype(
-    [
-        # the two cameras; information and score of their turns
-        ("cameras", "i8", (2,)), ("information", "f8", (6, 6)), ("score", "f8", (6,)),
-        # the turns about the world's axes [rad], their covariance
-        ("turn", "f8", (6,)), ("turn_cov", "f8", (6, 6)),
-        # share of the last updates in which lines met; whether the two count as turned; updates in
-        # which they saw somebody whom nobody follows
-        ("fits", "f8"), ("askew", "?"), ("waited", "i8"),
-    ],
-    align=True,
-)  # fmt: skip
-"""What is remembered of two cameras that alone see a worker."""
 TURN_STD_RAD = 0.05
 """Of a camera that was knocked, about each axis: a judgement."""
 _LEAST_TURN_RAD, _LEAST_EVIDENCE = 0.014, 16.0

@@ -24,9 +24,6 @@ from hrc_env.core.kernels import kernel
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, inverse3
 from hrc_env.tracking.config import ParticleConfig
 
-N_SUMS = 5
-"""Fading sums of the residuals' squares, redundancy, products with the last ones and the squares
-of these; and, at the first joint and camera, whose turn it is."""
 _TURNS = 2
 """Every update looks at every so-manieth joint, which costs less and tells as much: neighbouring
 frames are alike."""

@@ -6,33 +6,19 @@ bones are always on; a scalar Kalman filter per bone learns it while two views s
 
 import math
 
-import numpy as np
-
 from hrc_env.core.kernels import kernel
-from hrc_env.core.skeleton import BONE_LENGTH_M, BONES, JOINT
-from hrc_env.core.typing import Floats
-from hrc_env.tracking.tree.gaussian import EDGE_BONE, PARENT, ROOT
+from hrc_env.tracking.tree.gaussian import PARENT
+from hrc_env.tracking.tree.state import EDGE_STIFFNESS_M
 
-POPULATION_SHARE = 0.10
-"""Standard deviation of a bone's length over people, as a share of it."""
-STIFFNESS_M: Floats = np.where(np.any(JOINT["nose"] == BONES, axis=-1), 0.05, 0.02)
-"""How much a distance changes in one person [m]: the head turns on its neck."""
 _CORRELATED_UPDATES = 10.0
 _GATE_SIGMA, _LEAST_VARIANCE = 3.0, 1e-5
-_STIFFNESS = tuple(0.0 if j == ROOT else float(STIFFNESS_M[k]) for j, k in enumerate(EDGE_BONE))
-
-
-def population_edges() -> tuple[Floats, Floats]:
-    """Lengths [m] from each joint to its parent and their variances [m^2], (J,); the root's: 1."""
-    length = np.array([1.0 if k < 0 else BONE_LENGTH_M[k] for k in EDGE_BONE])
-    return length, (POPULATION_SHARE * length) ** 2
 
 
 @kernel
 def stiff_lengths(variance, give, out):
     """Variances (J,) of the lengths as measurements: what is not known of them, and the give."""
     for j in range(len(variance)):
-        out[j] = variance[j] + (give * _STIFFNESS[j]) ** 2
+        out[j] = variance[j] + (give * EDGE_STIFFNESS_M[j]) ** 2
 
 
 @kernel
@@ -56,7 +42,7 @@ def learn_lengths(tree, n_views):
                 spread += along[i] * along[k] * difference
                 total += difference if i == k else 0.0
         measured = now - 0.5 * (total - spread) / now  # errors across a bone lengthen it
-        _learn_length(tree, j, measured, max(spread, _STIFFNESS[j] ** 2))
+        _learn_length(tree, j, measured, max(spread, EDGE_STIFFNESS_M[j] ** 2))
 
 
 @kernel

@@ -9,18 +9,9 @@ import math
 
 from hrc_env.core.kernels import kernel
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M
+from hrc_env.tracking.tree.state import LANES
 
-LANES = 16
-"""Columns: joints, and one that is nobody's."""
-N_POINT = 9
-"""x, y, z [m]; then 00, 11, 22, 01, 02, 12 of the prior's position covariance [m^2]."""
-N_VIEW = 3
-"""u, v [px], precision [1/px^2]; 0 stands for what was not measured."""
 BELIEF, LOG_ODDS, FACTOR, A0, A1, A2, B0, B1, B2, DU, DV = range(11)
-N_IMAGE = 11
-"""Belief; logarithm and factor of its odds; Jacobian of u, of v [px/m]; residuals [px]."""
-N_SUM = 9
-"""Information 00, 11, 22, 01, 02, 12 [1/m^2], then gradient [1/m]."""
 _REORDER = {"reassoc", "contract", "nsz"}  # NaN and infinity keep their meaning
 
 

@@ -1,7 +1,7 @@
 """An update of one Gaussian on the tree, step by step.
 
 `tree` is a record of `tree.state.TREE`, `seen` is `measurements.Seen`, `s` are `settings.Settings`
-and `work` is a record of `tree.work.WORK`.
+and `work` is a record of `tree.state.WORK`.
 """
 
 from hrc_env.core.kernels import kernel

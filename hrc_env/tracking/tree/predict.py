@@ -1,20 +1,46 @@
-"""The tree a moment later: damped joints about the middle of the torso, moments exact.
+"""Prediction: the tree a moment later, with exact moments.
 
-With r the mean of the four torso states, a joint moves by x' = F x + D r + constant + noise,
-where F damps it towards its place on the body and D = [[1, dt], [0, 1]] - F lets it travel
-with the torso. That is linear in the 90 numbers, so that marginals and edges of the moved body
-follow exactly from Cov(x_j, r), which the tree gives by a recursion. Keeping these and
-forgetting all other covariances is the nearest Gaussian on the tree (least Kullback-Leibler
-divergence).
+Each joint is a second-order Gauss-Markov process (a damped oscillator driven by white noise) about
+an anchor: the root r (mean of the four torso states) plus the joint's mean place on the body,
+turned as the body is. It moves by x' = F x + D r + constant + noise, where D = [[1, dt], [0, 1]] -
+F lets it travel with the torso. All joints share the root's error: damping towards the anchor must
+not make it smaller.
+
+That is linear in the 90 numbers, so that marginals and edges of the moved body follow exactly from
+Cov(x_j, r), which the tree gives by a recursion. Keeping these and forgetting all other
+covariances is the nearest Gaussian on the tree (least Kullback-Leibler divergence).
+
+A trunk that leans little counts as upright, as people's are: where one view leaves open how far it
+leans, that tells the depth. One that lies takes head and arms with it; the legs go with it, or
+hang below it as those of a person who bends down, whichever they are nearer to.
 """
 
+import functools
+import math
+
+import numpy as np
+
 from hrc_env.core.kernels import kernel
-from hrc_env.tracking.models.axes import part_of, set_axes
-from hrc_env.tracking.models.motion import learn_offsets
+from hrc_env.core.skeleton import JOINT
+from hrc_env.core.typing import Floats
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT, invert, multiply, multiply_transposed
 
 _LEFT, _RIGHT, _LEFT_HIP, _RIGHT_HIP = 1, 2, 7, 8  # shoulders: _RIGHT, _LEFT_HIP hang on _LEFT
 _REORDER = {"reassoc", "contract", "nsz"}
+_LEANS, _LIES = math.cos(math.radians(25.0)), math.cos(math.radians(50.0))
+"""Up to the first angle a trunk is upright, from the second on it lies; judgement."""
+_SHORT_M = 0.05
+_KNEE, _FOOT = JOINT["left_knee"], JOINT["left_foot"]
+SPREAD_M: Floats = np.array(
+    [.06, .04, .04, .12, .12, .20, .20, .04, .04, .12, .12, .20, .20, .22, .22]
+)  # fmt: skip
+"""Standard deviation of a joint about its mean place on the body [m]; a judgement."""
+SPEED_M_S: Floats = np.array(
+    [.2, .2, .2, .5, .5, .95, .95, .2, .2, .5, .5, .9, .9, .95, .95]
+)  # fmt: skip
+"""Standard deviation of its speed relative to the body [m/s]; a judgement: those of people at
+work are near it, and twice as much makes every prediction twice as uncertain as it is wrong."""
+_OFFSET_TAU_S, _OFFSET_STD_M = 2.0, 0.06
 
 
 @kernel
@@ -143,3 +169,137 @@ def _add_noise(noise, out):
         out[i, 3 + i] += noise[0, 1]
         out[3 + i, i] += noise[1, 0]
         out[3 + i, 3 + i] += noise[1, 1]
+
+
+@kernel
+def leaning(body):
+    """How far a trunk lies, 0 to 1, and the direction from its hips to its shoulders."""
+    x, y, z = _trunk(body, 0), _trunk(body, 1), _trunk(body, 2)
+    length = math.sqrt(x * x + y * y + z * z) + 1e-9
+    lies = min(max((z / length - _LEANS) / (_LIES - _LEANS), 0.0), 1.0)
+    return lies, (x / length, y / length, z / length)
+
+
+@kernel
+def _trunk(body, i):
+    return body[1, i] + body[2, i] - body[7, i] - body[8, i]
+
+
+@kernel
+def part_of(j):
+    """Which axes joint j goes by: 0 the trunk's, 1 the legs'."""
+    return 1 if j >= _KNEE else 0
+
+
+@kernel
+def set_axes(body, root, offset, axes):
+    """Fill axes (2, 3, 3), columns forward, left, up of trunk and legs; whether they are known.
+
+    `body` is (J, 3+), `root` begins with the middle of its torso, `offset` are the joints' mean
+    places (J, 3).
+    """
+    trunk, legs = axes[0], axes[1]
+    lies, along = leaning(body)
+    for i in range(3):
+        legs[i, 2] = 1.0 if i == 2 else 0.0
+        trunk[i, 2] = lies * along[i] + (1.0 - lies) * legs[i, 2]
+    known = _turn(body, trunk)
+    if not _turn(body, legs) or _legs_follow(body, root, offset, axes):
+        for i in range(3):
+            for k in range(3):
+                legs[i, k] = trunk[i, k]
+    return known
+
+
+@kernel
+def _turn(body, axes):
+    """Make axes (3, 3) of a body that has up in the last column; whether its left is known."""
+    length = along = across = 0.0
+    for i in range(3):
+        axes[i, 1] = body[1, i] - body[2, i] + body[7, i] - body[8, i]
+        length += axes[i, 2] * axes[i, 2]
+        along += axes[i, 1] * axes[i, 2]
+    for i in range(3):
+        axes[i, 1] -= along * axes[i, 2] / length
+        axes[i, 2] /= math.sqrt(length)
+        across += axes[i, 1] * axes[i, 1]
+    if across < _SHORT_M * _SHORT_M:
+        return False
+    for i in range(3):
+        axes[i, 1] /= math.sqrt(across)
+    for i in range(3):
+        a, b = (i + 1) % 3, (i + 2) % 3
+        axes[i, 0] = axes[a, 1] * axes[b, 2] - axes[b, 1] * axes[a, 2]
+    return True
+
+
+@kernel
+def _legs_follow(body, root, offset, axes):
+    """Whether knees and ankles are nearer to where the trunk's axes put them than below it."""
+    difference = 0.0
+    for j in range(_KNEE, _FOOT):
+        for i in range(3):
+            along = below = body[j, i] - root[i]
+            for k in range(3):
+                along -= axes[0, i, k] * offset[j, k]
+                below -= axes[1, i, k] * offset[j, k]
+            difference += along * along - below * below
+    return difference < 0.0
+
+
+@functools.lru_cache(maxsize=16)
+def damped_joints(dt_s: float, damping: float, root_acceleration: float) -> tuple[Floats, Floats]:
+    """Exact discretisation over `dt_s` [s] of damped joints, `damping` in (0, 1).
+
+    F (J, 2, 2) moves (position, velocity) relative to the anchor; the process noise Q (J, 2, 2)
+    keeps the stationary spreads and adds the whole body's acceleration [m^2/s^3].
+    """
+    frequency = SPEED_M_S / SPREAD_M
+    damped = frequency * np.sqrt(1 - damping**2)
+    decay, cos, sin = (
+        np.exp(-damping * frequency * dt_s),
+        np.cos(damped * dt_s),
+        np.sin(damped * dt_s),
+    )
+    slope = damping * frequency / damped * sin
+    F = np.empty((len(frequency), 2, 2))
+    F[:, 0, 0], F[:, 0, 1] = decay * (cos + slope), decay * sin / damped
+    F[:, 1, 0], F[:, 1, 1] = -decay * frequency**2 / damped * sin, decay * (cos - slope)
+    stationary = np.zeros_like(F)
+    stationary[:, 0, 0], stationary[:, 1, 1] = SPREAD_M**2, SPEED_M_S**2
+    Q = stationary - F @ stationary @ F.swapaxes(1, 2)
+    Q += whole_body_noise(dt_s, root_acceleration)
+    return F, Q
+
+
+def whole_body_noise(dt_s: float, root_acceleration: float) -> Floats:
+    """(2, 2) noise of position and velocity that all joints share over `dt_s` [s]."""
+    return root_acceleration * np.array([[dt_s**3 / 3, dt_s**2 / 2], [dt_s**2 / 2, dt_s]])
+
+
+@kernel
+def learn_offsets(tree, root, axes, dt):
+    """Joints that are known well teach their mean places (J, 3) on the body, in place.
+
+    `axes` are as `axes.set_axes` fills them, `root` begins with the middle of the torso.
+    """
+    body, cov, offset, offset_count = tree.body, tree.cov, tree.offset, tree.offset_count
+    for j in range(len(body)):
+        if cov[j, 0, 0] + cov[j, 1, 1] + cov[j, 2, 2] > 3.0 * _OFFSET_STD_M**2:
+            continue
+        offset_count[j] += 1.0
+        trust = max(1.0 / offset_count[j], dt / _OFFSET_TAU_S)
+        own = axes[part_of(j)]
+        for k in range(3):
+            there = 0.0
+            for i in range(3):
+                there += own[i, k] * (body[j, i] - root[i])
+            offset[j, k] += trust * (there - offset[j, k])
+
+
+@functools.lru_cache(maxsize=16)
+def motion(dt_s: float, damping: float, acceleration: float) -> tuple[Floats, ...]:
+    """F, travel, Q (J, 2, 2) and shared noise (2, 2), as `tree.predict.predict_tree` takes them."""
+    F, Q = damped_joints(dt_s, damping, acceleration)
+    travel = np.array([[1.0, dt_s], [0.0, 1.0]]) - F
+    return F, travel, Q, whole_body_noise(dt_s, acceleration)
