@@ -15,7 +15,7 @@ from hrc_env.core.records import Keypoints
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.geometry.triangulation import FURTHEST_PX, NEAREST_DEPTH_M, pixel_of
-from hrc_env.tracking.tree.state import LANES, N_VIEW
+from hrc_env.tracking.tree.state import LANES, N_IMAGE, N_VIEW
 
 MIN_SIGMA_PX = 0.25
 """No detector is believed to be better than this [px]."""
@@ -61,7 +61,9 @@ class Seen(NamedTuple):
     belief: Floats
     """(J, C) how far it is believed to be no outlier."""
     views: Floats
-    """(C, N_VIEW, LANES) the measurements as `tree.cameras` takes them."""
+    """(C, N_VIEW, LANES) the measurements as `tree.search` takes them."""
+    images: Floats
+    """(C, N_IMAGE, LANES) the joints in each camera where `tree.search` linearised last."""
     looks: Floats
     """(C, 8) what each camera says of one joint, for `models.noise`."""
 
@@ -77,6 +79,7 @@ def make_seen(P):
         ok=np.empty((N_JOINTS, n), np.bool_),
         belief=np.empty((N_JOINTS, n)),
         views=np.zeros((n, N_VIEW, LANES)),
+        images=np.zeros((n, N_IMAGE, LANES)),
         looks=np.empty((n, 8)),
     )
 

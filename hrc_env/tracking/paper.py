@@ -32,8 +32,8 @@ from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
 from hrc_env.tracking.config import PaperConfig
 from hrc_env.tracking.forecast import forecast
 from hrc_env.tracking.measurements import Seen, arrays_of, make_seen, read_worker, supports
-from hrc_env.tracking.models.acquisition import count_conflict
 from hrc_env.tracking.tracks import forget, make_tracks, report
+from hrc_env.tracking.tree.update import count_conflict
 
 BEHIND = -1e12
 """Log-likelihood of a particle behind the camera that saw the joint: the last to be chosen."""

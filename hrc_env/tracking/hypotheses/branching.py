@@ -21,11 +21,9 @@ from hrc_env.tracking.hypotheses.depth_flip import (
 )
 from hrc_env.tracking.hypotheses.slots import copy_slot
 from hrc_env.tracking.hypotheses.yaw_flip import heads_like, turn_body, turn_of
-from hrc_env.tracking.tree.bone_lengths import stiff_lengths
 from hrc_env.tracking.tree.evidence import distance_between, log_evidence
-from hrc_env.tracking.tree.filter import condition, correct_mean
-from hrc_env.tracking.tree.search import find_pose_near
-from hrc_env.tracking.tree.update import update_tree
+from hrc_env.tracking.tree.search import find_pose_near, stiff_lengths
+from hrc_env.tracking.tree.update import condition, correct_mean, update_tree
 
 _LOG_LEAST_EVIDENCE = math.log(0.01)
 """A limb's other mode with less evidence than this beside the known one's is none."""

@@ -29,9 +29,10 @@ from hrc_env.tracking.models.track_management import acquire, grow_older
 from hrc_env.tracking.settings import Settings
 from hrc_env.tracking.tracks import count_up
 from hrc_env.tracking.tree.evidence import log_evidence
-from hrc_env.tracking.tree.filter import condition, correct_mean, keep_positions, recover
+from hrc_env.tracking.tree.filter import recover
 from hrc_env.tracking.tree.predict import predict_tree
 from hrc_env.tracking.tree.state import Hypotheses
+from hrc_env.tracking.tree.update import condition, correct_mean
 
 _TORSO = (1, 2, 7, 8)
 _CLOSE = 2.0
@@ -213,7 +214,6 @@ def _follow(own, h, look, seen, s, noise, scratch):
     scale_sigma(learnt, seen.sigma)
     if undo_swaps(tree, seen, own.views[h], s) and acquire(tree, seen, s):
         tree.slope[:] = 0.0
-    keep_positions(tree.cov, work.predicted)
     evidence = 0.0
     if several or look:
         prior[0] = tree

@@ -12,14 +12,12 @@ from hrc_env.core.kernels import kernel
 from hrc_env.geometry.lines_of_sight import eye_of
 from hrc_env.geometry.triangulation import linear_point
 from hrc_env.tracking.hypotheses.anatomy import anatomy
-from hrc_env.tracking.tree.bone_lengths import stiff_lengths
 from hrc_env.tracking.tree.evidence import log_evidence
-from hrc_env.tracking.tree.filter import correct_mean
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT
 from hrc_env.tracking.tree.predict import SPEED_M_S
-from hrc_env.tracking.tree.search import find_pose_near
+from hrc_env.tracking.tree.search import find_pose_near, stiff_lengths
 from hrc_env.tracking.tree.state import STANDING_M
-from hrc_env.tracking.tree.update import update_tree
+from hrc_env.tracking.tree.update import correct_mean, update_tree
 
 _N_TURNS, _SEARCH_STEPS = 8, 6
 _LEAST_EVIDENCE = 2.0

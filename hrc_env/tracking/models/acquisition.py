@@ -128,11 +128,3 @@ def _across(points, shoulders, hips):
     if length < 0.05:
         return 0.0, 0.0, False
     return y / length, -x / length, True
-
-
-@kernel
-def count_conflict(n_ok, n_supporting, conflict):
-    """Updates in a row in which two views were there and fewer than two supported the joint."""
-    if n_ok < 2 or n_supporting >= 2:
-        return 0 if n_supporting >= 2 or n_ok == 0 else conflict
-    return conflict + 1

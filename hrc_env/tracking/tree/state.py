@@ -21,8 +21,9 @@ N_POINT = 9
 """x, y, z [m]; then 00, 11, 22, 01, 02, 12 of the prior's position covariance [m^2]."""
 N_VIEW = 3
 """u, v [px], precision [1/px^2]; 0 stands for what was not measured."""
-N_IMAGE = 11
-"""Belief; logarithm and factor of its odds; Jacobian of u, of v [px/m]; residuals [px]."""
+N_IMAGE = 12
+"""Belief; logarithm and factor of its odds; Jacobian of u, of v [px/m]; residuals [px]; reciprocal
+of the depth [1/m], 0 for a joint that has no usable pixel."""
 N_SUM = 9
 """Information 00, 11, 22, 01, 02, 12 [1/m^2], then gradient [1/m]."""
 STANDING_M: Floats = np.array(
@@ -144,9 +145,8 @@ WORK = np.dtype(
         ("camera_information", "f8", (_J, 3, 3)), ("camera_gradient", "f8", (_J, 3)),
         # the same of the bones', of x_j - x_parent; of no meaning at the root
         ("edge_information", "f8", (_J, 3, 3)), ("edge_gradient", "f8", (_J, 3)),
-        # as in `cameras`
-        ("points", "f8", (N_POINT, LANES)), ("image", "f8", (N_IMAGE, LANES)),
-        ("sums", "f8", (N_SUM, LANES)),
+        # as in `search`
+        ("points", "f8", (N_POINT, LANES)), ("sums", "f8", (N_SUM, LANES)),
         # for `models.noise`: where the cameras see a joint together, how lasting errors add up
         ("spread", "f8", (3, 4)), ("grows", "f8", (_J,)),
         # cameras that measured a joint; variances of the bones' lengths as measurements [m^2]

@@ -1,47 +1,160 @@
-"""The tree after a set of frames: one exact linear-Gaussian update, then the mean correction.
+"""Update: a tree given one frame, which is one exact linear-Gaussian update about the mode.
 
-Cameras inform single joints, bones inform edges, so that the posterior is again a Gaussian on
-the same tree: elimination from the leaves to the root and substitution back give its marginals
-and slopes exactly.
+Cameras inform single joints, bones inform edges, so that the posterior is again a Gaussian on the
+same tree: elimination from the leaves to the root and substitution back give its marginals and
+slopes. Then the means move from the mode to the mean, and lengths of bones are learnt.
+
+Where several views agree with each other and not with the prediction, it was too sure: a limb was
+jerked, a person turned over. The part R of a joint's covariance C that is not its parent's then
+grows, and the pose is searched for again. With d from the predicted joint to where it is seen, R
+is multiplied by 1 + (|d|^4 - d'C d) / d'R d: the variance along d is then |d|^2, the likeliest
+(covariance matching: Mehra, IEEE Trans. Automatic Control 17, 1972, doi:10.1109/TAC.1972.1100100).
 """
 
+import math
+
+import numpy as np
+
 from hrc_env.core.kernels import kernel
-from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
-from hrc_env.tracking.measurements import pixel_spread
+from hrc_env.geometry.triangulation import consensus_point
 from hrc_env.tracking.tree.gaussian import (
     LEAVES_FIRST,
     ORDER,
     PARENT,
     invert,
+    invert3,
     multiply,
     multiply_transposed,
     transposed_multiply,
 )
+from hrc_env.tracking.tree.search import A0, A1, A2, B0, B1, B2, NEARNESS, find_pose
+from hrc_env.tracking.tree.state import EDGE_STIFFNESS_M
 
+_FAR = 16.0
+"""Squared Mahalanobis distance of a jump: by chance a joint is as far once in 900 updates."""
+_SURE_VIEWS, _AGREEING_VIEWS = 1.5, 3
+"""Where more views than this are believed, the pose that was found counts; where not, it takes so
+many that agree: two may err alike."""
 _NEAREST_M = 0.3
 """The mean correction knows no joint nearer to a lens than this."""
 _REORDER = {"reassoc", "contract", "nsz"}
+_CORRELATED_UPDATES, _GATE_SIGMA, _LEAST_VARIANCE = 10.0, 3.0, 1e-5
+
+
+@kernel(makes_arrays=True)
+def condition(tree, seen, s, work):
+    """Search the mode and condition the tree there; seen.belief says which pixels it believes.
+
+    Keeps the predicted covariances of the positions in work.predicted.
+    """
+    for j in range(len(tree.cov)):
+        for i in range(3):
+            for k in range(3):
+                work.predicted[j, i, k] = tree.cov[j, i, k]
+    find_pose(tree, seen, s, work)
+    if widen_jumped(tree, seen, s, work):
+        find_pose(tree, seen, s, work)
+    update_tree(tree, work)
+
+
+@kernel(makes_arrays=True)
+def widen_jumped(tree, seen, s, w):
+    """Widen the predicted covariances of joints that have jumped, in place; whether any has."""
+    cov, grown, jumped = tree.cov, w.moved, False
+    use, point, spread = np.empty(len(seen.P), np.bool_), np.empty(3), np.empty((3, 3))
+    for j in ORDER:
+        grown[j] = 0.0
+        if jumped and PARENT[j] >= 0:  # joints beyond one that jumped go with it
+            multiply(tree.slope[j], grown[PARENT[j]], w.a)
+            multiply_transposed(w.a, tree.slope[j], grown[j])
+        if _has_jumped(j, tree, seen, s, (point, spread, use, w)):
+            jumped |= _grow(j, tree, point, w)
+    for j in ORDER:
+        if not jumped:
+            break
+        for i in range(6):
+            for k in range(6):
+                cov[j, i, k] += grown[j, i, k]
+    return jumped
+
+
+@kernel
+def _grow(j, tree, point, w):
+    """Add to w.moved[j] what makes the predicted variance as large as the jump to `point`."""
+    q, body, cov, inherited = PARENT[j], tree.body[j], tree.cov[j], w.b
+    for i in range(6):
+        for k in range(6):
+            inherited[i, k] = 0.0
+    if q >= 0:
+        multiply(tree.slope[j], tree.cov[q], w.a)
+        multiply_transposed(w.a, tree.slope[j], inherited)
+    squared = known = own = 0.0
+    for i in range(3):
+        d = point[i] - body[i]
+        squared += d * d
+        for k in range(3):
+            product = d * (point[k] - body[k])
+            known += product * (cov[i, k] + w.moved[j, i, k])
+            own += product * (cov[i, k] - inherited[i, k])
+    if not (own > 0.0 and squared * squared > known):
+        return False
+    more = (squared * squared - known) / own
+    for i in range(6):
+        for k in range(6):
+            w.moved[j, i, k] += more * (cov[i, k] - inherited[i, k])
+    return True
+
+
+@kernel(makes_arrays=True)
+def _has_jumped(j, tree, seen, s, scratch):
+    """Whether views agree on another place of a joint than the expected one: `point`."""
+    point, spread, use, w = scratch
+    ok, body, cov = seen.ok[j], tree.body[j], tree.cov[j]
+    n_believed = 0.0
+    for c in range(len(ok)):
+        n_believed += seen.belief[j, c] if ok[c] else 0.0
+    if n_believed > _SURE_VIEWS:
+        for i in range(3):
+            point[i] = w.point[j, i]
+        return _is_far(point, body, cov, w.c)
+    views = (seen.P, seen.z[j], seen.sigma[j], ok)
+    if ok.sum() < _AGREEING_VIEWS:
+        return False
+    if consensus_point(*views, s.gate_sigma, point, spread, use) < _AGREEING_VIEWS:
+        return False
+    for i in range(3):
+        for k in range(3):
+            spread[i, k] += cov[i, k]
+    return _is_far(point, body, spread, w.c)
+
+
+@kernel
+def _is_far(point, body, cov, inverse):
+    invert3(cov, inverse)
+    squared = 0.0
+    for i in range(3):
+        for k in range(3):
+            squared += (point[i] - body[i]) * inverse[i, k] * (point[k] - body[k])
+    return squared > _FAR
 
 
 @kernel
 def update_tree(tree, w):
     """Condition a tree on cameras and bones, in place.
 
-    Covariances with the parents (edge) and what cameras and bones say (information and gradient)
-    are in `w` as `tree.search.find_pose` leaves them. Keeps the factors for `shift_to_mean`.
+    `w` is as `find_pose` leaves it; the factors stay in it for `shift_to_mean`.
     """
     body, cov, slope = tree.body, tree.cov, tree.slope
     for j in LEAVES_FIRST:
         _split(j, cov, slope, w)
-        _load_measurements(j, w)
+        _add_measurements(j, w)
     for j in LEAVES_FIRST:
         _eliminate(j, slope, w)
     for j in ORDER:
         _marginalise(j, cov, slope, w)
     for j in range(len(body)):
         for i in range(3):
-            w.gradient[j, i] = w.camera_gradient[j, i]
-            w.gradient[j, 3 + i] = 0.0
+            w.gradient[j, i], w.gradient[j, 3 + i] = w.camera_gradient[j, i], 0.0
     for j in range(len(body)):
         q = PARENT[j]
         if q >= 0:
@@ -53,7 +166,7 @@ def update_tree(tree, w):
 
 @kernel
 def _split(j, cov, slope, w):
-    """What a joint knows by itself, given its parent."""
+    """Write the precision of a joint given its parent, and how it follows that."""
     own, rest, shared = w.own[j], w.a, w.b
     if PARENT[j] >= 0:
         multiply_transposed(w.edge[j], slope[j], shared)
@@ -71,8 +184,8 @@ def _split(j, cov, slope, w):
 
 
 @kernel
-def _load_measurements(j, w):
-    """Cameras inform a joint; bones it, its parent and what ties the two."""
+def _add_measurements(j, w):
+    """Add the information of cameras on a joint, and of its bone on it and its parent."""
     w.known[j] = 0.0
     for i in range(3):
         for k in range(3):
@@ -86,7 +199,7 @@ def _load_measurements(j, w):
 
 @kernel
 def _eliminate(j, slope, w):
-    """Posterior slope and inverse Hessian of a joint, and what it tells its parent."""
+    """Write a joint's posterior slope and inverse Hessian; pass on its information."""
     hessian, message, q = w.a, w.b, PARENT[j]
     for i in range(6):
         for k in range(6):
@@ -136,7 +249,7 @@ def _substitute(body, slope, w):
 
 @kernel
 def shift_to_mean(tree, seen, share, w):
-    """Lead the means from the mode towards the mean of the posterior (Laplace's next term).
+    """Move the means from the mode towards the mean of the posterior (Laplace's next term).
 
     A camera's information falls with the square of the depth: there is more room behind the mode
     than before it. With J the Jacobian of joint j's pixel, n the camera's optical axis (both in the
@@ -144,20 +257,94 @@ def shift_to_mean(tree, seen, share, w):
     cameras of n tr(S_j J'J / sigma^2) / d, H being the Hessian of all joints, whose factors
     `update_tree` left. `share` of it is applied.
     """
-    body, cov, slope = tree.body, tree.cov, tree.slope
-    P, sigma, ok, belief = seen.P, seen.sigma, seen.ok, seen.belief
+    sigma, ok, belief = seen.sigma, seen.ok, seen.belief
     for j in range(len(ok)):
         for i in range(6):
             w.gradient[j, i] = 0.0
-        for c in range(len(P)):
+        for c in range(len(seen.P)):
             if not (ok[j, c] and belief[j, c] > 0.0):
                 continue
-            p = P[c]
-            u, v, depth = pixel_of(p, w.point[j, 0], w.point[j, 1], w.point[j, 2])
-            if not depth > NEAREST_DEPTH_M:
-                continue
-            variance = 2.0 * pixel_spread(p, u, v, depth, cov[j])
-            pull = share * belief[j, c] * variance / sigma[j, c] ** 2 / max(depth, _NEAREST_M)
+            image = seen.images[c]
+            pull = share * belief[j, c] * _pixel_variance(image, j, tree.cov[j]) / sigma[j, c] ** 2
+            pull *= min(image[NEARNESS, j], 1.0 / _NEAREST_M)
             for i in range(3):
-                w.gradient[j, i] += pull * p[2, i]
-    _substitute(body, slope, w)
+                w.gradient[j, i] += pull * seen.P[c, 2, i]
+    _substitute(tree.body, tree.slope, w)
+
+
+@kernel(fastmath=_REORDER)
+def _pixel_variance(image, j, cov):
+    """Return the variance of both coordinates of joint j's pixel together [px^2]."""
+    a0, a1, a2 = image[A0, j], image[A1, j], image[A2, j]
+    b0, b1, b2 = image[B0, j], image[B1, j], image[B2, j]
+    own = cov[0, 0] * (a0 * a0 + b0 * b0) + cov[1, 1] * (a1 * a1 + b1 * b1)
+    own += cov[2, 2] * (a2 * a2 + b2 * b2)
+    cross = cov[0, 1] * (a0 * a1 + b0 * b1) + cov[0, 2] * (a0 * a2 + b0 * b2)
+    return own + 2.0 * (cross + cov[1, 2] * (a1 * a2 + b1 * b2))
+
+
+@kernel
+def correct_mean(tree, seen, s, work):
+    """Move from the mode to the mean, and learn ages and lengths from it."""
+    if s.mean_correction > 0.0:
+        shift_to_mean(tree, seen, s.mean_correction, work)
+    _update_ages(tree, seen, work.n_views)
+    learn_lengths(tree, work.n_views)
+
+
+@kernel
+def _update_ages(tree, seen, n_views):
+    """Update ages and conflicts of a worker's joints; count the cameras that saw each."""
+    ok, belief = seen.ok, seen.belief
+    for j in range(len(ok)):
+        n_views[j], n_supporting = 0, 0
+        for c in range(ok.shape[1]):
+            n_views[j] += ok[j, c]
+            n_supporting += belief[j, c] > 0.5
+        tree.age_s[j] = 0.0 if n_supporting > 0 else tree.age_s[j]
+        tree.conflict[j] = count_conflict(n_views[j], n_supporting, tree.conflict[j])
+
+
+@kernel
+def count_conflict(n_ok, n_supporting, conflict):
+    """Count updates in a row with two views of a joint of which fewer than two support it."""
+    if n_ok < 2 or n_supporting >= 2:
+        return 0 if n_supporting >= 2 or n_ok == 0 else conflict
+    return conflict + 1
+
+
+@kernel
+def learn_lengths(tree, n_views):
+    """Learn a tree's bone lengths, in place, from the joints that two views see (J,)."""
+    body, cov, slope = tree.body, tree.cov, tree.slope
+    for j in range(len(body)):
+        q = PARENT[j]
+        if q < 0 or n_views[j] < 2 or n_views[q] < 2:
+            continue
+        x, y, z = body[j, 0] - body[q, 0], body[j, 1] - body[q, 1], body[j, 2] - body[q, 2]
+        now = math.sqrt(x * x + y * y + z * z) + 1e-6
+        along = (x / now, y / now, z / now)
+        spread, total = 0.0, 0.0
+        for i in range(3):
+            for k in range(3):
+                edge = 0.0
+                for h in range(6):
+                    edge += slope[j, i, h] * cov[q, h, k]
+                difference = cov[j, i, k] + cov[q, i, k] - 2.0 * edge
+                spread += along[i] * along[k] * difference
+                total += difference if i == k else 0.0
+        measured = now - 0.5 * (total - spread) / now  # errors across a bone lengthen it
+        _learn_length(tree, j, measured, max(spread, EDGE_STIFFNESS_M[j] ** 2))
+
+
+@kernel
+def _learn_length(tree, j, measured, spread):
+    """Kalman update of one length by a measurement whose errors last for several updates."""
+    length, variance = tree.bone_length, tree.bone_variance
+    noise = _CORRELATED_UPDATES * spread
+    miss = measured - length[j]
+    if miss * miss > _GATE_SIGMA**2 * (noise + variance[j]):
+        return
+    gain = variance[j] / (variance[j] + noise)
+    length[j] += gain * miss
+    variance[j] = max((1.0 - gain) * variance[j], _LEAST_VARIANCE)
