@@ -1,10 +1,16 @@
-"""Keypoints as the kernels take them: one worker's usable measurements, and their noise.
+"""Measurements: one worker's usable pixels of one frame, and which side each camera calls left.
 
 Pixels that are not finite or absurdly far, confidences outside (0, 1] and standard deviations that
 are not finite and positive mean that there is no measurement; wrong pixels that look like pixels
 are left to the robust likelihoods.
+
+Cameras that exchange left and right are noticed over the whole body by a two-state hidden Markov
+model per camera: detections as they are, or mirrored. A camera that comes back after having seen
+nothing is believed at first, for the body may have been tracked mirrored in depth meanwhile; so
+are several cameras that all seem to be wrong.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -12,14 +18,20 @@ import numpy as np
 from hrc_env.core.errors import check_shape
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Keypoints
-from hrc_env.core.skeleton import N_JOINTS
+from hrc_env.core.skeleton import MIRROR, N_JOINTS
 from hrc_env.core.typing import Bools, Floats
-from hrc_env.geometry.triangulation import FURTHEST_PX, NEAREST_DEPTH_M, pixel_of
+from hrc_env.geometry.triangulation import FURTHEST_PX, NEAREST_DEPTH_M
 from hrc_env.tracking.tree.state import LANES, N_IMAGE, N_VIEW
 
 MIN_SIGMA_PX = 0.25
 """No detector is believed to be better than this [px]."""
 _REORDER = {"reassoc", "contract", "nsz"}
+_MIRROR = tuple(int(j) for j in MIRROR)
+_BLIND_UPDATES, _BELIEVED_UPDATES = 8, 5
+_ENOUGH, _AGAINST = 3, 5.0
+"""So many cameras hardly exchange sides at once, while the others say no more than this against it
+(a log-likelihood ratio)."""
+_LEAST_CHANCE, _MOST_EVIDENCE = 1e-3, 50.0
 
 
 def arrays_of(
@@ -127,10 +139,120 @@ def pixel_spread(p, u, v, depth, cov):
 
 
 @kernel
+def project_joint(p, mean, cov):
+    """Return (u, v, depth, spread): the pixel of a joint (3+,) and its mean variance [px^2].
+
+    `p` is the (3, 4) camera. A depth of NEAREST_DEPTH_M or less means that there is no pixel.
+    """
+    x, y, z = mean[0], mean[1], mean[2]
+    depth = p[2, 0] * x + p[2, 1] * y + p[2, 2] * z + p[2, 3]
+    u = (p[0, 0] * x + p[0, 1] * y + p[0, 2] * z + p[0, 3]) / depth
+    v = (p[1, 0] * x + p[1, 1] * y + p[1, 2] * z + p[1, 3]) / depth
+    return u, v, depth, pixel_spread(p, u, v, depth, cov)
+
+
+@kernel
 def supports(camera, z, sigma, gate_sigma, point, cov):
     """Whether a pixel lies where a joint with this mean and covariance may be seen."""
-    u, v, depth = pixel_of(camera, point[0], point[1], point[2])
+    u, v, depth, spread = project_joint(camera, point, cov)
     if not depth > NEAREST_DEPTH_M:
         return False
-    variance = sigma * sigma + pixel_spread(camera, u, v, depth, cov)
+    variance = sigma * sigma + spread
     return (z[0] - u) ** 2 + (z[1] - v) ** 2 < gate_sigma * gate_sigma * variance
+
+
+@kernel
+def read_for_hypothesis(tree, views, learnt, measured, b, w, s, seen):
+    """Read a worker's measurements as one hypothesis takes them; whether it is the mirrored one.
+
+    `learnt` (J, C) and `views` (C,) are its records of `NOISE` and `VIEW`: standard deviations are
+    scaled by what it has learnt, and cameras that exchange left and right are corrected.
+    """
+    read_worker(measured, b, w, s.sigma_scale, seen)
+    scale_sigma(learnt, seen.sigma)
+    return undo_swaps(tree, seen, views, s)
+
+
+@kernel
+def scale_sigma(learnt, sigma):
+    """Multiply sigma (J, C) by the roots of the learnt factors (J, C), in place."""
+    for j in range(len(sigma)):
+        for c in range(sigma.shape[1]):
+            sigma[j, c] *= math.sqrt(learnt[j, c].factor)
+
+
+@kernel
+def undo_swaps(tree, seen, views, s):
+    """Mirror measurements of cameras that are probably swapped, in place.
+
+    Returns whether the body has its sides exchanged instead, as all of several cameras show it.
+    """
+    n_seeing, n_swapped, against = 0, 0, 0.0
+    for c in range(len(views)):
+        sees, view = False, views[c]
+        for j in range(len(_MIRROR)):
+            sees |= seen.ok[j, c]
+        if not sees:
+            view.blind += 1
+            continue
+        back = view.blind > _BLIND_UPDATES
+        view.believed = _BELIEVED_UPDATES if back else max(view.believed - 1, 0)
+        view.blind = 0
+        n_seeing += 1
+        if view.believed > 0:
+            view.swap_chance = _LEAST_CHANCE
+            continue
+        prior = view.swap_chance * (1.0 - s.swap_ends) + (1.0 - view.swap_chance) * s.swap_begins
+        evidence = _swap_evidence(tree, seen, c, s.inlier_odds)
+        odds = math.log(prior / (1.0 - prior)) + evidence
+        chance = min(max(1.0 / (1.0 + math.exp(-odds)), _LEAST_CHANCE), 1.0 - _LEAST_CHANCE)
+        view.swap_chance = chance
+        n_swapped += chance > 0.5
+        against -= min(evidence, 0.0)
+    mirrored = n_swapped >= _ENOUGH and against < _AGAINST
+    if n_swapped == n_seeing > 1 or mirrored:
+        for c in range(len(views)):
+            views[c].swap_chance = _LEAST_CHANCE
+    for c in range(len(views)):
+        if views[c].swap_chance > 0.5 and views[c].blind == 0:
+            mirror(c, seen.z, seen.sigma, seen.ok)
+    return mirrored
+
+
+@kernel
+def _swap_evidence(tree, seen, c, inlier_odds):
+    """Log-likelihood ratio of camera c being swapped, bounded."""
+    camera, body, cov = seen.P[c], tree.body, tree.cov
+    z, sigma, ok = seen.z, seen.sigma, seen.ok
+    swapped, right = 1.0, 1.0  # products: no term is more than 1e10
+    for j in range(len(_MIRROR)):
+        m = _MIRROR[j]
+        if m == j or not (ok[j, c] or ok[m, c]):
+            continue
+        u, v, depth, spread = project_joint(camera, body[j], cov[j])
+        if not depth > NEAREST_DEPTH_M:
+            continue
+        if ok[m, c]:
+            swapped *= _mixture(z[m, c, 0] - u, z[m, c, 1] - v, sigma[m, c], spread, inlier_odds)
+        if ok[j, c]:
+            right *= _mixture(z[j, c, 0] - u, z[j, c, 1] - v, sigma[j, c], spread, inlier_odds)
+    return min(max(math.log(swapped / right), -_MOST_EVIDENCE), _MOST_EVIDENCE)
+
+
+@kernel(fastmath=_REORDER)
+def _mixture(du, dv, sigma, spread, inlier_odds):
+    """Density of a detection over that of an outlier, but for a factor that pairs share."""
+    near = 1.0 / (sigma * sigma + spread)
+    return 1.0 + inlier_odds * near * math.exp(-0.5 * (du * du + dv * dv) * near)
+
+
+@kernel
+def mirror(c, z, sigma, ok):
+    """Exchange left and right of camera c, in place."""
+    for j in range(len(_MIRROR)):
+        m = _MIRROR[j]
+        if m > j:
+            for i in range(2):
+                z[j, c, i], z[m, c, i] = z[m, c, i], z[j, c, i]
+            sigma[j, c], sigma[m, c] = sigma[m, c], sigma[j, c]
+            ok[j, c], ok[m, c] = ok[m, c], ok[j, c]

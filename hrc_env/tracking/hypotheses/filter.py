@@ -13,7 +13,7 @@ from hrc_env.tracking.hypotheses.one_view import begin_from_one
 from hrc_env.tracking.hypotheses.pace import forget_pace, update_pace
 from hrc_env.tracking.hypotheses.sides import agree_on_sides
 from hrc_env.tracking.hypotheses.slots import drop, merge, normalise, worker_slots
-from hrc_env.tracking.measurements import make_seen, read_worker
+from hrc_env.tracking.measurements import make_seen, read_for_hypothesis, read_worker, scale_sigma
 from hrc_env.tracking.models.acquisition import WIDEST_STD_M, heading
 from hrc_env.tracking.models.askew import (
     compare,
@@ -23,8 +23,7 @@ from hrc_env.tracking.models.askew import (
     hang_as_known,
     hang_askew,
 )
-from hrc_env.tracking.models.noise import NoiseModel, learn_noise, scale_sigma
-from hrc_env.tracking.models.swaps import undo_swaps
+from hrc_env.tracking.models.noise import NoiseModel, learn_noise
 from hrc_env.tracking.models.track_management import acquire, grow_older
 from hrc_env.tracking.settings import Settings
 from hrc_env.tracking.tracks import count_up
@@ -128,8 +127,11 @@ def update_all(state, P, measured, s, noise, works, prior):
             look = len(own.trees) > 1 and own.waited_s[0] >= s.look_every_s
             look &= is_ambiguous(tree, seen, s)
             for h in range(own.n_alive[0]):
-                if h > 0:
-                    read_worker(measured, b, w, s.sigma_scale, seen)
+                mirrored = read_for_hypothesis(
+                    own.trees[h], own.views[h], own.noise[h], measured, b, w, s, seen
+                )
+                if mirrored and acquire(own.trees[h], seen, s):
+                    own.trees[h].slope[:] = 0.0
                 _follow(own, h, look and h == 0, seen, s, noise, (work, prior))
             if own.n_alive[0] > 1:
                 _tidy(own, s, work)
@@ -211,9 +213,6 @@ def _follow(own, h, look, seen, s, noise, scratch):
     """What one set of frames does to one hypothesis; `look` for others beside it."""
     work, prior = scratch
     tree, learnt, several = own.trees[h], own.noise[h], own.n_alive[0] > 1
-    scale_sigma(learnt, seen.sigma)
-    if undo_swaps(tree, seen, own.views[h], s) and acquire(tree, seen, s):
-        tree.slope[:] = 0.0
     evidence = 0.0
     if several or look:
         prior[0] = tree

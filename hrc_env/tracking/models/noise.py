@@ -66,14 +66,6 @@ def noise_model(config: ParticleConfig, ctrl_dt: float) -> NoiseModel:
 
 
 @kernel
-def scale_sigma(learnt, sigma):
-    """Multiply sigma (J, C) by the roots of the learnt factors (J, C), in place."""
-    for j in range(len(sigma)):
-        for c in range(sigma.shape[1]):
-            sigma[j, c] *= math.sqrt(learnt[j, c].factor)
-
-
-@kernel
 def learn_noise(seen, tree, learnt, model, w):
     """Learn the factors of `learnt` (J, C), records of `tree.state.NOISE`, from one update, in
     place.
