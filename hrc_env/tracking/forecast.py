@@ -22,8 +22,8 @@ from hrc_env.core.records import PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.models.acquisition import heading
 from hrc_env.tracking.tracks import bounded, relax
+from hrc_env.tracking.tree.evidence import heading
 from hrc_env.worker.body import assets_dir
 
 LONGEST_S = 1.0

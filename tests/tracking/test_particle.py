@@ -5,13 +5,18 @@ import pytest
 from simulated import DT, HARD, LAB, Damage, detections, generators, keypoints, track, walk
 
 from hrc_env.core.errors import ConfigError
+from hrc_env.geometry.lines_of_sight import eye_of
 from hrc_env.tracking.config import ParticleConfig
 from hrc_env.tracking.estimators import make_estimator
-from hrc_env.tracking.hypotheses.anatomy import anatomy
-from hrc_env.tracking.hypotheses.depth_flip import eye_of, lone_camera, open_depth, reflect
-from hrc_env.tracking.hypotheses.slots import exchange_slots, merge, normalise
-from hrc_env.tracking.hypotheses.yaw_flip import heads_like, turn_body, turn_of
-from hrc_env.tracking.tree.evidence import tree_measure
+from hrc_env.tracking.tree.branching import (
+    heads_like,
+    lone_camera,
+    open_depth,
+    reflect,
+    turn_body,
+    turn_of,
+)
+from hrc_env.tracking.tree.evidence import anatomy, exchange_slots, merge, normalise, tree_measure
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT
 from hrc_env.tracking.tree.state import WORK, Hypotheses
 

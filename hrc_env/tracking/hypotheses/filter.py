@@ -7,14 +7,12 @@
 import numpy as np
 
 from hrc_env.core.kernels import kernel
-from hrc_env.tracking.hypotheses.anatomy import anatomy
-from hrc_env.tracking.hypotheses.branching import branch, is_ambiguous
 from hrc_env.tracking.hypotheses.one_view import begin_from_one
 from hrc_env.tracking.hypotheses.pace import forget_pace, update_pace
 from hrc_env.tracking.hypotheses.sides import agree_on_sides
-from hrc_env.tracking.hypotheses.slots import drop, merge, normalise, worker_slots
+from hrc_env.tracking.hypotheses.slots import worker_slots
 from hrc_env.tracking.measurements import make_seen, read_for_hypothesis, read_worker, scale_sigma
-from hrc_env.tracking.models.acquisition import WIDEST_STD_M, heading
+from hrc_env.tracking.models.acquisition import WIDEST_STD_M
 from hrc_env.tracking.models.askew import (
     compare,
     count_views,
@@ -27,15 +25,20 @@ from hrc_env.tracking.models.noise import NoiseModel, learn_noise
 from hrc_env.tracking.models.track_management import acquire, grow_older
 from hrc_env.tracking.settings import Settings
 from hrc_env.tracking.tracks import count_up
-from hrc_env.tracking.tree.evidence import log_evidence
+from hrc_env.tracking.tree.branching import branch, is_ambiguous
+from hrc_env.tracking.tree.evidence import (
+    heading,
+    log_evidence,
+    normalise,
+    prune_and_merge,
+    weigh_pose,
+)
 from hrc_env.tracking.tree.filter import recover
 from hrc_env.tracking.tree.predict import predict_tree
 from hrc_env.tracking.tree.state import Hypotheses
 from hrc_env.tracking.tree.update import condition, correct_mean
 
 _TORSO = (1, 2, 7, 8)
-_CLOSE = 2.0
-"""Hypotheses within so many posterior deviations are one."""
 
 
 @kernel(makes_arrays=True)
@@ -132,9 +135,9 @@ def update_all(state, P, measured, s, noise, works, prior):
                 )
                 if mirrored and acquire(own.trees[h], seen, s):
                     own.trees[h].slope[:] = 0.0
-                _follow(own, h, look and h == 0, seen, s, noise, (work, prior))
+                _update_hypothesis(own, h, look and h == 0, seen, s, noise, (work, prior))
             if own.n_alive[0] > 1:
-                _tidy(own, s, work)
+                prune_and_merge(own, s, work)
             _keep_pace(own)
             _doubt_cameras(own, P, seen, s)
 
@@ -209,7 +212,7 @@ def _wait(own, seen, s, scratch):
 
 
 @kernel(makes_arrays=True)
-def _follow(own, h, look, seen, s, noise, scratch):
+def _update_hypothesis(own, h, look, seen, s, noise, scratch):
     """What one set of frames does to one hypothesis; `look` for others beside it."""
     work, prior = scratch
     tree, learnt, several = own.trees[h], own.noise[h], own.n_alive[0] > 1
@@ -221,29 +224,9 @@ def _follow(own, h, look, seen, s, noise, scratch):
         evidence = log_evidence(prior[0], tree, seen, s, work)
     correct_mean(tree, seen, s, work)
     if several or look:
-        _weigh_pose(tree, several, s.evidence_trust * evidence, s)
+        weigh_pose(tree, several, s.evidence_trust * evidence, s)
     learn_noise(seen, tree, learnt, noise, work)
     if look:
         own.waited_s[0] = 0.0
         branch(own, prior[0], evidence, seen, s, work)
     recover(tree, seen, s, work)
-
-
-@kernel
-def _weigh_pose(tree, several, gain, s):
-    """Weigh a hypothesis by its evidence, and by its pose in the place of the last one."""
-    pose_log_prior = s.anatomy_trust * anatomy(tree.body)
-    if several:
-        tree.log_weight += gain + pose_log_prior - tree.pose_log_prior
-    tree.pose_log_prior = pose_log_prior
-
-
-@kernel(makes_arrays=True)
-def _tidy(own, s, work):
-    """Drop hypotheses that are lost or too light, and merge those that have come close."""
-    for h in range(own.n_alive[0] - 1, -1, -1):
-        if own.n_alive[0] > 1 and not own.trees[h].tracked:
-            drop(own, h)
-    normalise(own, s.log_least_weight)
-    merge(own, _CLOSE**2, work)
-    normalise(own, s.log_least_weight)

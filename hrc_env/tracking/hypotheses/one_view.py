@@ -11,8 +11,7 @@ import numpy as np
 from hrc_env.core.kernels import kernel
 from hrc_env.geometry.lines_of_sight import eye_of
 from hrc_env.geometry.triangulation import linear_point
-from hrc_env.tracking.hypotheses.anatomy import anatomy
-from hrc_env.tracking.tree.evidence import log_evidence
+from hrc_env.tracking.tree.evidence import anatomy, log_evidence
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT
 from hrc_env.tracking.tree.predict import SPEED_M_S
 from hrc_env.tracking.tree.search import find_pose_near, stiff_lengths

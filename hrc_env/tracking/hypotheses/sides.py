@@ -10,9 +10,9 @@ import numpy as np
 from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import MIRROR
 from hrc_env.geometry.triangulation import linear_point, misfit
-from hrc_env.tracking.hypotheses.anatomy import anatomy
 from hrc_env.tracking.measurements import mirror
 from hrc_env.tracking.models.acquisition import find_body
+from hrc_env.tracking.tree.evidence import anatomy
 
 _MIRROR = tuple(int(j) for j in MIRROR)
 _SWAP_COST = 4.0

@@ -9,6 +9,7 @@ import numpy as np
 
 from hrc_env.core.kernels import kernel
 from hrc_env.geometry.triangulation import consensus_point
+from hrc_env.tracking.tree.evidence import find_heading
 from hrc_env.tracking.tree.state import STANDING_M
 
 WIDEST_STD_M = 0.5
@@ -90,7 +91,7 @@ def distance(a, b):
 @kernel(makes_arrays=True)
 def complete_body(points, cov, found):
     """Guess the joints that were not found, from a standing body turned as the torso is."""
-    cos, sin, known = _across(points, found[1] and found[2], found[7] and found[8])
+    cos, sin, known = find_heading(points, found[1] and found[2], found[7] and found[8])
     root, n_found = np.zeros(3), 0
     for j in range(len(points)):
         if found[j]:
@@ -108,23 +109,3 @@ def complete_body(points, cov, found):
             points[j, 1] = root[1] + sin * forward + cos * left
             points[j, 2] = root[2] + up
             cov[j] = np.eye(3) * std**2
-
-
-@kernel
-def heading(points):
-    """(cos, sin, known) of the body's heading, from shoulders and hips; (0, 0, False) unknown."""
-    return _across(points, True, True)
-
-
-@kernel
-def _across(points, shoulders, hips):
-    """The heading, from the shoulders or hips that are known."""
-    x, y = 0.0, 0.0
-    for left, known in ((1, shoulders), (7, hips)):
-        if known:
-            x += points[left, 0] - points[left + 1, 0]
-            y += points[left, 1] - points[left + 1, 1]
-    length = math.sqrt(x * x + y * y)
-    if length < 0.05:
-        return 0.0, 0.0, False
-    return y / length, -x / length, True

@@ -1,13 +1,18 @@
-"""How well a hypothesis explained a set of frames: Laplace's approximation on the tree.
+"""Evidence: how likely each hypothesis about a worker is; prune and merge.
 
-For a predicted Gaussian N(m, C), a posterior that is Gaussian about its mode x with covariance
-S, and the robust likelihood L of the frames and the bones,
+A hypothesis is weighed by Laplace's approximation. For a predicted Gaussian N(m, C), a posterior
+that is Gaussian about its mode x with covariance S, and the robust likelihood L of the frame and
+the bones,
 
-    log p(frames) = log L(x) - 1/2 (x - m)' C^-1 (x - m) + 1/2 log det S - 1/2 log det C,
+log p(frame) = log L(x) - 1/2 (x - m)' C^-1 (x - m) + 1/2 log det S - 1/2 log det C,
 
-and both determinants and the square are sums over the tree's joints, because with the part
-R_j = C_j - B_j C_q B_j' that joint j does not share with its parent q, det C is the product of
-det R_j. What all hypotheses have in common is left out.
+and both determinants and the square are sums over the tree's joints, because with the part R_j =
+C_j - B_j C_q B_j' that joint j does not share with its parent q, det C is the product of det R_j.
+Terms that all hypotheses share are left out.
+
+Bodies have the nose, the toes and the knees in front, and a body that is tracked mirrored in depth
+has them behind. That weighs hypotheses as a potential of the pose that is believed now, not anew
+with every frame: it does not add up.
 """
 
 import math
@@ -20,6 +25,18 @@ from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT, multiply, multiply_transposed
 
 _NOSE, _RIGHT_SHOULDER = JOINT["nose"], JOINT["right_shoulder"]
+_FEATURES = (
+    (0, 1, 2, 0.12, 0.10),  # the nose before the middle of the shoulders
+    (13, 11, 11, 0.12, 0.10), (14, 12, 12, 0.12, 0.10),  # toes before the ankles
+    (9, 7, 11, 0.06, 0.12), (10, 8, 12, 0.06, 0.12),  # knees before the middle of the leg
+    (3, 1, 5, -0.05, 0.12), (4, 2, 6, -0.05, 0.12),  # elbows behind the middle of the arm
+)  # fmt: skip
+"""A joint, two others, how far it is before their middle [m], and its deviation [m]: judgements
+from common proportions, wide enough for turned heads and feet."""
+_MOST = 4.5
+"""No feature counts for more than three deviations."""
+_CLOSE = 2.0
+"""Hypotheses within so many posterior deviations are one."""
 
 
 @kernel
@@ -157,3 +174,129 @@ def distance_between(one, other, w):
         square, _ = tree_measure(tree, w.step, w)
         least = min(least, square)
     return least
+
+
+@kernel
+def anatomy(body):
+    """Log-potential of a pose (J, 6): 0 at best; 0 if the heading is unknown."""
+    cos, sin, known = heading(body)
+    total = 0.0
+    if known:
+        for joint, one, other, ahead, std in _FEATURES:
+            x = body[joint, 0] - 0.5 * (body[one, 0] + body[other, 0])
+            y = body[joint, 1] - 0.5 * (body[one, 1] + body[other, 1])
+            total -= min(0.5 * ((cos * x + sin * y - ahead) / std) ** 2, _MOST)
+    return total
+
+
+@kernel
+def heading(points):
+    """(cos, sin, known) of the body's heading, from shoulders and hips; (0, 0, False) unknown."""
+    return find_heading(points, True, True)
+
+
+@kernel
+def find_heading(points, shoulders, hips):
+    """The heading, from the shoulders or hips that are known."""
+    x, y = 0.0, 0.0
+    for left, known in ((1, shoulders), (7, hips)):
+        if known:
+            x += points[left, 0] - points[left + 1, 0]
+            y += points[left, 1] - points[left + 1, 1]
+    length = math.sqrt(x * x + y * y)
+    if length < 0.05:
+        return 0.0, 0.0, False
+    return y / length, -x / length, True
+
+
+@kernel
+def weigh_pose(tree, several, gain, s):
+    """Weigh a hypothesis by its evidence, and by its pose in the place of the last one."""
+    pose_log_prior = s.anatomy_trust * anatomy(tree.body)
+    if several:
+        tree.log_weight += gain + pose_log_prior - tree.pose_log_prior
+    tree.pose_log_prior = pose_log_prior
+
+
+@kernel(makes_arrays=True)
+def prune_and_merge(own, s, work):
+    """Drop hypotheses that are lost or too light, and merge those that have come close."""
+    for h in range(own.n_alive[0] - 1, -1, -1):
+        if own.n_alive[0] > 1 and not own.trees[h].tracked:
+            drop(own, h)
+    normalise(own, s.log_least_weight)
+    merge(own, _CLOSE**2, work)
+    normalise(own, s.log_least_weight)
+
+
+@kernel(makes_arrays=True)
+def copy_slot(own, source, target):
+    """Make slot `target` of a worker a copy of `source`."""
+    own.trees[target] = own.trees[source]
+    own.views[target] = own.views[source]
+    own.noise[target] = own.noise[source]
+
+
+@kernel(makes_arrays=True)
+def exchange_slots(own, one, other):
+    """Exchange two slots of a worker."""
+    tree = own.trees[one : one + 1].copy()
+    views, noise = own.views[one].copy(), own.noise[one].copy()
+    copy_slot(own, other, one)
+    own.trees[other] = tree[0]
+    own.views[other], own.noise[other] = views, noise
+
+
+@kernel(makes_arrays=True)
+def drop(own, h):
+    """Drop hypothesis h of a worker who has others; the last one takes its place."""
+    last = own.n_alive[0] - 1
+    if h != last:
+        copy_slot(own, last, h)
+    own.n_alive[0] = last
+
+
+@kernel(makes_arrays=True)
+def normalise(own, log_least):
+    """Drop what is lighter than `log_least`; the weights of the others sum to one, best first."""
+    trees = own.trees
+    _share_out(trees, own.n_alive[0])
+    for h in range(own.n_alive[0] - 1, -1, -1):
+        if trees[h].log_weight < log_least and own.n_alive[0] > 1:
+            drop(own, h)
+    _share_out(trees, own.n_alive[0])
+    best = 0
+    for h in range(own.n_alive[0]):
+        best = h if trees[h].log_weight > trees[best].log_weight else best
+    if best > 0:
+        exchange_slots(own, 0, best)
+
+
+@kernel
+def _share_out(trees, n):
+    """Make the weights of the first n sum to one."""
+    most, total = -np.inf, 0.0
+    for h in range(n):
+        most = max(most, trees[h].log_weight)
+    for h in range(n):
+        total += math.exp(trees[h].log_weight - most)
+    for h in range(n):
+        trees[h].log_weight -= most + math.log(total)
+
+
+@kernel(makes_arrays=True)
+def merge(own, least_distance, work):
+    """Hypotheses that have come close are one: the heavier stays, with the weight of both.
+
+    `least_distance` is squared, in posterior deviations.
+    """
+    trees, h = own.trees, 0
+    while h < own.n_alive[0]:
+        for k in range(own.n_alive[0] - 1, h, -1):
+            if distance_between(trees[h], trees[k], work) < least_distance:
+                both = np.logaddexp(trees[h].log_weight, trees[k].log_weight)
+                if trees[k].log_weight > trees[h].log_weight:
+                    exchange_slots(own, h, k)
+                trees[h].log_weight = both
+                drop(own, k)
+        h += 1
