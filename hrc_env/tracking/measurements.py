@@ -77,7 +77,7 @@ class Seen(NamedTuple):
     images: Floats
     """(C, N_IMAGE, LANES) the joints in each camera where `tree.search` linearised last."""
     looks: Floats
-    """(C, 8) what each camera says of one joint, for `models.noise`."""
+    """(C, 8) what each camera says of one joint, for `noise`."""
 
 
 @kernel(makes_arrays=True)

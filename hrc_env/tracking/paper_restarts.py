@@ -1,6 +1,6 @@
 """Algorithm 1 with what its listing lacks: it begins, is repaired and is given up as other tracks.
 
-A cloud begins round a triangulated point, as `models.acquisition` finds it; a joint that two views
+A cloud begins round a triangulated point, as `tree.acquisition` finds it; a joint that two views
 have long agreed on elsewhere begins anew there; a worker whom nothing supports is lost, and the
 estimate relaxes to the prior. Between these events the clouds are those of `paper`.
 """
@@ -12,10 +12,10 @@ import numpy as np
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Ints, Rngs
 from hrc_env.tracking.measurements import Seen
-from hrc_env.tracking.models.acquisition import find_again, find_body
 from hrc_env.tracking.paper import PaperEstimator, PaperState
 from hrc_env.tracking.settings import settings_of
 from hrc_env.tracking.tracks import forget, grow_older
+from hrc_env.tracking.tree.acquisition import find_again, find_body
 
 
 @dataclass(frozen=True, slots=True)

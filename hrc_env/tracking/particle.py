@@ -17,13 +17,13 @@ from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Ints, Rngs
 from hrc_env.tracking.config import ParticleConfig
 from hrc_env.tracking.forecast import forecast, mixed
-from hrc_env.tracking.hypotheses.filter import predict_all, update_all
-from hrc_env.tracking.hypotheses.mixture import estimate_all
 from hrc_env.tracking.measurements import arrays_of
-from hrc_env.tracking.models.noise import noise_model
 from hrc_env.tracking.settings import settings_of
 from hrc_env.tracking.tracks import bounded
+from hrc_env.tracking.tree.body_filter import predict_all, update_all
+from hrc_env.tracking.tree.noise import noise_model
 from hrc_env.tracking.tree.predict import motion
+from hrc_env.tracking.tree.report import estimate_all
 from hrc_env.tracking.tree.state import NOISE, PACE, TREE, VIEW, WORK, Hypotheses, forget_trees
 
 

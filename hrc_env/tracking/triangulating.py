@@ -18,9 +18,9 @@ from hrc_env.geometry.triangulation import FURTHEST_PX, triangulate
 from hrc_env.tracking.config import TriangulationConfig
 from hrc_env.tracking.forecast import forecast
 from hrc_env.tracking.measurements import MIN_SIGMA_PX, arrays_of
-from hrc_env.tracking.models.acquisition import complete_body, keep_one_body
 from hrc_env.tracking.settings import settings_of
 from hrc_env.tracking.tracks import forget, grow_older, make_tracks, report
+from hrc_env.tracking.tree.acquisition import complete_body, keep_one_body
 
 
 @dataclass(frozen=True, slots=True)

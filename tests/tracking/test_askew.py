@@ -9,14 +9,14 @@ from simulated import DT, HARD, LAB, Damage, detections, generators, keypoints, 
 from hrc_env.geometry.cameras import pinhole, project, projections
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.tracking.measurements import make_seen
-from hrc_env.tracking.models.askew import (
+from hrc_env.tracking.smoother import smooth
+from hrc_env.tracking.tree.askew import (
     TURN_STD_RAD,
     _gaps,
     displacement,
     hang_as_known,
     turn_camera,
 )
-from hrc_env.tracking.smoother import smooth
 from hrc_env.tracking.tree.state import PAIR, TREE
 
 TWO = LAB[:2]

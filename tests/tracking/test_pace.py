@@ -6,7 +6,7 @@ import pytest
 from benchmarks.tracking.rigs import DT_S, make_rig
 from benchmarks.tracking.sequences import make_sequences
 from hrc_env.tracking.estimators import make_estimator
-from hrc_env.tracking.hypotheses.pace import MOST_MOVING, forget_pace, update_pace, widening
+from hrc_env.tracking.tree.report import MOST_MOVING, forget_pace, update_pace, widening
 from hrc_env.tracking.tree.state import PACE
 
 STANDS = np.zeros((15, 6))

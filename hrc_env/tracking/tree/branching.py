@@ -84,7 +84,7 @@ def _find_lone_camera(part, tree, seen, s):
 def branch(own, prior, evidence, seen, s, work):
     """Look for other bodies beside the heaviest hypothesis, and keep them as hypotheses.
 
-    `own` are a worker's `slots.Hypotheses`, of which the first has been updated: `prior` is what it
+    `own` are a worker's `Hypotheses`, of which the first has been updated: `prior` is what it
     was before, `evidence` the update's log-evidence.
     """
     trees = own.trees

@@ -11,7 +11,11 @@ import numpy as np
 from hrc_env.core.kernels import kernel
 from hrc_env.geometry.lines_of_sight import eye_of
 from hrc_env.geometry.triangulation import linear_point
-from hrc_env.tracking.tree.evidence import anatomy, log_evidence
+from hrc_env.tracking.tree.askew import count_views
+from hrc_env.tracking.tree.evidence import (
+    anatomy,
+    log_evidence,
+)
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT
 from hrc_env.tracking.tree.predict import SPEED_M_S
 from hrc_env.tracking.tree.search import find_pose_near, stiff_lengths
@@ -30,8 +34,19 @@ _BLIND = 100
 
 
 @kernel(makes_arrays=True)
+def start_from_one_view(own, seen, s, scratch):
+    """Begin a track from one view where no second one has come for a while."""
+    tree, cameras = own.trees[0], np.zeros(2, np.int64)
+    n_views = count_views(seen, s.acquire_min_joints, cameras)
+    tree.waited = tree.waited + 1 if n_views == 1 else max(tree.waited - 1, 0)
+    if n_views == 1 and (tree.waited > s.wait_updates or len(seen.P) == 1):
+        begin_from_one(own, cameras[1], seen, s, scratch)
+        tree.waited, own.waited_s[0] = 0, s.look_every_s
+
+
+@kernel(makes_arrays=True)
 def begin_from_one(own, camera, seen, s, scratch):
-    """Make slot 0 of `slots.Hypotheses` the body that explains one camera best, if any does."""
+    """Make slot 0 of `Hypotheses` the body that explains one camera best, if any does."""
     work, prior = scratch
     tree, best = own.trees[0], own.trees[:1].copy()
     most = least = _LEAST_EVIDENCE * seen.ok[:, camera].sum()

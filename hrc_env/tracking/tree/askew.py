@@ -17,6 +17,7 @@ import numpy as np
 from hrc_env.core.kernels import kernel
 from hrc_env.geometry.lines_of_sight import CAMERA, eye_of, look, model_cameras, nearest_places
 from hrc_env.geometry.triangulation import inverse3
+from hrc_env.tracking.tree.acquisition import WIDEST_STD_M, start_track
 from hrc_env.tracking.tree.gaussian import invert, multiply, multiply_transposed
 
 TURN_STD_RAD = 0.05
@@ -34,6 +35,44 @@ last for twelve."""
 _PASSING_M, _TAIL = 0.03, 4.0
 """Lines of sight may pass each other at this distance [m] for other reasons than noise; squares so
 many times the median have half their weight."""
+
+
+@kernel(makes_arrays=True)
+def check_pair_calibration(own, P, seen, s):
+    """Ask two cameras that alone see a worker whether they hang as is said, P (C, 3, 4); if not,
+    begin the track with them turned. Where a third one sees them, too, nothing is held against two:
+    a detector's errors of one kind look like a turn before long."""
+    tree, cameras = own.trees[0], np.zeros(2, np.int64)
+    pair, n_views = tree.pair, count_views(seen, s.acquire_min_joints, cameras)
+    if n_views == 2:
+        compare(tree, cameras, P, seen, s.acquire_min_joints)
+    elif n_views > 2:
+        was_askew = pair.askew
+        forget_turns(pair)
+        if was_askew:
+            hang_as_known(pair, P, seen.P)
+            start_track(own, seen, s)
+    if not tree.tracked:
+        pair.waited = pair.waited + 1 if n_views == 2 else max(pair.waited - 1, 0)
+    if pair.askew:
+        pair.askew = hang_askew(pair)
+    elif hang_askew(pair) and n_views == 2 and _may_be_turned(tree, P, s):
+        pair.askew = True
+        hang_as_known(pair, P, seen.P)
+        pair.askew = start_track(own, seen, s)
+    tree.displaced_m2[:] = 0.0
+    if pair.askew and tree.tracked:
+        displacement(pair, P, tree.body, tree.displaced_m2)
+
+
+@kernel(makes_arrays=True)
+def _may_be_turned(tree, P, s):
+    """Whether a track may begin with two cameras turned: where these leave open where a body is, as
+    nearly opposite ones do, whoever is followed already is better off without."""
+    if not tree.tracked:
+        return tree.pair.waited > s.wait_updates
+    displacement(tree.pair, P, tree.body, tree.displaced_m2)
+    return np.diag(tree.displaced_m2).max() < WIDEST_STD_M**2
 
 
 @kernel

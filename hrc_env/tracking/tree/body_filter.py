@@ -1,30 +1,28 @@
 """The kernels of `particle`: one loop over environments, workers and hypotheses.
 
-`own` are a worker's `slots.Hypotheses`, `s` are `settings.Settings`, `seen` is `measurements.Seen`,
-`work` is a record of `tree.state.WORK`; what happens to one hypothesis is `tree.filter`'s.
+`own` are a worker's `Hypotheses`, `s` are `settings.Settings`, `seen` is `measurements.Seen`,
+`work` is a record of `WORK`.
 """
 
-import numpy as np
-
 from hrc_env.core.kernels import kernel
-from hrc_env.tracking.hypotheses.one_view import begin_from_one
-from hrc_env.tracking.hypotheses.pace import forget_pace, update_pace
-from hrc_env.tracking.hypotheses.sides import agree_on_sides
-from hrc_env.tracking.hypotheses.slots import worker_slots
-from hrc_env.tracking.measurements import make_seen, read_for_hypothesis, read_worker, scale_sigma
-from hrc_env.tracking.models.acquisition import WIDEST_STD_M
-from hrc_env.tracking.models.askew import (
-    compare,
-    count_views,
-    displacement,
-    forget_turns,
-    hang_as_known,
-    hang_askew,
+from hrc_env.tracking.measurements import (
+    make_seen,
+    read_for_hypothesis,
+    read_worker,
+    scale_sigma,
 )
-from hrc_env.tracking.models.noise import NoiseModel, learn_noise
-from hrc_env.tracking.models.track_management import acquire, grow_older
 from hrc_env.tracking.settings import Settings
-from hrc_env.tracking.tracks import count_up
+from hrc_env.tracking.tracks import age_worker, count_up
+from hrc_env.tracking.tree.acquisition import (
+    acquire,
+    agree_on_sides,
+    recover,
+    start_track,
+)
+from hrc_env.tracking.tree.askew import (
+    check_pair_calibration,
+    hang_as_known,
+)
 from hrc_env.tracking.tree.branching import branch, is_ambiguous
 from hrc_env.tracking.tree.evidence import (
     heading,
@@ -33,8 +31,10 @@ from hrc_env.tracking.tree.evidence import (
     prune_and_merge,
     weigh_pose,
 )
-from hrc_env.tracking.tree.filter import recover
+from hrc_env.tracking.tree.noise import NoiseModel, learn_noise
+from hrc_env.tracking.tree.one_view import start_from_one_view
 from hrc_env.tracking.tree.predict import predict_tree
+from hrc_env.tracking.tree.report import measure_pace
 from hrc_env.tracking.tree.state import Hypotheses
 from hrc_env.tracking.tree.update import condition, correct_mean
 
@@ -120,12 +120,12 @@ def update_all(state, P, measured, s, noise, works, prior):
             if not tree.tracked:
                 scale_sigma(own.noise[0], seen.sigma)
                 agree_on_sides(seen, s)
-                _begin(own, seen, s)
-                _doubt_cameras(own, P, seen, s)
+                start_track(own, seen, s)
+                check_pair_calibration(own, P, seen, s)
                 if not tree.tracked:
-                    _wait(own, seen, s, (work, prior))
+                    start_from_one_view(own, seen, s, (work, prior))
                 continue
-            if tree.size_std > 0.0 and _begin(own, seen, s):
+            if tree.size_std > 0.0 and start_track(own, seen, s):
                 continue
             look = len(own.trees) > 1 and own.waited_s[0] >= s.look_every_s
             look &= is_ambiguous(tree, seen, s)
@@ -138,77 +138,8 @@ def update_all(state, P, measured, s, noise, works, prior):
                 _update_hypothesis(own, h, look and h == 0, seen, s, noise, (work, prior))
             if own.n_alive[0] > 1:
                 prune_and_merge(own, s, work)
-            _keep_pace(own)
-            _doubt_cameras(own, P, seen, s)
-
-
-@kernel
-def _keep_pace(own):
-    """Note how the heaviest hypothesis has moved since the last update."""
-    pace = own.pace[0]
-    update_pace(pace, own.trees[0].body, pace.since_s)
-    pace.since_s = 0.0
-
-
-@kernel(makes_arrays=True)
-def _begin(own, seen, s):
-    """Begin a track where two views agree on a worker; whether they did."""
-    tree = own.trees[0]
-    if not acquire(tree, seen, s):
-        return False
-    tree.slope[:], tree.waited, tree.size_std, own.n_alive[0] = 0.0, 0, 0.0, 1
-    tree.log_weight, tree.pose_log_prior, tree.pair.waited = 0.0, 0.0, 0
-    forget_pace(own.pace[0])
-    return True
-
-
-@kernel(makes_arrays=True)
-def _doubt_cameras(own, P, seen, s):
-    """Ask two cameras that alone see a worker whether they hang as is said, P (C, 3, 4); if not,
-    begin the track with them turned. Where a third one sees them, too, nothing is held against two:
-    a detector's errors of one kind look like a turn before long."""
-    tree, cameras = own.trees[0], np.zeros(2, np.int64)
-    pair, n_views = tree.pair, count_views(seen, s.acquire_min_joints, cameras)
-    if n_views == 2:
-        compare(tree, cameras, P, seen, s.acquire_min_joints)
-    elif n_views > 2:
-        was_askew = pair.askew
-        forget_turns(pair)
-        if was_askew:
-            hang_as_known(pair, P, seen.P)
-            _begin(own, seen, s)
-    if not tree.tracked:
-        pair.waited = pair.waited + 1 if n_views == 2 else max(pair.waited - 1, 0)
-    if pair.askew:
-        pair.askew = hang_askew(pair)
-    elif hang_askew(pair) and n_views == 2 and _may_be_turned(tree, P, s):
-        pair.askew = True
-        hang_as_known(pair, P, seen.P)
-        pair.askew = _begin(own, seen, s)
-    tree.displaced_m2[:] = 0.0
-    if pair.askew and tree.tracked:
-        displacement(pair, P, tree.body, tree.displaced_m2)
-
-
-@kernel(makes_arrays=True)
-def _may_be_turned(tree, P, s):
-    """Whether a track may begin with two cameras turned: where these leave open where a body is, as
-    nearly opposite ones do, whoever is followed already is better off without."""
-    if not tree.tracked:
-        return tree.pair.waited > s.wait_updates
-    displacement(tree.pair, P, tree.body, tree.displaced_m2)
-    return np.diag(tree.displaced_m2).max() < WIDEST_STD_M**2
-
-
-@kernel(makes_arrays=True)
-def _wait(own, seen, s, scratch):
-    """Begin a track from one view where no second one has come for a while."""
-    tree, cameras = own.trees[0], np.zeros(2, np.int64)
-    n_views = count_views(seen, s.acquire_min_joints, cameras)
-    tree.waited = tree.waited + 1 if n_views == 1 else max(tree.waited - 1, 0)
-    if n_views == 1 and (tree.waited > s.wait_updates or len(seen.P) == 1):
-        begin_from_one(own, cameras[1], seen, s, scratch)
-        tree.waited, own.waited_s[0] = 0, s.look_every_s
+            measure_pace(own)
+            check_pair_calibration(own, P, seen, s)
 
 
 @kernel(makes_arrays=True)
@@ -230,3 +161,19 @@ def _update_hypothesis(own, h, look, seen, s, noise, scratch):
         own.waited_s[0] = 0.0
         branch(own, prior[0], evidence, seen, s, work)
     recover(tree, seen, s, work)
+
+
+@kernel(makes_arrays=True)
+def worker_slots(state, b, w):
+    """Worker w of environment b alone: views (H, ...); `n_alive`, `waited_s` and `pace` (1,)."""
+    trees, views, noise = state.trees[b, w], state.views[b, w], state.noise[b, w]
+    n_alive, waited_s = state.n_alive[b, w : w + 1], state.waited_s[b, w : w + 1]
+    return Hypotheses(trees, views, noise, n_alive, waited_s, state.pace[b, w : w + 1])
+
+
+@kernel
+def grow_older(tree, dt, s):
+    """Count ages up by dt [s]; give up a track that nothing supports, let a lost one relax."""
+    body, ages = tree.body, (tree.age_s, tree.conflict)
+    gaussian = (body[:, :3], tree.cov[:, :3, :3], body[:, 3:])
+    tree.tracked = age_worker(*gaussian, *ages, tree.tracked, dt, s)

@@ -1,1 +1,0 @@
-"""Several bodies that one worker may be: each a Gaussian tree, weighted."""

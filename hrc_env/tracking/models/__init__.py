@@ -1,1 +1,0 @@
-"""What filters know of any worker: how bodies move, are found, and what detectors do."""
