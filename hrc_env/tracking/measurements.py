@@ -59,7 +59,7 @@ def is_measurement(u, v, belief, sigma):
     )
 
 
-class Seen(NamedTuple):
+class Frame(NamedTuple):
     """What C cameras measured of one worker, and what an update makes of it; filled in place."""
 
     P: Floats
@@ -81,10 +81,10 @@ class Seen(NamedTuple):
 
 
 @kernel(makes_arrays=True)
-def make_seen(P):
+def make_frame(P):
     """Room for the measurements of one worker."""
     n = len(P)
-    return Seen(
+    return Frame(
         P=P,
         z=np.empty((N_JOINTS, n, 2)),
         sigma=np.empty((N_JOINTS, n)),
@@ -97,14 +97,14 @@ def make_seen(P):
 
 
 @kernel
-def read_worker(measured, b, w, scale, seen):
-    """Put what was measured of worker w of environment b into `seen`; whether there is anything.
+def read_worker(measured, b, w, scale, frame):
+    """Put what was measured of worker w of environment b into `frame`; whether there is anything.
 
     `measured` is as `arrays_of` gives it, `scale` a factor on sigma. Missing measurements get
     pixel 0 and sigma 1, so that no NaN enters the arithmetic.
     """
     px, confidence, sigma_px = measured
-    z, sigma, ok = seen.z, seen.sigma, seen.ok
+    z, sigma, ok = frame.z, frame.sigma, frame.ok
     any_ok = False
     for c in range(px.shape[1]):
         for j in range(px.shape[3]):
@@ -162,15 +162,15 @@ def supports(camera, z, sigma, gate_sigma, point, cov):
 
 
 @kernel
-def read_for_hypothesis(tree, views, learnt, measured, b, w, s, seen):
+def read_for_hypothesis(tree, views, learnt, measured, b, w, s, frame):
     """Read a worker's measurements as one hypothesis takes them; whether it is the mirrored one.
 
     `learnt` (J, C) and `views` (C,) are its records of `NOISE` and `VIEW`: standard deviations are
     scaled by what it has learnt, and cameras that exchange left and right are corrected.
     """
-    read_worker(measured, b, w, s.sigma_scale, seen)
-    scale_sigma(learnt, seen.sigma)
-    return undo_swaps(tree, seen, views, s)
+    read_worker(measured, b, w, s.sigma_scale, frame)
+    scale_sigma(learnt, frame.sigma)
+    return undo_swaps(tree, frame, views, s)
 
 
 @kernel
@@ -182,7 +182,7 @@ def scale_sigma(learnt, sigma):
 
 
 @kernel
-def undo_swaps(tree, seen, views, s):
+def undo_swaps(tree, frame, views, s):
     """Mirror measurements of cameras that are probably swapped, in place.
 
     Returns whether the body has its sides exchanged instead, as all of several cameras show it.
@@ -191,7 +191,7 @@ def undo_swaps(tree, seen, views, s):
     for c in range(len(views)):
         sees, view = False, views[c]
         for j in range(len(_MIRROR)):
-            sees |= seen.ok[j, c]
+            sees |= frame.ok[j, c]
         if not sees:
             view.blind += 1
             continue
@@ -203,7 +203,7 @@ def undo_swaps(tree, seen, views, s):
             view.swap_chance = _LEAST_CHANCE
             continue
         prior = view.swap_chance * (1.0 - s.swap_ends) + (1.0 - view.swap_chance) * s.swap_begins
-        evidence = _swap_evidence(tree, seen, c, s.inlier_odds)
+        evidence = _swap_evidence(tree, frame, c, s.inlier_odds)
         odds = math.log(prior / (1.0 - prior)) + evidence
         chance = min(max(1.0 / (1.0 + math.exp(-odds)), _LEAST_CHANCE), 1.0 - _LEAST_CHANCE)
         view.swap_chance = chance
@@ -215,15 +215,15 @@ def undo_swaps(tree, seen, views, s):
             views[c].swap_chance = _LEAST_CHANCE
     for c in range(len(views)):
         if views[c].swap_chance > 0.5 and views[c].blind == 0:
-            mirror(c, seen.z, seen.sigma, seen.ok)
+            mirror(c, frame.z, frame.sigma, frame.ok)
     return mirrored
 
 
 @kernel
-def _swap_evidence(tree, seen, c, inlier_odds):
+def _swap_evidence(tree, frame, c, inlier_odds):
     """Log-likelihood ratio of camera c being swapped, bounded."""
-    camera, body, cov = seen.P[c], tree.body, tree.cov
-    z, sigma, ok = seen.z, seen.sigma, seen.ok
+    camera, body, cov = frame.P[c], tree.body, tree.cov
+    z, sigma, ok = frame.z, frame.sigma, frame.ok
     swapped, right = 1.0, 1.0  # products: no term is more than 1e10
     for j in range(len(_MIRROR)):
         m = _MIRROR[j]

@@ -31,7 +31,7 @@ from hrc_env.core.typing import Bools, Floats, Ints, Rngs
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
 from hrc_env.tracking.config import PaperConfig
 from hrc_env.tracking.forecast import forecast
-from hrc_env.tracking.measurements import Seen, arrays_of, make_seen, read_worker, supports
+from hrc_env.tracking.measurements import Frame, arrays_of, make_frame, read_worker, supports
 from hrc_env.tracking.tracks import forget, make_tracks, report
 from hrc_env.tracking.tree.update import count_conflict
 
@@ -93,10 +93,10 @@ class PaperEstimator:
         """Lines 8 to 17."""
         batch, n_workers = state.tracks.shape
         measured = arrays_of(keypoints, (batch, len(self.P), n_workers, N_JOINTS))
-        seen = make_seen(self.P)
+        frame = make_frame(self.P)
         for b, w in np.ndindex(state.tracks.shape):
-            read_worker(measured, b, w, self.config.sigma_scale, seen)
-            self.take(state, (b, w), seen, rngs[b])
+            read_worker(measured, b, w, self.config.sigma_scale, frame)
+            self.take(state, (b, w), frame, rngs[b])
         state.elapsed_s[:] = 0.0
 
     def estimate(self, state: PaperState) -> PoseEstimate:
@@ -117,7 +117,7 @@ class PaperEstimator:
             state.tracks["cov_world"][b, w] += sigma_m**2 * np.eye(3)
 
     def take(
-        self, state: PaperState, who: tuple[int, int], seen: Seen, rng: np.random.Generator
+        self, state: PaperState, who: tuple[int, int], frame: Frame, rng: np.random.Generator
     ) -> None:
         """What one set of frames does to a worker: the loop of lines 2 to 18, then line 19."""
         track, particles, config = state.tracks[who], state.particles[who], self.config
@@ -125,7 +125,7 @@ class PaperEstimator:
             if n > 0:
                 roll(particles, config.sigma_m, rng)  # line 7, of further passes
             waits = rng.standard_exponential((N_JOINTS, particles.shape[-1] + 1))
-            weigh_and_resample(seen, particles, waits)
+            weigh_and_resample(frame, particles, waits)
         mean, cov = np.empty((N_JOINTS, 3)), np.empty((N_JOINTS, 3, 3))
         moments(particles, mean, cov)  # line 19
         elapsed_s = max(state.elapsed_s.item(who[0]), 1e-6)
@@ -133,7 +133,7 @@ class PaperEstimator:
             change = (mean - track["mean_world"]) / elapsed_s - track["velocity_world"]
             track["velocity_world"] += elapsed_s / (config.velocity_tau_s + elapsed_s) * change
         track["mean_world"], track["cov_world"] = mean, cov
-        n_supported = note_support(track, seen, config.gate_sigma)
+        n_supported = note_support(track, frame, config.gate_sigma)
         track["tracked"] |= n_supported >= config.acquire_min_joints
 
 
@@ -151,9 +151,9 @@ def place_of(P: Floats, config: PaperConfig) -> Floats:
 
 
 @kernel(makes_arrays=True)
-def weigh_and_resample(seen, particles, waits):
+def weigh_and_resample(frame, particles, waits):
     """Lines 8 to 17 for clouds (J, 3, M) of one worker, in place; `waits` are `multinomial`'s."""
-    P, z, sigma, ok = seen.P, seen.z, seen.sigma, seen.ok
+    P, z, sigma, ok = frame.P, frame.z, frame.sigma, frame.ok
     n_joints, n_cameras = ok.shape
     n_particles = particles.shape[2]
     log_weights, weights = np.empty(n_particles), np.empty(n_particles)
@@ -174,16 +174,16 @@ def weigh_and_resample(seen, particles, waits):
 
 
 @kernel(makes_arrays=True)
-def note_support(track, seen, gate_sigma):
+def note_support(track, frame, gate_sigma):
     """Count ages and conflicts of one worker's joints; how many of these a view supports."""
     mean, cov, n_supported = track.mean_world, track.cov_world, 0
     for j in range(len(mean)):
         n_ok, n_supporting = 0, 0
-        for c in range(seen.ok.shape[1]):
-            if seen.ok[j, c]:
-                z, sigma = seen.z[j, c], seen.sigma[j, c]
+        for c in range(frame.ok.shape[1]):
+            if frame.ok[j, c]:
+                z, sigma = frame.z[j, c], frame.sigma[j, c]
                 n_ok += 1
-                n_supporting += supports(seen.P[c], z, sigma, gate_sigma, mean[j], cov[j])
+                n_supporting += supports(frame.P[c], z, sigma, gate_sigma, mean[j], cov[j])
         track.conflict[j] = count_conflict(n_ok, n_supporting, track.conflict[j])
         if n_supporting > 0:
             track.age_s[j] = 0.0

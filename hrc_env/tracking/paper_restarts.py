@@ -11,7 +11,7 @@ import numpy as np
 
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Ints, Rngs
-from hrc_env.tracking.measurements import Seen
+from hrc_env.tracking.measurements import Frame
 from hrc_env.tracking.paper import PaperEstimator, PaperState
 from hrc_env.tracking.settings import settings_of
 from hrc_env.tracking.tracks import forget, grow_older
@@ -33,18 +33,18 @@ class PaperRestarts(PaperEstimator):
         grow_older(state.tracks, dt_s, self.config)
 
     def take(
-        self, state: PaperState, who: tuple[int, int], seen: Seen, rng: np.random.Generator
+        self, state: PaperState, who: tuple[int, int], frame: Frame, rng: np.random.Generator
     ) -> None:
         """Lines 2 to 19 for a worker with a track, and what it needs; line 1 for one without."""
         track, s, anew = state.tracks[who], settings_of(self.config), np.zeros(N_JOINTS, bool)
         points, cov = np.empty((N_JOINTS, 3)), np.empty((N_JOINTS, 3, 3))
         if track["tracked"]:
-            PaperEstimator.take(self, state, who, seen, rng)
+            PaperEstimator.take(self, state, who, frame, rng)
             middle = np.median(track["mean_world"], axis=0)
             for j in np.flatnonzero(track["conflict"] >= s.conflict_frames):
-                anew[j] = find_again(seen, j, s, middle, points[j], cov[j])
+                anew[j] = find_again(frame, j, s, middle, points[j], cov[j])
             track["age_s"][anew], track["conflict"][anew] = 0.0, 0
-        elif seen.ok.any() and find_body(seen, s, points, cov, anew):
+        elif frame.ok.any() and find_body(frame, s, points, cov, anew):
             track["age_s"][anew] = 0.0
             track["tracked"], anew[:] = True, True
         if anew.any():

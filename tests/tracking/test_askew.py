@@ -8,7 +8,7 @@ from simulated import DT, HARD, LAB, Damage, detections, generators, keypoints, 
 
 from hrc_env.geometry.cameras import pinhole, project, projections
 from hrc_env.tracking.estimators import make_estimator
-from hrc_env.tracking.measurements import make_seen
+from hrc_env.tracking.measurements import make_frame
 from hrc_env.tracking.smoother import smooth
 from hrc_env.tracking.tree.askew import (
     TURN_STD_RAD,
@@ -176,23 +176,23 @@ def test_who_is_followed_is_reported_as_wide_as_the_turns_are_unknown_and_smooth
 
 
 def measured(joints, P):
-    """`Seen` of one body (J, 3) without any noise."""
-    seen = make_seen(np.ascontiguousarray(P))
-    seen.z[:] = project(P, joints[None])[0][0].swapaxes(0, 1)
-    seen.sigma[:], seen.ok[:] = 3.0, True
-    return seen
+    """`Frame` of one body (J, 3) without any noise."""
+    frame = make_frame(np.ascontiguousarray(P))
+    frame.z[:] = project(P, joints[None])[0][0].swapaxes(0, 1)
+    frame.sigma[:], frame.ok[:] = 3.0, True
+    return frame
 
 
 def test_slopes_of_the_gaps_are_their_derivatives():
     joints, tree = walk(1, 1)[0], np.zeros(1, TREE)
     tree["body"][0, :, :3], tree["tracked"] = joints, True
     tree["pair"]["cameras"] = (0, 1)
-    seen, step = measured(joints, TWO), 1e-5
+    frame, step = measured(joints, TWO), 1e-5
 
     def gaps(turn):
         tree["pair"]["turn"] = turn
         rows, gap, variance = np.empty((15, 6)), np.empty(15), np.empty(15)
-        assert _gaps(tree[0], TWO, seen, rows, gap, variance) == 15
+        assert _gaps(tree[0], TWO, frame, rows, gap, variance) == 15
         return rows, gap
 
     rows, gap = gaps(np.zeros(6))

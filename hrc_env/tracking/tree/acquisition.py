@@ -5,7 +5,7 @@ sides are exchanged. That splits the cameras in two camps before there is a body
 right is decided by their numbers and by the body that they show: the nose and the toes are in
 front.
 
-`seen` is `measurements.Seen`, `s` are `settings.Settings`, `tree` is a record of `TREE`.
+`frame` is `measurements.Frame`, `s` are `settings.Settings`, `tree` is a record of `TREE`.
 """
 
 import math
@@ -41,10 +41,10 @@ _FURTHEST_STD = 8.0
 
 
 @kernel(makes_arrays=True)
-def start_track(own, seen, s):
+def start_track(own, frame, s):
     """Begin a track where two views agree on a worker; whether they did."""
     tree = own.trees[0]
-    if not acquire(tree, seen, s):
+    if not acquire(tree, frame, s):
         return False
     tree.slope[:], tree.waited, tree.size_std, own.n_alive[0] = 0.0, 0, 0.0, 1
     tree.log_weight, tree.pose_log_prior, tree.pair.waited = 0.0, 0.0, 0
@@ -53,12 +53,12 @@ def start_track(own, seen, s):
 
 
 @kernel(makes_arrays=True)
-def acquire(tree, seen, s):
+def acquire(tree, frame, s):
     """Start a track when two views agree on enough joints; whether one was started."""
     n_joints = len(tree.body)
     points, spread = np.empty((n_joints, 3)), np.empty((n_joints, 3, 3))
     found = np.empty(n_joints, np.bool_)
-    if not find_body(seen, s, points, spread, found):
+    if not find_body(frame, s, points, spread, found):
         return False
     for j in range(n_joints):
         place(tree.body[j], tree.cov[j], points[j], spread[j])
@@ -79,15 +79,15 @@ def place(body, cov, point, spread):
 
 
 @kernel(makes_arrays=True)
-def find_body(seen, s, points, cov, found):
+def find_body(frame, s, points, cov, found):
     """Find joints on which two views agree, and guess the others; whether there are enough.
 
     Fills points (J, 3), cov (J, 3, 3) and which joints were found (J,).
     """
-    use = np.empty(len(seen.P), np.bool_)
+    use = np.empty(len(frame.P), np.bool_)
     for j in range(len(points)):
         cov[j] = 1.0
-        found[j] = _triangulate_agreed(seen, j, s, points[j], cov[j], use) >= 2
+        found[j] = _triangulate_agreed(frame, j, s, points[j], cov[j], use) >= 2
     if keep_one_body(points, cov, found, s.body_radius_m) < s.acquire_min_joints:
         return False
     complete_body(points, cov, found)
@@ -95,19 +95,19 @@ def find_body(seen, s, points, cov, found):
 
 
 @kernel(makes_arrays=True)
-def find_again(seen, j, s, middle, point, cov):
+def find_again(frame, j, s, middle, point, cov):
     """Fill `point` (3,) and `cov` (3, 3) of joint j, if two views agree near the body's middle."""
-    use = np.empty(len(seen.P), np.bool_)
-    if _triangulate_agreed(seen, j, s, point, cov, use) < 2:
+    use = np.empty(len(frame.P), np.bool_)
+    if _triangulate_agreed(frame, j, s, point, cov, use) < 2:
         return False
     widest = max(cov[0, 0], cov[1, 1], cov[2, 2])
     return widest < WIDEST_STD_M**2 and distance(point, middle) < s.body_radius_m
 
 
 @kernel(makes_arrays=True)
-def _triangulate_agreed(seen, j, s, point, cov, use):
-    z, sigma, ok = seen.z[j], seen.sigma[j], seen.ok[j]
-    return consensus_point(seen.P, z, sigma, ok, s.gate_sigma, point, cov, use)
+def _triangulate_agreed(frame, j, s, point, cov, use):
+    z, sigma, ok = frame.z[j], frame.sigma[j], frame.ok[j]
+    return consensus_point(frame.P, z, sigma, ok, s.gate_sigma, point, cov, use)
 
 
 @kernel(makes_arrays=True)
@@ -173,32 +173,32 @@ def complete_body(points, cov, found):
 
 
 @kernel(makes_arrays=True)
-def agree_on_sides(seen, s):
+def agree_on_sides(frame, s):
     """Mirror, in place, what was seen by cameras that exchange left and right."""
-    n_cameras, n_joints = len(seen.P), len(_MIRROR)
+    n_cameras, n_joints = len(frame.P), len(_MIRROR)
     gain = np.zeros((n_cameras, n_cameras))
     for a in range(n_cameras):
         for b in range(a):
-            gain[a, b] = gain[b, a] = _gain(seen, a, b)
+            gain[a, b] = gain[b, a] = _gain(frame, a, b)
     other = _camps(gain)
     n_other = other.sum()
     if n_other == 0:
         return
     for c in range(n_cameras):
         if other[c]:
-            mirror(c, seen.z, seen.sigma, seen.ok)
+            mirror(c, frame.z, frame.sigma, frame.ok)
     points, found = np.empty((n_joints, 3)), np.empty(n_joints, np.bool_)
-    if not find_body(seen, s, points, np.empty((n_joints, 3, 3)), found):
+    if not find_body(frame, s, points, np.empty((n_joints, 3, 3)), found):
         return
     turned, n_seeing = np.empty((n_joints, 3)), 0
     for j in range(n_joints):
         turned[_MIRROR[j]] = points[j]
     for c in range(n_cameras):
-        n_seeing += seen.ok[:, c].any()
+        n_seeing += frame.ok[:, c].any()
     fewer = _SWAP_COST * (n_seeing - 2 * n_other)
     if anatomy(turned) > anatomy(points) + fewer:
         for c in range(n_cameras):
-            mirror(c, seen.z, seen.sigma, seen.ok)
+            mirror(c, frame.z, frame.sigma, frame.ok)
 
 
 @kernel(makes_arrays=True)
@@ -224,40 +224,40 @@ def _camps(gain):
 
 
 @kernel(makes_arrays=True)
-def _gain(seen, a, b):
+def _gain(frame, a, b):
     """By how much [nat] limbs fit better in two cameras if one of them is mirrored."""
-    as_they_are, n_joints = _misfit(seen, a, b, False)
-    exchanged, _ = _misfit(seen, a, b, True)
+    as_they_are, n_joints = _misfit(frame, a, b, False)
+    exchanged, _ = _misfit(frame, a, b, True)
     fits = min(as_they_are, exchanged) < _FITS * _MOST * n_joints
     return as_they_are - exchanged if fits else 0.0
 
 
 @kernel(makes_arrays=True)
-def _misfit(seen, a, b, mirrored):
+def _misfit(frame, a, b, mirrored):
     """Negative log-likelihood [nat] of limbs' joints in two cameras, and how many there are."""
     total, n_joints = 0.0, 0
-    use, z, point = np.zeros(len(seen.P), np.bool_), np.empty((len(seen.P), 2)), np.empty(3)
+    use, z, point = np.zeros(len(frame.P), np.bool_), np.empty((len(frame.P), 2)), np.empty(3)
     use[a] = use[b] = True
     for j in range(len(_MIRROR)):
         i = _MIRROR[j] if mirrored else j
-        if _MIRROR[j] == j or not (seen.ok[j, a] and seen.ok[i, b]):
+        if _MIRROR[j] == j or not (frame.ok[j, a] and frame.ok[i, b]):
             continue
-        z[a], z[b] = seen.z[j, a], seen.z[i, b]
+        z[a], z[b] = frame.z[j, a], frame.z[i, b]
         miss = _MOST
-        if linear_point(seen.P, z, use, point):
-            miss = 0.5 * misfit(seen.P[a], z[a, 0], z[a, 1], seen.sigma[j, a], point)
-            miss += 0.5 * misfit(seen.P[b], z[b, 0], z[b, 1], seen.sigma[i, b], point)
+        if linear_point(frame.P, z, use, point):
+            miss = 0.5 * misfit(frame.P[a], z[a, 0], z[a, 1], frame.sigma[j, a], point)
+            miss += 0.5 * misfit(frame.P[b], z[b, 0], z[b, 1], frame.sigma[i, b], point)
         total += min(miss, _MOST)
         n_joints += 1
     return total, n_joints
 
 
 @kernel
-def recover(tree, seen, s, work):
+def recover(tree, frame, s, work):
     """Find joints or the whole body again where the views say so; notice a body that is lost."""
     placed = work.placed
-    placed[:] = acquire_anew(tree, seen, s)
-    find_joints_again(tree, seen, s, placed)
+    placed[:] = acquire_anew(tree, frame, s)
+    find_joints_again(tree, frame, s, placed)
     for j in range(len(placed)):
         if placed[j] or (PARENT[j] >= 0 and placed[PARENT[j]]):
             tree.slope[j] = 0.0
@@ -266,7 +266,7 @@ def recover(tree, seen, s, work):
 
 
 @kernel(makes_arrays=True)
-def find_joints_again(tree, seen, s, placed):
+def find_joints_again(tree, frame, s, placed):
     """Put joints where two views have seen them for a while; `placed` (J,) says which."""
     everyone, middle = np.ones(len(placed), np.bool_), np.empty(3)
     point, spread = np.empty(3), np.empty((3, 3))
@@ -274,18 +274,18 @@ def find_joints_again(tree, seen, s, placed):
         if tree.conflict[j] < s.conflict_frames:
             continue
         middle_of(tree.body, everyone, middle)
-        if find_again(seen, j, s, middle, point, spread):
+        if find_again(frame, j, s, middle, point, spread):
             place(tree.body[j], tree.cov[j], point, spread)
             tree.age_s[j], tree.conflict[j], placed[j] = 0.0, 0, True
 
 
 @kernel
-def acquire_anew(tree, seen, s):
+def acquire_anew(tree, frame, s):
     """Start over when the views have long agreed on another body; whether that happened."""
     n_wrong = 0
     for j in range(len(tree.conflict)):
         n_wrong += tree.conflict[j] >= s.conflict_frames
-    if n_wrong < s.acquire_min_joints or not acquire(tree, seen, s):
+    if n_wrong < s.acquire_min_joints or not acquire(tree, frame, s):
         return False
     tree.conflict[:] = 0
     return True

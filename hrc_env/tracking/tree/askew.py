@@ -38,28 +38,28 @@ many times the median have half their weight."""
 
 
 @kernel(makes_arrays=True)
-def check_pair_calibration(own, P, seen, s):
+def check_pair_calibration(own, P, frame, s):
     """Ask two cameras that alone see a worker whether they hang as is said, P (C, 3, 4); if not,
     begin the track with them turned. Where a third one sees them, too, nothing is held against two:
     a detector's errors of one kind look like a turn before long."""
     tree, cameras = own.trees[0], np.zeros(2, np.int64)
-    pair, n_views = tree.pair, count_views(seen, s.acquire_min_joints, cameras)
+    pair, n_views = tree.pair, count_views(frame, s.acquire_min_joints, cameras)
     if n_views == 2:
-        compare(tree, cameras, P, seen, s.acquire_min_joints)
+        compare(tree, cameras, P, frame, s.acquire_min_joints)
     elif n_views > 2:
         was_askew = pair.askew
         forget_turns(pair)
         if was_askew:
-            hang_as_known(pair, P, seen.P)
-            start_track(own, seen, s)
+            hang_as_known(pair, P, frame.P)
+            start_track(own, frame, s)
     if not tree.tracked:
         pair.waited = pair.waited + 1 if n_views == 2 else max(pair.waited - 1, 0)
     if pair.askew:
         pair.askew = hang_askew(pair)
     elif hang_askew(pair) and n_views == 2 and _may_be_turned(tree, P, s):
         pair.askew = True
-        hang_as_known(pair, P, seen.P)
-        pair.askew = start_track(own, seen, s)
+        hang_as_known(pair, P, frame.P)
+        pair.askew = start_track(own, frame, s)
     tree.displaced_m2[:] = 0.0
     if pair.askew and tree.tracked:
         displacement(pair, P, tree.body, tree.displaced_m2)
@@ -76,13 +76,13 @@ def _may_be_turned(tree, P, s):
 
 
 @kernel
-def count_views(seen, least_joints, cameras):
+def count_views(frame, least_joints, cameras):
     """How many cameras show so many joints; the last two of them go to `cameras` (2,)."""
     n = 0
-    for c in range(len(seen.P)):
+    for c in range(len(frame.P)):
         n_joints = 0
-        for j in range(len(seen.ok)):
-            n_joints += seen.ok[j, c]
+        for j in range(len(frame.ok)):
+            n_joints += frame.ok[j, c]
         if n_joints >= least_joints:
             cameras[0], cameras[1] = cameras[1], c
             n += 1
@@ -90,15 +90,15 @@ def count_views(seen, least_joints, cameras):
 
 
 @kernel(makes_arrays=True)
-def compare(tree, cameras, P, seen, least_joints):
+def compare(tree, cameras, P, frame, least_joints):
     """Learn the turns of two cameras from what they show now; P (C, 3, 4) is without any."""
     pair = tree.pair
     if pair.cameras[0] != cameras[0] or pair.cameras[1] != cameras[1]:
         forget_turns(pair)
         pair.cameras[0], pair.cameras[1] = cameras[0], cameras[1]
-    n_joints = len(seen.ok)
+    n_joints = len(frame.ok)
     rows, gap, variance = np.empty((n_joints, 6)), np.empty(n_joints), np.empty(n_joints)
-    n = _gaps(tree, P, seen, rows, gap, variance)
+    n = _gaps(tree, P, frame, rows, gap, variance)
     if n < least_joints:
         return
     squares = gap[:n] ** 2 / variance[:n]
@@ -150,7 +150,7 @@ def hang_askew(pair):
 
 
 @kernel(makes_arrays=True)
-def _gaps(tree, P, seen, rows, gap, variance):
+def _gaps(tree, P, frame, rows, gap, variance):
     """Gaps of the joints [m] as the cameras are turned now, their slopes on the turns [m/rad] and
     variances [m^2]; how many joints both see.
 
@@ -164,11 +164,11 @@ def _gaps(tree, P, seen, rows, gap, variance):
         turn_camera(P[pair.cameras[k]], pair.turn[3 * k : 3 * k + 3], turned[k])
     model_cameras(turned, cameras)
     one, other, middle, normal = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    for j in range(len(seen.ok)):
-        if not (seen.ok[j, a] and seen.ok[j, b]):
+    for j in range(len(frame.ok)):
+        if not (frame.ok[j, a] and frame.ok[j, b]):
             continue
-        look(cameras[0].back, seen.z[j, a, 0], seen.z[j, a, 1], one)
-        look(cameras[1].back, seen.z[j, b, 0], seen.z[j, b, 1], other)
+        look(cameras[0].back, frame.z[j, a, 0], frame.z[j, a, 1], one)
+        look(cameras[1].back, frame.z[j, b, 0], frame.z[j, b, 1], other)
         far_a, far_b, _ = nearest_places(cameras[0].eye, one, cameras[1].eye, other, middle)
         if not (far_a > 0.0 and far_b > 0.0):
             continue
@@ -176,8 +176,8 @@ def _gaps(tree, P, seen, rows, gap, variance):
         gap[n] = 0.0
         for i in range(3):
             gap[n] += normal[i] * (cameras[1].eye[i] - cameras[0].eye[i])
-        variance[n] = (seen.sigma[j, a] * far_a / cameras[0].focal) ** 2 + _PASSING_M**2
-        variance[n] += (seen.sigma[j, b] * far_b / cameras[1].focal) ** 2
+        variance[n] = (frame.sigma[j, a] * far_a / cameras[0].focal) ** 2 + _PASSING_M**2
+        variance[n] += (frame.sigma[j, b] * far_b / cameras[1].focal) ** 2
         for i in range(3):
             place = tree.body[j, i] if tree.tracked else middle[i]
             one[i], other[i] = place - cameras[0].eye[i], place - cameras[1].eye[i]

@@ -1,12 +1,12 @@
 """The kernels of `particle`: one loop over environments, workers and hypotheses.
 
-`own` are a worker's `Hypotheses`, `s` are `settings.Settings`, `seen` is `measurements.Seen`,
+`own` are a worker's `Hypotheses`, `s` are `settings.Settings`, `frame` is `measurements.Frame`,
 `work` is a record of `WORK`.
 """
 
 from hrc_env.core.kernels import kernel
 from hrc_env.tracking.measurements import (
-    make_seen,
+    make_frame,
     read_for_hypothesis,
     read_worker,
     scale_sigma,
@@ -110,57 +110,57 @@ def update_all(state, P, measured, s, noise, works, prior):
         prior: (1,) records of `tree.state.TREE`: room for a hypothesis before its update.
     """
     state, s, noise = Hypotheses(*state), Settings(*s), NoiseModel(*noise)
-    seen, work = make_seen(P.copy()), works[0]
+    frame, work = make_frame(P.copy()), works[0]
     for b in range(state.n_alive.shape[0]):
         for w in range(state.n_alive.shape[1]):
             own = worker_slots(state, b, w)
-            read_worker(measured, b, w, s.sigma_scale, seen)
+            read_worker(measured, b, w, s.sigma_scale, frame)
             tree = own.trees[0]
-            hang_as_known(tree.pair, P, seen.P)
+            hang_as_known(tree.pair, P, frame.P)
             if not tree.tracked:
-                scale_sigma(own.noise[0], seen.sigma)
-                agree_on_sides(seen, s)
-                start_track(own, seen, s)
-                check_pair_calibration(own, P, seen, s)
+                scale_sigma(own.noise[0], frame.sigma)
+                agree_on_sides(frame, s)
+                start_track(own, frame, s)
+                check_pair_calibration(own, P, frame, s)
                 if not tree.tracked:
-                    start_from_one_view(own, seen, s, (work, prior))
+                    start_from_one_view(own, frame, s, (work, prior))
                 continue
-            if tree.size_std > 0.0 and start_track(own, seen, s):
+            if tree.size_std > 0.0 and start_track(own, frame, s):
                 continue
             look = len(own.trees) > 1 and own.waited_s[0] >= s.look_every_s
-            look &= is_ambiguous(tree, seen, s)
+            look &= is_ambiguous(tree, frame, s)
             for h in range(own.n_alive[0]):
                 mirrored = read_for_hypothesis(
-                    own.trees[h], own.views[h], own.noise[h], measured, b, w, s, seen
+                    own.trees[h], own.views[h], own.noise[h], measured, b, w, s, frame
                 )
-                if mirrored and acquire(own.trees[h], seen, s):
+                if mirrored and acquire(own.trees[h], frame, s):
                     own.trees[h].slope[:] = 0.0
-                _update_hypothesis(own, h, look and h == 0, seen, s, noise, (work, prior))
+                _update_hypothesis(own, h, look and h == 0, frame, s, noise, (work, prior))
             if own.n_alive[0] > 1:
                 prune_and_merge(own, s, work)
             measure_pace(own)
-            check_pair_calibration(own, P, seen, s)
+            check_pair_calibration(own, P, frame, s)
 
 
 @kernel(makes_arrays=True)
-def _update_hypothesis(own, h, look, seen, s, noise, scratch):
+def _update_hypothesis(own, h, look, frame, s, noise, scratch):
     """What one set of frames does to one hypothesis; `look` for others beside it."""
     work, prior = scratch
     tree, learnt, several = own.trees[h], own.noise[h], own.n_alive[0] > 1
     evidence = 0.0
     if several or look:
         prior[0] = tree
-    condition(tree, seen, s, work)
+    condition(tree, frame, s, work)
     if several or look:  # the mean correction needs the factors that the evidence leaves alone
-        evidence = log_evidence(prior[0], tree, seen, s, work)
-    correct_mean(tree, seen, s, work)
+        evidence = log_evidence(prior[0], tree, frame, s, work)
+    correct_mean(tree, frame, s, work)
     if several or look:
         weigh_pose(tree, several, s.evidence_trust * evidence, s)
-    learn_noise(seen, tree, learnt, noise, work)
+    learn_noise(frame, tree, learnt, noise, work)
     if look:
         own.waited_s[0] = 0.0
-        branch(own, prior[0], evidence, seen, s, work)
-    recover(tree, seen, s, work)
+        branch(own, prior[0], evidence, frame, s, work)
+    recover(tree, frame, s, work)
 
 
 @kernel(makes_arrays=True)

@@ -60,28 +60,30 @@ _LEAST_TURN = 0.35
 
 
 @kernel
-def is_ambiguous(tree, seen, s):
+def is_ambiguous(tree, frame, s):
     """Whether one view alone carries a part of the body whose depth is open in a prediction."""
     ambiguous = False
     for part in range(N_MIRRORS):
-        ambiguous = ambiguous or _find_lone_camera(part, tree, seen, s) >= 0
+        ambiguous = ambiguous or _find_lone_camera(part, tree, frame, s) >= 0
     return ambiguous
 
 
 @kernel
-def _find_lone_camera(part, tree, seen, s):
+def _find_lone_camera(part, tree, frame, s):
     """The camera that leaves the depth of a part open that may be mirrored, or -1.
 
     One view in this update is not enough: what other views said a moment ago is still known.
     """
     if not (s.mirrors_body if part == WHOLE_BODY else s.mirrors_limbs):
         return -1
-    c = lone_camera(part, seen.ok)
-    return c if c >= 0 and open_depth(part, seen.P[c], tree.body, tree.cov) > s.open_depth_m else -1
+    c = lone_camera(part, frame.ok)
+    return (
+        c if c >= 0 and open_depth(part, frame.P[c], tree.body, tree.cov) > s.open_depth_m else -1
+    )
 
 
 @kernel(makes_arrays=True)
-def branch(own, prior, evidence, seen, s, work):
+def branch(own, prior, evidence, frame, s, work):
     """Look for other bodies beside the heaviest hypothesis, and keep them as hypotheses.
 
     `own` are a worker's `Hypotheses`, of which the first has been updated: `prior` is what it
@@ -90,15 +92,15 @@ def branch(own, prior, evidence, seen, s, work):
     trees = own.trees
     for part in range(N_MIRRORS):
         n = own.n_alive[0]
-        camera = _find_lone_camera(part, prior, seen, s) if n < len(trees) else -1
+        camera = _find_lone_camera(part, prior, frame, s) if n < len(trees) else -1
         if camera < 0:
             continue
         copy_slot(own, 0, n)
         penalty = np.inf
         if part == WHOLE_BODY:
-            penalty = _try_turned_body(trees, n, camera, prior, seen, s, work)
-        elif reflect(part, seen.P[camera], trees[0].body, work.point):
-            penalty = _search_mode(trees, n, prior, evidence, seen, s, work)
+            penalty = _try_turned_body(trees, n, camera, prior, frame, s, work)
+        elif reflect(part, frame.P[camera], trees[0].body, work.point):
+            penalty = _search_mode(trees, n, prior, evidence, frame, s, work)
         if penalty < np.inf:
             tree = trees[n]
             before, tree.pose_log_prior = tree.pose_log_prior, s.anatomy_trust * anatomy(tree.body)
@@ -107,20 +109,20 @@ def branch(own, prior, evidence, seen, s, work):
 
 
 @kernel(makes_arrays=True)
-def _try_turned_body(trees, n, camera, prior, seen, s, work):
+def _try_turned_body(trees, n, camera, prior, frame, s, work):
     """Make tree n the body that is turned the other way; its penalty [nat], infinite if it is
     known."""
     new = trees[n]
-    turn = turn_of(seen.P[camera], prior.body)
+    turn = turn_of(frame.P[camera], prior.body)
     penalty = 0.5 * (turn / s.turn_std_rad) ** 2
     if penalty > _MOST_PENALTY:
         return np.inf
     _restore_prediction(new, prior)
-    turn_body(seen.P[camera], turn, new.body, new.cov, new.slope)
+    turn_body(frame.P[camera], turn, new.body, new.cov, new.slope)
     if _is_turned_alike(trees, n):
         return np.inf
-    condition(new, seen, s, work)
-    correct_mean(new, seen, s, work)
+    condition(new, frame, s, work)
+    correct_mean(new, frame, s, work)
     return np.inf if _is_turned_alike(trees, n) else penalty
 
 
@@ -140,7 +142,7 @@ def _is_turned_alike(trees, n):
 
 
 @kernel(makes_arrays=True)
-def _search_mode(trees, n, prior, evidence, seen, s, work):
+def _search_mode(trees, n, prior, evidence, frame, s, work):
     """Condition tree n at the mode next to a reflected limb (work.point); 0, or infinity for none.
 
     There is none where the search ends at a known hypothesis, or with negligible evidence.
@@ -148,7 +150,7 @@ def _search_mode(trees, n, prior, evidence, seen, s, work):
     new, known = trees[n], trees[0].body
     _restore_prediction(new, prior)
     stiff_lengths(new.bone_variance, s.bone_give, work.bone_variance)
-    find_pose_near(new, seen, s, _SEARCH_STEPS, 0.0, work)
+    find_pose_near(new, frame, s, _SEARCH_STEPS, 0.0, work)
     moved = 0.0
     for j in range(len(known)):
         for i in range(3):
@@ -156,9 +158,9 @@ def _search_mode(trees, n, prior, evidence, seen, s, work):
     if not moved > _NEARER_M:
         return np.inf
     update_tree(new, work)
-    if not log_evidence(prior, new, seen, s, work) - evidence > _LOG_LEAST_EVIDENCE:
+    if not log_evidence(prior, new, frame, s, work) - evidence > _LOG_LEAST_EVIDENCE:
         return np.inf
-    correct_mean(new, seen, s, work)
+    correct_mean(new, frame, s, work)
     for k in range(n):
         if not distance_between(trees[k], new, work) > _DISTINCT**2:
             return np.inf

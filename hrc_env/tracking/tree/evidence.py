@@ -40,7 +40,7 @@ _CLOSE = 2.0
 
 
 @kernel
-def log_evidence(prior, tree, seen, s, w):
+def log_evidence(prior, tree, frame, s, w):
     """Log of the evidence of one update, up to what all hypotheses share.
 
     `prior` is the tree before the update, `tree` what `tree.update.update_tree` made of it, before
@@ -56,15 +56,15 @@ def log_evidence(prior, tree, seen, s, w):
         for i in range(6):
             w.step[j, i] = 0.0
     _, log_det_after = tree_measure(tree, w.step, w)
-    likelihood = log_likelihood(body, seen, s.inlier_odds)
+    likelihood = log_likelihood(body, frame, s.inlier_odds)
     likelihood += _bones(body, tree.bone_length, w.bone_variance) + _floor(body, s.floor_std_m)
     return likelihood - 0.5 * square + 0.5 * (log_det_after - log_det)
 
 
 @kernel
-def log_likelihood(body, seen, inlier_odds):
+def log_likelihood(body, frame, inlier_odds):
     """Log-likelihood of all pixels at positions (J, 6), relative to all being outliers."""
-    P, z, sigma, ok = seen.P, seen.z, seen.sigma, seen.ok
+    P, z, sigma, ok = frame.P, frame.z, frame.sigma, frame.ok
     total = 0.0
     for j in range(len(ok)):
         for c in range(len(P)):

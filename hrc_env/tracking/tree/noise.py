@@ -66,23 +66,23 @@ def noise_model(config: ParticleConfig, ctrl_dt: float) -> NoiseModel:
 
 
 @kernel
-def learn_noise(seen, tree, learnt, model, w):
+def learn_noise(frame, tree, learnt, model, w):
     """Learn the factors of `learnt` (J, C), records of `tree.state.NOISE`, from one update, in
     place.
 
-    `seen` has sigma as scaled by `scale_sigma`, w.predicted (J, 3, 3) the covariances before the
+    `frame` has sigma as scaled by `scale_sigma`, w.predicted (J, 3, 3) the covariances before the
     update.
     """
     if model.least == model.most:
         return
     mean, cov, predicted = tree.body, tree.cov, w.predicted
-    view, spread, grows = seen.looks, w.spread, w.grows
+    view, spread, grows = frame.looks, w.spread, w.grows
     turn = learnt[0, 0].sums[4]
     learnt[0, 0].sums[4] = (turn + 1.0) % _TURNS
     for j in range(len(mean)):
         n_views, grows[j] = 0, -1.0
         if j % _TURNS == turn:
-            n_views = _look(seen, mean[j], j, view, spread)
+            n_views = _look(frame, mean[j], j, view, spread)
         if n_views < 2:
             for c in range(learnt.shape[1]):
                 learnt[j, c].last[0] *= model.persists
@@ -96,7 +96,7 @@ def learn_noise(seen, tree, learnt, model, w):
 
 
 @kernel(fastmath=_REORDER)
-def _look(seen, body, j, view, spread):
+def _look(frame, body, j, view, spread):
     """Triangulate joint j linearly about `body`, from the cameras that are believed; how many.
 
     Fills view (C, 8) by `_linearise` (a residual of infinity: the camera does not count) and spread
@@ -105,11 +105,11 @@ def _look(seen, body, j, view, spread):
     h00 = h11 = h22 = 1.0 / _OPEN_M**2
     h01 = h02 = h12 = g0 = g1 = g2 = 0.0
     n_views = 0
-    for c in range(len(seen.P)):
+    for c in range(len(frame.P)):
         view[c, 6] = np.inf
-        if not (seen.ok[j, c] and seen.belief[j, c] > _LEAST_BELIEF):
+        if not (frame.ok[j, c] and frame.belief[j, c] > _LEAST_BELIEF):
             continue
-        if not _linearise(seen.P[c], body, seen.z[j, c], seen.sigma[j, c], view[c]):
+        if not _linearise(frame.P[c], body, frame.z[j, c], frame.sigma[j, c], view[c]):
             continue
         n_views += 1
         a0, a1, a2, du = view[c, 0], view[c, 1], view[c, 2], view[c, 6]

@@ -34,31 +34,31 @@ _BLIND = 100
 
 
 @kernel(makes_arrays=True)
-def start_from_one_view(own, seen, s, scratch):
+def start_from_one_view(own, frame, s, scratch):
     """Begin a track from one view where no second one has come for a while."""
     tree, cameras = own.trees[0], np.zeros(2, np.int64)
-    n_views = count_views(seen, s.acquire_min_joints, cameras)
+    n_views = count_views(frame, s.acquire_min_joints, cameras)
     tree.waited = tree.waited + 1 if n_views == 1 else max(tree.waited - 1, 0)
-    if n_views == 1 and (tree.waited > s.wait_updates or len(seen.P) == 1):
-        begin_from_one(own, cameras[1], seen, s, scratch)
+    if n_views == 1 and (tree.waited > s.wait_updates or len(frame.P) == 1):
+        begin_from_one(own, cameras[1], frame, s, scratch)
         tree.waited, own.waited_s[0] = 0, s.look_every_s
 
 
 @kernel(makes_arrays=True)
-def begin_from_one(own, camera, seen, s, scratch):
+def begin_from_one(own, camera, frame, s, scratch):
     """Make slot 0 of `Hypotheses` the body that explains one camera best, if any does."""
     work, prior = scratch
     tree, best = own.trees[0], own.trees[:1].copy()
-    most = least = _LEAST_EVIDENCE * seen.ok[:, camera].sum()
+    most = least = _LEAST_EVIDENCE * frame.ok[:, camera].sum()
     stiff_lengths(tree.bone_variance, s.bone_give, work.bone_variance)
     for turn in range(_N_TURNS):
-        if not _stand(tree, seen, camera, 2.0 * math.pi * turn / _N_TURNS):
+        if not _stand(tree, frame, camera, 2.0 * math.pi * turn / _N_TURNS):
             continue
         prior[0], work.point[:] = tree, tree.body[:, :3]
-        find_pose_near(tree, seen, s, _SEARCH_STEPS, 1.0, work)
+        find_pose_near(tree, frame, s, _SEARCH_STEPS, 1.0, work)
         update_tree(tree, work)
-        evidence = log_evidence(prior[0], tree, seen, s, work)
-        correct_mean(tree, seen, s, work)
+        evidence = log_evidence(prior[0], tree, frame, s, work)
+        correct_mean(tree, frame, s, work)
         tree.pose_log_prior = s.anatomy_trust * anatomy(tree.body)
         if evidence + tree.pose_log_prior > most:
             best[0], most = tree, evidence + tree.pose_log_prior
@@ -68,14 +68,14 @@ def begin_from_one(own, camera, seen, s, scratch):
         own.views[0].blind[:] = _BLIND
         own.views[0, camera].blind = 0
         if s.stands_std_m > 0.0:
-            _measure_size(tree, eye_of(seen.P[camera]), s)
+            _measure_size(tree, eye_of(frame.P[camera]), s)
 
 
 @kernel(makes_arrays=True)
-def _stand(tree, seen, camera, angle):
+def _stand(tree, frame, camera, angle):
     """Predict a body that stands turned by `angle` [rad] where its joints fit the pixels best;
     whether it can be in view."""
-    P, cos, sin = seen.P[camera], math.cos(angle), math.sin(angle)
+    P, cos, sin = frame.P[camera], math.cos(angle), math.sin(angle)
     views, place = np.empty((len(STANDING_M), 3, 4)), np.empty(3)
     tree.body[:], tree.cov[:], tree.slope[:] = 0.0, 0.0, 0.0
     for j in range(len(views)):  # every joint is a view of the middle of the body
@@ -83,7 +83,7 @@ def _stand(tree, seen, camera, angle):
         x, y = cos * forward - sin * left, sin * forward + cos * left
         tree.body[j, 0], tree.body[j, 1], tree.body[j, 2], views[j] = x, y, up, P
         views[j, :, 3] += P[:, 0] * x + P[:, 1] * y + P[:, 2] * up
-    if not linear_point(views, seen.z[:, camera], seen.ok[:, camera], place):
+    if not linear_point(views, frame.z[:, camera], frame.ok[:, camera], place):
         return False
     along = _DEPTH_SHARE * (place - eye_of(P))
     for j in ORDER:

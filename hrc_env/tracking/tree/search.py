@@ -26,23 +26,23 @@ _REORDER = {"reassoc", "contract", "nsz"}  # NaN and infinity keep their meaning
 
 
 @kernel
-def find_pose(tree, seen, s, w):
+def find_pose(tree, frame, s, w):
     """Search the most probable positions of a predicted tree and leave everything linearised there.
 
     In `w` stay the point, the variances of the bones as measurements, and the information and
     gradient of cameras and bones there: those of the log-likelihood as a function of the positions
     (of joints, and of joints less their parents') minus their predicted means, at 0. Fills
-    seen.belief and seen.images.
+    frame.belief and frame.images.
     """
     stiff_lengths(tree.bone_variance, s.bone_give, w.bone_variance)
     for j in range(len(tree.body)):
         for i in range(3):
             w.point[j, i] = tree.body[j, i]
-    find_pose_near(tree, seen, s, s.gauss_newton_steps, 1.0, w)
+    find_pose_near(tree, frame, s, s.gauss_newton_steps, 1.0, w)
 
 
 @kernel
-def find_pose_near(tree, seen, s, n_steps, widen, w):
+def find_pose_near(tree, frame, s, n_steps, widen, w):
     """As `find_pose`, but the search begins at w.point (J, 3) instead of the predicted means.
 
     `widen` times the prior's own image variance is added to the detector's in the first step.
@@ -55,10 +55,10 @@ def find_pose_near(tree, seen, s, n_steps, widen, w):
         for i in range(3):
             w.shift[j, i] = w.point[j, i] - body[j, i]
     set_covariances(cov, w.points)
-    set_views(seen)
+    set_views(frame)
     for step in range(n_steps + 1):
         widening = widen if step < n_steps - 1 else 0.0
-        _linearise_cameras(seen, s.inlier_odds, widening, w)
+        _linearise_cameras(frame, s.inlier_odds, widening, w)
         _stand_on_the_floor(body, 1.0 / s.floor_std_m**2, w)
         _linearise_bones(tree.bone_length, w)
         _add_second_bone(cov, tree.bone_length, w)
@@ -99,17 +99,17 @@ def _position_prior(j, cov, w):
 
 
 @kernel
-def _linearise_cameras(seen, inlier_odds, widening, w):
+def _linearise_cameras(frame, inlier_odds, widening, w):
     """Information and gradient of what the cameras say, at the points."""
-    points, sums, belief = w.points, w.sums, seen.belief
+    points, sums, belief = w.points, w.sums, frame.belief
     for j in range(len(belief)):
         for i in range(3):
             points[i, j] = w.point[j, i]
     sums[:] = 0.0
-    for c in range(len(seen.P)):
-        add_view(seen.P[c], points, seen.views[c], widening, inlier_odds, seen.images[c], sums)
+    for c in range(len(frame.P)):
+        add_view(frame.P[c], points, frame.views[c], widening, inlier_odds, frame.images[c], sums)
         for j in range(len(belief)):
-            belief[j, c] = seen.images[c, BELIEF, j]
+            belief[j, c] = frame.images[c, BELIEF, j]
     for j in range(len(belief)):
         h, shift = w.camera_information[j], w.shift[j]
         h[0, 0], h[1, 1], h[2, 2] = sums[0, j], sums[1, j], sums[2, j]
@@ -229,9 +229,9 @@ def _eliminate(j, w):
 
 
 @kernel
-def set_views(seen):
-    """Put pixels and precisions into seen.views (C, N_VIEW, LANES)."""
-    z, sigma, ok, views = seen.z, seen.sigma, seen.ok, seen.views
+def set_views(frame):
+    """Put pixels and precisions into frame.views (C, N_VIEW, LANES)."""
+    z, sigma, ok, views = frame.z, frame.sigma, frame.ok, frame.views
     for c in range(len(views)):
         for j in range(len(ok)):
             good = ok[j, c]

@@ -42,8 +42,8 @@ _CORRELATED_UPDATES, _GATE_SIGMA, _LEAST_VARIANCE = 10.0, 3.0, 1e-5
 
 
 @kernel(makes_arrays=True)
-def condition(tree, seen, s, work):
-    """Search the mode and condition the tree there; seen.belief says which pixels it believes.
+def condition(tree, frame, s, work):
+    """Search the mode and condition the tree there; frame.belief says which pixels it believes.
 
     Keeps the predicted covariances of the positions in work.predicted.
     """
@@ -51,23 +51,23 @@ def condition(tree, seen, s, work):
         for i in range(3):
             for k in range(3):
                 work.predicted[j, i, k] = tree.cov[j, i, k]
-    find_pose(tree, seen, s, work)
-    if widen_jumped(tree, seen, s, work):
-        find_pose(tree, seen, s, work)
+    find_pose(tree, frame, s, work)
+    if widen_jumped(tree, frame, s, work):
+        find_pose(tree, frame, s, work)
     update_tree(tree, work)
 
 
 @kernel(makes_arrays=True)
-def widen_jumped(tree, seen, s, w):
+def widen_jumped(tree, frame, s, w):
     """Widen the predicted covariances of joints that have jumped, in place; whether any has."""
     cov, grown, jumped = tree.cov, w.moved, False
-    use, point, spread = np.empty(len(seen.P), np.bool_), np.empty(3), np.empty((3, 3))
+    use, point, spread = np.empty(len(frame.P), np.bool_), np.empty(3), np.empty((3, 3))
     for j in ORDER:
         grown[j] = 0.0
         if jumped and PARENT[j] >= 0:  # joints beyond one that jumped go with it
             multiply(tree.slope[j], grown[PARENT[j]], w.a)
             multiply_transposed(w.a, tree.slope[j], grown[j])
-        if _has_jumped(j, tree, seen, s, (point, spread, use, w)):
+        if _has_jumped(j, tree, frame, s, (point, spread, use, w)):
             jumped |= _grow(j, tree, point, w)
     for j in ORDER:
         if not jumped:
@@ -106,18 +106,18 @@ def _grow(j, tree, point, w):
 
 
 @kernel(makes_arrays=True)
-def _has_jumped(j, tree, seen, s, scratch):
+def _has_jumped(j, tree, frame, s, scratch):
     """Whether views agree on another place of a joint than the expected one: `point`."""
     point, spread, use, w = scratch
-    ok, body, cov = seen.ok[j], tree.body[j], tree.cov[j]
+    ok, body, cov = frame.ok[j], tree.body[j], tree.cov[j]
     n_believed = 0.0
     for c in range(len(ok)):
-        n_believed += seen.belief[j, c] if ok[c] else 0.0
+        n_believed += frame.belief[j, c] if ok[c] else 0.0
     if n_believed > _SURE_VIEWS:
         for i in range(3):
             point[i] = w.point[j, i]
         return _is_far(point, body, cov, w.c)
-    views = (seen.P, seen.z[j], seen.sigma[j], ok)
+    views = (frame.P, frame.z[j], frame.sigma[j], ok)
     if ok.sum() < _AGREEING_VIEWS:
         return False
     if consensus_point(*views, s.gate_sigma, point, spread, use) < _AGREEING_VIEWS:
@@ -248,7 +248,7 @@ def _substitute(body, slope, w):
 
 
 @kernel
-def shift_to_mean(tree, seen, share, w):
+def shift_to_mean(tree, frame, share, w):
     """Move the means from the mode towards the mean of the posterior (Laplace's next term).
 
     A camera's information falls with the square of the depth: there is more room behind the mode
@@ -257,18 +257,18 @@ def shift_to_mean(tree, seen, share, w):
     cameras of n tr(S_j J'J / sigma^2) / d, H being the Hessian of all joints, whose factors
     `update_tree` left. `share` of it is applied.
     """
-    sigma, ok, belief = seen.sigma, seen.ok, seen.belief
+    sigma, ok, belief = frame.sigma, frame.ok, frame.belief
     for j in range(len(ok)):
         for i in range(6):
             w.gradient[j, i] = 0.0
-        for c in range(len(seen.P)):
+        for c in range(len(frame.P)):
             if not (ok[j, c] and belief[j, c] > 0.0):
                 continue
-            image = seen.images[c]
+            image = frame.images[c]
             pull = share * belief[j, c] * _pixel_variance(image, j, tree.cov[j]) / sigma[j, c] ** 2
             pull *= min(image[NEARNESS, j], 1.0 / _NEAREST_M)
             for i in range(3):
-                w.gradient[j, i] += pull * seen.P[c, 2, i]
+                w.gradient[j, i] += pull * frame.P[c, 2, i]
     _substitute(tree.body, tree.slope, w)
 
 
@@ -284,18 +284,18 @@ def _pixel_variance(image, j, cov):
 
 
 @kernel
-def correct_mean(tree, seen, s, work):
+def correct_mean(tree, frame, s, work):
     """Move from the mode to the mean, and learn ages and lengths from it."""
     if s.mean_correction > 0.0:
-        shift_to_mean(tree, seen, s.mean_correction, work)
-    _update_ages(tree, seen, work.n_views)
+        shift_to_mean(tree, frame, s.mean_correction, work)
+    _update_ages(tree, frame, work.n_views)
     learn_lengths(tree, work.n_views)
 
 
 @kernel
-def _update_ages(tree, seen, n_views):
+def _update_ages(tree, frame, n_views):
     """Update ages and conflicts of a worker's joints; count the cameras that saw each."""
-    ok, belief = seen.ok, seen.belief
+    ok, belief = frame.ok, frame.belief
     for j in range(len(ok)):
         n_views[j], n_supporting = 0, 0
         for c in range(ok.shape[1]):
