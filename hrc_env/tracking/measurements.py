@@ -77,7 +77,7 @@ class Frame(NamedTuple):
     images: Floats
     """(C, N_IMAGE, LANES) the joints in each camera where `tree.search` linearised last."""
     looks: Floats
-    """(C, 8) what each camera says of one joint, for `noise`."""
+    """(C, 8) what each camera says of one joint, for `learning`."""
 
 
 @kernel(makes_arrays=True)
@@ -162,13 +162,13 @@ def supports(camera, z, sigma, gate_sigma, point, cov):
 
 
 @kernel
-def read_for_hypothesis(tree, views, learnt, measured, b, w, s, frame):
+def read_for_hypothesis(tree, views, learnt, measured, at, s, frame):
     """Read a worker's measurements as one hypothesis takes them; whether it is the mirrored one.
 
     `learnt` (J, C) and `views` (C,) are its records of `NOISE` and `VIEW`: standard deviations are
     scaled by what it has learnt, and cameras that exchange left and right are corrected.
     """
-    read_worker(measured, b, w, s.sigma_scale, frame)
+    read_worker(measured, at[0], at[1], s.sigma_scale, frame)
     scale_sigma(learnt, frame.sigma)
     return undo_swaps(tree, frame, views, s)
 

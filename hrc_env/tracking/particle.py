@@ -21,7 +21,7 @@ from hrc_env.tracking.measurements import arrays_of
 from hrc_env.tracking.settings import settings_of
 from hrc_env.tracking.tracks import bounded
 from hrc_env.tracking.tree.body_filter import predict_all, update_all
-from hrc_env.tracking.tree.noise import noise_model
+from hrc_env.tracking.tree.learning import noise_model
 from hrc_env.tracking.tree.predict import motion
 from hrc_env.tracking.tree.report import estimate_all
 from hrc_env.tracking.tree.state import NOISE, PACE, TREE, VIEW, WORK, Hypotheses, forget_trees
@@ -36,7 +36,7 @@ class ParticleEstimator:
     config: ParticleConfig
     settings: tuple[Any, ...] = field(init=False, repr=False)
     noise: tuple[Any, ...] = field(init=False, repr=False)
-    """`settings.Settings` and `noise.NoiseModel` as kernels take them."""
+    """`settings.Settings` and `learning.NoiseModel` as kernels take them."""
 
     def __post_init__(self) -> None:
         """Make what the kernels take."""

@@ -7,9 +7,10 @@ from simulated import DT
 
 from hrc_env.core.skeleton import BONES, N_JOINTS, TORSO
 from hrc_env.tracking.tree.gaussian import EDGE_BONE, ORDER, PARENT, ROOT, invert
+from hrc_env.tracking.tree.learning import learn_lengths
 from hrc_env.tracking.tree.predict import damped_joints, predict_tree, whole_body_noise
 from hrc_env.tracking.tree.state import STANDING_M, TREE, WORK, population_edges
-from hrc_env.tracking.tree.update import learn_lengths, update_tree
+from hrc_env.tracking.tree.update import update_tree
 
 J = N_JOINTS
 _I3 = np.eye(3)

@@ -14,9 +14,9 @@ from hrc_env.tracking.measurements import (
 from hrc_env.tracking.settings import Settings
 from hrc_env.tracking.tracks import age_worker, count_up
 from hrc_env.tracking.tree.acquisition import (
-    acquire,
     agree_on_sides,
     recover,
+    restart_body,
     start_track,
 )
 from hrc_env.tracking.tree.askew import (
@@ -26,17 +26,16 @@ from hrc_env.tracking.tree.askew import (
 from hrc_env.tracking.tree.branching import branch, is_ambiguous
 from hrc_env.tracking.tree.evidence import (
     heading,
-    log_evidence,
     normalise,
     prune_and_merge,
     weigh_pose,
 )
-from hrc_env.tracking.tree.noise import NoiseModel, learn_noise
+from hrc_env.tracking.tree.learning import NoiseModel, learn_from_frame
 from hrc_env.tracking.tree.one_view import start_from_one_view
 from hrc_env.tracking.tree.predict import predict_tree
 from hrc_env.tracking.tree.report import measure_pace
 from hrc_env.tracking.tree.state import Hypotheses
-from hrc_env.tracking.tree.update import condition, correct_mean
+from hrc_env.tracking.tree.update import condition_on_frame
 
 _TORSO = (1, 2, 7, 8)
 
@@ -105,62 +104,72 @@ def update_all(state, P, measured, s, noise, works, prior):
         state: plain tuple of `Hypotheses`, which are changed in place.
         P: (C, 3, 4).
         measured: of all workers, as `measurements.arrays_of` gives it.
-        s, noise: plain tuples of `Settings` and of `noise.NoiseModel`.
-        works: (1,) scratch, records of `tree.state.WORK`.
-        prior: (1,) records of `tree.state.TREE`: room for a hypothesis before its update.
+        s, noise: plain tuples of `Settings` and of `learning.NoiseModel`.
+        works: (1,) scratch, records of `WORK`.
+        prior: (1,) records of `TREE`: room for a hypothesis before its update.
     """
     state, s, noise = Hypotheses(*state), Settings(*s), NoiseModel(*noise)
-    frame, work = make_frame(P.copy()), works[0]
+    frame, scratch = make_frame(P.copy()), (works[0], prior)
     for b in range(state.n_alive.shape[0]):
         for w in range(state.n_alive.shape[1]):
-            own = worker_slots(state, b, w)
-            read_worker(measured, b, w, s.sigma_scale, frame)
-            tree = own.trees[0]
-            hang_as_known(tree.pair, P, frame.P)
-            if not tree.tracked:
-                scale_sigma(own.noise[0], frame.sigma)
-                agree_on_sides(frame, s)
-                start_track(own, frame, s)
-                check_pair_calibration(own, P, frame, s)
-                if not tree.tracked:
-                    start_from_one_view(own, frame, s, (work, prior))
-                continue
-            if tree.size_std > 0.0 and start_track(own, frame, s):
-                continue
-            look = len(own.trees) > 1 and own.waited_s[0] >= s.look_every_s
-            look &= is_ambiguous(tree, frame, s)
-            for h in range(own.n_alive[0]):
-                mirrored = read_for_hypothesis(
-                    own.trees[h], own.views[h], own.noise[h], measured, b, w, s, frame
-                )
-                if mirrored and acquire(own.trees[h], frame, s):
-                    own.trees[h].slope[:] = 0.0
-                _update_hypothesis(own, h, look and h == 0, frame, s, noise, (work, prior))
-            if own.n_alive[0] > 1:
-                prune_and_merge(own, s, work)
-            measure_pace(own)
-            check_pair_calibration(own, P, frame, s)
+            own, at = worker_slots(state, b, w), (b, w)
+            frame.P[:] = P
+            if own.trees[0].pair.askew:
+                hang_as_known(own.trees[0].pair, P, frame.P)
+            if own.trees[0].tracked:
+                _update_worker(own, P, measured, at, frame, s, noise, scratch)
+            else:
+                _find_worker(own, P, measured, at, frame, s, scratch)
 
 
 @kernel(makes_arrays=True)
-def _update_hypothesis(own, h, look, frame, s, noise, scratch):
-    """What one set of frames does to one hypothesis; `look` for others beside it."""
+def _update_worker(own, P, measured, at, frame, s, noise, scratch):
+    """Update the hypotheses about a worker who is tracked, and look for others if it is time."""
+    tree = own.trees[0]
+    if tree.size_std > 0.0:
+        read_worker(measured, at[0], at[1], s.sigma_scale, frame)
+        if start_track(own, frame, s):
+            return
+    searches_now = len(own.trees) > 1 and own.waited_s[0] >= s.look_every_s
+    if searches_now:
+        read_worker(measured, at[0], at[1], s.sigma_scale, frame)
+        searches_now = is_ambiguous(tree, frame, s)
+    for h in range(own.n_alive[0]):
+        learnt = own.noise[h]
+        if read_for_hypothesis(own.trees[h], own.views[h], learnt, measured, at, s, frame):
+            restart_body(own.trees[h], frame, s)
+        _update_hypothesis(own, h, searches_now and h == 0, frame, s, noise, scratch)
+    if own.n_alive[0] > 1:
+        prune_and_merge(own, s, scratch[0])
+    measure_pace(own)
+    check_pair_calibration(own, P, frame, s)
+
+
+@kernel(makes_arrays=True)
+def _update_hypothesis(own, h, searches_now, frame, s, noise, scratch):
+    """Update one hypothesis by its measurements, and weigh it if there are or may be others."""
     work, prior = scratch
-    tree, learnt, several = own.trees[h], own.noise[h], own.n_alive[0] > 1
-    evidence = 0.0
-    if several or look:
-        prior[0] = tree
-    condition(tree, frame, s, work)
-    if several or look:  # the mean correction needs the factors that the evidence leaves alone
-        evidence = log_evidence(prior[0], tree, frame, s, work)
-    correct_mean(tree, frame, s, work)
-    if several or look:
+    tree, several = own.trees[h], own.n_alive[0] > 1
+    evidence = condition_on_frame(tree, prior, several or searches_now, frame, s, work)
+    if several or searches_now:
         weigh_pose(tree, several, s.evidence_trust * evidence, s)
-    learn_noise(frame, tree, learnt, noise, work)
-    if look:
+    learn_from_frame(frame, tree, own.noise[h], noise, work)
+    if searches_now:
         own.waited_s[0] = 0.0
         branch(own, prior[0], evidence, frame, s, work)
     recover(tree, frame, s, work)
+
+
+@kernel(makes_arrays=True)
+def _find_worker(own, P, measured, at, frame, s, scratch):
+    """Begin a track of a worker whom nobody tracks, if the views allow it."""
+    read_worker(measured, at[0], at[1], s.sigma_scale, frame)
+    scale_sigma(own.noise[0], frame.sigma)
+    agree_on_sides(frame, s)
+    start_track(own, frame, s)
+    check_pair_calibration(own, P, frame, s)
+    if not own.trees[0].tracked:
+        start_from_one_view(own, frame, s, scratch)
 
 
 @kernel(makes_arrays=True)

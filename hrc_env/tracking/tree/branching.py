@@ -28,6 +28,7 @@ from hrc_env.tracking.tree.evidence import (
     log_evidence,
 )
 from hrc_env.tracking.tree.gaussian import multiply
+from hrc_env.tracking.tree.learning import learn_lengths
 from hrc_env.tracking.tree.search import find_pose_near, stiff_lengths
 from hrc_env.tracking.tree.update import condition, correct_mean, update_tree
 
@@ -123,6 +124,7 @@ def _try_turned_body(trees, n, camera, prior, frame, s, work):
         return np.inf
     condition(new, frame, s, work)
     correct_mean(new, frame, s, work)
+    learn_lengths(new, work.n_views)
     return np.inf if _is_turned_alike(trees, n) else penalty
 
 
@@ -161,6 +163,7 @@ def _search_mode(trees, n, prior, evidence, frame, s, work):
     if not log_evidence(prior, new, frame, s, work) - evidence > _LOG_LEAST_EVIDENCE:
         return np.inf
     correct_mean(new, frame, s, work)
+    learn_lengths(new, work.n_views)
     for k in range(n):
         if not distance_between(trees[k], new, work) > _DISTINCT**2:
             return np.inf

@@ -17,6 +17,7 @@ from hrc_env.tracking.tree.evidence import (
     log_evidence,
 )
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT
+from hrc_env.tracking.tree.learning import learn_lengths
 from hrc_env.tracking.tree.predict import SPEED_M_S
 from hrc_env.tracking.tree.search import find_pose_near, stiff_lengths
 from hrc_env.tracking.tree.state import STANDING_M
@@ -59,6 +60,7 @@ def begin_from_one(own, camera, frame, s, scratch):
         update_tree(tree, work)
         evidence = log_evidence(prior[0], tree, frame, s, work)
         correct_mean(tree, frame, s, work)
+        learn_lengths(tree, work.n_views)
         tree.pose_log_prior = s.anatomy_trust * anatomy(tree.body)
         if evidence + tree.pose_log_prior > most:
             best[0], most = tree, evidence + tree.pose_log_prior

@@ -107,7 +107,7 @@ NOISE = np.dtype(
     ],
     align=True,
 )  # fmt: skip
-"""What a hypothesis holds of one joint in one camera, as in `noise`."""
+"""What a hypothesis holds of one joint in one camera, as in `learning`."""
 PACE = np.dtype(
     [
         # directions in the last update, of the line across hips and shoulders on the floor, and of
@@ -147,11 +147,11 @@ WORK = np.dtype(
         ("edge_information", "f8", (_J, 3, 3)), ("edge_gradient", "f8", (_J, 3)),
         # as in `search`
         ("points", "f8", (N_POINT, LANES)), ("sums", "f8", (N_SUM, LANES)),
-        # for `noise`: where the cameras see a joint together, how lasting errors add up
+        # for `learning`: where the cameras see a joint together, how lasting errors add up
         ("spread", "f8", (3, 4)), ("grows", "f8", (_J,)),
         # cameras that measured a joint; variances of the bones' lengths as measurements [m^2]
         ("n_views", "i8", (_J,)), ("bone_variance", "f8", (_J,)),
-        # places on the body that are not learnt; covariances before the update, for `noise`;
+        # places on the body that are not learnt; covariances before the update, for `learning`;
         # joints that were put somewhere
         ("offset", "f8", (_J, 3)), ("offset_count", "f8", (_J,)),
         ("predicted", "f8", (_J, 3, 3)), ("placed", "i1", (_J,)),

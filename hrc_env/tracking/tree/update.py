@@ -11,12 +11,11 @@ is multiplied by 1 + (|d|^4 - d'C d) / d'R d: the variance along d is then |d|^2
 (covariance matching: Mehra, IEEE Trans. Automatic Control 17, 1972, doi:10.1109/TAC.1972.1100100).
 """
 
-import math
-
 import numpy as np
 
 from hrc_env.core.kernels import kernel
 from hrc_env.geometry.triangulation import consensus_point
+from hrc_env.tracking.tree.evidence import log_evidence
 from hrc_env.tracking.tree.gaussian import (
     LEAVES_FIRST,
     ORDER,
@@ -28,7 +27,6 @@ from hrc_env.tracking.tree.gaussian import (
     transposed_multiply,
 )
 from hrc_env.tracking.tree.search import A0, A1, A2, B0, B1, B2, NEARNESS, find_pose
-from hrc_env.tracking.tree.state import EDGE_STIFFNESS_M
 
 _FAR = 16.0
 """Squared Mahalanobis distance of a jump: by chance a joint is as far once in 900 updates."""
@@ -38,7 +36,22 @@ many that agree: two may err alike."""
 _NEAREST_M = 0.3
 """The mean correction knows no joint nearer to a lens than this."""
 _REORDER = {"reassoc", "contract", "nsz"}
-_CORRELATED_UPDATES, _GATE_SIGMA, _LEAST_VARIANCE = 10.0, 3.0, 1e-5
+
+
+@kernel(makes_arrays=True)
+def condition_on_frame(tree, prior, weigh, frame, s, work):
+    """Condition a predicted tree on a frame; return its log-evidence, 0 if not to `weigh` it.
+
+    `prior` (1,) then holds the prediction.
+    """
+    if weigh:
+        prior[0] = tree
+    condition(tree, frame, s, work)
+    evidence = 0.0
+    if weigh:  # the mean correction needs the factors that the evidence leaves alone
+        evidence = log_evidence(prior[0], tree, frame, s, work)
+    correct_mean(tree, frame, s, work)
+    return evidence
 
 
 @kernel(makes_arrays=True)
@@ -285,11 +298,10 @@ def _pixel_variance(image, j, cov):
 
 @kernel
 def correct_mean(tree, frame, s, work):
-    """Move from the mode to the mean, and learn ages and lengths from it."""
+    """Move from the mode to the mean; update ages, and in work.n_views the views of joints."""
     if s.mean_correction > 0.0:
         shift_to_mean(tree, frame, s.mean_correction, work)
     _update_ages(tree, frame, work.n_views)
-    learn_lengths(tree, work.n_views)
 
 
 @kernel
@@ -311,40 +323,3 @@ def count_conflict(n_ok, n_supporting, conflict):
     if n_ok < 2 or n_supporting >= 2:
         return 0 if n_supporting >= 2 or n_ok == 0 else conflict
     return conflict + 1
-
-
-@kernel
-def learn_lengths(tree, n_views):
-    """Learn a tree's bone lengths, in place, from the joints that two views see (J,)."""
-    body, cov, slope = tree.body, tree.cov, tree.slope
-    for j in range(len(body)):
-        q = PARENT[j]
-        if q < 0 or n_views[j] < 2 or n_views[q] < 2:
-            continue
-        x, y, z = body[j, 0] - body[q, 0], body[j, 1] - body[q, 1], body[j, 2] - body[q, 2]
-        now = math.sqrt(x * x + y * y + z * z) + 1e-6
-        along = (x / now, y / now, z / now)
-        spread, total = 0.0, 0.0
-        for i in range(3):
-            for k in range(3):
-                edge = 0.0
-                for h in range(6):
-                    edge += slope[j, i, h] * cov[q, h, k]
-                difference = cov[j, i, k] + cov[q, i, k] - 2.0 * edge
-                spread += along[i] * along[k] * difference
-                total += difference if i == k else 0.0
-        measured = now - 0.5 * (total - spread) / now  # errors across a bone lengthen it
-        _learn_length(tree, j, measured, max(spread, EDGE_STIFFNESS_M[j] ** 2))
-
-
-@kernel
-def _learn_length(tree, j, measured, spread):
-    """Kalman update of one length by a measurement whose errors last for several updates."""
-    length, variance = tree.bone_length, tree.bone_variance
-    noise = _CORRELATED_UPDATES * spread
-    miss = measured - length[j]
-    if miss * miss > _GATE_SIGMA**2 * (noise + variance[j]):
-        return
-    gain = variance[j] / (variance[j] + noise)
-    length[j] += gain * miss
-    variance[j] = max((1.0 - gain) * variance[j], _LEAST_VARIANCE)

@@ -1,18 +1,20 @@
-"""How noisy a camera's detections really are: learnt while tracking, from what views disagree on.
+"""Learning: what a hypothesis keeps of a frame for later ones, true noise and lengths of bones.
 
-True errors may be larger or smaller than a detector reports, and they may persist for about half a
-second. Per worker and camera this learns a factor on the reported variance with which a filter for
-white noise is honest (docs/tracking.md, "Errors that persist"):
+True errors of a detector may be larger or smaller than it reports, and they may persist for about
+half a second. Per worker and camera a factor on the reported variance is learnt with which a
+filter for white noise is honest (docs/tracking.md, "Measurement noise"):
 
-    factor = V (1 - L + L (1 + a r) / (1 - a r)).
+factor = V (1 - L + L (1 + a r) / (1 - a r)).
 
-V is true over reported variance: each joint is triangulated from this set of frames alone,
-without the prediction, in which a camera's persistent error is already believed; what a
-camera's pixels are off by, squared, is divided by how much of it the point could not absorb,
-its redundancy (Foerstner, Zeitschrift fuer Vermessungswesen 104, 1979). L is the share of the
-variance that persists, from the products of these residuals with those of the update before;
-r the correlation of that part over one update; a the weight of the prediction in the estimate,
-the mean over joints of tr(posterior covariance, predicted covariance^-1) / 3.
+V is true over reported variance: each joint is triangulated from this frame alone, without the
+prediction, in which a camera's persistent error is already believed; the square of a camera's
+residual is divided by how much of it the point could not absorb, its redundancy (Foerstner,
+Zeitschrift fuer Vermessungswesen 104, 1979). L is the share of the variance that persists, from
+the products of these residuals with those of the update before; r the correlation of that part
+over one update; a the weight of the prediction in the estimate, the mean over joints of
+tr(posterior covariance, predicted covariance^-1) / 3.
+
+The length of each bone has a scalar Kalman filter, which learns while two views see both ends.
 """
 
 import math
@@ -23,6 +25,10 @@ import numpy as np
 from hrc_env.core.kernels import kernel
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, inverse3
 from hrc_env.tracking.config import ParticleConfig
+from hrc_env.tracking.tree.gaussian import (
+    PARENT,
+)
+from hrc_env.tracking.tree.state import EDGE_STIFFNESS_M
 
 _TURNS = 2
 """Every update looks at every so-manieth joint, which costs less and tells as much: neighbouring
@@ -36,6 +42,8 @@ _SHARE_WEIGHT = 600.0
 it late."""
 _CHANCE = 0.07
 """Twice the standard deviation of the share that persists where nothing does."""
+_CORRELATED_UPDATES, _GATE_SIGMA, _LEAST_VARIANCE = 10.0, 3.0, 1e-5
+"""Of the lengths of bones: updates for which errors last, gate, least variance [m^2]."""
 _OPEN_M = 0.5
 """Two views triangulate no joint along a ray that they share: it stays within this [m]."""
 _LEAST_BELIEF = 0.5
@@ -63,6 +71,13 @@ def noise_model(config: ParticleConfig, ctrl_dt: float) -> NoiseModel:
         math.exp(-ctrl_dt / tau) for tau in (config.noise_tau_s, config.noise_persists_s)
     )
     return NoiseModel(keep**_TURNS, persists, config.noise_share, least, most)
+
+
+@kernel
+def learn_from_frame(frame, tree, learnt, model, w):
+    """Learn lengths of bones and factors on the noise from a tree that was updated, in place."""
+    learn_lengths(tree, w.n_views)
+    learn_noise(frame, tree, learnt, model, w)
 
 
 @kernel
@@ -215,3 +230,40 @@ def _set_factors(learnt, grows, model):
                 variance = own / (learnt[j, c].sums[1] + _JOINT_WEIGHT)
                 wanted = variance * (1.0 - share + share * grows[j])
                 learnt[j, c].factor = min(max(wanted, model.least), model.most)
+
+
+@kernel
+def learn_lengths(tree, n_views):
+    """Learn a tree's bone lengths, in place, from the joints that two views see (J,)."""
+    body, cov, slope = tree.body, tree.cov, tree.slope
+    for j in range(len(body)):
+        q = PARENT[j]
+        if q < 0 or n_views[j] < 2 or n_views[q] < 2:
+            continue
+        x, y, z = body[j, 0] - body[q, 0], body[j, 1] - body[q, 1], body[j, 2] - body[q, 2]
+        now = math.sqrt(x * x + y * y + z * z) + 1e-6
+        along = (x / now, y / now, z / now)
+        spread, total = 0.0, 0.0
+        for i in range(3):
+            for k in range(3):
+                edge = 0.0
+                for h in range(6):
+                    edge += slope[j, i, h] * cov[q, h, k]
+                difference = cov[j, i, k] + cov[q, i, k] - 2.0 * edge
+                spread += along[i] * along[k] * difference
+                total += difference if i == k else 0.0
+        measured = now - 0.5 * (total - spread) / now  # errors across a bone lengthen it
+        _learn_length(tree, j, measured, max(spread, EDGE_STIFFNESS_M[j] ** 2))
+
+
+@kernel
+def _learn_length(tree, j, measured, spread):
+    """Kalman update of one length by a measurement whose errors last for several updates."""
+    length, variance = tree.bone_length, tree.bone_variance
+    noise = _CORRELATED_UPDATES * spread
+    miss = measured - length[j]
+    if miss * miss > _GATE_SIGMA**2 * (noise + variance[j]):
+        return
+    gain = variance[j] / (variance[j] + noise)
+    length[j] += gain * miss
+    variance[j] = max((1.0 - gain) * variance[j], _LEAST_VARIANCE)
