@@ -11,7 +11,7 @@ are several cameras that all seem to be wrong.
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Keypoints
 from hrc_env.core.skeleton import MIRROR, N_JOINTS
 from hrc_env.core.typing import Bools, Floats
+from hrc_env.geometry.lines_of_sight import CAMERA, model_cameras
 from hrc_env.geometry.triangulation import FURTHEST_PX, NEAREST_DEPTH_M
 from hrc_env.tracking.tree.state import LANES, N_IMAGE, N_VIEW
 
@@ -62,8 +63,10 @@ def is_measurement(u, v, belief, sigma):
 class Frame(NamedTuple):
     """What C cameras measured of one worker, and what an update makes of it; filled in place."""
 
+    cameras: Any
+    """(C,) records of `lines_of_sight.CAMERA`, as the rig has them."""
     P: Floats
-    """(C, 3, 4)."""
+    """(C, 3, 4) projections, as the cameras are believed to hang; the third row is the axis."""
     z: Floats
     """(J, C, 2) pixels; 0 where there is no measurement."""
     sigma: Floats
@@ -84,8 +87,11 @@ class Frame(NamedTuple):
 def make_frame(P):
     """Room for the measurements of one worker."""
     n = len(P)
+    cameras = np.empty(n, CAMERA)
+    model_cameras(P, cameras)
     return Frame(
-        P=P,
+        cameras=cameras,
+        P=P.copy(),
         z=np.empty((N_JOINTS, n, 2)),
         sigma=np.empty((N_JOINTS, n)),
         ok=np.empty((N_JOINTS, n), np.bool_),

@@ -13,8 +13,8 @@ from hrc_env.tracking.smoother import smooth
 from hrc_env.tracking.tree.askew import (
     TURN_STD_RAD,
     _gaps,
+    aim_cameras,
     displacement,
-    hang_as_known,
     turn_camera,
 )
 from hrc_env.tracking.tree.state import PAIR, TREE
@@ -78,7 +78,7 @@ def pairs(state):
 
 def test_a_camera_is_turned_as_by_a_rotation_of_its_rays():
     out = np.empty((3, 4))
-    turn_camera(LAB[1], TILTED, out)
+    turn_camera(make_frame(LAB).cameras[1], TILTED, out)
     np.testing.assert_allclose(out, turned(LAB[1], TILTED), atol=1e-6)
 
 
@@ -192,7 +192,7 @@ def test_slopes_of_the_gaps_are_their_derivatives():
     def gaps(turn):
         tree["pair"]["turn"] = turn
         rows, gap, variance = np.empty((15, 6)), np.empty(15), np.empty(15)
-        assert _gaps(tree[0], TWO, frame, rows, gap, variance) == 15
+        assert _gaps(tree[0], frame, rows, gap, variance) == 15
         return rows, gap
 
     rows, gap = gaps(np.zeros(6))
@@ -205,7 +205,7 @@ def test_slopes_of_the_gaps_are_their_derivatives():
 def test_displacement_is_the_spread_of_bodies_triangulated_with_turned_cameras():
     joints, pair, out = walk(1, 1)[0], np.zeros(1, PAIR), np.empty((3, 3))
     pair["cameras"], pair["turn_cov"] = (0, 1), (0.1 * TURN_STD_RAD) ** 2 * np.eye(6)
-    displacement(pair[0], TWO, np.column_stack([joints, 0 * joints]), out)
+    displacement(pair[0], make_frame(TWO).cameras, np.column_stack([joints, 0 * joints]), out)
     middle, rng, places = joints.mean(0), np.random.default_rng(0), []
     eyes = [-np.linalg.solve(p[:, :3], p[:, 3]) for p in TWO]
     for turn in rng.normal(0.0, 0.1 * TURN_STD_RAD, (4000, 2, 3)):
@@ -219,14 +219,14 @@ def test_displacement_is_the_spread_of_bodies_triangulated_with_turned_cameras()
 
 
 def test_nothing_is_turned_that_does_not_hang_askew():
-    pair, out = np.zeros(1, PAIR), np.empty(LAB.shape)
+    pair, frame = np.zeros(1, PAIR), make_frame(LAB)
     pair["cameras"], pair["turn"] = (0, 1), 0.05
-    hang_as_known(pair[0], LAB, out)
-    np.testing.assert_array_equal(out, LAB)
+    aim_cameras(pair[0], frame)
+    np.testing.assert_array_equal(frame.P, LAB)
     pair["askew"] = True
-    hang_as_known(pair[0], LAB, out)
-    np.testing.assert_allclose(out[1], turned(LAB[1], np.full(3, 0.05)), atol=1e-6)
-    np.testing.assert_array_equal(out[2:], LAB[2:])
+    aim_cameras(pair[0], frame)
+    np.testing.assert_allclose(frame.P[1], turned(LAB[1], np.full(3, 0.05)), atol=1e-6)
+    np.testing.assert_array_equal(frame.P[2:], LAB[2:])
 
 
 def test_absurd_pixels_leave_numbers_finite():

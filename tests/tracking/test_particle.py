@@ -5,7 +5,6 @@ import pytest
 from simulated import DT, HARD, LAB, Damage, detections, generators, keypoints, track, walk
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.geometry.lines_of_sight import eye_of
 from hrc_env.tracking.config import ParticleConfig
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.tracking.tree.branching import (
@@ -204,10 +203,10 @@ def test_the_mixtures_moments_are_those_of_its_parts():
 
 
 def test_the_other_body_has_its_shoulders_reflected_and_its_nose_in_front():
-    body, camera = standing(0.4), LAB[1]
+    body, eye = standing(0.4), EYES[1]
     cov, slope = np.tile(0.01 * np.eye(6), (15, 1, 1)), np.zeros((15, 6, 6))
     other = body.copy()
-    turn_body(camera, turn_of(camera, body), other, cov, slope)
+    turn_body(eye, turn_of(eye, body), other, cov, slope)
     assert not heads_like(body, other)
     middle = body[[1, 2, 7, 8], :2].mean(0)
     ray = (middle - EYES[1, :2]) / np.linalg.norm(middle - EYES[1, :2])
@@ -216,7 +215,7 @@ def test_the_other_body_has_its_shoulders_reflected_and_its_nose_in_front():
     np.testing.assert_allclose(left(other), expected, atol=0.02)
     assert anatomy(other) == pytest.approx(anatomy(body))
     again = other.copy()
-    turn_body(camera, turn_of(camera, other), again, cov, slope)
+    turn_body(eye, turn_of(eye, other), again, cov, slope)
     np.testing.assert_allclose(again, body, atol=1e-9)
 
 
@@ -229,12 +228,11 @@ def test_a_body_that_is_inside_out_is_unlikely():
 
 def test_a_reflected_limb_keeps_its_pixels_nearly_and_changes_its_depth():
     body, out = standing(0.7), np.empty((15, 3))
-    assert reflect(1, LAB[0], body, out)
+    assert reflect(1, EYES[0], body, out)
     np.testing.assert_array_equal(out[[0, 1, 2, 4]], body[[0, 1, 2, 4], :3])
     for j in (3, 5):
         a, b = body[j, :3] - EYES[0], out[j] - EYES[0]
         assert np.linalg.norm(np.cross(a, b)) < 1e-9  # the same ray
-    np.testing.assert_allclose(eye_of(LAB[0]), EYES[0], atol=1e-6)
 
 
 def test_a_part_is_ambiguous_only_where_one_camera_sees_it():
@@ -250,13 +248,13 @@ def test_a_part_is_ambiguous_only_where_one_camera_sees_it():
 
 def test_a_parts_depth_is_open_as_far_as_its_best_known_joint_is():
     body, cov = standing(), np.tile(1e-4 * np.eye(6), (15, 1, 1))
-    assert open_depth(1, LAB[0], body, cov) == pytest.approx(0.01)
+    assert open_depth(1, EYES[0], body, cov) == pytest.approx(0.01)
     for j, std in ((3, 0.2), (5, 0.3)):  # an arm, along the camera's rays only
         ray = (body[j, :3] - EYES[0]) / np.linalg.norm(body[j, :3] - EYES[0])
         cov[j, :3, :3] += (std**2 - 1e-4) * np.outer(ray, ray)
-    assert open_depth(1, LAB[0], body, cov) == pytest.approx(0.2)
-    assert open_depth(3, LAB[0], body, cov) == pytest.approx(0.3)  # its forearm
-    assert open_depth(0, LAB[0], body, cov) == pytest.approx(0.01)  # the whole body
+    assert open_depth(1, EYES[0], body, cov) == pytest.approx(0.2)
+    assert open_depth(3, EYES[0], body, cov) == pytest.approx(0.3)  # its forearm
+    assert open_depth(0, EYES[0], body, cov) == pytest.approx(0.01)  # the whole body
 
 
 def test_the_trees_determinant_and_square_are_those_of_the_whole_matrix():

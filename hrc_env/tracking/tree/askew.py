@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from hrc_env.core.kernels import kernel
-from hrc_env.geometry.lines_of_sight import CAMERA, eye_of, look, model_cameras, nearest_places
+from hrc_env.geometry.lines_of_sight import CAMERA, look, model_cameras, nearest_places
 from hrc_env.geometry.triangulation import inverse3
 from hrc_env.tracking.tree.acquisition import WIDEST_STD_M, start_track
 from hrc_env.tracking.tree.gaussian import invert, multiply, multiply_transposed
@@ -38,40 +38,42 @@ many times the median have half their weight."""
 
 
 @kernel(makes_arrays=True)
-def check_pair_calibration(own, P, frame, s):
-    """Ask two cameras that alone see a worker whether they hang as is said, P (C, 3, 4); if not,
-    begin the track with them turned. Where a third one sees them, too, nothing is held against two:
-    a detector's errors of one kind look like a turn before long."""
+def check_pair_calibration(own, frame, s):
+    """Check whether two cameras that alone see a worker hang askew; then start with them turned.
+
+    Where a third one sees the worker, too, nothing is held against two: a detector's errors of one
+    kind look like a turn before long.
+    """
     tree, cameras = own.trees[0], np.zeros(2, np.int64)
     pair, n_views = tree.pair, count_views(frame, s.acquire_min_joints, cameras)
     if n_views == 2:
-        compare(tree, cameras, P, frame, s.acquire_min_joints)
+        compare(tree, cameras, frame, s.acquire_min_joints)
     elif n_views > 2:
         was_askew = pair.askew
         forget_turns(pair)
         if was_askew:
-            hang_as_known(pair, P, frame.P)
+            aim_cameras(pair, frame)
             start_track(own, frame, s)
     if not tree.tracked:
         pair.waited = pair.waited + 1 if n_views == 2 else max(pair.waited - 1, 0)
     if pair.askew:
         pair.askew = hang_askew(pair)
-    elif hang_askew(pair) and n_views == 2 and _may_be_turned(tree, P, s):
+    elif hang_askew(pair) and n_views == 2 and _may_be_turned(tree, frame.cameras, s):
         pair.askew = True
-        hang_as_known(pair, P, frame.P)
+        aim_cameras(pair, frame)
         pair.askew = start_track(own, frame, s)
     tree.displaced_m2[:] = 0.0
     if pair.askew and tree.tracked:
-        displacement(pair, P, tree.body, tree.displaced_m2)
+        displacement(pair, frame.cameras, tree.body, tree.displaced_m2)
 
 
 @kernel(makes_arrays=True)
-def _may_be_turned(tree, P, s):
+def _may_be_turned(tree, cameras, s):
     """Whether a track may begin with two cameras turned: where these leave open where a body is, as
     nearly opposite ones do, whoever is followed already is better off without."""
     if not tree.tracked:
         return tree.pair.waited > s.wait_updates
-    displacement(tree.pair, P, tree.body, tree.displaced_m2)
+    displacement(tree.pair, cameras, tree.body, tree.displaced_m2)
     return np.diag(tree.displaced_m2).max() < WIDEST_STD_M**2
 
 
@@ -90,15 +92,15 @@ def count_views(frame, least_joints, cameras):
 
 
 @kernel(makes_arrays=True)
-def compare(tree, cameras, P, frame, least_joints):
-    """Learn the turns of two cameras from what they show now; P (C, 3, 4) is without any."""
+def compare(tree, cameras, frame, least_joints):
+    """Learn the turns of two cameras, by number, from what they show now."""
     pair = tree.pair
     if pair.cameras[0] != cameras[0] or pair.cameras[1] != cameras[1]:
         forget_turns(pair)
         pair.cameras[0], pair.cameras[1] = cameras[0], cameras[1]
     n_joints = len(frame.ok)
     rows, gap, variance = np.empty((n_joints, 6)), np.empty(n_joints), np.empty(n_joints)
-    n = _gaps(tree, P, frame, rows, gap, variance)
+    n = _gaps(tree, frame, rows, gap, variance)
     if n < least_joints:
         return
     squares = gap[:n] ** 2 / variance[:n]
@@ -150,7 +152,7 @@ def hang_askew(pair):
 
 
 @kernel(makes_arrays=True)
-def _gaps(tree, P, frame, rows, gap, variance):
+def _gaps(tree, frame, rows, gap, variance):
     """Gaps of the joints [m] as the cameras are turned now, their slopes on the turns [m/rad] and
     variances [m^2]; how many joints both see.
 
@@ -161,7 +163,7 @@ def _gaps(tree, P, frame, rows, gap, variance):
     a, b = pair.cameras
     turned, cameras = np.empty((2, 3, 4)), np.empty(2, CAMERA)
     for k in range(2):
-        turn_camera(P[pair.cameras[k]], pair.turn[3 * k : 3 * k + 3], turned[k])
+        turn_camera(frame.cameras[pair.cameras[k]], pair.turn[3 * k : 3 * k + 3], turned[k])
     model_cameras(turned, cameras)
     one, other, middle, normal = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for j in range(len(frame.ok)):
@@ -207,23 +209,23 @@ def cross(a, b, out):
 
 @kernel(makes_arrays=True)
 def turn_camera(camera, turn, out):
-    """A camera (3, 4) turned about its centre: rows of its first three columns are turned."""
-    angle, eye, first, second = 1e-12, eye_of(camera), np.empty(3), np.empty(3)
+    """Write the projection (3, 4) of a record of `CAMERA` that is turned about its centre."""
+    P, angle, first, second = camera.P, 1e-12, np.empty(3), np.empty(3)
     for i in range(3):
         angle += turn[i] ** 2
     angle = math.sqrt(angle)
     sine, versine = math.sin(angle) / angle, (1.0 - math.cos(angle)) / angle**2
     for row in range(3):
-        cross(turn, camera[row, :3], first)
+        cross(turn, P[row, :3], first)
         cross(turn, first, second)
         out[row, 3] = 0.0
         for i in range(3):
-            out[row, i] = camera[row, i] + sine * first[i] + versine * second[i]
-            out[row, 3] -= out[row, i] * eye[i]
+            out[row, i] = P[row, i] + sine * first[i] + versine * second[i]
+            out[row, 3] -= out[row, i] * camera.eye[i]
 
 
 @kernel(makes_arrays=True)
-def displacement(pair, P, body, out):
+def displacement(pair, cameras, body, out):
     """How far off a body (J, 6) may be as a whole: covariance (3, 3) [m^2].
 
     The point that two cameras triangulate follows their turns w_c with the slope
@@ -236,7 +238,7 @@ def displacement(pair, P, body, out):
         for i in range(3):
             middle[i] += body[j, i] / len(body)
     for k in range(2):
-        line[k] = middle - eye_of(P[pair.cameras[k]])
+        line[k] = middle - cameras[pair.cameras[k]].eye
         squared = line[k, 0] ** 2 + line[k, 1] ** 2 + line[k, 2] ** 2
         for i in range(3):
             for m in range(3):
@@ -258,10 +260,11 @@ def displacement(pair, P, body, out):
 
 
 @kernel(makes_arrays=True)
-def hang_as_known(pair, P, out):
-    """Fill in the projections (C, 3, 4) as the cameras are thought to hang, for one worker."""
-    out[:] = P
+def aim_cameras(pair, frame):
+    """Write the projections frame.P as the cameras are believed to hang for one worker."""
+    for c in range(len(frame.P)):
+        frame.P[c] = frame.cameras[c].P
     if pair.askew:
         for k in range(2):
             c = pair.cameras[k]
-            turn_camera(P[c], pair.turn[3 * k : 3 * k + 3], out[c])
+            turn_camera(frame.cameras[c], pair.turn[3 * k : 3 * k + 3], frame.P[c])

@@ -20,8 +20,8 @@ from hrc_env.tracking.tree.acquisition import (
     start_track,
 )
 from hrc_env.tracking.tree.askew import (
+    aim_cameras,
     check_pair_calibration,
-    hang_as_known,
 )
 from hrc_env.tracking.tree.branching import branch, is_ambiguous
 from hrc_env.tracking.tree.evidence import (
@@ -109,21 +109,21 @@ def update_all(state, P, measured, s, noise, works, prior):
         prior: (1,) records of `TREE`: room for a hypothesis before its update.
     """
     state, s, noise = Hypotheses(*state), Settings(*s), NoiseModel(*noise)
-    frame, scratch = make_frame(P.copy()), (works[0], prior)
+    frame, scratch = make_frame(P), (works[0], prior)
     for b in range(state.n_alive.shape[0]):
         for w in range(state.n_alive.shape[1]):
             own, at = worker_slots(state, b, w), (b, w)
             frame.P[:] = P
             if own.trees[0].pair.askew:
-                hang_as_known(own.trees[0].pair, P, frame.P)
+                aim_cameras(own.trees[0].pair, frame)
             if own.trees[0].tracked:
-                _update_worker(own, P, measured, at, frame, s, noise, scratch)
+                _update_worker(own, measured, at, frame, s, noise, scratch)
             else:
-                _find_worker(own, P, measured, at, frame, s, scratch)
+                _find_worker(own, measured, at, frame, s, scratch)
 
 
 @kernel(makes_arrays=True)
-def _update_worker(own, P, measured, at, frame, s, noise, scratch):
+def _update_worker(own, measured, at, frame, s, noise, scratch):
     """Update the hypotheses about a worker who is tracked, and look for others if it is time."""
     tree = own.trees[0]
     if tree.size_std > 0.0:
@@ -142,7 +142,7 @@ def _update_worker(own, P, measured, at, frame, s, noise, scratch):
     if own.n_alive[0] > 1:
         prune_and_merge(own, s, scratch[0])
     measure_pace(own)
-    check_pair_calibration(own, P, frame, s)
+    check_pair_calibration(own, frame, s)
 
 
 @kernel(makes_arrays=True)
@@ -161,13 +161,13 @@ def _update_hypothesis(own, h, searches_now, frame, s, noise, scratch):
 
 
 @kernel(makes_arrays=True)
-def _find_worker(own, P, measured, at, frame, s, scratch):
+def _find_worker(own, measured, at, frame, s, scratch):
     """Begin a track of a worker whom nobody tracks, if the views allow it."""
     read_worker(measured, at[0], at[1], s.sigma_scale, frame)
     scale_sigma(own.noise[0], frame.sigma)
     agree_on_sides(frame, s)
     start_track(own, frame, s)
-    check_pair_calibration(own, P, frame, s)
+    check_pair_calibration(own, frame, s)
     if not own.trees[0].tracked:
         start_from_one_view(own, frame, s, scratch)
 

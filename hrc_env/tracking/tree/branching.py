@@ -19,7 +19,6 @@ import numpy as np
 from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import N_JOINTS, TORSO
 from hrc_env.core.typing import Bools
-from hrc_env.geometry.lines_of_sight import eye_of
 from hrc_env.tracking.tree.evidence import (
     anatomy,
     copy_slot,
@@ -79,7 +78,9 @@ def _find_lone_camera(part, tree, frame, s):
         return -1
     c = lone_camera(part, frame.ok)
     return (
-        c if c >= 0 and open_depth(part, frame.P[c], tree.body, tree.cov) > s.open_depth_m else -1
+        c
+        if c >= 0 and open_depth(part, frame.cameras[c].eye, tree.body, tree.cov) > s.open_depth_m
+        else -1
     )
 
 
@@ -100,7 +101,7 @@ def branch(own, prior, evidence, frame, s, work):
         penalty = np.inf
         if part == WHOLE_BODY:
             penalty = _try_turned_body(trees, n, camera, prior, frame, s, work)
-        elif reflect(part, frame.P[camera], trees[0].body, work.point):
+        elif reflect(part, frame.cameras[camera].eye, trees[0].body, work.point):
             penalty = _search_mode(trees, n, prior, evidence, frame, s, work)
         if penalty < np.inf:
             tree = trees[n]
@@ -114,12 +115,13 @@ def _try_turned_body(trees, n, camera, prior, frame, s, work):
     """Make tree n the body that is turned the other way; its penalty [nat], infinite if it is
     known."""
     new = trees[n]
-    turn = turn_of(frame.P[camera], prior.body)
+    eye = frame.cameras[camera].eye
+    turn = turn_of(eye, prior.body)
     penalty = 0.5 * (turn / s.turn_std_rad) ** 2
     if penalty > _MOST_PENALTY:
         return np.inf
     _restore_prediction(new, prior)
-    turn_body(frame.P[camera], turn, new.body, new.cov, new.slope)
+    turn_body(eye, turn, new.body, new.cov, new.slope)
     if _is_turned_alike(trees, n):
         return np.inf
     condition(new, frame, s, work)
@@ -200,11 +202,12 @@ def lone_camera(part, ok):
 
 
 @kernel(makes_arrays=True)
-def open_depth(part, camera, body, cov):
-    """How little is known of a part's depth from a camera (3, 4), for a body (J, 6), cov (J, 6, 6)
-    [m]: the least standard deviation along its ray of any joint of the part.
+def open_depth(part, eye, body, cov):
+    """Return the least standard deviation of a part's joints along their rays from `eye` (3,) [m].
+
+    `body` is (J, 6), `cov` (J, 6, 6).
     """
-    eye, ray, least = eye_of(camera), np.empty(3), np.inf
+    ray, least = np.empty(3), np.inf
     for j in range(len(body)):
         if not _MOVED[part, j]:
             continue
@@ -220,12 +223,12 @@ def open_depth(part, camera, body, cov):
 
 
 @kernel(makes_arrays=True)
-def reflect(part, camera, body, out):
-    """Positions (J, 3) of a body (J, 6) whose `part` is reflected along a camera's rays.
+def reflect(part, eye, body, out):
+    """Write positions (J, 3) of a body (J, 6) whose `part` is reflected along the rays from `eye`.
 
-    False where that would bring a joint to the camera or behind it.
+    Returns False where that would bring a joint to the camera or behind it.
     """
-    eye, middle, n = eye_of(camera), np.zeros(3), 0
+    middle, n = np.zeros(3), 0
     for j in range(len(body)):
         for i in range(3):
             out[j, i] = body[j, i]
@@ -247,13 +250,13 @@ def reflect(part, camera, body, out):
     return True
 
 
-@kernel(makes_arrays=True)
-def turn_of(camera, body):
-    """By how much [rad] the other body of `body` (J, 6) is turned; 0 if that is not known."""
+@kernel
+def turn_of(eye, body):
+    """Return the angle [rad] between a body (J, 6) and the other one from `eye`; 0 if unknown."""
     cos, sin, known = heading(body)
     if not known:
         return 0.0
-    eye, x, y = eye_of(camera), 0.0, 0.0
+    x, y = 0.0, 0.0
     for j in _TORSO:
         x += 0.25 * body[j, 0]
         y += 0.25 * body[j, 1]
@@ -271,7 +274,7 @@ def heads_like(one, other):
 
 
 @kernel(makes_arrays=True)
-def turn_body(camera, turn, body, cov, slope):
+def turn_body(eye, turn, body, cov, slope):
     """Make a Gaussian (J, 6), (J, 6, 6), (J, 6, 6) the other body's, in place."""
     middle, across, speed = np.zeros(6), np.zeros(2), np.zeros(2)
     for j in _TORSO:
@@ -292,7 +295,7 @@ def turn_body(camera, turn, body, cov, slope):
         x, y = body[j, 0] - middle[0], body[j, 1] - middle[1]
         body[j, 3] = middle[3] + cos * vx - sin * vy + rate * y
         body[j, 4] = middle[4] + sin * vx + cos * vy - rate * x
-    eye, mirror = eye_of(camera), np.eye(3)
+    mirror = np.eye(3)
     ray = middle[:3] - eye
     ray /= math.sqrt(ray[0] ** 2 + ray[1] ** 2 + ray[2] ** 2)
     for i in range(3):

@@ -9,7 +9,6 @@ import math
 import numpy as np
 
 from hrc_env.core.kernels import kernel
-from hrc_env.geometry.lines_of_sight import eye_of
 from hrc_env.geometry.triangulation import linear_point
 from hrc_env.tracking.tree.askew import count_views
 from hrc_env.tracking.tree.evidence import (
@@ -70,7 +69,7 @@ def begin_from_one(own, camera, frame, s, scratch):
         own.views[0].blind[:] = _BLIND
         own.views[0, camera].blind = 0
         if s.stands_std_m > 0.0:
-            _measure_size(tree, eye_of(frame.P[camera]), s)
+            _measure_size(tree, frame.cameras[camera].eye, s)
 
 
 @kernel(makes_arrays=True)
@@ -87,7 +86,7 @@ def _stand(tree, frame, camera, angle):
         views[j, :, 3] += P[:, 0] * x + P[:, 1] * y + P[:, 2] * up
     if not linear_point(views, frame.z[:, camera], frame.ok[:, camera], place):
         return False
-    along = _DEPTH_SHARE * (place - eye_of(P))
+    along = _DEPTH_SHARE * (place - frame.cameras[camera].eye)
     for j in ORDER:
         q, cov = PARENT[j], tree.cov[j]
         tree.body[j, :3] += place
