@@ -122,7 +122,7 @@ def update_all(state, P, measured, s, noise, works, prior):
                 _find_worker(own, measured, at, frame, s, scratch)
 
 
-@kernel(makes_arrays=True)
+@kernel
 def _update_worker(own, measured, at, frame, s, noise, scratch):
     """Update the hypotheses about a worker who is tracked, and look for others if it is time."""
     tree = own.trees[0]
@@ -145,7 +145,7 @@ def _update_worker(own, measured, at, frame, s, noise, scratch):
     check_pair_calibration(own, frame, s)
 
 
-@kernel(makes_arrays=True)
+@kernel
 def _update_hypothesis(own, h, searches_now, frame, s, noise, scratch):
     """Update one hypothesis by its measurements, and weigh it if there are or may be others."""
     work, prior = scratch
@@ -160,7 +160,7 @@ def _update_hypothesis(own, h, searches_now, frame, s, noise, scratch):
     recover(tree, frame, s, work)
 
 
-@kernel(makes_arrays=True)
+@kernel
 def _find_worker(own, measured, at, frame, s, scratch):
     """Begin a track of a worker whom nobody tracks, if the views allow it."""
     read_worker(measured, at[0], at[1], s.sigma_scale, frame)

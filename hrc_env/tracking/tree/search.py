@@ -58,7 +58,7 @@ def find_pose_near(tree, frame, s, n_steps, widen, w):
     set_views(frame)
     for step in range(n_steps + 1):
         widening = widen if step < n_steps - 1 else 0.0
-        _linearise_cameras(frame, s.inlier_odds, widening, w)
+        _linearise_cameras(frame, s.inlier_odds, widening, step == n_steps, w)
         _stand_on_the_floor(body, 1.0 / s.floor_std_m**2, w)
         _linearise_bones(tree.bone_length, w)
         _add_second_bone(cov, tree.bone_length, w)
@@ -99,17 +99,19 @@ def _position_prior(j, cov, w):
 
 
 @kernel
-def _linearise_cameras(frame, inlier_odds, widening, w):
-    """Information and gradient of what the cameras say, at the points."""
+def _linearise_cameras(frame, inlier_odds, widening, keep, w):
+    """Write the cameras' information and gradient at the points; `keep` their images."""
     points, sums, belief = w.points, w.sums, frame.belief
     for j in range(len(belief)):
         for i in range(3):
             points[i, j] = w.point[j, i]
     sums[:] = 0.0
     for c in range(len(frame.P)):
-        add_view(frame.P[c], points, frame.views[c], widening, inlier_odds, frame.images[c], sums)
+        add_view(frame.P[c], points, frame.views[c], widening, inlier_odds, w.image, sums)
         for j in range(len(belief)):
-            belief[j, c] = frame.images[c, BELIEF, j]
+            belief[j, c] = w.image[BELIEF, j]
+        if keep:
+            _keep_image(w.image, frame.images[c])
     for j in range(len(belief)):
         h, shift = w.camera_information[j], w.shift[j]
         h[0, 0], h[1, 1], h[2, 2] = sums[0, j], sums[1, j], sums[2, j]
@@ -119,6 +121,14 @@ def _linearise_cameras(frame, inlier_odds, widening, w):
         for i in range(3):
             back = h[i, 0] * shift[0] + h[i, 1] * shift[1] + h[i, 2] * shift[2]
             w.camera_gradient[j, i] = sums[6 + i, j] + back
+
+
+@kernel
+def _keep_image(image, out):
+    """Copy Jacobians, residuals and depths of a camera out of the scratch."""
+    for row in range(A0, N_IMAGE):
+        for j in range(LANES):
+            out[row, j] = image[row, j]
 
 
 @kernel

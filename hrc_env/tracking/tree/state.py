@@ -146,7 +146,8 @@ WORK = np.dtype(
         # the same of the bones', of x_j - x_parent; of no meaning at the root
         ("edge_information", "f8", (_J, 3, 3)), ("edge_gradient", "f8", (_J, 3)),
         # as in `search`
-        ("points", "f8", (N_POINT, LANES)), ("sums", "f8", (N_SUM, LANES)),
+        ("points", "f8", (N_POINT, LANES)), ("image", "f8", (N_IMAGE, LANES)),
+        ("sums", "f8", (N_SUM, LANES)),
         # for `learning`: where the cameras see a joint together, how lasting errors add up
         ("spread", "f8", (3, 4)), ("grows", "f8", (_J,)),
         # cameras that measured a joint; variances of the bones' lengths as measurements [m^2]

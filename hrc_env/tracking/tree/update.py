@@ -38,7 +38,7 @@ _NEAREST_M = 0.3
 _REORDER = {"reassoc", "contract", "nsz"}
 
 
-@kernel(makes_arrays=True)
+@kernel
 def condition_on_frame(tree, prior, weigh, frame, s, work):
     """Condition a predicted tree on a frame; return its log-evidence, 0 if not to `weigh` it.
 
@@ -54,7 +54,7 @@ def condition_on_frame(tree, prior, weigh, frame, s, work):
     return evidence
 
 
-@kernel(makes_arrays=True)
+@kernel
 def condition(tree, frame, s, work):
     """Search the mode and condition the tree there; frame.belief says which pixels it believes.
 
