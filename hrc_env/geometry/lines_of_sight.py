@@ -5,7 +5,6 @@ import math
 import numpy as np
 
 from hrc_env.core.kernels import kernel
-from hrc_env.geometry.triangulation import inverse3
 
 MIN_CROSSING = 0.1
 """Sine of the smallest angle between two lines that fixes a point."""
@@ -68,22 +67,3 @@ def look(back, u, v, ray):
         length += ray[i] * ray[i]
     for i in range(3):
         ray[i] /= math.sqrt(length)
-
-
-@kernel(makes_arrays=True)
-def eye_of(camera):
-    """Optical centre (3,) of a projection (3, 4)."""
-    inverse, eye = np.empty((3, 3)), np.zeros(3)
-    a, b = camera[:, :3], camera[:, 3]
-    normal = np.zeros((3, 3))
-    right = np.zeros(3)
-    for i in range(3):
-        for k in range(3):
-            right[i] -= a[k, i] * b[k]
-            for m in range(3):
-                normal[i, k] += a[m, i] * a[m, k]
-    inverse3(normal, inverse)
-    for i in range(3):
-        for k in range(3):
-            eye[i] += inverse[i, k] * right[k]
-    return eye

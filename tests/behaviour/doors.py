@@ -1459,8 +1459,8 @@ def lines_of_sight(
             lines.look(rig[c]["back"], views[c, 0], views[c, 1], ray[c])
         found = lines.nearest_places(rig[0]["eye"], ray[0], rig[1]["eye"], ray[1], middle)
         passing.append([*ray.ravel(), *found, *middle])
-    eyes = np.stack([lines.eye_of(camera) for camera in P])
-    return {"eyes": np.column_stack([eyes, rig["eye"], rig["focal"]]), "passing": np.array(passing)}
+    eyes = np.column_stack([rig["eye"], rig["eye"], rig["focal"]])
+    return {"eyes": eyes, "passing": np.array(passing)}
 
 
 def assign(cost: NDArray[np.float64]) -> NDArray[np.int64]:

@@ -10,13 +10,7 @@ from hrc_env.geometry.cameras import pinhole, project, projections
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.tracking.measurements import make_frame
 from hrc_env.tracking.smoother import smooth
-from hrc_env.tracking.tree.askew import (
-    TURN_STD_RAD,
-    _gaps,
-    aim_cameras,
-    displacement,
-    turn_camera,
-)
+from hrc_env.tracking.tree.askew import TURN_STD_RAD, _gaps, aim_cameras, displacement, turn_camera
 from hrc_env.tracking.tree.state import PAIR, TREE
 
 TWO = LAB[:2]

@@ -1,1 +1,1 @@
-"""A whole body as one Gaussian on the kinematic tree."""
+"""The default estimator by stage: a body is a Gaussian on its kinematic tree, or several."""

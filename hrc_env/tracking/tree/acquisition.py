@@ -15,13 +15,8 @@ import numpy as np
 from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import MIRROR
 from hrc_env.geometry.triangulation import consensus_point, linear_point, misfit
-from hrc_env.tracking.measurements import (
-    mirror,
-)
-from hrc_env.tracking.tree.evidence import (
-    anatomy,
-    find_heading,
-)
+from hrc_env.tracking.measurements import mirror
+from hrc_env.tracking.tree.evidence import anatomy, find_heading
 from hrc_env.tracking.tree.gaussian import PARENT, is_positive_definite
 from hrc_env.tracking.tree.report import forget_pace
 from hrc_env.tracking.tree.state import STANDING_M

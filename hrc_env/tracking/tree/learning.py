@@ -25,9 +25,7 @@ import numpy as np
 from hrc_env.core.kernels import kernel
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, inverse3
 from hrc_env.tracking.config import ParticleConfig
-from hrc_env.tracking.tree.gaussian import (
-    PARENT,
-)
+from hrc_env.tracking.tree.gaussian import PARENT
 from hrc_env.tracking.tree.state import EDGE_STIFFNESS_M
 
 _TURNS = 2

@@ -11,10 +11,7 @@ import numpy as np
 from hrc_env.core.kernels import kernel
 from hrc_env.geometry.triangulation import linear_point
 from hrc_env.tracking.tree.askew import count_views
-from hrc_env.tracking.tree.evidence import (
-    anatomy,
-    log_evidence,
-)
+from hrc_env.tracking.tree.evidence import anatomy, log_evidence
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT
 from hrc_env.tracking.tree.learning import learn_lengths
 from hrc_env.tracking.tree.predict import SPEED_M_S
