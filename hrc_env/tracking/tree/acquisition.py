@@ -64,13 +64,6 @@ def acquire(tree, frame, s):
 
 
 @kernel(makes_arrays=True)
-def restart_body(tree, frame, s):
-    """Put a body where two views agree on it, if they do."""
-    if acquire(tree, frame, s):
-        tree.slope[:] = 0.0
-
-
-@kernel(makes_arrays=True)
 def place(body, cov, point, spread):
     """Put a joint at rest at a point."""
     body[:3], body[3:] = point, 0.0

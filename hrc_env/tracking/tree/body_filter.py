@@ -13,7 +13,7 @@ from hrc_env.core.kernels import kernel
 from hrc_env.tracking.measurements import make_frame, read_for_hypothesis, read_worker, scale_sigma
 from hrc_env.tracking.settings import Settings
 from hrc_env.tracking.tracks import age_worker, count_up
-from hrc_env.tracking.tree.acquisition import agree_on_sides, recover, restart_body, start_track
+from hrc_env.tracking.tree.acquisition import acquire, agree_on_sides, recover, start_track
 from hrc_env.tracking.tree.askew import aim_cameras, check_pair_calibration
 from hrc_env.tracking.tree.branching import branch, is_ambiguous
 from hrc_env.tracking.tree.evidence import heading, normalise, prune_and_merge, weigh_pose
@@ -49,58 +49,46 @@ def update_all(state, P, measured, s, noise, works, prior):
                 aim_cameras(own.trees[0].pair, frame)
             if own.trees[0].tracked:
                 _update_worker(own, measured, at, frame, s, noise, scratch)
-            else:
-                _find_worker(own, measured, at, frame, s, scratch)
-
-
-@kernel
-def _find_worker(own, measured, at, frame, s, scratch):
-    """Begin the track of a worker who has none, from views that agree or from one that waited."""
-    read_worker(measured, at[0], at[1], s.sigma_scale, frame)
-    scale_sigma(own.noise[0], frame.sigma)
-    agree_on_sides(frame, s)
-    start_track(own, frame, s)
-    check_pair_calibration(own, frame, s)
-    if not own.trees[0].tracked:
-        start_from_one_view(own, frame, s, scratch)
+                continue
+            read_worker(measured, b, w, s.sigma_scale, frame)
+            scale_sigma(own.noise[0], frame.sigma)
+            agree_on_sides(frame, s)
+            start_track(own, frame, s)
+            check_pair_calibration(own, frame, s)
+            if not own.trees[0].tracked:
+                start_from_one_view(own, frame, s, scratch)
 
 
 @kernel
 def _update_worker(own, measured, at, frame, s, noise, scratch):
     """Update the hypotheses about a worker who is tracked, and look for others if it is time."""
-    tree = own.trees[0]
-    if tree.size_std > 0.0:
+    work, prior = scratch
+    if own.trees[0].size_std > 0.0:
         read_worker(measured, at[0], at[1], s.sigma_scale, frame)
         if start_track(own, frame, s):
             return
     searches_now = len(own.trees) > 1 and own.waited_s[0] >= s.look_every_s
     if searches_now:
         read_worker(measured, at[0], at[1], s.sigma_scale, frame)
-        searches_now = is_ambiguous(tree, frame, s)
+        searches_now = is_ambiguous(own.trees[0], frame, s)
     for h in range(own.n_alive[0]):
-        learnt = own.noise[h]
-        if read_for_hypothesis(own.trees[h], own.views[h], learnt, measured, at, s, frame):
-            restart_body(own.trees[h], frame, s)
-        _update_hypothesis(own, h, searches_now and h == 0, frame, s, noise, scratch)
+        tree, learnt, several = own.trees[h], own.noise[h], own.n_alive[0] > 1
+        branches = searches_now and h == 0
+        mirrored = read_for_hypothesis(tree, own.views[h], learnt, measured, at, s, frame)
+        if mirrored and acquire(tree, frame, s):
+            tree.slope[:] = 0.0
+        evidence = condition_on_frame(tree, prior, several or branches, frame, s, work)
+        if several or branches:
+            weigh_pose(tree, several, s.evidence_trust * evidence, s)
+        learn_from_frame(frame, tree, learnt, noise, work)
+        if branches:
+            own.waited_s[0] = 0.0
+            branch(own, prior, evidence, frame, s, work)
+        recover(tree, frame, s, work)
     if own.n_alive[0] > 1:
-        prune_and_merge(own, s, scratch[0])
+        prune_and_merge(own, s, work)
     measure_pace(own)
     check_pair_calibration(own, frame, s)
-
-
-@kernel
-def _update_hypothesis(own, h, searches_now, frame, s, noise, scratch):
-    """Update one hypothesis by its measurements, and weigh it if there are or may be others."""
-    work, prior = scratch
-    tree, several = own.trees[h], own.n_alive[0] > 1
-    evidence = condition_on_frame(tree, prior, several or searches_now, frame, s, work)
-    if several or searches_now:
-        weigh_pose(tree, several, s.evidence_trust * evidence, s)
-    learn_from_frame(frame, tree, own.noise[h], noise, work)
-    if searches_now:
-        own.waited_s[0] = 0.0
-        branch(own, prior[0], evidence, frame, s, work)
-    recover(tree, frame, s, work)
 
 
 @kernel(makes_arrays=True)

@@ -29,7 +29,7 @@ from hrc_env.tracking.tree.evidence import (
 from hrc_env.tracking.tree.gaussian import multiply
 from hrc_env.tracking.tree.learning import learn_lengths
 from hrc_env.tracking.tree.search import find_pose_near, stiff_lengths
-from hrc_env.tracking.tree.update import condition, correct_mean, update_tree
+from hrc_env.tracking.tree.update import condition_on_frame, correct_mean, update_tree
 
 _LOG_LEAST_EVIDENCE = math.log(0.01)
 """A limb's other mode with less evidence than this beside the known one's is none."""
@@ -77,24 +77,22 @@ def _find_lone_camera(part, tree, frame, s):
     if not (s.mirrors_body if part == WHOLE_BODY else s.mirrors_limbs):
         return -1
     c = lone_camera(part, frame.ok)
-    return (
-        c
-        if c >= 0 and open_depth(part, frame.cameras[c].eye, tree.body, tree.cov) > s.open_depth_m
-        else -1
-    )
+    if c < 0 or not open_depth(part, frame.cameras[c].eye, tree.body, tree.cov) > s.open_depth_m:
+        return -1
+    return c
 
 
 @kernel(makes_arrays=True)
 def branch(own, prior, evidence, frame, s, work):
     """Look for other bodies beside the heaviest hypothesis, and keep them as hypotheses.
 
-    `own` are a worker's `Hypotheses`, of which the first has been updated: `prior` is what it
-    was before, `evidence` the update's log-evidence.
+    `own` are a worker's `Hypotheses`, of which the first has been updated: `prior` (1,) is what
+    it was before, `evidence` the update's log-evidence.
     """
     trees = own.trees
     for part in range(N_MIRRORS):
         n = own.n_alive[0]
-        camera = _find_lone_camera(part, prior, frame, s) if n < len(trees) else -1
+        camera = _find_lone_camera(part, prior[0], frame, s) if n < len(trees) else -1
         if camera < 0:
             continue
         copy_slot(own, 0, n)
@@ -102,7 +100,7 @@ def branch(own, prior, evidence, frame, s, work):
         if part == WHOLE_BODY:
             penalty = _try_turned_body(trees, n, camera, prior, frame, s, work)
         elif reflect(part, frame.cameras[camera].eye, trees[0].body, work.point):
-            penalty = _search_mode(trees, n, prior, evidence, frame, s, work)
+            penalty = _search_mode(trees, n, prior[0], evidence, frame, s, work)
         if penalty < np.inf:
             tree = trees[n]
             before, tree.pose_log_prior = tree.pose_log_prior, s.anatomy_trust * anatomy(tree.body)
@@ -116,16 +114,15 @@ def _try_turned_body(trees, n, camera, prior, frame, s, work):
     known."""
     new = trees[n]
     eye = frame.cameras[camera].eye
-    turn = turn_of(eye, prior.body)
+    turn = turn_of(eye, prior[0].body)
     penalty = 0.5 * (turn / s.turn_std_rad) ** 2
     if penalty > _MOST_PENALTY:
         return np.inf
-    _restore_prediction(new, prior)
+    _restore_prediction(new, prior[0])
     turn_body(eye, turn, new.body, new.cov, new.slope)
     if _is_turned_alike(trees, n):
         return np.inf
-    condition(new, frame, s, work)
-    correct_mean(new, frame, s, work)
+    condition_on_frame(new, prior, False, frame, s, work)
     learn_lengths(new, work.n_views)
     return np.inf if _is_turned_alike(trees, n) else penalty
 

@@ -42,24 +42,12 @@ _REORDER = {"reassoc", "contract", "nsz"}
 def condition_on_frame(tree, prior, weigh, frame, s, work):
     """Condition a predicted tree on a frame; return its log-evidence, 0 if not to `weigh` it.
 
-    `prior` (1,) then holds the prediction.
+    `prior` (1,) then holds the prediction. frame.belief says which pixels are believed; the
+    predicted covariances of the positions stay in work.predicted.
     """
+    evidence = 0.0
     if weigh:
         prior[0] = tree
-    condition(tree, frame, s, work)
-    evidence = 0.0
-    if weigh:  # the mean correction needs the factors that the evidence leaves alone
-        evidence = log_evidence(prior[0], tree, frame, s, work)
-    correct_mean(tree, frame, s, work)
-    return evidence
-
-
-@kernel
-def condition(tree, frame, s, work):
-    """Search the mode and condition the tree there; frame.belief says which pixels it believes.
-
-    Keeps the predicted covariances of the positions in work.predicted.
-    """
     for j in range(len(tree.cov)):
         for i in range(3):
             for k in range(3):
@@ -68,6 +56,10 @@ def condition(tree, frame, s, work):
     if widen_jumped(tree, frame, s, work):
         find_pose(tree, frame, s, work)
     update_tree(tree, work)
+    if weigh:  # the mean correction needs the factors that the evidence leaves alone
+        evidence = log_evidence(prior[0], tree, frame, s, work)
+    correct_mean(tree, frame, s, work)
+    return evidence
 
 
 @kernel(makes_arrays=True)
