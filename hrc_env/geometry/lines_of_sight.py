@@ -1,10 +1,12 @@
 """Lines of sight: cameras as centres that look along rays, and where two rays pass each other."""
 
 import math
+from typing import Any
 
 import numpy as np
 
 from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 
 MIN_CROSSING = 0.1
 """Sine of the smallest angle between two lines that fixes a point."""
@@ -18,24 +20,37 @@ CAMERA = np.dtype(
 """A camera of the rig."""
 
 
-@kernel(makes_arrays=True)
+def cameras_of(P: Floats) -> Any:
+    """Return the cameras (C,) of projections P (C, 3, 4) as records of `CAMERA`."""
+    cameras = np.empty(len(P), CAMERA)
+    model_cameras(np.ascontiguousarray(P, np.float64), cameras)
+    return cameras
+
+
+@kernel
 def model_cameras(P, cameras):
     """Fill cameras (C,) in from their projections P (C, 3, 4)."""
     for c in range(len(P)):
-        a, inverse = P[c, :, :3].copy(), cameras[c].back
+        a, camera, inverse = P[c], cameras[c], cameras[c].back
         for i in range(3):
             k, m = (i + 1) % 3, (i + 2) % 3
             for n in range(3):
                 p, q = (n + 1) % 3, (n + 2) % 3
                 inverse[n, i] = a[k, p] * a[m, q] - a[k, q] * a[m, p]
-        inverse /= a[0, 0] * inverse[0, 0] + a[0, 1] * inverse[1, 0] + a[0, 2] * inverse[2, 0]
+        determinant = a[0, 0] * inverse[0, 0] + a[0, 1] * inverse[1, 0] + a[0, 2] * inverse[2, 0]
+        along = squared = 0.0
         for i in range(3):
-            cameras[c].eye[i] = -(
-                inverse[i, 0] * P[c, 0, 3] + inverse[i, 1] * P[c, 1, 3] + inverse[i, 2] * P[c, 2, 3]
+            for n in range(3):
+                inverse[i, n] /= determinant
+            along += a[0, i] * a[2, i]
+            squared += a[0, i] * a[0, i]
+        camera.focal = math.sqrt(max(squared - along * along, 1e-12))
+        for i in range(3):
+            camera.eye[i] = -(
+                inverse[i, 0] * a[0, 3] + inverse[i, 1] * a[1, 3] + inverse[i, 2] * a[2, 3]
             )
-        along = (a[0] * a[2]).sum()
-        cameras[c].focal = math.sqrt(max((a[0] * a[0]).sum() - along * along, 1e-12))
-        cameras[c].P[:] = P[c]
+            for k in range(4):
+                camera.P[i, k] = a[i, k]
 
 
 @kernel(makes_arrays=True)

@@ -20,7 +20,6 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Keypoints
 from hrc_env.core.skeleton import MIRROR, N_JOINTS
 from hrc_env.core.typing import Bools, Floats
-from hrc_env.geometry.lines_of_sight import CAMERA, model_cameras
 from hrc_env.geometry.triangulation import FURTHEST_PX, NEAREST_DEPTH_M
 from hrc_env.tracking.tree.state import LANES, N_IMAGE, N_VIEW
 
@@ -84,14 +83,12 @@ class Frame(NamedTuple):
 
 
 @kernel(makes_arrays=True)
-def make_frame(P):
-    """Room for the measurements of one worker."""
-    n = len(P)
-    cameras = np.empty(n, CAMERA)
-    model_cameras(P, cameras)
+def make_frame(cameras):
+    """Return room for the measurements of one worker by `cameras`, (C,) records of `CAMERA`."""
+    n = len(cameras)
     return Frame(
         cameras=cameras,
-        P=P.copy(),
+        P=cameras.P.copy(),
         z=np.empty((N_JOINTS, n, 2)),
         sigma=np.empty((N_JOINTS, n)),
         ok=np.empty((N_JOINTS, n), np.bool_),

@@ -28,6 +28,7 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Floats, Ints, Rngs
+from hrc_env.geometry.lines_of_sight import cameras_of
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
 from hrc_env.tracking.config import PaperConfig
 from hrc_env.tracking.forecast import forecast
@@ -93,7 +94,7 @@ class PaperEstimator:
         """Lines 8 to 17."""
         batch, n_workers = state.tracks.shape
         measured = arrays_of(keypoints, (batch, len(self.P), n_workers, N_JOINTS))
-        frame = make_frame(self.P)
+        frame = make_frame(cameras_of(self.P))
         for b, w in np.ndindex(state.tracks.shape):
             read_worker(measured, b, w, self.config.sigma_scale, frame)
             self.take(state, (b, w), frame, rngs[b])

@@ -15,6 +15,7 @@ import numpy as np
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Ints, Rngs
+from hrc_env.geometry.lines_of_sight import cameras_of
 from hrc_env.tracking.config import ParticleConfig
 from hrc_env.tracking.forecast import forecast, mixed
 from hrc_env.tracking.measurements import arrays_of
@@ -34,12 +35,15 @@ class ParticleEstimator:
     P: Floats
     ctrl_dt: float
     config: ParticleConfig
+    cameras: Any = field(init=False, repr=False)
+    """(C,) records of `lines_of_sight.CAMERA`, of the projections `P`."""
     settings: tuple[Any, ...] = field(init=False, repr=False)
     noise: tuple[Any, ...] = field(init=False, repr=False)
     """`settings.Settings` and `learning.NoiseModel` as kernels take them."""
 
     def __post_init__(self) -> None:
         """Make what the kernels take."""
+        object.__setattr__(self, "cameras", cameras_of(self.P))
         object.__setattr__(self, "settings", tuple(settings_of(self.config)))
         object.__setattr__(self, "noise", tuple(noise_model(self.config, self.ctrl_dt)))
 
@@ -74,7 +78,7 @@ class ParticleEstimator:
         measured = arrays_of(keypoints, (batch, len(self.P), n_workers, N_JOINTS))
         constants = (self.settings, self.noise)
         scratch = np.empty(1, WORK), np.empty(1, TREE)
-        update_all(tuple(state), self.P, measured, *constants, *scratch)
+        update_all(tuple(state), self.cameras, measured, *constants, *scratch)
 
     def estimate(self, state: Hypotheses) -> PoseEstimate:
         """Mean and covariance of the mixture; ages are the heaviest hypothesis's."""

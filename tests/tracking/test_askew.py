@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 from simulated import DT, HARD, LAB, Damage, detections, generators, keypoints, track, walk
 
 from hrc_env.geometry.cameras import pinhole, project, projections
+from hrc_env.geometry.lines_of_sight import cameras_of
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.tracking.measurements import make_frame
 from hrc_env.tracking.smoother import smooth
@@ -72,7 +73,7 @@ def pairs(state):
 
 def test_a_camera_is_turned_as_by_a_rotation_of_its_rays():
     out = np.empty((3, 4))
-    turn_camera(make_frame(LAB).cameras[1], TILTED, out)
+    turn_camera(cameras_of(LAB)[1], TILTED, out)
     np.testing.assert_allclose(out, turned(LAB[1], TILTED), atol=1e-6)
 
 
@@ -171,7 +172,7 @@ def test_who_is_followed_is_reported_as_wide_as_the_turns_are_unknown_and_smooth
 
 def measured(joints, P):
     """`Frame` of one body (J, 3) without any noise."""
-    frame = make_frame(np.ascontiguousarray(P))
+    frame = make_frame(cameras_of(P))
     frame.z[:] = project(P, joints[None])[0][0].swapaxes(0, 1)
     frame.sigma[:], frame.ok[:] = 3.0, True
     return frame
@@ -199,7 +200,7 @@ def test_slopes_of_the_gaps_are_their_derivatives():
 def test_displacement_is_the_spread_of_bodies_triangulated_with_turned_cameras():
     joints, pair, out = walk(1, 1)[0], np.zeros(1, PAIR), np.empty((3, 3))
     pair["cameras"], pair["turn_cov"] = (0, 1), (0.1 * TURN_STD_RAD) ** 2 * np.eye(6)
-    displacement(pair[0], make_frame(TWO).cameras, np.column_stack([joints, 0 * joints]), out)
+    displacement(pair[0], cameras_of(TWO), np.column_stack([joints, 0 * joints]), out)
     middle, rng, places = joints.mean(0), np.random.default_rng(0), []
     eyes = [-np.linalg.solve(p[:, :3], p[:, 3]) for p in TWO]
     for turn in rng.normal(0.0, 0.1 * TURN_STD_RAD, (4000, 2, 3)):
@@ -213,7 +214,7 @@ def test_displacement_is_the_spread_of_bodies_triangulated_with_turned_cameras()
 
 
 def test_nothing_is_turned_that_does_not_hang_askew():
-    pair, frame = np.zeros(1, PAIR), make_frame(LAB)
+    pair, frame = np.zeros(1, PAIR), make_frame(cameras_of(LAB))
     pair["cameras"], pair["turn"] = (0, 1), 0.05
     aim_cameras(pair[0], frame)
     np.testing.assert_array_equal(frame.P, LAB)

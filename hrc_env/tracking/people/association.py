@@ -19,7 +19,7 @@ from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.geometry.assignment import assign_rows
-from hrc_env.geometry.lines_of_sight import CAMERA, model_cameras
+from hrc_env.geometry.lines_of_sight import cameras_of
 from hrc_env.tracking.measurements import arrays_of, is_measurement
 from hrc_env.tracking.people.affinity import LEAST_JOINTS, POSE, affinity, expect
 from hrc_env.tracking.people.track_initiation import (
@@ -98,8 +98,7 @@ def associate(
         np.ascontiguousarray(predicted.cov_world, np.float64),
         np.ascontiguousarray(predicted.tracked),
     )
-    cameras, poses = np.empty(len(P), CAMERA), np.empty((len(P), n_poses), POSE)
-    model_cameras(P, cameras)
+    cameras, poses = cameras_of(P), np.empty((len(P), n_poses), POSE)
     sorted_into = (keypoints.px, keypoints.confidence, keypoints.sigma_px)
     _associate_all(cameras, poses, measured, belief, settings, pose, sorted_into)
     return Association(keypoints, pose)

@@ -28,23 +28,23 @@ _TORSO = (1, 2, 7, 8)
 
 
 @kernel(makes_arrays=True)
-def update_all(state, P, measured, s, noise, works, prior):
+def update_all(state, cameras, measured, s, noise, works, prior):
     """Update every worker's hypotheses by one set of frames.
 
     Args:
         state: plain tuple of `Hypotheses`, which are changed in place.
-        P: (C, 3, 4) projections of the rig.
+        cameras: (C,) records of `lines_of_sight.CAMERA`, as the rig has them.
         measured: pixels, confidence and sigma of all workers, as `arrays_of` makes them.
         s, noise: plain tuples of `Settings` and of `learning.NoiseModel`.
         works: (1,) scratch, records of `WORK`.
         prior: (1,) records of `TREE`: room for a hypothesis before its update.
     """
     state, s, noise = Hypotheses(*state), Settings(*s), NoiseModel(*noise)
-    frame, scratch = make_frame(P), (works[0], prior)
+    frame, scratch = make_frame(cameras), (works[0], prior)
     for b in range(state.n_alive.shape[0]):
         for w in range(state.n_alive.shape[1]):
             own, at = worker_slots(state, b, w), (b, w)
-            frame.P[:] = P
+            _hang_as_rigged(frame)
             if own.trees[0].pair.askew:
                 aim_cameras(own.trees[0].pair, frame)
             if own.trees[0].tracked:
@@ -57,6 +57,15 @@ def update_all(state, P, measured, s, noise, works, prior):
             check_pair_calibration(own, frame, s)
             if not own.trees[0].tracked:
                 start_from_one_view(own, frame, s, scratch)
+
+
+@kernel
+def _hang_as_rigged(frame):
+    """Write the projections frame.P of the cameras as the rig has them."""
+    for c in range(len(frame.P)):
+        for i in range(3):
+            for k in range(4):
+                frame.P[c, i, k] = frame.cameras[c].P[i, k]
 
 
 @kernel
