@@ -10,7 +10,13 @@ from hrc_env.core.errors import ConfigError, check_fields, check_names
 
 @dataclass(frozen=True, slots=True)
 class TrackerConfig:
-    """How workers are acquired, lost and reported, whatever the estimator."""
+    """How workers are acquired, lost and reported, whatever the estimator.
+
+    Positions are in the world, +Z up. `dataclasses.replace` makes a copy with other values.
+
+    Raises:
+        ConfigError: a value is out of its range; the error names the field and the range.
+    """
 
     prior_mean_world: tuple[float, float, float] = (1.3, 0.0, 1.0)
     """Where a worker is thought to be when nothing was seen [m]: the working area's centre."""
@@ -56,7 +62,14 @@ class TrackerConfig:
 
 @dataclass(frozen=True, slots=True)
 class ParticleConfig(TrackerConfig):
-    """The default estimator: hypotheses about what is discrete, each with a Gaussian."""
+    """The default estimator: hypotheses about what is discrete, each with a Gaussian.
+
+    A Rao-Blackwellised particle filter (Doucet, de Freitas, Murphy and Russell, UAI 2000); the
+    mathematics, with the symbols that these settings stand for, is in docs/tracking.md.
+
+    Raises:
+        ConfigError: a value is out of its range; the error names the field and the range.
+    """
 
     noise_bounds: tuple[float, float] = (1.0, 6.0)
     """Least and most of the factor on the detector's variance that is learnt for every camera
@@ -152,7 +165,11 @@ class ParticleConfig(TrackerConfig):
 
 @dataclass(frozen=True, slots=True)
 class PaperConfig(TrackerConfig):
-    """The paper's Algorithm 1."""
+    """The paper's Algorithm 1.
+
+    Raises:
+        ConfigError: a value is out of its range; the error names the field and the range.
+    """
 
     velocity_tau_s: float = 0.2
     """Time constant of the difference filter for velocities [s]."""
@@ -187,7 +204,11 @@ class PaperConfig(TrackerConfig):
 
 @dataclass(frozen=True, slots=True)
 class TriangulationConfig(TrackerConfig):
-    """Triangulation, frame by frame."""
+    """Triangulation, frame by frame.
+
+    Raises:
+        ConfigError: a value is out of its range; the error names the field and the range.
+    """
 
     velocity_tau_s: float = 0.2
     """Time constant of the difference filter for velocities [s]."""

@@ -49,6 +49,8 @@ class Estimator(Protocol[State]):
     The state is an array, or a record of arrays, with leading axes (B, W), changed in place:
     copying the arrays copies it. Random numbers for environment b come from `rngs[b]` only, and
     nothing that happens in one environment depends on the others or on how many there are.
+    Positions are in the world, +Z up, in metres and seconds; pixels are those of the cameras'
+    projections, u to the right and v down.
     """
 
     @property
@@ -101,12 +103,16 @@ class Estimator(Protocol[State]):
 
 @dataclass(frozen=True, slots=True)
 class EstimatorSpec:
-    """An estimator by name: how it is made, and what may be set."""
+    """An estimator by name: how it is made, and what may be set.
+
+    `register_estimator` takes one; `estimator=` of an environment takes its name, it, or `make`.
+    """
 
     name: str
-    """By which `estimator=` and `--estimator` know it."""
+    """As which it is registered and named in errors."""
     make: Callable[[Floats, float, Any], Estimator[Any]]
-    """(P (C, 3, 4), time between updates [s], settings) -> estimator."""
+    """(P, ctrl_dt, config) -> estimator: projections from the world to pixels (C, 3, 4), time
+    between updates [s], and settings, of the kind `config`."""
     config: type[TrackerConfig] = TrackerConfig
     """The kind of its settings."""
     needs_pairs: bool = False
@@ -155,7 +161,11 @@ EstimatorChoice = str | EstimatorSpec | Callable[..., Any]
 
 
 def estimator_called(estimator: EstimatorChoice) -> EstimatorSpec:
-    """The spec of an estimator; `ConfigError` for a name that is unknown or `OFFLINE`."""
+    """Return the spec of an estimator that is given by name, as a spec or as `EstimatorSpec.make`.
+
+    Raises:
+        ConfigError: the name is unknown or `OFFLINE`, or the function takes other arguments.
+    """
     if isinstance(estimator, EstimatorSpec):
         return estimator
     if callable(estimator):
@@ -184,15 +194,19 @@ def make_estimator(
     """Return an estimator for a rig of cameras.
 
     Args:
-        estimator: a name ("particle", "kalman", "paper", "paper_restarts", "triangulation",
-            "ransac" or one that was registered), an `EstimatorSpec`, or a function as its `make`.
-        P: (C, 3, 4) projections of world points [m] to pinhole pixels, as of `make_cameras`.
-        ctrl_dt: the usual time between two updates [s].
+        estimator: a name in `ESTIMATORS`, an `EstimatorSpec`, or a function as its `make`.
+        P: (C, 3, 4) projections from the world [m] to pixels.
+        ctrl_dt: usual time between two updates [s].
         config: its settings; of another estimator's those that all share count. None: the defaults.
-            With `longest_delay_s` late frames are used at their own time.
+
+    Returns:
+        The estimator. Of one that is not built in, arguments and estimates are checked
+        (`checked.CheckedEstimator`); with `config.longest_delay_s` late frames are used at their
+        own time (`out_of_sequence.OutOfSequence`).
 
     Raises:
-        ConfigError: there is no such estimator, P has another shape, or no positive time.
+        ConfigError: the estimator is unknown or needs the future (`OFFLINE`), P is of another shape
+            or not finite, `ctrl_dt` is not positive.
     """
     spec = estimator_called(estimator)
     P = np.ascontiguousarray(P, dtype=float)

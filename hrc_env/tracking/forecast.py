@@ -4,7 +4,7 @@ A small network, made by `assets/ahead/train.py` from the environment's own moti
 body in the frame of its heading. For a few horizons it says each joint's displacement and the
 standard deviation of what it cannot know, which is added to what is not known now. A body whose
 heading is unknown moves on with constant velocity and random acceleration; one that is not tracked
-relaxes to the prior (docs/tracking.md, "Ahead").
+relaxes to the prior (docs/tracking.md, "Forecast").
 """
 
 import functools
@@ -149,18 +149,20 @@ def make_scratch(network):
 
 
 def forecast(now: PoseEstimate, horizon_s: float, config: TrackerConfig) -> PoseEstimate:
-    """Return where workers are expected if no camera sees them until then.
+    """Return what is expected of the workers in a while, if no camera sees them until then.
 
     Args:
-        now: the present belief; it stays as it is.
-        horizon_s: time ahead, in (0, 1] [s].
-        config: settings of the estimator that made `now`.
+        now: what is believed of them, in the world; it stays as it is.
+        horizon_s: how long from now, in (0, 1] [s].
+        config: settings of the estimator that said so: the prior, to which a worker without a track
+            relaxes, and the bounds of what is reported.
 
     Returns:
-        The belief of that time, with wider covariances (docs/tracking.md, "Ahead").
+        Arrays of its own of the shapes of `now`: means [m], velocities [m/s] and covariances [m^2]
+        at that time, and ages that have grown by the horizon. Who is tracked stays tracked.
 
     Raises:
-        ConfigError: the horizon is not in (0, 1] s.
+        ConfigError: `horizon_s` is not in (0, 1].
     """
     if not 0 < horizon_s <= LONGEST_S:
         raise ConfigError(f"A horizon must be in (0, {LONGEST_S:g}] s, got {horizon_s}.")
