@@ -81,3 +81,18 @@ print([name for name in {OURS} if find_spec(name) is not None])
         check=True,
     )  # fmt: skip
     assert done.stdout == "[]\n"
+
+
+def test_pytest_alone_finds_modules_that_only_the_checkout_has():
+    """As `python -m pytest` does."""
+    usual = {
+        name: value
+        for name, value in os.environ.items()
+        if not name.startswith(("PYTHONPATH", "PYTEST_"))
+    }
+    done = subprocess.run(
+        [Path(sys.executable).with_name("pytest"), "--collect-only", "-q", "tests/test_docs.py",
+         "tests/benchmarks/test_tracks.py", "tests/behaviour/test_mutations.py"],
+        cwd=ROOT, env=usual, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout
