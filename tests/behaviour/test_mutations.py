@@ -123,6 +123,14 @@ def test_the_semantic_list_has_enough_of_each_kind():
     assert len({each.name for each in semantic}) == len(semantic)
 
 
+def test_the_unseen_list_is_of_the_code_that_says_what_cameras_do_not_see():
+    unseen = read_list("unseen")
+    assert len({each.key for each in unseen}) == 40
+    assert {each.room for each in unseen} == {
+        "pipeline", "tracking", "safety", "perception", "scene",
+    }  # fmt: skip
+
+
 @pytest.mark.parametrize("name", DRAWS)
 def test_a_draw_has_enough_of_each_room(name):
     drawn = read_list(name)  # it fits the code of its day; lines may have changed since

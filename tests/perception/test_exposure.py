@@ -9,7 +9,14 @@ from hrc_env.core.records import Roi
 from hrc_env.core.skeleton import BLAZEPOSE_INDEX
 from hrc_env.geometry.cameras import pinhole
 from hrc_env.perception.detector import PoseDetector
-from hrc_env.perception.exposure import MOST_DOUBT, SPAN, develop, has_edges, is_blank
+from hrc_env.perception.exposure import (
+    MOST_DOUBT,
+    SPAN,
+    develop,
+    has_edges,
+    is_blank,
+    noise_of,
+)
 from hrc_env.scene.build import build
 from hrc_env.scene.domain_randomization import AppearanceConfig, draw_look
 from hrc_env.scene.render import CropRenderer
@@ -101,6 +108,14 @@ def test_pictures_in_which_noise_hides_people_show_nothing(pictures, share, nois
         dull = darker(crop, share, noise, base=40.0)
         assert not is_blank(dull)
         assert develop(dull).shows == shows
+
+
+@pytest.mark.parametrize("noise", [6.0, 12.0])
+def test_noise_stays_small_beside_what_pictures_span(pictures, noise):
+    for crop in pictures.values():
+        picture = develop(darker(crop, 0.14, noise, base=40.0)).picture
+        assert span(picture) > 0.4 * SPAN
+        assert noise_of(cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)) < 0.12 * SPAN
 
 
 X, Y = np.meshgrid(np.arange(256.0), np.arange(256.0))

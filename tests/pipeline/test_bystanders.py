@@ -1,12 +1,15 @@
 """More people than slots: they are remembered, make slots unknown, and get one if nearest."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from hrc_env.core.records import Roi
+from hrc_env.core.vacancy import MOST_OTHERS
 from hrc_env.geometry.cameras import pinhole, project
 from hrc_env.perception.searching import sightings
-from hrc_env.pipeline.bystanders import ALONE, EVERY, GIVEN_UP, MISSES, Bystanders
+from hrc_env.pipeline.bystanders import ALONE, BESIDE, EVERY, GIVEN_UP, MISSES, Bystanders
 
 EYES = [(3.0, 3.0, 2.4), (-3.0, 3.0, 2.4), (3.0, -3.0, 2.4), (-3.0, -3.0, 2.4)]
 RIG = tuple(
@@ -87,6 +90,39 @@ def test_the_workers_themselves_and_the_robot_are_nobody_else(whom):
     bystanders, aside = Bystanders(1, 1, RIG), hips + np.array([0.1, 0.1, 0.0])
     for _ in range(2 * ALONE):
         assert len(searched(bystanders, shown(aside), [windows(NEAR)], NEAR[None])) == 0
+
+
+@pytest.mark.parametrize("camera", range(len(RIG)))
+@pytest.mark.parametrize(("share", "somebody"), [(0.9, 0), (1.1, 1)])
+def test_whom_one_camera_shows_close_beside_a_worker_in_its_image_is_that_worker(
+    camera, share, somebody
+):
+    """Of two workers, neither of whom that camera detects where they are."""
+    workers = np.array([NEAR, FAR])
+    taken = [windows(each) for each in workers]
+    window, found = taken[1][camera], [[] for _ in RIG]
+    (x, y), other_x = window.centre_px, taken[0][camera].centre_px[0]
+    off_px = np.sign(x - other_x) * share * BESIDE * window.side_px
+    found[camera] = [replace(window, centre_px=(x + off_px, y))]
+    bystanders = Bystanders(1, 2, RIG)
+    counts = [len(searched(bystanders, found, taken, workers)) for _ in range(ALONE)]
+    assert counts[-1] == somebody
+
+
+def test_of_more_people_than_are_remembered_those_who_count_stay():
+    bystanders, places = Bystanders(1, 1, RIG), np.linspace(-1.6, 1.6, MOST_OTHERS)
+    alone = shown(*(np.array([x, -1.5, 0.9]) for x in places), cameras=[3])
+    for found in (shown(FAR), alone):
+        others = searched(bystanders, found, [windows(NEAR)], NEAR[None])
+    assert len(bystanders.people[0]) == MOST_OTHERS
+    assert len(others) == 1
+    assert np.linalg.norm(others[0] - FAR) < 0.05
+
+
+def test_who_is_followed_from_now_on_is_nobody_else_any_more():
+    bystanders = Bystanders(1, 1, RIG)
+    assert len(searched(bystanders, shown(FAR), (), NEAR[None])) == 1
+    assert len(searched(bystanders, shown(FAR), [windows(FAR)], FAR[None])) == 0
 
 
 def test_who_is_hidden_is_remembered_for_a_while_and_then_forgotten():

@@ -314,6 +314,15 @@ def test_towards_where_somebody_unseen_may_be_it_comes_no_nearer_and_elsewhere_i
     assert 0.05 < max(speeds) < 0.25 + 1e-4
 
 
+def test_whom_another_environment_has_lost_slows_nobody():
+    envs = vector(2, None, n_workers=1)
+    envs.reset(seed=0)
+    lost = unseen(envs.unwrapped.shards.first.belief, 0.9)
+    lost.estimate.blind_s[1] = 0.0
+    limits = limit_m_s(lost, ShieldConfig())
+    assert np.isfinite(limits).tolist() == [True, False]
+
+
 def test_robots_whose_cameras_all_fail_come_no_nearer_to_where_people_were():
     lost = [{"kind": "lost", "cameras": ["all"], "from_s": 1.0}]
     gaps_m, blind_s, driven = [], [], []

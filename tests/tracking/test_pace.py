@@ -62,6 +62,13 @@ def test_who_turns_fast_before_one_camera_is_reported_honestly(condition):
     assert 0.6 < ratio < 1.6
 
 
+def test_how_fast_a_body_moves_is_known_from_its_second_moment_on():
+    known = np.zeros(1, PACE)[0]
+    for dt_s in (0.04, 0.0):  # first seen, then seen again at the same time
+        update_pace(known, STANDS, dt_s)
+        assert [known[name] for name in ("turns", "tips", "travels")] == [0.0] * 3
+
+
 def test_a_lost_track_begins_with_no_pace():
     known = np.zeros(1, PACE)[0]
     update_pace(known, STANDS, 0.0)

@@ -2,7 +2,8 @@
 
 `named.toml` and `semantic.toml` are written by hand, as old text and new text of a file. A draw
 (`draw_A.toml`) is made once, from all candidates that `mutations` finds in the code and from the
-semantic ones, and holds its seed and every mutant in full.
+semantic ones, and holds its seed and every mutant in full. `unseen.toml` is such a draw from
+the modules that say what cameras do not see.
 """
 
 import ast
