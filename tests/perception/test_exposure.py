@@ -110,6 +110,15 @@ def test_pictures_in_which_noise_hides_people_show_nothing(pictures, share, nois
         assert develop(dull).shows == shows
 
 
+def test_dull_pictures_without_noise_stay_sharp():
+    """Grey levels are spread one by one: what was equal stays equal, up to every edge."""
+    squares = np.random.default_rng(0).integers(100, 130, (8, 8))
+    dull = np.repeat(np.kron(squares, np.ones((32, 32)))[..., None], 3, axis=2).astype(np.uint8)
+    picture = develop(dull).picture
+    assert span(picture) > 0.7 * SPAN
+    assert all(len(np.unique(picture[dull == level])) == 1 for level in squares.ravel())
+
+
 @pytest.mark.parametrize("noise", [6.0, 12.0])
 def test_noise_stays_small_beside_what_pictures_span(pictures, noise):
     for crop in pictures.values():

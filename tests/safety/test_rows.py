@@ -7,10 +7,11 @@ import pytest
 
 from hrc_env.core.records import PoseEstimate
 from hrc_env.core.skeleton import HAND_SEGMENTS, SEGMENT_ENDS, SEGMENT_RADIUS_M
+from hrc_env.core.vacancy import EMPTY, POSSIBLE, STATURE_M
 from hrc_env.geometry import chains
 from hrc_env.geometry.distances import closest_parameters, segments
 from hrc_env.safety.config import ShieldConfig
-from hrc_env.safety.rows import MOST_ROWS, RANKING_HZ, tightest_rows
+from hrc_env.safety.rows import MOST_ROWS, RANKING_HZ, floor_rows, tightest_rows
 from hrc_env.scene.build import build
 from hrc_env.scene.limits import slew_rad_s2
 
@@ -140,6 +141,55 @@ def test_rows_are_as_they_are_defined_and_none_that_matters_is_left_out(robot, t
         several += len(b) > 3
         if len(b):
             assert least_m == pytest.approx(all_m)
+    assert several > 5
+
+
+def floor_rows_of(chain, q, places, level, reach_m, box, config=CONFIG):
+    """The rows b, n.J of pieces of floor, the tightest first, and the least D."""
+    q, (low, high, slew) = q[None], box
+    found = np.empty((1, MOST_ROWS, chain.n_joints)), np.empty((1, MOST_ROWS))
+    count, least_m = np.zeros(1, np.int64), np.full(1, np.inf)
+    floor_rows(
+        (chains.forward(chain, q), chain.slides, chain.capsule_link, chains.capsules(chain, q),
+         chain.capsule_radius_m, low[None], high[None], slew),
+        (places, np.array([level]), np.array([reach_m])), config.record(), (*found, count, least_m),
+    )  # fmt: skip
+    rows = np.column_stack([found[1][0], found[0][0]])[: count[0]]
+    return rows[rows[:, 0].argsort()], least_m[0]
+
+
+@pytest.mark.parametrize("robot", ["ur10e_like", "mobile_base"])
+def test_a_robot_can_brake_before_somebody_on_floor_that_no_camera_has_seen(robot):
+    """By the rows' definition, capsule by capsule."""
+    scene = build(robot=robot)
+    chain, slew, reach_m = scene.chain, slew_rad_s2(scene), 0.3
+    rng, several = np.random.default_rng(4), 0
+    for _ in range(60):
+        q = scene.home_q + rng.uniform(-0.6, 0.6, chain.n_joints)
+        middle = rng.uniform(-0.5, 0.5, chain.n_joints) * chain.velocity_limit_rad_s
+        low, high = middle - 0.3, middle + 0.3
+        caps = chains.capsules(chain, q)
+        foot = np.array([*caps[..., :2].reshape(-1, 2).mean(0) + rng.uniform(-0.9, 0.9, 2), 0.0])
+        expected = []
+        for c, axis in enumerate(caps):
+            head = foot + np.array([0.0, 0.0, STATURE_M])
+            squared, u, t = closest_parameters(*axis, foot, head)
+            n = foot + t * (head - foot) - (axis[0] + u * (axis[1] - axis[0]))
+            clear = math.sqrt(squared) - chain.capsule_radius_m[c] - reach_m
+            row = n / math.sqrt(squared) @ moved(chain, q, c, u)
+            a = min(CONFIG.deceleration_m_s2, max(np.abs(row) @ slew, 1e-9))
+            bound = RANKING_HZ * clear
+            if clear >= 0:
+                bound = a * (math.sqrt(CONFIG.reaction_s**2 + 2 * clear / a) - CONFIG.reaction_s)
+            if bound < np.maximum(row * low, row * high).sum():
+                expected.append((bound, *row))
+        places = np.stack([foot, caps[-1, 1] * (1.0, 1.0, 0.0)])
+        levels = [POSSIBLE, EMPTY]
+        rows, _ = floor_rows_of(chain, q, places, levels, reach_m, (low, high, slew))
+        np.testing.assert_allclose(
+            rows, np.array(sorted(expected)).reshape(-1, 1 + len(q)), atol=2e-4
+        )
+        several += len(rows) > 2
     assert several > 5
 
 

@@ -74,7 +74,10 @@ CODE: dict[str, CodeRoom] = {
         ("tracker", "shield", "emulator", "detector", "env", "agents", "motion"),
         ("tests/geometry",),
     ),
-    "scene": CodeRoom("hrc_env/scene", ("env", "emulator", "detector"), ("tests/scene",)),
+    "scene": CodeRoom(
+        "hrc_env/scene", ("env", "emulator", "detector"),
+        ("tests/scene", "tests/geometry/test_rig_files.py", "tests/test_unseen_floor.py"),
+    ),
     "pipeline": CodeRoom(
         "hrc_env/pipeline", ("env", "emulator", "detector"),
         ("tests/pipeline", "tests/render", "tests/test_unknown.py", "tests/test_truth.py"),
