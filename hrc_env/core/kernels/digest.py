@@ -1,6 +1,7 @@
 """What a kernel is made of, as a digest: its module, its bytecode, its options, the values of the
 constants it names, and the same of every kernel that it calls."""
 
+import dis
 import hashlib
 import types
 from pathlib import Path
@@ -9,6 +10,9 @@ from typing import Any
 import numpy as np
 from numba.core.dispatcher import Dispatcher
 from numba.core.extending import _Intrinsic
+
+LOADS_CONSTANT = frozenset(dis.hasconst)
+"""Instructions with the place of a constant as their argument."""
 
 
 def digest_of(dispatcher: Dispatcher) -> str:
@@ -30,12 +34,28 @@ def _function(function: Any) -> list[str]:
     for code in codes:
         codes += [each for each in code.co_consts if isinstance(each, types.CodeType)]
         names |= set(code.co_names)
-        constants = [_value(each, names) for each in code.co_consts if each != function.__doc__]
-        parts.append(f"{code.co_code.hex()} {code.co_varnames} {code.co_names} {constants}")
+        bytecode, loaded = _instructions(code)
+        constants = [_value(each, names) for each in loaded]
+        parts.append(f"{bytecode.hex()} {code.co_varnames} {code.co_names} {constants}")
     scope = function.__globals__
     cells = dict(zip(function.__code__.co_freevars, function.__closure__ or (), strict=True))
     parts += [f"{name}={_value(cell.cell_contents, names)}" for name, cell in cells.items()]
     return parts + [f"{name}={_value(scope[name], names)}" for name in sorted(names & set(scope))]
+
+
+def _instructions(code: types.CodeType) -> tuple[bytes, list[Any]]:
+    """Return the bytecode without constants' places, and the constants in order of loading.
+
+    A docstring shifts the places of other constants, and no instruction loads it.
+    """
+    bytecode, loaded, high = bytearray(code.co_code), [], 0
+    for k in range(0, len(bytecode), 2):
+        operation, low = bytecode[k : k + 2]
+        if operation in LOADS_CONSTANT:
+            loaded.append(code.co_consts[high | low])
+            bytecode[k + 1] = 0
+        high = (high | low) << 8 if operation == dis.EXTENDED_ARG else 0
+    return bytes(bytecode), loaded
 
 
 def _value(value: Any, names: set[str]) -> str:

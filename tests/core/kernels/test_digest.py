@@ -11,7 +11,7 @@ FACTOR = 2.0
 TABLE = np.array([1.0, 2.0])
 @kernel
 def callee(x):
-    return FACTOR * x
+    return 0.5 * (FACTOR * x)
 @kernel
 def caller(x):
     return callee(x) + TABLE[0]
@@ -50,6 +50,7 @@ def test_it_changes_with_the_module():
     [
         ("FACTOR = 2.0", "# a comment\n\nFACTOR = 4.0 / 2"),
         ("def caller(x):", 'def caller(x):\n    """What it does."""'),
+        ("def callee(x):", 'def callee(x):\n    """What it does."""'),
         ("FACTOR = 2.0", "FACTOR = 2.0\nOTHER = 7.0"),
     ],
 )
