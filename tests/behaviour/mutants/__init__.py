@@ -97,8 +97,10 @@ CODE: dict[str, CodeRoom] = {
     ),
     "rewards": CodeRoom("hrc_env/rewards.py", ("env",), ("tests/test_rewards.py",)),
     "metrics": CodeRoom(
-        "hrc_env/metrics.py", ("env",), ("tests/test_metrics.py", "tests/test_several_workers.py")
+        "hrc_env/tracking/metrics.py", ("env",),
+        ("tests/test_metrics.py", "tests/test_several_workers.py"),
     ),
+    "infos": CodeRoom("hrc_env/infos.py", ("env",), ("tests/test_infos.py",)),
     "agents": CodeRoom(
         "agents", ("agents", "learning"),
         (
