@@ -11,7 +11,7 @@ import numpy as np
 from rich.console import Console
 
 from hrc_env import __version__
-from hrc_env.cli.environment import shield_named
+from hrc_env.cli.environment import read_word
 from hrc_env.cli.export import Export
 from hrc_env.cli.progress import progress_bar
 from hrc_env.cli.ready import make_ready
@@ -121,7 +121,7 @@ def _worth(
     with progress_bar(console, f"judged, shield {shield}") as say:
         episodes = play_episodes(
             lambda _: network, asked.episodes, tick=lambda share: say(share, ""),
-            **{**kwargs, "shield": shield_named(None if shield == "none" else shield)},
+            **{**kwargs, "shield": read_word(None if shield == "none" else shield)},
         )  # fmt: skip
     found = measure(episodes)
     names = ("goals_per_minute", "cost_per_episode", "contacts_per_episode")

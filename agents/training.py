@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, get_type_hints
 
+import numpy as np
 from rich.console import Console
 
 from hrc_env.cli.progress import Meter, progress_bar
@@ -142,6 +143,9 @@ def asked_of(folder: Path) -> Train:
     if not record.exists():
         raise CheckpointError(f"{folder} holds no run: {record} is missing.")
     said, hints = json.loads(record.read_text())["arguments"], get_type_hints(Train)
+    if said.get("n_workers") is not None:  # earlier runs hold numbers, not words
+        said["n_workers"] = [str(n) for n in np.atleast_1d(said["n_workers"])]
+    said = {name: value for name, value in said.items() if value is not None}
     left = {*ONLY_OF_A_RUN} - {"timesteps"}
     names = [each.name for each in fields(Train) if each.name in said and each.name not in left]
     return Train(**{name: restored(hints[name], said[name], name) for name in names})

@@ -1,12 +1,9 @@
 """The reference: pages that say what the code declares."""
 
-import ast
 import dataclasses
 import importlib
 import inspect
-import itertools
 import re
-import textwrap
 from collections.abc import Iterator
 from typing import Any, get_args, get_origin
 
@@ -21,8 +18,10 @@ from benchmarks.__main__ import Benchmarks
 from hrc_env import __main__, observations
 from hrc_env.belief import NEAR_FLOOR_M
 from hrc_env.cli.environment import EnvironmentArguments
+from hrc_env.core.docstrings import field_docs
 from hrc_env.core.infos import ALWAYS, ENTRIES, OF_WORKERS, Entry
 from hrc_env.env import HRCEnv
+from hrc_env.env_config import EnvConfig
 from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.geometry.lens import Lens
 from hrc_env.perception.faults.fault import FaultConfig
@@ -211,14 +210,12 @@ def _spaces_of(space: Any) -> str:
 
 
 def arguments() -> str:
-    """The keyword arguments of the environment, from its docstring."""
-    section = inspect.cleandoc(HRCEnv.__doc__ or "").split("Args:\n")[1].split("\n\n")[0]
-    defaults = inspect.signature(HRCEnv).parameters
-    rows = []
-    for each in textwrap.dedent(section).replace("\n    ", " ").splitlines():
-        names, meaning = each.split(": ", 1)
-        for name in names.split(", "):
-            rows.append((f"`{name}`", f"`{defaults[name].default!r}`", meaning))
+    """The keyword arguments of the environment: fields of `EnvConfig`."""
+    docs = field_docs(EnvConfig)
+    rows = [
+        (f"`{each.name}`", f"`{each.default!r}`", docs[each.name])
+        for each in dataclasses.fields(EnvConfig)
+    ]
     return _table(("argument", "default", "meaning"), rows)
 
 
@@ -502,20 +499,6 @@ def _fields_of(kind: type, title: str) -> str:
         if field.name not in shared
     ]
     return f"## {title}\n\n{_table(('field', 'type', 'default', 'meaning'), rows)}"
-
-
-def field_docs(kind: type) -> dict[str, str]:
-    """The sentence after each field of a dataclass, those that it inherits included."""
-    docs: dict[str, str] = {}
-    for each in reversed(kind.__mro__):
-        if not dataclasses.is_dataclass(each):
-            continue
-        tree = ast.parse(textwrap.dedent(inspect.getsource(each))).body[0]
-        assert isinstance(tree, ast.ClassDef)
-        for field, after in itertools.pairwise(tree.body):
-            if isinstance(field, ast.AnnAssign) and isinstance(after, ast.Expr):
-                docs[ast.unparse(field.target)] = " ".join(ast.literal_eval(after.value).split())
-    return docs
 
 
 def _rewards(env: HRCEnv) -> list[tuple[str, str]]:

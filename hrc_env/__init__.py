@@ -32,6 +32,7 @@ if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
     from hrc_env.core.skeleton import JOINTS as JOINTS
     from hrc_env.core.skeleton import MIRROR as MIRROR
     from hrc_env.env import HRCEnv as HRCEnv
+    from hrc_env.env_config import EnvConfig as EnvConfig
     from hrc_env.evaluation.episodes import Score as Score
     from hrc_env.evaluation.episodes import evaluate as evaluate
     from hrc_env.evaluation.intervals import mean_over as mean_over
@@ -99,6 +100,7 @@ __version__ = "0.1.0"
 PUBLIC = {
     # environments and their settings
     "AppearanceConfig": "hrc_env.scene.domain_randomization",
+    "EnvConfig": "hrc_env.env_config",
     "FaultConfig": "hrc_env.perception.faults.fault",
     "HRCConfig": "hrc_env.config",
     "HRCEnv": "hrc_env.env",

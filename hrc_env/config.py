@@ -13,9 +13,10 @@ from typing import Any, get_type_hints
 import numpy as np
 
 from hrc_env.control import ControlConfig
-from hrc_env.core.errors import ConfigError, check_names, unknown
+from hrc_env.core.errors import ConfigError, check_names
 from hrc_env.core.mapping import PRESETS, from_mapping, plain, read_toml, restored, to_toml
 from hrc_env.core.results import write_whole
+from hrc_env.env_config import EnvConfig, answer_unknown_fields
 from hrc_env.geometry.camera_config import CameraConfig, camera_of, read_rig
 from hrc_env.motion.generator import PEOPLE, MotionConfig, PeopleConfig
 from hrc_env.motion.schedule import WORK, Job
@@ -32,7 +33,6 @@ from hrc_env.scene.handling import ObjectsConfig
 from hrc_env.scene.rigs import RIGS
 from hrc_env.scene.robot import DEFAULT as DEFAULT_ROBOT
 from hrc_env.scene.robot import ROBOTS, Robot, robot_called
-from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import Task, TaskType, find_task
 from hrc_env.tracking.config import ParticleConfig, TrackerConfig, of_kind
 from hrc_env.tracking.estimators import EstimatorSpec, estimator_called
@@ -41,6 +41,7 @@ from hrc_env.tracking.people.association import AssociationConfig
 from hrc_env.worker.body import pool
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class HRCConfig:
     """Everything about an environment that is not one of its keyword arguments."""
@@ -120,12 +121,6 @@ PARTS = {
     "appearance": "appearance",
 }
 """Arguments of an environment that are parts of the config: chosen often."""
-ARGUMENTS: dict[str, Any] = {
-    "task": DEFAULT, "perception": "pixels", "estimator": "particle", "cameras": None,
-    "scene": None, "robot": None, "n_workers": None, "control": "joint", "shield": None,
-    "config": None, **dict.fromkeys(PARTS),
-}  # fmt: skip
-"""The arguments of an environment that decide what happens in it (`HRCEnv`): their defaults."""
 PRESETS.update({AppearanceConfig: APPEARANCES, PeopleConfig: PEOPLE, tuple[Job, ...]: WORK})
 
 
@@ -133,8 +128,9 @@ PRESETS.update({AppearanceConfig: APPEARANCES, PeopleConfig: PEOPLE, tuple[Job, 
 class Settings:
     """Everything that a simulation is made from, whole and checked."""
 
+    asked: EnvConfig
+    """The arguments, as they were given."""
     task: Task[Any, Any]
-    perception: str
     estimator: EstimatorSpec
     cameras: Any
     """Names and indices of the scene's cameras that are used; None: all."""
@@ -142,7 +138,6 @@ class Settings:
     robot: Robot
     n_workers: tuple[int, int]
     """The fewest and the most of an episode."""
-    control: str
     shield: Shield | None
     config: HRCConfig
 
@@ -150,31 +145,35 @@ class Settings:
         """What a state must have been taken with to be set."""
         fewest, most = self.n_workers
         return {
-            "batch": batch, "task": self.task.id, "perception": self.perception,
+            "batch": batch, "task": self.task.id, "perception": self.asked.perception,
             "estimator": self.estimator.name, "scene": self.scene, "robot": self.robot.name,
             "cameras": tuple(camera.name for camera in scene.cameras),
-            "n_workers": (fewest, most) if fewest < most else most, "control": self.control,
+            "n_workers": (fewest, most) if fewest < most else most, "control": self.asked.control,
             "config": self.config,
         }  # fmt: skip
 
 
 def settle(**arguments: Any) -> Settings:
-    """Settings from keyword arguments of an environment (`ARGUMENTS`); see `HRCEnv`. Raises
-    `ConfigError` for an argument that there is not, or a value that cannot be."""
-    for name in arguments:
-        if name not in ARGUMENTS:
-            raise unknown("argument", name, ARGUMENTS)
-    given = {**ARGUMENTS, **arguments}
-    task, estimator = find_task(given["task"]), estimator_called(given["estimator"])
-    config, cameras = resolve(given["config"], task, estimator), given["cameras"]
+    """Return settings from keyword arguments of an environment; see `make_settings`."""
+    return make_settings(EnvConfig(**arguments))
+
+
+def make_settings(asked: EnvConfig) -> Settings:
+    """Return everything that a simulation is made from, given an environment's arguments.
+
+    Raises:
+        ConfigError: a value that cannot be, with those that can.
+    """
+    task, estimator = find_task(asked.task), estimator_called(asked.estimator)
+    config, cameras = resolve(asked.config, task, estimator), asked.cameras
     if isinstance(cameras, np.ndarray):
         cameras = cameras.tolist()
     if (rig := rig_of(cameras)) is not None:
         config, cameras = replace(config, scene=replace(config.scene, cameras=rig)), None
     for name, path in PARTS.items():
-        if given[name] is not None:
-            config = _with_part(config, path, given[name], name)
-    named = task.robot if given["robot"] is None else given["robot"]
+        if (part := getattr(asked, name)) is not None:
+            config = _with_part(config, path, part, name)
+    named = task.robot if asked.robot is None else asked.robot
     robot = robot_called(DEFAULT_ROBOT if named is None else named)
     if task.needs_gripper and not robot.grips:
         able = [name for name, each in ROBOTS.items() if each.grips]
@@ -189,12 +188,12 @@ def settle(**arguments: Any) -> Settings:
             f"{task.id} needs {kind}, and {robot.name!r} is none; there are "
             f"{', '.join(map(repr, able))}."
         )
-    scene = task.scene if given["scene"] is None else given["scene"]
-    n_workers = task.n_workers if given["n_workers"] is None else given["n_workers"]
+    scene = task.scene if asked.scene is None else asked.scene
+    n_workers = task.n_workers if asked.n_workers is None else asked.n_workers
     return Settings(
-        task(config.task), given["perception"], estimator, cameras, scene,
-        robot, _worker_counts(n_workers), given["control"],
-        shield_called(given["shield"]), config,
+        asked, task(config.task), estimator, cameras, scene,
+        robot, _worker_counts(n_workers),
+        shield_called(asked.shield), config,
     )  # fmt: skip
 
 

@@ -6,7 +6,7 @@ env = gymnasium.make("HRCReach-v0", perception="keypoints")
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from pathlib import Path
+from inspect import Parameter
 from typing import Any, ClassVar
 
 import gymnasium
@@ -15,27 +15,22 @@ from gymnasium.spaces import Box, Dict
 from numpy.typing import NDArray
 
 from hrc_env import observations, rewards
-from hrc_env.config import ConfigChoice, Settings, settle
+from hrc_env.config import Settings, settle
 from hrc_env.control import checked_action
 from hrc_env.core.batching import Stateful, one
 from hrc_env.core.errors import ConfigError, NoAttributeError, unknown, whole
 from hrc_env.core.infos import Words, worded
 from hrc_env.core.registry import share
 from hrc_env.core.typing import Floats
+from hrc_env.env_config import signature_of_env
 from hrc_env.infos import words_of
-from hrc_env.motion.generator import Clip, PeopleConfig
-from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.registration import HasSpec
-from hrc_env.render.views import PICTURE_SIZE, Views, picture_size
+from hrc_env.render.views import Views, picture_size
 from hrc_env.rewards import RewardConfig
-from hrc_env.safety.shield import ShieldChoice
-from hrc_env.scene.domain_randomization import AppearanceConfig
-from hrc_env.scene.robot import Robot
 from hrc_env.simulation import Simulation
 from hrc_env.step_result import Observation
 from hrc_env.tasks import DEFAULT, goal
 from hrc_env.tasks.task import TaskType, goal_of
-from hrc_env.tracking.estimators import EstimatorChoice
 
 RENDER_MODES = ("rgb_array", "depth_array")
 RESET_OPTIONS = ("steps_left",)
@@ -50,12 +45,17 @@ class EnvBase(HasSpec, Stateful):
     PICTURES: ClassVar[tuple[str, ...]] = RENDER_MODES
     """The render modes that are taken."""
 
-    def _open(self, settings: Settings, render_mode: str | None, width: int, height: int) -> None:
+    def _open(self, settings: Settings) -> None:
         """Keep settings, and a form of pictures once it is known to be one."""
-        check_render_mode(render_mode, self.PICTURES)
+        asked = settings.asked
+        check_render_mode(asked.render_mode, self.PICTURES)
         share()
-        self._size = picture_size(width, height)
-        self.render_mode, self.config, self._task = render_mode, settings.config, settings.task
+        self._size = picture_size(asked.width, asked.height)
+        self.render_mode, self.config, self._task = (
+            asked.render_mode,
+            settings.config,
+            settings.task,
+        )
         fps = round(1 / self.config.ctrl_dt)
         self.metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": fps}
 
@@ -117,44 +117,8 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
     """A robot works beside people whom it knows through cameras only.
 
     Args:
-        task: what it has to do: an id ("HRCReach-v0") or a subclass of `Task`
-            (docs/bring_your_own.md).
-        perception: "pixels" (rendered images through MediaPipe Pose), "keypoints" (an
-            emulator of that), "truth" (the worker as they are) or "none".
-        estimator: "particle" (default), "kalman" (the same with one hypothesis), "paper"
-            (Algorithm 1 as printed), "paper_restarts" (with what it lacks), "triangulation" or
-            "ransac"; one that was registered, an `EstimatorSpec`, or a function that makes an
-            estimator (docs/bring_your_own.md).
-        cameras: indices or names of the scene's cameras to use; or a rig of your own: its name
-            ("lab_gopro"), a TOML file's path, or a list of places (x, y, z) [m],
-            `CameraConfig`s or mappings. None is all cameras of the scene.
-        scene: name of the place: "lab", a workshop, or "site", a construction site; None: that
-            which the task is made for.
-        robot: a name ("ur10e_like", "ur10e_gripper", "ur10e_cups", "mobile_base"), one that was
-            registered, a `Robot` or a mapping of its fields; None: the one that the task is
-            made for.
-        n_workers: 0 or more workers, None: as the task is made for; (fewest, most): each
-            episode's number is drawn, and the observation has room for the most.
-        people: how the workers are with the robot: "attentive", "hurried", "unaware", a
-            `PeopleConfig` or a mapping; None for those of the config (attentive).
-        motions: clips of recorded motion that the workers play, too, or paths of such
-            (docs/people_and_scenes.md); None for those of the config (none).
-        faults: what goes wrong with cameras, `FaultConfig`s or mappings
-            (docs/perception_and_estimators.md); None for those of the config (none).
-        appearance: how scene and workers look, drawn for every episode: a name
-            (docs/perception_and_estimators.md), as "varied", an `AppearanceConfig` or a mapping;
-            None for that of the config (as built). Level "pixels"; "keypoints" knows the strength
-            of the light.
-        control: "joint" (joint velocities), "tool" (tool velocity) or "twist" (that and the
-            tool's turn rate); a robot with a hand has one entry more, -1 open to 1 closed.
-        shield: what may change a command before the arm gets it: "qp", "ssm", "pfl", a
-            `ShieldConfig` or a mapping (docs/reference/shields.md), a name that was registered or a
-            function (`hrc_env.Shield`); None: nothing.
-        render_mode: "rgb_array", "depth_array" or None; `gymnasium.make` also takes "human", a
-            window (docs/start.md).
-        width, height: of what `render` gives [px].
-        config: an `HRCConfig`, a nested mapping of changes to the default, or the path of a TOML
-            file of such (`hrc_env.save_config` writes one).
+        task: what it has to do, an id or a subclass of `Task`.
+        arguments: the other fields of `EnvConfig`, which documents them all.
 
     Raises:
         ConfigError: a name, index or value that is not valid, with those that are.
@@ -163,32 +127,13 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
     CHANGES = ("simulation", "_np_random", "_np_random_seed", "_begun", "_steps_left")
     metadata = {"render_modes": list(RENDER_MODES), "render_fps": 25}  # noqa: RUF012
 
-    def __init__(
-        self,
-        task: str | TaskType = DEFAULT,
-        perception: str = "pixels",
-        estimator: EstimatorChoice = "particle",
-        cameras: str | Path | Sequence[Any] | NDArray[Any] | None = None,
-        scene: str | None = None,
-        robot: str | Robot | Mapping[str, Any] | None = None,
-        n_workers: int | tuple[int, int] | None = None,
-        people: str | PeopleConfig | Mapping[str, Any] | None = None,
-        motions: Sequence[str | Path | Clip] | None = None,
-        faults: Sequence[FaultConfig | Mapping[str, Any]] | None = None,
-        appearance: str | AppearanceConfig | Mapping[str, Any] | None = None,
-        control: str = "joint",
-        shield: ShieldChoice = None,
-        render_mode: str | None = None,
-        width: int = PICTURE_SIZE[0],
-        height: int = PICTURE_SIZE[1],
-        config: ConfigChoice = None,
-    ) -> None:
-        settings = settle(
-            task=task, perception=perception, estimator=estimator, cameras=cameras, scene=scene,
-            robot=robot, n_workers=n_workers, people=people, motions=motions, faults=faults,
-            appearance=appearance, control=control, shield=shield, config=config,
-        )  # fmt: skip
-        self._open(settings, render_mode, width, height)
+    __signature__ = signature_of_env(
+        Parameter("task", Parameter.POSITIONAL_OR_KEYWORD, default=DEFAULT)
+    )
+
+    def __init__(self, task: str | TaskType = DEFAULT, **arguments: Any) -> None:
+        settings = settle(task=task, **arguments)
+        self._open(settings)
         self.simulation = Simulation(1, settings)
         self.views = Views(self.simulation)
         self.observation_space, self.action_space = spaces(self.simulation)

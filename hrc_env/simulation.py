@@ -92,9 +92,9 @@ class Simulation(Stateful):
     )  # fmt: skip
 
     def __init__(self, batch: int, settings: Settings) -> None:
-        config, perception = settings.config, settings.perception
+        config, perception = settings.config, settings.asked.perception
         prepare(perception, config.detector)
-        self.batch, self.config, self.control = batch, config, settings.control
+        self.batch, self.config, self.control = batch, config, settings.asked.control
         self.perception, self.shield, self.task = perception, settings.shield, settings.task
         self.bodies = stack(pool(config.worker))
         self._make_people_and_scene(settings)
@@ -108,7 +108,7 @@ class Simulation(Stateful):
         self._spread_rad = np.array(config.start_spread_rad or settings.robot.spread_rad)
         check_shape("start_spread_rad", self._spread_rad.shape, (n_joints,), "one a joint")
         self._grips = settings.robot.grips
-        self.n_actions = n_actions(settings.control, self.chain, self._grips)
+        self.n_actions = n_actions(self.control, self.chain, self._grips)
         n_slides = int(self.chain.slides.sum())
         self.place = self.task.survey(self.scene.map)
         sizes = observations.Sizes(
@@ -117,7 +117,7 @@ class Simulation(Stateful):
             len(self.scene.objects.names), n_slides,
         )  # fmt: skip
         self.layout = observations.layout(self.terms, sizes)
-        self.model = robot_model(self.scene, fastest(settings.control, self.chain, config.control))
+        self.model = robot_model(self.scene, fastest(self.control, self.chain, config.control))
         self.monitor = IncidentMonitor(
             batch, self.scene.n_workers, self.bodies.capsule_names, self.model, config.ctrl_dt
         )

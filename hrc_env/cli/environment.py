@@ -1,73 +1,18 @@
 """The arguments of an environment, as the commands take them that make one."""
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
-from pathlib import Path
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import Field, field, fields, make_dataclass
+from typing import TYPE_CHECKING, Annotated, Any
 
+import tyro
+
+from hrc_env.core.docstrings import field_docs
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.mapping import read_toml
-from hrc_env.tasks import DEFAULT
+from hrc_env.env_config import EnvConfig
 
 FAULT = """'{"kind": "late", "cameras": ["camera_1"], "amount": 0.2}'"""
-
-
-@dataclass(frozen=True, kw_only=True)
-class EnvironmentArguments:
-    """What `gymnasium.make` takes; names are in `python -m hrc_env list`."""
-
-    task: str = DEFAULT
-    """Which environment, by its id."""
-    perception: str = "pixels"
-    """What the robot sees with: pixels, keypoints, truth or none."""
-    estimator: str = "particle"
-    """particle, kalman, paper, paper_restarts, triangulation or ransac."""
-    cameras: tuple[str, ...] = ()
-    """Names or numbers of cameras of the scene; or a rig: its name or a .toml file. All cameras
-    of the scene if not given."""
-    scene: str | None = None
-    """lab or site; the one that the task is made for if not given."""
-    robot: str | None = None
-    """ur10e_like, ur10e_gripper, or one that was registered (--import); the task's own if not
-    given."""
-    n_workers: int | tuple[int, int] | None = None
-    """How many workers, as the task is made for if not given; two numbers are the
-    fewest and the most, drawn for every episode."""
-    people: str | None = None
-    """attentive, hurried or unaware; --config motion.people.FIELD=VALUE for more."""
-    motions: tuple[Path, ...] = ()
-    """Clips (.npz) that workers play, too: python -m hrc_env import-motion."""
-    faults: tuple[str, ...] = ()
-    """What goes wrong with cameras, each a JSON object:
-    '{"kind": "late", "cameras": ["camera_1"], "amount": 0.2}'."""
-    appearance: str | None = None
-    """as_built, varied, lights, surfaces or people (pixels only; keypoints knows
-    appearance.light); --config appearance.FIELD=VALUE for more."""
-    control: str | None = None
-    """What actions are: joint, velocities of the joints, if not given; tool, of the tool; or twist,
-    which turns the tool, too."""
-    shield: str | None = None
-    """qp, ssm, pfl, or one that was registered (--import); or a JSON object of changes to the
-    first: '{"kind": "qp", "margin_m": 0.1}'."""
-    config: tuple[str, ...] = ()
-    """Changes to the default configuration: FIELD=VALUE as in reward.proximity=0 (a value is
-    JSON, or else text), or a .toml file of them. Later ones win. docs/reference/config.md"""
-
-    def keywords(self) -> dict[str, Any]:
-        """Keyword arguments of `HRCEnv`, of lists, mappings, text and numbers only."""
-        given = {each.name: getattr(self, each.name) for each in fields(EnvironmentArguments)}
-        given["cameras"] = cameras_named(self.cameras)
-        given["motions"] = [str(path) for path in self.motions]
-        given["faults"] = [_fault(text) for text in self.faults]
-        given["shield"] = shield_named(self.shield)
-        given["config"] = read_config(self.config or ())
-        return {name: value for name, value in given.items() if value not in (None, [], {})}
-
-
-def shield_named(word: str | None) -> str | dict[str, Any] | None:
-    """A shield's name, or what a JSON object says of its settings."""
-    return _value(word) if word and word.startswith("{") else word
 
 
 def cameras_named(words: Sequence[str]) -> str | list[int | str]:
@@ -123,3 +68,83 @@ def _value(text: str) -> Any:
         return json.loads(text)
     except json.JSONDecodeError:
         return text
+
+
+def read_word(word: str | None) -> Any:
+    """Return the JSON object that a word is, or else the word."""
+    return _value(word) if word and word.startswith("{") else word
+
+
+def _counts(words: Sequence[str]) -> Any:
+    """Return a number of workers, or the fewest and the most."""
+    values = [_value(word) for word in words]
+    return values[0] if len(values) == 1 else values
+
+
+READERS: dict[str, Callable[[Any], Any]] = {
+    "cameras": cameras_named, "n_workers": _counts, "config": read_config,
+    "faults": lambda words: [_fault(text) for text in words],
+}  # fmt: skip
+"""How words become an argument, where they are not one value or a list of values."""
+AGENTS_OWN = ("control",)
+"""Arguments that are an agent's own if they are not given."""
+ON_THE_COMMAND_LINE = {
+    "faults": "Each is a JSON object.",
+    "people": "--config motion.people.FIELD=VALUE changes one thing.",
+    "appearance": "--config appearance.FIELD=VALUE changes one thing.",
+    "control": "If not given: the agent's own, or joint.",
+    "config": "Here: FIELD=VALUE as in reward.proximity=0 (a value is JSON, or else text), or "
+    ".toml files; later ones win.",
+}
+"""What else the help of a command says of an argument."""
+
+
+def _read(each: Field[Any], words: Any) -> Any:
+    """Return the value of an argument that these words are."""
+    if each.name in READERS:
+        return READERS[each.name](words)
+    return [read_word(str(word)) for word in words] if _is_many(each) else read_word(words)
+
+
+def _is_many(each: Field[Any]) -> bool:
+    return bool(each.metadata.get("many"))
+
+
+def _arguments() -> list[Field[Any]]:
+    """Return the fields of `EnvConfig` that commands take."""
+    return [each for each in fields(EnvConfig) if each.metadata.get("words", True)]
+
+
+def _options() -> list[tuple[str, Any, Any]]:
+    """Return them as fields of a command: words, one or many, with their help."""
+    docs, options = field_docs(EnvConfig), []
+    for each in _arguments():
+        kind: Any = tuple[str, ...] if _is_many(each) else str | None
+        shown = isinstance(each.default, str) and each.name not in AGENTS_OWN
+        default: Any = () if _is_many(each) else each.default if shown else None
+        text = f"{docs[each.name]} {ON_THE_COMMAND_LINE.get(each.name, '')}".strip()
+        option = Annotated[kind, tyro.conf.arg(help=text)]
+        options.append((each.name, option, field(default=default)))
+    return options
+
+
+class _Command:
+    """What commands that make an environment have in common."""
+
+    def keywords(self) -> dict[str, Any]:
+        """Return keyword arguments of `HRCEnv`, of lists, mappings, text and numbers only."""
+        given = {each.name: _read(each, getattr(self, each.name)) for each in _arguments()}
+        return {name: value for name, value in given.items() if value not in (None, [], {})}
+
+
+if TYPE_CHECKING:
+
+    class EnvironmentArguments(EnvConfig, _Command):
+        """Arguments of an environment, as words of a command."""
+
+else:
+    EnvironmentArguments = make_dataclass(
+        "EnvironmentArguments", _options(), bases=(_Command,), frozen=True, kw_only=True,
+        namespace={"__doc__": "Arguments of an environment, as words of a command."},
+    )  # fmt: skip
+    EnvironmentArguments.__module__ = __name__

@@ -11,6 +11,7 @@ from hrc_env.core.batching import one, rows
 from hrc_env.core.errors import whole
 from hrc_env.core.records import Keypoints, PoseEstimate, Roi, WorkerMotion
 from hrc_env.core.typing import Floats, Image, Points3
+from hrc_env.env_config import PICTURE_SIZE
 from hrc_env.geometry.cameras import PinholeCamera, image_from_pinhole, pinhole, resized
 from hrc_env.geometry.chains import capsules
 from hrc_env.motion import generator
@@ -22,8 +23,6 @@ from hrc_env.scene.domain_randomization import Look
 from hrc_env.scene.render import PICTURE_QUALITY, CropRenderer, PictureRenderer, viewpoint_camera
 from hrc_env.simulation import Simulation
 
-PICTURE_SIZE = (960, 720)
-"""Width and height of a picture, if nobody asks for another [px]."""
 SMALLEST_PX, LARGEST_PX = 16, 4096
 DEPTH_QUALITY = {**PICTURE_QUALITY, "offsamples": 0, "shadowsize": 0}
 MOSAIC_TILE = (640, 360)

@@ -24,7 +24,6 @@ from hrc_env.core.batching import copied, mapped, one, write_rows
 from hrc_env.core.errors import ConfigError, check_shape, whole
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.env import RENDER_MODES, EnvBase, spaces
-from hrc_env.render.views import PICTURE_SIZE
 from hrc_env.rewards import RewardConfig
 from hrc_env.simulation import Simulation
 from hrc_env.step_result import Observation, StepResult
@@ -55,15 +54,14 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
 
     Args:
         num_envs: how many environments step together.
-        perception: "keypoints", "truth" or "none"; pictures have no batched form.
         max_episode_steps: the time limit; None is the task's, -1 none.
         autoreset_mode: when an environment whose episode is over starts anew: at the next
             step (default), in the same step, or not by itself ("Disabled").
         num_threads: threads that share the environments; all cores if None.
-        render_mode: of `HRCEnv`, or with "_list" behind it: `render` gives every environment's
-            pictures of all steps since the last `render` or the beginning of the episode.
-        width, height: of pictures [px].
-        arguments: the others of `HRCEnv`.
+        arguments: of `EnvConfig`. perception is "keypoints" (default), "truth" or "none", as
+            pictures have no batched form; with "_list" behind a render mode `render` gives every
+            environment's pictures of all steps since the last `render` or the beginning of the
+            episode.
 
     Raises:
         ConfigError: a name, index or value that is not valid, with those that are.
@@ -76,34 +74,29 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         self,
         num_envs: int,
         *,
-        perception: str = "keypoints",
-        render_mode: str | None = None,
-        width: int = PICTURE_SIZE[0],
-        height: int = PICTURE_SIZE[1],
         max_episode_steps: int | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         num_threads: int | None = None,
         **arguments: Any,
     ) -> None:
-        if perception == "pixels":
+        arguments = {"perception": "keypoints", **arguments}
+        if arguments["perception"] == "pixels":
             raise ConfigError(
                 'perception="pixels" has no batched form: gymnasium.make_vec makes it with a '
                 'process for each environment. perception="keypoints" emulates it, batched.'
             )
-        settings = settle(perception=perception, **arguments)
-        self._open(settings, render_mode, width, height)
-        if render_mode in LISTS:
-            self.metadata["render_modes"].append(render_mode)
-        size = {"width": width, "height": height} if self._size != PICTURE_SIZE else {}
-        shown = {} if render_mode is None else {"render_mode": render_mode, **size}
-        self.arguments = {"perception": perception, **arguments, **shown}
+        settings = settle(**arguments)
+        self._open(settings)
+        if self.render_mode in LISTS:
+            self.metadata["render_modes"].append(self.render_mode)
+        self.arguments = arguments if self.render_mode else _without_pictures(arguments)
         """Given arguments of `HRCEnv`."""
         self.num_envs = whole("num_envs", num_envs, 1, MAX_ENVS)
         self.autoreset_mode = autoreset_of(autoreset_mode)
         self.metadata["autoreset_mode"] = self.autoreset_mode
         n_shards = min(threads_of(num_threads), self.num_envs)
         self.shards = Shards(self.num_envs, n_shards, partial(Simulation, settings=settings))
-        self.pictures = Pictures(self.shards, render_mode, self._size)
+        self.pictures = Pictures(self.shards, self.render_mode, self._size)
         self.single_observation_space, self.single_action_space = spaces(self.shards.first)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
@@ -299,6 +292,12 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
             actions = np.array(actions)
             actions[over] = 0.0
         return checked_action(actions, self._action_shape)
+
+
+def _without_pictures(arguments: dict[str, Any]) -> dict[str, Any]:
+    """Return arguments without those of pictures, which nobody draws."""
+    of_pictures = ("render_mode", "width", "height")
+    return {name: value for name, value in arguments.items() if name not in of_pictures}
 
 
 def _finals(observation: Observation, info: InfoTable, who: Bools) -> dict[str, Any]:

@@ -36,7 +36,7 @@ def test_nothing_said_is_the_environments_own_default():
 def test_everything_said_reaches_the_environment():
     arguments = EnvironmentArguments(
         perception="keypoints", estimator="kalman", cameras=("camera_2", "0"), scene="site",
-        n_workers=(1, 2), people="hurried", control="tool",
+        n_workers=("1", "2"), people="hurried", control="tool",
         faults=('{"kind": "late", "cameras": ["camera_2"], "amount": 0.2}',),
         config=("reward.proximity=0.5", "worker=any"), shield='{"kind": "ssm", "margin_m": 0.1}',
     )  # fmt: skip
