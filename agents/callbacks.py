@@ -19,7 +19,7 @@ from hrc_env.cli.progress import Meter
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import write_whole
 from hrc_env.evaluation.episodes import summarize
-from hrc_env.experiments.study.plots import label, new_figure, save
+from hrc_env.experiments.plots import label, new_figure, save
 from hrc_env.sb3 import HRCVecEnv
 
 from . import checkpoints

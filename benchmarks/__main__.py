@@ -15,7 +15,7 @@ from hrc_env.cli.entry import import_first, run_command, show_errors
 from hrc_env.cli.progress import progress_bar, show
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.machine import n_cores
-from hrc_env.experiments.study.runner import Study, changed, run
+from hrc_env.experiments.runner import Study, changed, run
 
 PROGRAM = "python -m benchmarks"
 

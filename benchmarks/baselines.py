@@ -30,9 +30,9 @@ from hrc_env.cli.checks import at_least, writable_folder
 from hrc_env.cli.progress import progress_bar
 from hrc_env.core.results import Metric
 from hrc_env.evaluation.episodes import EVALUATION_SEED, measure, play_episodes
-from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.report import Column, Report, table_of
-from hrc_env.experiments.study.versions import key_of
+from hrc_env.experiments.cache import PartCache, PartProgress
+from hrc_env.experiments.report import Column, Report, table_of
+from hrc_env.experiments.versions import key_of
 
 DEPENDS = ("env", "tracker", "emulator", "detector", "motion", "agents")
 """Subsystems that finished parts depend on."""

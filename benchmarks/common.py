@@ -10,7 +10,7 @@ from rich.markdown import Markdown
 
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Covariances3, Floats, Points3
-from hrc_env.experiments.study.report import Metrics, Report, with_interval
+from hrc_env.experiments.report import Metrics, Report, with_interval
 
 CHI2_95_3D = 7.815
 """95 % of a three-dimensional normal variable lies within this squared distance."""

@@ -6,7 +6,7 @@ from dataclasses import asdict
 from importlib import import_module
 from typing import Any
 
-from hrc_env.experiments.study.runner import Study
+from hrc_env.experiments.runner import Study
 
 Made = tuple[Study[Any, Any], Any]
 """A study and its configuration."""

@@ -23,9 +23,9 @@ from hrc_env.core.errors import check_names
 from hrc_env.core.results import Metric
 from hrc_env.evaluation.episodes import play_episodes
 from hrc_env.evaluation.intervals import mean_over, rate_of, share_of
-from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.report import Column, Report, table_of
-from hrc_env.experiments.study.versions import key_of
+from hrc_env.experiments.cache import PartCache, PartProgress
+from hrc_env.experiments.report import Column, Report, table_of
+from hrc_env.experiments.versions import key_of
 from hrc_env.tasks import BUILT_IN
 
 DEPENDS = ("env", "tracker", "emulator", "detector", "motion", "agents")

@@ -32,11 +32,11 @@ from hrc_env.core.typing import Bools, Floats, Ints, Points3
 from hrc_env.evaluation.counts import ERRORS_M, Bins
 from hrc_env.evaluation.intervals import counted_quantile_over, ratio_over
 from hrc_env.experiments.ablations.play import BODIES, Walks, walks_of
+from hrc_env.experiments.cache import PartCache, PartProgress
 from hrc_env.experiments.lab.sides import MISSED_CONFIDENCE, MISSED_SHARE
-from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.report import Column, Report, table_of
-from hrc_env.experiments.study.rigs import ALL, DT_S, N_WARM_UP, SINGLE, Rig, left_with
-from hrc_env.experiments.study.versions import key_of
+from hrc_env.experiments.report import Column, Report, table_of
+from hrc_env.experiments.rigs import ALL, DT_S, N_WARM_UP, SINGLE, Rig, left_with
+from hrc_env.experiments.versions import key_of
 from hrc_env.geometry.cameras import project, projections
 from hrc_env.geometry.sight import hidden
 from hrc_env.pipeline.levels import make_pipeline

@@ -23,9 +23,9 @@ from hrc_env.core.results import Metric
 from hrc_env.evaluation.episodes import EVALUATION_SEED, play_episodes
 from hrc_env.evaluation.intervals import goals_over, mean_over, rate_of, share_of
 from hrc_env.evaluation.sums import ACHIEVED, FAILED
-from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.report import Column, Report, table_of
-from hrc_env.experiments.study.versions import key_of
+from hrc_env.experiments.cache import PartCache, PartProgress
+from hrc_env.experiments.report import Column, Report, table_of
+from hrc_env.experiments.versions import key_of
 
 DEPENDS = ("env", "tracker", "emulator", "motion", "shield", "agents")
 """Subsystems that finished parts depend on."""

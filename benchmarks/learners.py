@@ -30,9 +30,9 @@ from hrc_env.core.results import Metric, over
 from hrc_env.evaluation.episodes import EVALUATION_SEED, play_episodes
 from hrc_env.evaluation.intervals import mean_over, rate_of, success_over
 from hrc_env.evaluation.sums import ACHIEVED, FAILED
-from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.report import Column, Report, table_of
-from hrc_env.experiments.study.versions import key_of
+from hrc_env.experiments.cache import PartCache, PartProgress
+from hrc_env.experiments.report import Column, Report, table_of
+from hrc_env.experiments.versions import key_of
 from hrc_env.tasks import BUILT_IN
 
 DEPENDS = ("env", "tracker", "emulator", "motion", "agents")

@@ -28,9 +28,9 @@ from hrc_env.cli.progress import progress_bar
 from hrc_env.core.results import Metric, over
 from hrc_env.evaluation.episodes import EVALUATION_SEED, measure, play_episodes
 from hrc_env.evaluation.intervals import rate_of
-from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.report import Column, Report, table_of
-from hrc_env.experiments.study.versions import key_of
+from hrc_env.experiments.cache import PartCache, PartProgress
+from hrc_env.experiments.report import Column, Report, table_of
+from hrc_env.experiments.versions import key_of
 
 DEPENDS = ("env", "tracker", "emulator", "motion", "shield", "agents")
 """Subsystems that the numbers depend on."""

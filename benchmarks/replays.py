@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.defaults import MADE
-from hrc_env.experiments.study.cache import PartCache
-from hrc_env.experiments.study.runner import Study
-from hrc_env.experiments.study.versions import key_of
+from hrc_env.experiments.cache import PartCache
+from hrc_env.experiments.runner import Study
+from hrc_env.experiments.versions import key_of
 
 Walk = Callable[["Replayed"], None]
 

@@ -36,7 +36,7 @@ from benchmarks.studies import COMMANDS, STUDIES, Command, commands_of
 from docs import generate, tables
 from hrc_env.core.errors import HRCError
 from hrc_env.core.results import provenance
-from hrc_env.experiments.study.versions import versions_of
+from hrc_env.experiments.versions import versions_of
 
 ROOT = Path(__file__).resolve().parent.parent
 OUT, QUICK_OUT = ROOT / "out" / "results", ROOT / "out" / "results_quick"

@@ -23,10 +23,10 @@ from hrc_env.cli.progress import progress_bar
 from hrc_env.core.results import Metric
 from hrc_env.evaluation.episodes import play_episodes
 from hrc_env.evaluation.intervals import goals_over, mean_over, rate_of, ratio_over
-from hrc_env.experiments.impact.setups import PerceptionSetup
-from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.report import Column, Report, table_of
-from hrc_env.experiments.study.versions import key_of
+from hrc_env.experiments.cache import PartCache, PartProgress
+from hrc_env.experiments.report import Column, Report, table_of
+from hrc_env.experiments.setups import PerceptionSetup
+from hrc_env.experiments.versions import key_of
 from hrc_env.perception.faults.fault import ALL, FaultConfig
 from hrc_env.safety.incidents import KINDS
 from hrc_env.scene.rigs import RIGS

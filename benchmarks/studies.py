@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 from hrc_env.core.errors import check_names
-from hrc_env.experiments.study.versions import check_subsystems
+from hrc_env.experiments.versions import check_subsystems
 
 EXPERIMENT, BENCH = "python -m hrc_env experiment ", "python -m benchmarks "
 

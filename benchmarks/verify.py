@@ -38,7 +38,7 @@ from hrc_env.core.errors import (
     RenderingError,
 )
 from hrc_env.core.results import write_whole
-from hrc_env.experiments.study.cache import PartCache, PartProgress
+from hrc_env.experiments.cache import PartCache, PartProgress
 
 CONFIDENCE = 0.95
 LACKING = (DownloadError, MissingExtraError, RenderingError)

@@ -2,7 +2,7 @@
 
 from hrc_env.experiments.benchmark.conditions import CONDITIONS, MAIN, SEED, VERSION
 from hrc_env.experiments.benchmark.entries import PER, Entry, entries
-from hrc_env.experiments.study.report import said, table
+from hrc_env.experiments.report import said, table
 from hrc_env.tasks import BUILT_IN
 
 HEAD = f"""\

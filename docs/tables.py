@@ -31,8 +31,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from hrc_env.experiments.study.report import with_interval
-from hrc_env.experiments.study.versions import SUBSYSTEMS, versions_of
+from hrc_env.experiments.report import with_interval
+from hrc_env.experiments.versions import SUBSYSTEMS, versions_of
 
 RESULTS = Path(__file__).parent / "results"
 BLOCK = re.compile(

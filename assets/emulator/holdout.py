@@ -40,8 +40,8 @@ from assets.emulator.writing import write_calibration
 from hrc_env.cli.progress import progress_bar
 from hrc_env.config import HRCConfig
 from hrc_env.core.results import Metric, write_results
-from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.versions import key_of
+from hrc_env.experiments.cache import PartCache, PartProgress
+from hrc_env.experiments.versions import key_of
 from hrc_env.perception.emulator import EmulatorConfig
 from hrc_env.worker.body import Body, load_body, worker_names
 

@@ -10,7 +10,7 @@ from assets.emulator.clips import Clip
 from assets.emulator.watch import BodyOf, Watched, load, save, watch
 from hrc_env.config import HRCConfig
 from hrc_env.core.typing import Floats
-from hrc_env.experiments.study.versions import key_of
+from hrc_env.experiments.versions import key_of
 from hrc_env.worker.body import load_body
 
 DEPENDS = ("env", "tracker", "emulator", "detector", "motion")

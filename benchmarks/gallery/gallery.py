@@ -13,7 +13,7 @@ from benchmarks.gallery.motions import strip
 from benchmarks.gallery.still import CASTS, portrait, views
 from hrc_env.core.errors import check_names
 from hrc_env.core.typing import Image
-from hrc_env.experiments.study.cache import Progress
+from hrc_env.experiments.cache import Progress
 from hrc_env.motion.repertoire import SCENES
 from hrc_env.worker.body import load_body, worker_names
 

@@ -9,8 +9,8 @@ from benchmarks.motion.report import report
 from benchmarks.motion.statistics import gait_of, statistics_of
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric, over
-from hrc_env.experiments.study.cache import PartCache
-from hrc_env.experiments.study.runner import Study, at_least_one
+from hrc_env.experiments.cache import PartCache
+from hrc_env.experiments.runner import Study, at_least_one
 from hrc_env.motion import state as st
 from hrc_env.motion.repertoire import SCENES, Film, alone, perform
 from hrc_env.worker.body import Body, load_body, worker_names

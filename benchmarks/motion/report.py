@@ -2,7 +2,7 @@
 
 from benchmarks.motion.targets import ANY, Target, targets_of
 from hrc_env.core.results import Metric
-from hrc_env.experiments.study.report import Column, Metrics, Report, said, table, table_of
+from hrc_env.experiments.report import Column, Metrics, Report, said, table, table_of
 
 COLUMNS = (
     Column("{}.seconds", "s"),

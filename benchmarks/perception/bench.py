@@ -20,8 +20,8 @@ from benchmarks.perception.metrics import EMULATED, NO_FAULT, PIXELS, metrics_of
 from benchmarks.perception.report import report
 from benchmarks.perception.views import PLAIN, View, in_turns
 from hrc_env.core.errors import ConfigError
-from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.runner import Study, at_least_one
+from hrc_env.experiments.cache import PartCache, PartProgress
+from hrc_env.experiments.runner import Study, at_least_one
 from hrc_env.perception import vino
 from hrc_env.perception.faults.fault import IMAGE, KINDS, FaultConfig
 from hrc_env.scene.build import SCENES, Scene, SceneConfig, build

@@ -17,9 +17,9 @@ from benchmarks.recorded.metrics import (
 )
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats
-from hrc_env.experiments.study.cache import PartCache
-from hrc_env.experiments.study.report import Column, Metrics, Report, table_of
-from hrc_env.experiments.study.runner import Study
+from hrc_env.experiments.cache import PartCache
+from hrc_env.experiments.report import Column, Metrics, Report, table_of
+from hrc_env.experiments.runner import Study
 from hrc_env.geometry.cameras import projections
 from hrc_env.tracking.config import TrackerConfig
 

@@ -10,7 +10,7 @@ from benchmarks.recorded.films import Films
 from hrc_env.core.records import Keypoints, PoseEstimate, Roi
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Points2
-from hrc_env.experiments.study.cache import PartCache, PartProgress
+from hrc_env.experiments.cache import PartCache, PartProgress
 from hrc_env.geometry.cameras import PinholeCamera, pinhole_from_image, project, projections
 from hrc_env.perception.detector import DetectorConfig, PoseDetector
 from hrc_env.perception.windows import window_from_joints

@@ -17,8 +17,8 @@ from benchmarks.speed.report import REACHER, SINGLE, report
 from benchmarks.speed.tasks import Tasks, shares
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric, over
-from hrc_env.experiments.study.cache import PartCache, Progress
-from hrc_env.experiments.study.runner import Study, at_least_one
+from hrc_env.experiments.cache import PartCache, Progress
+from hrc_env.experiments.runner import Study, at_least_one
 from hrc_env.safety.shield import shield_called
 from hrc_env.tasks.task import find_task
 

@@ -19,8 +19,8 @@ from benchmarks.tracking.report import report
 from benchmarks.tracking.rigs import RIGS, SIGMA_PX, Rig, make_rig
 from benchmarks.tracking.sequences import MATCHED, Sequences, make_sequences
 from benchmarks.tracking.timing import BATCH, time_estimator
-from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.runner import Study, at_least_one
+from hrc_env.experiments.cache import PartCache, PartProgress
+from hrc_env.experiments.runner import Study, at_least_one
 from hrc_env.tracking.estimators import ESTIMATORS
 
 

@@ -17,7 +17,7 @@ from hrc_env.core.batching import rows
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import TORSO
 from hrc_env.core.typing import Bools, Covariances3, Floats, Points3
-from hrc_env.experiments.study.cache import PartProgress
+from hrc_env.experiments.cache import PartProgress
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.tracking.people.association import associate
 from hrc_env.tracking.smoother import smooth

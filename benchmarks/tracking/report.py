@@ -8,7 +8,7 @@ from benchmarks.tracking.env_sequences import ENV
 from benchmarks.tracking.names import DEFAULT, DLT, RIVALS, SMOOTHER, names_of, rows
 from benchmarks.tracking.rigs import RIGS
 from benchmarks.tracking.sequences import MATCHED, TWO_WORKERS
-from hrc_env.experiments.study.report import Metrics, Report, table
+from hrc_env.experiments.report import Metrics, Report, table
 from hrc_env.tracking.estimators import ESTIMATORS
 
 _LEAD = f"""\

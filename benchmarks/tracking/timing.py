@@ -8,7 +8,7 @@ import numpy as np
 from benchmarks.tracking.rigs import DT_S, Rig
 from benchmarks.tracking.sequences import Sequences
 from hrc_env.core.typing import Floats
-from hrc_env.experiments.study.cache import PartProgress
+from hrc_env.experiments.cache import PartProgress
 from hrc_env.tracking.estimators import make_estimator
 
 BATCH = 64

@@ -39,7 +39,7 @@ class Benchmark:
         """Judge it."""
         at_least("--seeds", self.seeds, 1)
         experiment = import_module("hrc_env.experiments.benchmark.experiment")
-        runner = import_module("hrc_env.experiments.study.runner")
+        runner = import_module("hrc_env.experiments.runner")
         config = experiment.config_for(self.policy, self.ids, self.control, self.seeds)
         words = self.policy.removeprefix("hrc://").replace("/", "-").replace(":", "-")
         out = self.out or Path("out/benchmark") / words

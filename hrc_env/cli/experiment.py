@@ -31,7 +31,7 @@ class AnyExperiment:
         """Run, show the tables."""
         at_least("--seeds", self.seeds, 1)
         experiment = import_module(f"hrc_env.experiments.{self.name}.experiment")
-        runner = import_module("hrc_env.experiments.study.runner")
+        runner = import_module("hrc_env.experiments.runner")
         asked = {each.name: getattr(self, each.name) for each in fields(self)}
         out, overwrite = asked.pop("out"), asked.pop("overwrite")
         config = experiment.config_for(**asked)

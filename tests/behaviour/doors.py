@@ -132,14 +132,14 @@ from hrc_env.world import WorkerSignal, Workplace, World
 
 def subsystems() -> tuple[str, ...]:
     """Return the names in `behaviour.toml`."""
-    from hrc_env.experiments.study.versions import SUBSYSTEMS  # here: older code has none
+    from hrc_env.experiments.versions import SUBSYSTEMS  # here: older code has none
 
     return SUBSYSTEMS
 
 
 def read_versions(path: Path) -> dict[str, int]:
     """Return the version of each subsystem that a file gives."""
-    from hrc_env.experiments.study import versions
+    from hrc_env.experiments import versions
 
     return versions.read_versions(path)
 

@@ -8,7 +8,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.experiments.impact.episodes import Stage
 from hrc_env.experiments.impact.experiment import ImpactConfig, config_for
 from hrc_env.experiments.impact.policies import Policy, maker
-from hrc_env.experiments.impact.setups import REFERENCE, setup_called
+from hrc_env.experiments.setups import REFERENCE, setup_called
 from hrc_env.tasks.task import find_task
 
 pytestmark = pytest.mark.slow  # studies are played

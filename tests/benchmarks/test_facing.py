@@ -7,7 +7,7 @@ from benchmarks import facing
 from benchmarks.facing import YAWS, counted, metrics_of, yaw_of
 from hrc_env.core.skeleton import JOINTS, N_JOINTS
 from hrc_env.experiments.ablations.play import walks_of
-from hrc_env.experiments.study.rigs import ALL, N_WARM_UP
+from hrc_env.experiments.rigs import ALL, N_WARM_UP
 from hrc_env.geometry.rotations import about_axis
 
 pytestmark = pytest.mark.slow  # a study is played

@@ -9,7 +9,7 @@ from benchmarks.motion import bench
 from benchmarks.motion.report import inside
 from benchmarks.motion.targets import TARGETS, targets_of
 from hrc_env.core.errors import ConfigError
-from hrc_env.experiments.study.runner import run
+from hrc_env.experiments.runner import run
 from hrc_env.motion.repertoire import SCENES
 
 PLAYED = ("stand", "walk 1.1 m/s", "saw")

@@ -14,7 +14,7 @@ from benchmarks.perception.report import report
 from benchmarks.perception.views import FAMILIES, FAMILY_OF, View, rows_of
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric
-from hrc_env.experiments.study.runner import run
+from hrc_env.experiments.runner import run
 from hrc_env.motion.generator import activity_names
 
 TINY = PerceptionBenchConfig(

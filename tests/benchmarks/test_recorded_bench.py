@@ -22,7 +22,7 @@ from docs import tables
 from hrc_env.core.errors import ConfigError, DownloadError
 from hrc_env.core.records import Roi
 from hrc_env.core.results import Metric
-from hrc_env.experiments.study.cache import PartCache
+from hrc_env.experiments.cache import PartCache
 from hrc_env.perception.detector import Detection
 
 N_FRAMES = 12

@@ -13,7 +13,7 @@ from benchmarks.speed.organs import REST, TOTAL
 from benchmarks.speed.stopwatch import Stopwatch
 from benchmarks.speed.tasks import shares
 from hrc_env.core.errors import ConfigError, HRCError
-from hrc_env.experiments.study.runner import run
+from hrc_env.experiments.runner import run
 from hrc_env.tasks import BUILT_IN
 
 TINY = bench.SpeedBenchConfig(

@@ -9,7 +9,7 @@ from benchmarks.tracking.baselines import bench
 from benchmarks.tracking.baselines.model import F, Q, first_joints, pixels
 from benchmarks.tracking.rigs import make_rig
 from benchmarks.tracking.sequences import make_sequences
-from hrc_env.experiments.study.runner import run
+from hrc_env.experiments.runner import run
 from hrc_env.geometry.cameras import project
 
 

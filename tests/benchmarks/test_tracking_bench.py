@@ -16,7 +16,7 @@ from benchmarks.tracking.sequences import make_sequences
 from benchmarks.tracking.timing import time_estimator
 from docs import tables
 from hrc_env.core.errors import ConfigError
-from hrc_env.experiments.study import runner
+from hrc_env.experiments import runner
 from hrc_env.tracking.estimators import ESTIMATORS
 
 pytestmark = pytest.mark.slow  # a study is played

@@ -12,8 +12,8 @@ from benchmarks.studies import COMMANDS, Command
 from benchmarks.verify import Arguments, draw, found_share, main
 from docs import tables
 from hrc_env.core.errors import ConfigError, DownloadError
-from hrc_env.experiments.study import runner
-from hrc_env.experiments.study.cache import PartCache
+from hrc_env.experiments import runner
+from hrc_env.experiments.cache import PartCache
 
 ROWS = ("lab", "site")
 SEEDS = range(5)

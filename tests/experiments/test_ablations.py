@@ -23,9 +23,9 @@ from hrc_env.experiments.ablations.experiment import (
 from hrc_env.experiments.ablations.handicaps import handicap, lengths_m
 from hrc_env.experiments.ablations.play import matched, pipeline_of, play, walks_of, watch
 from hrc_env.experiments.ablations.questions.rigs import CORNERS, WALLS, spread_over
-from hrc_env.experiments.study.report import Report
-from hrc_env.experiments.study.rigs import DT_S, N_WARM_UP, left_of
-from hrc_env.experiments.study.runner import run
+from hrc_env.experiments.report import Report
+from hrc_env.experiments.rigs import DT_S, N_WARM_UP, left_of
+from hrc_env.experiments.runner import run
 from hrc_env.tracking.tree.gaussian import PARENT, ROOT
 
 TINY = AblationsConfig(n_seeds=1, seconds=1.24)
@@ -134,7 +134,7 @@ def test_a_run_that_is_killed_goes_on_to_the_same_numbers(process, tmp_path):
     script = (
         "import os, sys; from pathlib import Path; "
         "from hrc_env.experiments.ablations.experiment import STUDY, AblationsConfig\n"
-        "from hrc_env.experiments.study.runner import run\n"
+        "from hrc_env.experiments.runner import run\n"
         "def say(share, label):\n"
         "    if label == 'workers.lab_3': os.kill(os.getpid(), 9)\n"
         f"run(STUDY, {config!r}, Path(sys.argv[1]), say)"

@@ -12,20 +12,20 @@ from docs import tables
 from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.evaluation.counts import GAPS_M, Bins
 from hrc_env.evaluation.intervals import counted_quantile_over
+from hrc_env.experiments.cache import PartCache
 from hrc_env.experiments.impact import policies
 from hrc_env.experiments.impact.episodes import STEP, Stage, sums_of
 from hrc_env.experiments.impact.experiment import STUDY, ImpactConfig, check_walks, config_for, play
 from hrc_env.experiments.impact.metrics import COMPARED, margin_needed, metrics_of
 from hrc_env.experiments.impact.policies import Policy, maker, trained
 from hrc_env.experiments.impact.report import report
-from hrc_env.experiments.impact.setups import (
+from hrc_env.experiments.runner import run
+from hrc_env.experiments.setups import (
     REFERENCE,
     PerceptionSetup,
     all_setups,
     setup_called,
 )
-from hrc_env.experiments.study.cache import PartCache
-from hrc_env.experiments.study.runner import run
 from hrc_env.safety.incidents import KINDS
 
 LATE = PerceptionSetup(latency_s=0.12).name
@@ -215,7 +215,7 @@ def test_a_run_that_is_killed_goes_on_to_the_same_numbers(end_to_end, process, t
     script = (
         "import os, sys; from pathlib import Path; "
         "from hrc_env.experiments.impact.experiment import STUDY, ImpactConfig\n"
-        "from hrc_env.experiments.study.runner import run\n"
+        "from hrc_env.experiments.runner import run\n"
         f"config = {TINY!r}\n"
         "def say(share, label):\n"
         f"    if label == 'scripted.{REFERENCE}': os.kill(os.getpid(), 9)\n"

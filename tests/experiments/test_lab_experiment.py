@@ -12,9 +12,9 @@ from hrc_env.experiments.lab import experiment
 from hrc_env.experiments.lab.experiment import STUDY, LabConfig, config_for, laboratory
 from hrc_env.experiments.lab.motions import MOTIONS, play
 from hrc_env.experiments.lab.sides import LEFT, RIGHT, turned_away
-from hrc_env.experiments.study.recording import replay
-from hrc_env.experiments.study.report import Report
-from hrc_env.experiments.study.runner import run
+from hrc_env.experiments.recording import replay
+from hrc_env.experiments.report import Report
+from hrc_env.experiments.runner import run
 
 TINY = LabConfig(n_seeds=1, max_frames=26)
 CAMERAS = (*(f"camera_{k}" for k in range(1, 5)), "multi")

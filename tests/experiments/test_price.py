@@ -12,7 +12,7 @@ from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats
-from hrc_env.experiments.impact.setups import PerceptionSetup
+from hrc_env.experiments.cache import PartCache
 from hrc_env.experiments.price import blindness, experiment, report, trainings
 from hrc_env.experiments.price.blindness import TrainingConfig
 from hrc_env.experiments.price.episodes import STEP, Stage, sums_of
@@ -27,8 +27,8 @@ from hrc_env.experiments.price.metrics import CONTRASTS, Row, metrics_of, suppos
 from hrc_env.experiments.price.report import QUESTIONS
 from hrc_env.experiments.price.search import Tried, draws, searched
 from hrc_env.experiments.price.shield import Widened
-from hrc_env.experiments.study.cache import PartCache
-from hrc_env.experiments.study.runner import run
+from hrc_env.experiments.runner import run
+from hrc_env.experiments.setups import PerceptionSetup
 from hrc_env.rewards import RewardConfig
 from hrc_env.safety.shield import SHIELDS
 from hrc_env.simulation import Simulation
@@ -243,7 +243,7 @@ def test_a_run_that_is_killed_goes_on_to_the_same_numbers(end_to_end, process, t
     script = (
         "import os, sys; from pathlib import Path; "
         "from hrc_env.experiments.price.experiment import STUDY, PriceConfig\n"
-        "from hrc_env.experiments.study.runner import run\n"
+        "from hrc_env.experiments.runner import run\n"
         f"config = {TINY!r}\n"
         "def say(share, label):\n"
         "    if label.startswith('HRCReach-v0.two_cameras'): os.kill(os.getpid(), 9)\n"

@@ -6,10 +6,10 @@ import pytest
 
 from docs import tables
 from hrc_env.core.errors import ConfigError
+from hrc_env.experiments.report import Report
+from hrc_env.experiments.runner import run
 from hrc_env.experiments.site import experiment
 from hrc_env.experiments.site.experiment import STUDY, SiteConfig, config_for
-from hrc_env.experiments.study.report import Report
-from hrc_env.experiments.study.runner import run
 
 TINY = SiteConfig(n_seeds=1, seconds=2.0, estimators=("particle",))
 CAMERAS = (*(f"camera_{k}" for k in range(1, 5)), "multi")

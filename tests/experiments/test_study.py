@@ -12,8 +12,8 @@ from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.core.results import Metric, write_results, write_whole
 from hrc_env.evaluation import intervals
 from hrc_env.evaluation.counts import ERRORS_M
-from hrc_env.experiments.study import report, runner
-from hrc_env.experiments.study.cache import PartCache, own_folder, owner_of
+from hrc_env.experiments import report, runner
+from hrc_env.experiments.cache import PartCache, own_folder, owner_of
 
 
 @dataclass(frozen=True)

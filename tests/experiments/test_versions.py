@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.experiments.study import versions
-from hrc_env.experiments.study.runner import Study
-from hrc_env.experiments.study.versions import (
+from hrc_env.experiments import versions
+from hrc_env.experiments.runner import Study
+from hrc_env.experiments.versions import (
     SUBSYSTEMS,
     key_of,
     read_versions,

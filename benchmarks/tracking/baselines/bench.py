@@ -31,9 +31,9 @@ from benchmarks.tracking.rigs import RIGS, Rig, make_rig
 from benchmarks.tracking.sequences import Sequences, make_sequences
 from hrc_env.core.results import Metric, over
 from hrc_env.core.typing import Floats, Points2, Points3
-from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.report import Metrics, Report, table
-from hrc_env.experiments.study.runner import Study, at_least_one
+from hrc_env.experiments.cache import PartCache, PartProgress
+from hrc_env.experiments.report import Metrics, Report, table
+from hrc_env.experiments.runner import Study, at_least_one
 
 LIBRARIES = ("aniposelib", "particles", "filterpy")
 INSTALL = 'pip install -c constraints.txt -e ".[baselines]"'

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from hrc_env.core.errors import ConfigError, check_names
 from hrc_env.experiments.ablations.handicaps import BONES, MOTION, TREES
-from hrc_env.experiments.study.rigs import Turn
+from hrc_env.experiments.rigs import Turn
 from hrc_env.tracking.config import TrackerConfig
 
 

@@ -20,10 +20,10 @@ from hrc_env.experiments.ablations.questions.faults import CALIBRATION, LATENCY
 from hrc_env.experiments.ablations.questions.filters import ALGORITHM_1, FILTER, KINEMATICS
 from hrc_env.experiments.ablations.questions.rigs import CAMERAS, OCCLUSION, WORKERS
 from hrc_env.experiments.ablations.report import report
-from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.rigs import DT_S, WARM_UP_S
-from hrc_env.experiments.study.runner import Study, at_least_one, changed
-from hrc_env.experiments.study.versions import key_of
+from hrc_env.experiments.cache import PartCache, PartProgress
+from hrc_env.experiments.rigs import DT_S, WARM_UP_S
+from hrc_env.experiments.runner import Study, at_least_one, changed
+from hrc_env.experiments.versions import key_of
 
 ABLATIONS: dict[str, Ablation] = {
     ablation.name: ablation

@@ -21,8 +21,8 @@ from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, Points3
 from hrc_env.evaluation.counts import ERRORS_M
 from hrc_env.experiments.ablations.ablation import Setting
 from hrc_env.experiments.ablations.handicaps import handicap, lengths_m
-from hrc_env.experiments.study.cache import PartProgress
-from hrc_env.experiments.study.rigs import N_WARM_UP, Turn
+from hrc_env.experiments.cache import PartProgress
+from hrc_env.experiments.rigs import N_WARM_UP, Turn
 from hrc_env.motion import generator
 from hrc_env.perception.emulator import lines_of_sight
 from hrc_env.perception.sightlines import SEEN

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import Any
 
-from hrc_env.experiments.impact.setups import PerceptionSetup
+from hrc_env.experiments.setups import PerceptionSetup
 from hrc_env.scene.rigs import RIGS
 from hrc_env.tasks.task import find_task
 

@@ -16,9 +16,9 @@ from hrc_env.evaluation.intervals import goals_over, rate_of, ratio_over, succes
 from hrc_env.experiments.benchmark.conditions import CONDITIONS, SEED, VERSION
 from hrc_env.experiments.benchmark.entries import Entry, enter, entries, regret
 from hrc_env.experiments.benchmark.report import report
-from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.runner import Study, at_least_one
-from hrc_env.experiments.study.versions import key_of
+from hrc_env.experiments.cache import PartCache, PartProgress
+from hrc_env.experiments.runner import Study, at_least_one
+from hrc_env.experiments.versions import key_of
 from hrc_env.safety.incidents import KINDS
 from hrc_env.tasks import BUILT_IN
 

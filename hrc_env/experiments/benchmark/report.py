@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from hrc_env.experiments.benchmark.conditions import CONDITIONS
-from hrc_env.experiments.study.report import Column, Metrics, Report, table_of
+from hrc_env.experiments.report import Column, Metrics, Report, table_of
 
 COLUMNS = (
     Column("{}.goals_per_minute", "goals a minute"),

@@ -22,9 +22,9 @@ from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.evaluation.counts import ERRORS_M, GAPS_M, SPEEDS_MPS
 from hrc_env.evaluation.rollout import rollout
-from hrc_env.experiments.impact.setups import PerceptionSetup
-from hrc_env.experiments.study.cache import PartProgress
-from hrc_env.experiments.study.rigs import Turn
+from hrc_env.experiments.cache import PartProgress
+from hrc_env.experiments.rigs import Turn
+from hrc_env.experiments.setups import PerceptionSetup
 from hrc_env.geometry import chains
 from hrc_env.geometry.distances import least_separation
 from hrc_env.motion import generator

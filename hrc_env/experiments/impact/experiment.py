@@ -7,11 +7,14 @@ from functools import partial
 from typing import Any
 
 from hrc_env.core.errors import ConfigError, HRCError, check_names
+from hrc_env.experiments.cache import PartCache
 from hrc_env.experiments.impact.episodes import PEOPLE, Stage
 from hrc_env.experiments.impact.metrics import Table, metrics_of
 from hrc_env.experiments.impact.policies import POLICIES, PPO, SLOWED, Policy, maker, trained
 from hrc_env.experiments.impact.report import report
-from hrc_env.experiments.impact.setups import (
+from hrc_env.experiments.rigs import DT_S
+from hrc_env.experiments.runner import Study, at_least_one, changed
+from hrc_env.experiments.setups import (
     LATE,
     REFERENCE,
     PerceptionSetup,
@@ -19,10 +22,7 @@ from hrc_env.experiments.impact.setups import (
     setup_called,
     usual_setups,
 )
-from hrc_env.experiments.study.cache import PartCache
-from hrc_env.experiments.study.rigs import DT_S
-from hrc_env.experiments.study.runner import Study, at_least_one, changed
-from hrc_env.experiments.study.versions import key_of, source_digest
+from hrc_env.experiments.versions import key_of, source_digest
 from hrc_env.safety.shield import shield_called
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import find_task

@@ -21,8 +21,8 @@ from hrc_env.evaluation import intervals
 from hrc_env.evaluation.counts import ERRORS_M, GAPS_M, SPEEDS_MPS
 from hrc_env.evaluation.intervals import paired, rate_of, ratio_of, ratio_over
 from hrc_env.experiments.impact.policies import SLOWED, Policy
-from hrc_env.experiments.impact.setups import LATE, REFERENCE, PerceptionSetup, setup_called
-from hrc_env.experiments.study.report import Metrics
+from hrc_env.experiments.report import Metrics
+from hrc_env.experiments.setups import LATE, REFERENCE, PerceptionSetup, setup_called
 
 Row = Mapping[str, list[Any]]
 Table = Mapping[tuple[str, str], Row]

@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from hrc_env.experiments.impact.episodes import SLOW_M, STOP_M
 from hrc_env.experiments.impact.metrics import COMPARED, NOMINAL_MPS, Table
 from hrc_env.experiments.impact.policies import POLICIES, SCRIPTED, SLOWED
-from hrc_env.experiments.impact.setups import LATE, LATE_S, REFERENCE, setup_called
-from hrc_env.experiments.study.plots import ends, label, new_figure, save
-from hrc_env.experiments.study.report import Column, Metrics, Report, picture, table_of
+from hrc_env.experiments.plots import ends, label, new_figure, save
+from hrc_env.experiments.report import Column, Metrics, Report, picture, table_of
+from hrc_env.experiments.setups import LATE, LATE_S, REFERENCE, setup_called
 from hrc_env.safety.incidents import MOVING_M_S
 from hrc_env.tracking.estimators import ESTIMATORS
 

@@ -12,13 +12,13 @@ from hrc_env.config import HRCConfig
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.evaluation.intervals import paired, quantile_of, quantile_over, ratio_over
+from hrc_env.experiments.cache import PartCache, PartProgress
 from hrc_env.experiments.lab.motions import MOTIONS, play
 from hrc_env.experiments.lab.report import ALL, COLUMNS, ESTIMATORS, WARM_UP, report
 from hrc_env.experiments.lab.sides import MISSED_SHARE, away_from_cameras, missed_by_camera
-from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.recording import Recording, record, replay
-from hrc_env.experiments.study.rigs import CHOICES, MULTI
-from hrc_env.experiments.study.runner import Study, at_least_one, changed
+from hrc_env.experiments.recording import Recording, record, replay
+from hrc_env.experiments.rigs import CHOICES, MULTI
+from hrc_env.experiments.runner import Study, at_least_one, changed
 from hrc_env.perception.detector import DetectorConfig
 from hrc_env.scene.build import Scene, SceneConfig, build
 from hrc_env.scene.rigs import RIGS

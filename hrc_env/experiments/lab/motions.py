@@ -6,8 +6,8 @@ import numpy as np
 
 from hrc_env.core.batching import rows
 from hrc_env.core.records import WorkerMotion
+from hrc_env.experiments.recording import concatenated
 from hrc_env.experiments.site.walk import walk
-from hrc_env.experiments.study.recording import concatenated
 from hrc_env.motion.repertoire import REPERTOIRE, Act, alone, perform
 from hrc_env.scene.build import Scene
 from hrc_env.worker.body import load_body

@@ -13,10 +13,10 @@ from hrc_env.core.skeleton import BONES
 from hrc_env.core.typing import Image, Points3
 from hrc_env.experiments.lab import sides
 from hrc_env.experiments.lab.motions import MOTIONS
-from hrc_env.experiments.study.plots import new_figure, save
-from hrc_env.experiments.study.recording import Recording, replay
-from hrc_env.experiments.study.report import Column, Metrics, Report, picture, table, table_of
-from hrc_env.experiments.study.rigs import SPOKEN
+from hrc_env.experiments.plots import new_figure, save
+from hrc_env.experiments.recording import Recording, replay
+from hrc_env.experiments.report import Column, Metrics, Report, picture, table, table_of
+from hrc_env.experiments.rigs import SPOKEN
 from hrc_env.geometry.cameras import image_from_pinhole
 from hrc_env.perception.lensed import Lensed
 from hrc_env.render import overlay

@@ -4,7 +4,7 @@ import numpy as np
 
 from hrc_env.core.skeleton import JOINTS
 from hrc_env.core.typing import Bools, Floats, Points3
-from hrc_env.experiments.study.recording import Recording
+from hrc_env.experiments.recording import Recording
 from hrc_env.geometry.cameras import project, projections
 from hrc_env.worker.body import load_body
 

@@ -21,10 +21,10 @@ import numpy as np
 
 from hrc_env.core.results import Metric
 from hrc_env.evaluation.intervals import mean_over
+from hrc_env.experiments.cache import PartCache
 from hrc_env.experiments.price.trainings import BELIEF, REWARDS, TRUE, Training, learn
-from hrc_env.experiments.study.cache import PartCache
-from hrc_env.experiments.study.runner import at_least_one
-from hrc_env.experiments.study.versions import key_of
+from hrc_env.experiments.runner import at_least_one
+from hrc_env.experiments.versions import key_of
 
 DEPENDS = ("env", "tracker", "emulator", "motion", "agents")
 """Subsystems that trainings depend on."""

@@ -16,11 +16,11 @@ from hrc_env.agents.env_info import env_info
 from hrc_env.agents.registry import make_agent
 from hrc_env.core.typing import Points3
 from hrc_env.evaluation.rollout import rollout
+from hrc_env.experiments.cache import PartProgress
 from hrc_env.experiments.impact.episodes import Endless, MakeAgent, Rows, build
 from hrc_env.experiments.price.eyes import Eyes
 from hrc_env.experiments.price.shield import Widened
-from hrc_env.experiments.study.cache import PartProgress
-from hrc_env.experiments.study.rigs import Turn
+from hrc_env.experiments.rigs import Turn
 from hrc_env.motion import generator
 from hrc_env.simulation import Simulation
 from hrc_env.tasks.task import find_task

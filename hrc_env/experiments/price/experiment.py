@@ -10,6 +10,7 @@ import numpy as np
 
 from hrc_env.agents.experts import EXPERTS
 from hrc_env.core.errors import ConfigError, HRCError
+from hrc_env.experiments.cache import PartCache
 from hrc_env.experiments.impact.episodes import PEOPLE, Rows
 from hrc_env.experiments.price import blindness
 from hrc_env.experiments.price.episodes import Stage
@@ -26,9 +27,8 @@ from hrc_env.experiments.price.metrics import PER, Row, metrics_of, supposed_m
 from hrc_env.experiments.price.report import report
 from hrc_env.experiments.price.search import searched
 from hrc_env.experiments.price.shield import SHIELD
-from hrc_env.experiments.study.cache import PartCache
-from hrc_env.experiments.study.runner import Study, at_least_one, changed
-from hrc_env.experiments.study.versions import key_of, source_digest
+from hrc_env.experiments.runner import Study, at_least_one, changed
+from hrc_env.experiments.versions import key_of, source_digest
 from hrc_env.tasks import BUILT_IN, DEFAULT
 from hrc_env.tasks.task import Task, find_task
 from hrc_env.tracking.estimators import estimator_called

@@ -5,8 +5,8 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from hrc_env.core.errors import check_names
-from hrc_env.experiments.impact.setups import LATE_S, PerceptionSetup
-from hrc_env.experiments.study.rigs import Turn
+from hrc_env.experiments.rigs import Turn
+from hrc_env.experiments.setups import LATE_S, PerceptionSetup
 from hrc_env.perception.faults.fault import ALL, FOREVER_S, FaultConfig
 from hrc_env.scene.rigs import RIGS
 from hrc_env.tracking.estimators import ESTIMATORS

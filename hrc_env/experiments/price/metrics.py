@@ -16,7 +16,7 @@ from hrc_env.experiments.impact.episodes import Rows
 from hrc_env.experiments.price.episodes import CONTACTS
 from hrc_env.experiments.price.eyes import ELSEWHERE, FOUR, ONE, TRUTH
 from hrc_env.experiments.price.search import Tried, draws, falling
-from hrc_env.experiments.study.report import Metrics
+from hrc_env.experiments.report import Metrics
 
 N_DRAWS = 1000
 EPISODE_MIN = 10.0 / 60.0

@@ -6,12 +6,12 @@ from typing import Any
 
 from matplotlib.axes import Axes
 
+from hrc_env.experiments.plots import ends, label, new_figure, save
 from hrc_env.experiments.price.blindness import MEASURED, WORDS, Learnt
 from hrc_env.experiments.price.eyes import ELSEWHERE, FOUR, GROUPS, QUICK, Eyes, all_eyes
 from hrc_env.experiments.price.metrics import PER, Row
 from hrc_env.experiments.price.trainings import TRUE
-from hrc_env.experiments.study.plots import ends, label, new_figure, save
-from hrc_env.experiments.study.report import Column, Metrics, Report, picture, table_of
+from hrc_env.experiments.report import Column, Metrics, Report, picture, table_of
 
 COLUMNS = {
     "margin_m": ("margin [m]", 3, 1.0),

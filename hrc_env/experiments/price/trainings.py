@@ -15,10 +15,10 @@ from hrc_env.config import settle
 from hrc_env.control import checked_action
 from hrc_env.core.machine import n_cores
 from hrc_env.core.typing import Floats
+from hrc_env.experiments.cache import PartProgress
 from hrc_env.experiments.impact.episodes import PEOPLE, SLOW_M
 from hrc_env.experiments.impact.policies import N_ENVS, PROXIMITY, taught
-from hrc_env.experiments.impact.setups import PerceptionSetup
-from hrc_env.experiments.study.cache import PartProgress
+from hrc_env.experiments.setups import PerceptionSetup
 from hrc_env.motion import generator
 from hrc_env.observations import FAR_SEPARATION_M
 from hrc_env.perception.emulator import lines_of_sight

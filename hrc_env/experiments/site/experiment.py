@@ -15,12 +15,12 @@ from hrc_env.core.results import Metric
 from hrc_env.core.skeleton import JOINT
 from hrc_env.core.typing import Floats
 from hrc_env.evaluation.intervals import mean_over, paired, rmse_of, rmse_over
+from hrc_env.experiments.cache import PartCache, PartProgress
+from hrc_env.experiments.recording import Recording, record, replay
+from hrc_env.experiments.rigs import CHOICES, DT_S, MULTI, N_WARM_UP, left_of
+from hrc_env.experiments.runner import Study, at_least_one, changed
 from hrc_env.experiments.site.report import report, site
 from hrc_env.experiments.site.walk import walk
-from hrc_env.experiments.study.cache import PartCache, PartProgress
-from hrc_env.experiments.study.recording import Recording, record, replay
-from hrc_env.experiments.study.rigs import CHOICES, DT_S, MULTI, N_WARM_UP, left_of
-from hrc_env.experiments.study.runner import Study, at_least_one, changed
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import ESTIMATORS
 

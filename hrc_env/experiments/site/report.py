@@ -12,10 +12,10 @@ from hrc_env.config import HRCConfig
 from hrc_env.core.batching import one
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats
+from hrc_env.experiments.plots import label, new_figure, save
+from hrc_env.experiments.report import Column, Metrics, Report, picture, table_of
+from hrc_env.experiments.rigs import MULTI, SPOKEN
 from hrc_env.experiments.site.walk import walk
-from hrc_env.experiments.study.plots import label, new_figure, save
-from hrc_env.experiments.study.report import Column, Metrics, Report, picture, table_of
-from hrc_env.experiments.study.rigs import MULTI, SPOKEN
 from hrc_env.geometry.cameras import pinhole, project
 from hrc_env.scene.build import Scene, build
 from hrc_env.scene.render import PictureRenderer

@@ -4,7 +4,7 @@ import numpy as np
 
 from hrc_env.core.batching import rows
 from hrc_env.core.records import WorkerMotion
-from hrc_env.experiments.study.recording import concatenated
+from hrc_env.experiments.recording import concatenated
 from hrc_env.motion import generator
 from hrc_env.motion.config import MotionConfig
 from hrc_env.motion.schedule import Job

@@ -3,7 +3,7 @@
 import math
 
 from hrc_env.experiments.ablations.ablation import Ablation, Setting
-from hrc_env.experiments.study.rigs import Turn, late
+from hrc_env.experiments.rigs import Turn, late
 from hrc_env.perception.faults.fault import ALL as EVERY
 from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.scene.rigs import RIGS

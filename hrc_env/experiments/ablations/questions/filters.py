@@ -5,7 +5,7 @@ from typing import Any
 
 from hrc_env.experiments.ablations.ablation import Ablation, Setting
 from hrc_env.experiments.ablations.questions.rigs import PAIRS
-from hrc_env.experiments.study.rigs import ALL, SINGLE, Rig, left_of
+from hrc_env.experiments.rigs import ALL, SINGLE, Rig, left_of
 from hrc_env.tracking.config import PaperConfig, ParticleConfig
 
 

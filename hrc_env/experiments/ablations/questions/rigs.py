@@ -1,7 +1,7 @@
 """How many cameras, and where; how many may be blocked; how many workers they can tell apart."""
 
 from hrc_env.experiments.ablations.ablation import Ablation, Setting
-from hrc_env.experiments.study.rigs import (
+from hrc_env.experiments.rigs import (
     ALL,
     NEIGHBOURS,
     OPPOSITE,

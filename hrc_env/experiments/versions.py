@@ -18,7 +18,7 @@ from hrc_env.core.errors import ConfigError, check_names
 
 SUBSYSTEMS = ("env", "tracker", "emulator", "detector", "motion", "shield", "agents")
 """Names in `behaviour.toml`."""
-_PACKAGE = Path(__file__).parents[2]
+_PACKAGE = Path(__file__).parents[1]
 
 
 def find_behaviour() -> Path:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hrc_env.core.errors import check_names
-from hrc_env.experiments.study.rigs import (
+from hrc_env.experiments.rigs import (
     ALL,
     OPPOSITE,
     SINGLE,

@@ -14,7 +14,7 @@ from hrc_env.config import HRCConfig
 from hrc_env.core.batching import rows
 from hrc_env.core.records import Keypoints, PoseEstimate, WorkerMotion
 from hrc_env.core.typing import Points3
-from hrc_env.experiments.study.cache import PartProgress
+from hrc_env.experiments.cache import PartProgress
 from hrc_env.geometry.cameras import projections
 from hrc_env.perception.noise import our_joints
 from hrc_env.pipeline.levels import make_pipeline

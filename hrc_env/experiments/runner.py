@@ -7,9 +7,9 @@ from typing import Any, Generic, TypeVar
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric
-from hrc_env.experiments.study.cache import PartCache, Progress, own_folder
-from hrc_env.experiments.study.report import Report
-from hrc_env.experiments.study.versions import check_subsystems, key_of
+from hrc_env.experiments.cache import PartCache, Progress, own_folder
+from hrc_env.experiments.report import Report
+from hrc_env.experiments.versions import check_subsystems, key_of
 
 ConfigT = TypeVar("ConfigT")
 PlayedT = TypeVar("PlayedT")
