@@ -15,13 +15,13 @@ from hrc_env.cli.entry import import_first, run_command, show_errors
 from hrc_env.cli.progress import progress_bar, show
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.machine import n_cores
-from hrc_env.experiments.runner import Study, changed, run
+from hrc_env.experiments.runner import Experiment, changed, run
 
 PROGRAM = "python -m benchmarks"
 
 
 @dataclass(frozen=True)
-class AnyBench:
+class BenchArguments:
     """What every bench is asked; one that was stopped goes on where it was in the same folder."""
 
     out: Path
@@ -29,13 +29,13 @@ class AnyBench:
     quick: bool = False
     """Every number, from less: minutes, not hours."""
 
-    def shown(self, study: Study[Any, Any], config: Any) -> int:
-        """Run a study, show its tables."""
-        return show(partial(run, study, config), self.out, "bench")
+    def show(self, experiment: Experiment[Any]) -> int:
+        """Run an experiment, show its tables."""
+        return show(partial(run, experiment), self.out, "bench")
 
 
 @dataclass(frozen=True)
-class TrackingBench(AnyBench):
+class TrackingArguments(BenchArguments):
     """Run every estimator on the same simulated sequences; tables and results.json."""
 
     out: Path = Path("out/bench_tracking")
@@ -58,28 +58,28 @@ class TrackingBench(AnyBench):
         if self.real and self.baselines:
             raise ConfigError("--real and --baselines are two parts of the bench; choose one.")
         if self.baselines:
-            from benchmarks.tracking.baselines.bench import BASELINES, BaselinesConfig
+            from benchmarks.tracking.baselines.bench import BaselinesBench
 
             n_seeds = self.seeds or (1 if self.quick else 5)
-            return self._beside("_baselines").shown(BASELINES, BaselinesConfig(n_seeds))
+            return self._beside("_baselines").show(BaselinesBench(n_seeds))
         if self.real:
-            from benchmarks.recorded.bench import RECORDED
+            from benchmarks.recorded.bench import RecordedBench
 
-            return self._beside("_real").shown(RECORDED, None)
-        from benchmarks.tracking.bench import QUICK, TRACKING, TrackingBenchConfig
+            return self._beside("_real").show(RecordedBench())
+        from benchmarks.tracking.bench import QUICK, TrackingBench
 
-        config = QUICK if self.quick else TrackingBenchConfig()
+        config = QUICK if self.quick else TrackingBench()
         processes = self.processes or n_cores()
-        return self.shown(TRACKING, changed(config, n_seeds=self.seeds, processes=processes))
+        return self.show(changed(config, n_seeds=self.seeds, processes=processes))
 
-    def _beside(self, ending: str) -> AnyBench:
+    def _beside(self, ending: str) -> BenchArguments:
         """The same in a folder of its own, unless one was given."""
-        is_usual = self.out == TrackingBench.out
-        return AnyBench(Path(f"{self.out}{ending}") if is_usual else self.out)
+        is_usual = self.out == TrackingArguments.out
+        return BenchArguments(Path(f"{self.out}{ending}") if is_usual else self.out)
 
 
 @dataclass(frozen=True)
-class SpeedBench(AnyBench):
+class SpeedArguments(BenchArguments):
     """Steps a second, what each organ takes of a step, and resets; beside Gymnasium's Reacher. Then
     those of every id, beside the first's.
 
@@ -98,16 +98,14 @@ class SpeedBench(AnyBench):
     def run(self) -> int:
         """Run, show the tables."""
         at_least("--rounds", self.rounds, 1)
-        from benchmarks.speed.bench import QUICK, SPEED, SpeedBenchConfig
+        from benchmarks.speed.bench import QUICK, SpeedBench
 
-        config = QUICK if self.quick else SpeedBenchConfig()
-        return self.shown(
-            SPEED, changed(config, n_rounds=self.rounds, task=self.task, shield=self.shield)
-        )
+        config = QUICK if self.quick else SpeedBench()
+        return self.show(changed(config, n_rounds=self.rounds, task=self.task, shield=self.shield))
 
 
 @dataclass(frozen=True)
-class MotionBench(AnyBench):
+class MotionArguments(BenchArguments):
     """Play everything that workers can do; statistics beside those of people."""
 
     out: Path = Path("out/bench_motion")
@@ -117,14 +115,14 @@ class MotionBench(AnyBench):
     def run(self) -> int:
         """Run, show the tables."""
         at_least("--seeds", self.seeds, 1)
-        from benchmarks.motion.bench import MOTION, QUICK, MotionBenchConfig
+        from benchmarks.motion.bench import QUICK, MotionBench
 
-        config = QUICK if self.quick else MotionBenchConfig()
-        return self.shown(MOTION, changed(config, n_seeds=self.seeds))
+        config = QUICK if self.quick else MotionBench()
+        return self.show(changed(config, n_seeds=self.seeds))
 
 
 @dataclass(frozen=True)
-class PerceptionBench(AnyBench):
+class PerceptionArguments(BenchArguments):
     """Level `pixels`: steps a second and what takes them, how well workers are seen by pose,
     distance, view angle and lens, and what every fault of a camera costs."""
 
@@ -132,9 +130,9 @@ class PerceptionBench(AnyBench):
 
     def run(self) -> int:
         """Run, show the tables."""
-        from benchmarks.perception.bench import PERCEPTION, QUICK, PerceptionBenchConfig
+        from benchmarks.perception.bench import QUICK, PerceptionBench
 
-        return self.shown(PERCEPTION, QUICK if self.quick else PerceptionBenchConfig())
+        return self.show(QUICK if self.quick else PerceptionBench())
 
 
 @dataclass(frozen=True)
@@ -166,10 +164,10 @@ class Benchmarks:
     """
 
     what: (
-        Annotated[TrackingBench, tyro.conf.subcommand("tracking")]
-        | Annotated[PerceptionBench, tyro.conf.subcommand("perception")]
-        | Annotated[SpeedBench, tyro.conf.subcommand("speed")]
-        | Annotated[MotionBench, tyro.conf.subcommand("motion")]
+        Annotated[TrackingArguments, tyro.conf.subcommand("tracking")]
+        | Annotated[PerceptionArguments, tyro.conf.subcommand("perception")]
+        | Annotated[SpeedArguments, tyro.conf.subcommand("speed")]
+        | Annotated[MotionArguments, tyro.conf.subcommand("motion")]
         | Annotated[Gallery, tyro.conf.subcommand("gallery")]
     )
     """Which one."""

@@ -11,7 +11,13 @@ from rich.markdown import Markdown
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Covariances3, Floats, Points3
 from hrc_env.experiments.report import Metrics, Report, with_interval
+from hrc_env.tasks import BUILT_IN
 
+TASKS = tuple(dict.fromkeys((
+    "HRCReach-v0", "HRCReachGoal-v0", "HRCPickPlace-v0", "HRCPickPlaceGoal-v0", "HRCHandover-v0",
+    "HRCDrywall-v0", "HRCDelivery-v0", *BUILT_IN,
+)))  # fmt: skip
+"""All built-in tasks in the order of tables."""
 CHI2_95_3D = 7.815
 """95 % of a three-dimensional normal variable lies within this squared distance."""
 

@@ -3,15 +3,13 @@
 For each seed PPO-Lagrangian learns with a limit of cost, and PPO without any care. Of the first it
 is told when it reached its limit and how well it stayed there: the cost of its noisy actions, on
 the truth, over windows of 250,000 steps, which are 1,000 episodes. Both are judged on the same
-fixed seeds, the second also under shields. What is finished stays in the folder.
+fixed seeds, the second also under a shield.
 """
 
-import hashlib
 import json
-import subprocess
 import sys
-from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -19,47 +17,40 @@ from typing import Any
 import numpy as np
 import torch
 import tyro
-from rich.console import Console
 
-from benchmarks.common import exactly, publish
+from benchmarks.command import StudyArguments, run_study
+from benchmarks.common import exactly
+from benchmarks.learning import Training
 from hrc_env.agents.callbacks import Curve
-from hrc_env.agents.registry import make_agent
-from hrc_env.cli.progress import progress_bar
+from hrc_env.cli.entry import show_errors
 from hrc_env.core.results import Metric, over
-from hrc_env.evaluation.episodes import EVALUATION_SEED, measure, play_episodes
-from hrc_env.evaluation.intervals import rate_of
-from hrc_env.experiments.cache import PartCache, PartProgress
-from hrc_env.experiments.report import Column, Report, table_of
+from hrc_env.evaluation.episodes import EVALUATION_SEED
+from hrc_env.evaluation.sums import ACHIEVED
+from hrc_env.experiments.columns import Column, mean, per_minute, rate
+from hrc_env.experiments.report import Metrics, Table
+from hrc_env.experiments.study import Row, Study
 from hrc_env.experiments.versions import key_of
 
-DEPENDS = ("env", "tracker", "emulator", "motion", "shield", "agents")
-"""Subsystems that the numbers depend on."""
 TRAINED_ON = ("env", "tracker", "emulator", "motion", "agents")
 """Subsystems that policies depend on."""
-WINDOW_STEPS = 250_000
-HELD = 1.1
+WINDOW_STEPS, N_WINDOWS = 250_000, 2
+"""Length of a window, and how many of the last ones count."""
+REACHED = 1.1
 """Times the limit: below that it is reached."""
-RUNS: Mapping[str, tuple[str, ...]] = {
-    "limited": ("--algorithm", "ppo_lagrangian"),
-    "fast": ("--proximity", "0"),
+WORDS = {
+    "limited": ("PPO-Lagrangian, limit 30", None),
+    "fast": ("PPO without care, then `qp`", "qp"),
+    "bare": ("the same without a shield", None),
 }
-COLUMNS = (
-    Column("{}.goals_per_minute", "goals a minute"),
-    Column("{}.cost_per_episode", "cost"),
-    Column("{}.contacts_per_episode", "contacts", 2),
-    Column("{}.towards", "contacts towards in 1,000 episodes", 1),
-)
-HELD_COLUMNS = (
-    Column("{}.reached_at_steps", "limit reached after [steps]", 0),
-    Column("{}.cost", "cost of the last windows"),
-    Column("{}.furthest", "furthest window from the limit [share]", 2),
-    Column("{}.goals_per_minute", "goals a minute, actions noisy"),
-)
+"""Rows of a seed: words, and the shield under which its policy is judged."""
+TITLE = "A limit, or a shield"
+Trainings = Mapping[tuple[str, int], Training]
+"""By learner and seed."""
 
 
 @dataclass(frozen=True)
-class Arguments:
-    """Learn with a limit on several seeds."""
+class LimitedArguments(StudyArguments):
+    """Learn with a limit on several seeds; with --quick for some thousand steps."""
 
     out: Path = Path("out/limited")
     """Folder for the runs, results.json and the report."""
@@ -68,120 +59,134 @@ class Arguments:
     cost_limit: float = 30.0
     """Of an episode."""
     timesteps: int = 3_000_000
-    """Of who learns with the limit."""
+    """Of who learns with the limit; 8192 if quick."""
     fast_timesteps: int = 1_000_000
-    """Of who learns without care."""
-    windows: int = 2
-    """How many of the last windows count."""
-    shields: tuple[str, ...] = ("qp",)
-    """Under which the second is judged, too."""
-    episodes: int = 1000
-    """Of each row."""
+    """Of who learns without care; 8192 if quick."""
 
 
-def main(arguments: Arguments) -> None:
-    """Learn, judge, show."""
-    torch.set_num_threads(1)
-    metrics: dict[str, Metric] = {}
-    runs = {(name, seed): learnt(arguments, name, seed)
-            for seed in arguments.seeds for name in RUNS}  # fmt: skip
-    n_parts = len(arguments.seeds) * (2 + len(arguments.shields))
-    with progress_bar(Console(), "judging") as progress:
-        parts = PartCache(arguments.out / "parts", key(arguments), n_parts, progress)
-        for seed in arguments.seeds:
-            curve = json.loads((runs["limited", seed] / "curve.json").read_text())
-            found = held(curve, arguments.cost_limit, arguments.windows)
-            metrics |= {f"seed_{seed}.{name}": each for name, each in found.items()}
-            for row, name, shield in rows(arguments, seed):
-                episodes = played(parts, arguments, row, runs[name, seed], shield)
-                metrics |= worth_of(row, episodes)
-    names = dict.fromkeys(n.rpartition(".")[0] for n in metrics if n.endswith("cost_per_episode"))
-    parts = [
-        table_of("Staying at the limit", {f"seed_{s}": f"seed {s}" for s in arguments.seeds},
-                 HELD_COLUMNS, metrics),
-        table_of("Judged", {name: name for name in names}, COLUMNS, metrics),
-    ]  # fmt: skip
-    seeds = range(EVALUATION_SEED, EVALUATION_SEED + arguments.episodes)
-    report = Report("Learning with a limit", (__doc__ or "").strip(), parts)
-    publish(arguments.out, report, asdict(arguments), list(seeds), metrics)
+def trainings_of(arguments: LimitedArguments) -> Trainings:
+    """Return the trainings of both learners."""
+    limit, found = arguments.cost_limit, {}
+    for seed in arguments.seeds:
+        for name, timesteps, options in (
+            ("limited", arguments.timesteps, {"algorithm": "ppo_lagrangian", "cost-limit": limit}),
+            ("fast", arguments.fast_timesteps, {"proximity": 0}),
+        ):
+            timesteps = 8192 if arguments.quick else timesteps
+            made_of = {"timesteps": timesteps, "cost_limit": options.get("cost-limit")}
+            folder = arguments.out / f"{name}-{seed}-{key_of(made_of, TRAINED_ON)}"
+            given = {**options, "seed": seed, "timesteps": timesteps}
+            found[name, seed] = Training(folder, given)
+    return found
 
 
-def key(arguments: Arguments) -> str:
-    """Return the key of finished parts."""
-    return key_of({"episodes": arguments.episodes, "seed": EVALUATION_SEED}, DEPENDS)
+def make_study(trainings: Trainings, limit: float) -> Study:
+    """Return the study of the policies that have learnt."""
+    rows, shown = dict[str, Row](), dict[str, tuple[str, ...]]()
+    seeds = list(dict.fromkeys(seed for _, seed in trainings))
+    for learner, (words, shield) in WORDS.items():
+        for seed in seeds:
+            policy = trainings["limited" if learner == "limited" else "fast", seed].policy
+            name, cells = name_row(learner, seed), (words, str(seed))
+            shown[name] = cells
+            if policy.exists():
+                rows[name] = Row(cells, 1000, str(policy), env={"shield": shield})
+    return Study(
+        name="limited",
+        title=TITLE,
+        about=(__doc__ or "").strip(),
+        depends=("env", "tracker", "emulator", "motion", "shield", "agents"),
+        first_seed=EVALUATION_SEED,
+        rows=rows,
+        columns=MEASURED,
+        tables=(Table("limited", TITLE, shown, COLUMNS, ("learner", "seed"), NOTE),),
+        derive=partial(judge_limits, trainings=trainings, limit=limit),
+        n_quick=2,
+    )
 
 
-def rows(arguments: Arguments, seed: int) -> Iterator[tuple[str, str, str | None]]:
-    """Yield the rows of a seed: name, run, and the shield under which its policy is judged."""
-    yield f"limited_{seed}", "limited", None
-    for shield in (None, *arguments.shields):
-        yield f"fast_{seed}.{shield or 'none'}", "fast", shield
+def name_row(learner: str, seed: int) -> str:
+    """Return the name of a row in results.json."""
+    if learner == "limited":
+        return f"limited_{seed}"
+    return f"fast_{seed}.{'qp' if learner == 'fast' else 'none'}"
 
 
-def folder_of(arguments: Arguments, name: str, seed: int) -> Path:
-    """Return the folder of a run, whether it has learnt or not."""
-    limited = name == "limited"
-    timesteps = arguments.timesteps if limited else arguments.fast_timesteps
-    made_of = {"timesteps": timesteps, "cost_limit": arguments.cost_limit if limited else None}
-    return arguments.out / f"{name}-{seed}-{key_of(made_of, TRAINED_ON)}"
+def judge_limits(metrics: Metrics, trainings: Trainings, limit: float) -> dict[str, Metric]:
+    """Return how every learner with a limit kept it, from its curve."""
+    del metrics
+    return {
+        f"limited_{seed}.{name}": metric
+        for (learner, seed), training in trainings.items()
+        if learner == "limited"
+        for name, metric in judge_curve(
+            json.loads((training.folder / "curve.json").read_text()), limit
+        ).items()
+    }
 
 
-def learnt(arguments: Arguments, name: str, seed: int) -> Path:
-    """The folder of a run, which is made, or goes on, if it is not there."""
-    folder, limited = folder_of(arguments, name, seed), name == "limited"
-    timesteps = arguments.timesteps if limited else arguments.fast_timesteps
-    if (folder / "score.json").exists():
-        return folder
-    options: dict[str, Any] = {"resume" if (folder / "policy.zip").exists() else "out": folder}
-    options |= {"seed": seed, "episodes": 1, "timesteps": timesteps}
-    if limited:
-        options["cost-limit"] = arguments.cost_limit
-    words = [word for option, value in options.items() for word in (f"--{option}", str(value))]
-    command = [sys.executable, "-m", "hrc_env", "train", "--no-film", *RUNS[name], *words]
-    subprocess.run(command, check=True)
-    return folder
+def judge_curve(curve: Curve, limit: float, n_windows: int = N_WINDOWS) -> dict[str, Metric]:
+    """Return how a limit was kept.
 
+    Args:
+        curve: points of a training.
+        limit: of the cost of an episode.
+        n_windows: how many of the last windows count.
 
-def held(curve: Curve, limit: float, windows: int) -> dict[str, Metric]:
-    """When the smoothed cost first was near the whole limit (infinite: never), the mean cost of the
-    last windows, and how far from the limit the furthest of them is, as a share of it."""
+    Returns:
+        When the smoothed cost first was near the whole limit (infinite: never), the mean cost of
+        the last windows, and how far from the limit the furthest of them is, as a share of it.
+    """
     whole = (each for each in curve if each["safety_share"] == 1)
-    reached = next((each["steps"] for each in whole if each["cost"] <= HELD * limit), np.inf)
+    reached = next((each["steps"] for each in whole if each["cost"] <= REACHED * limit), np.inf)
     steps = np.array([each["steps"] for each in curve])
     age = (steps[-1] - steps) // WINDOW_STEPS
-    last = [[each for each, k in zip(curve, age, strict=True) if k == w] for w in range(windows)]
+    last = [[each for each, k in zip(curve, age, strict=True) if k == w] for w in range(n_windows)]
     costs = [float(np.mean([each["cost"] for each in window])) for window in last if window]
     goals = [each["goals_per_minute"] for window in last for each in window]
     furthest = max(abs(cost / limit - 1) for cost in costs)
     return {
-        "reached_at_steps": exactly(reached, "1"),
-        "cost": over(costs, "1"),
-        "furthest": exactly(furthest, "share", len(costs)),
-        "goals_per_minute": exactly(float(np.mean(goals)), "1/min"),
+        "learning.reached_at_steps": exactly(reached, "1"),
+        "learning.cost": over(costs, "1"),
+        "learning.furthest": exactly(furthest, "share", len(costs)),
+        "learning.goals_per_minute": exactly(float(np.mean(goals)), "1/min"),
     }
 
 
-def played(
-    parts: PartCache, arguments: Arguments, row: str, folder: Path, shield: str | None
-) -> list[dict[str, float]]:
-    """Return a policy's episodes on fixed seeds, by its mean action, at its own level."""
-    policy = folder / "policy.zip"
-    digest = hashlib.sha256(policy.read_bytes()).hexdigest()[:12]
-
-    def play(tick: PartProgress) -> dict[str, Any]:
-        make = partial(make_agent, str(policy))
-        kwargs: dict[str, Any] = {"perception": "keypoints", "shield": shield}
-        return {"episodes": play_episodes(make, arguments.episodes, tick=tick, **kwargs)}
-
-    return parts.part(f"{row}.{digest}", play)["episodes"]
+def make_usual(out: Path) -> Study:
+    """Return the study as the command makes it, with the policies that are in a folder."""
+    arguments = LimitedArguments(out)
+    return make_study(trainings_of(arguments), arguments.cost_limit)
 
 
-def worth_of(name: str, episodes: list[dict[str, float]]) -> dict[str, Metric]:
-    """What a policy is worth, from its episodes."""
-    towards = [each["contacts_towards"] for each in episodes]
-    found = measure(episodes) | {"towards": rate_of(towards, len(towards) / 1000, "per 1000")}
-    return {f"{name}.{key}": each for key, each in found.items()}
+def main() -> int:
+    """Learn, judge, show."""
+    arguments = tyro.cli(LimitedArguments, description=__doc__)
+    torch.set_num_threads(1)
+    trainings = trainings_of(arguments)
+    for training in trainings.values():
+        training.run()
+    return run_study(make_study(trainings, arguments.cost_limit), arguments)
 
+
+NOTE = (
+    "HRCReach-v0 at `keypoints`; mean actions, 1,000 episodes, with 95 % intervals, of contacts "
+    "exact ones. While learning: noisy actions, the last two windows of 1,000 episodes, and how "
+    "far the furthest of them is from the limit. "
+)
+MEASURED = (
+    per_minute(ACHIEVED, "goals [1/min]", "goals_per_minute"),
+    mean("cost", "cost", "cost_per_episode"),
+    rate("contacts_towards", "contacts towards [in 1,000]", "towards", "1000 episodes"),
+    mean("r", name="return"),
+    rate("contacts", name="contacts_per_episode"),
+)
+COLUMNS: tuple[Any, ...] = (
+    *(column for column in MEASURED if column.heading),
+    Column("{}.learning.cost", "cost while learning"),
+    Column("{}.learning.reached_at_steps", "limit reached after [steps]", 0, plain=True),
+    Column("{}.learning.furthest", "furthest from it [%]", 0, 100, plain=True),
+)
 
 if __name__ == "__main__":
-    main(tyro.cli(Arguments, description=__doc__))
+    sys.exit(show_errors(main))

@@ -1,8 +1,8 @@
 """How the parts of each study are asked for again, with the settings of its command.
 
-A replay plays a study as it is, and gives it a cache (`benchmarks.verify.ReplayCache`) that makes
-the parts that were drawn and hands out an empty one for each of the others. So nothing here looks
-into a part. Whatever wants a policy that a training made takes the one that is kept in the
+A replay plays an experiment as it is, and gives it a cache (`benchmarks.verify.ReplayCache`) that
+makes the parts that were drawn and hands out an empty one for each of the others. So nothing here
+looks into a part. Whatever wants a policy that a training made takes the one that is kept in the
 study's folder, and leaves out its parts where there is none.
 """
 
@@ -12,12 +12,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from benchmarks.defaults import MADE
+from benchmarks.studies import COMMANDS
 from hrc_env.experiments.cache import PartCache
-from hrc_env.experiments.runner import Study
-from hrc_env.experiments.versions import key_of
-
-Walk = Callable[["Replayed"], None]
+from hrc_env.experiments.runner import Experiment, cache_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +32,7 @@ class Replayed:
 class Replay:
     """How a study is replayed, and which of its parts cannot be."""
 
-    walk: Walk
+    walk: Callable[[Replayed], None]
     """Asks the cache for every part."""
     timed: tuple[str, ...] = ()
     """Beginnings of the labels of parts that hold times of a clock."""
@@ -61,104 +58,38 @@ class Replay:
         return any(word in label for word in self.learnt)
 
 
-def walk_study(study: Study[Any, Any], config: Any, given: Replayed) -> None:
-    """Play a study with the cache of a replay."""
-    key = key_of({"experiment": study.name, **study.settings(config)}, study.depends)
-    study.play(config, replace(given.cache, key=key, n_parts=study.n_parts(config)))
+def walk(experiment: Experiment[Any], given: Replayed) -> None:
+    """Play an experiment with the cache of a replay."""
+    usual = cache_of(experiment, given.cache.folder, given.cache.progress)
+    experiment.play(replace(given.cache, key=usual.key, n_parts=usual.n_parts))
 
 
-def walk_usual(command: str, given: Replayed) -> None:
-    """Play a study as its command does, with the cache of a replay."""
-    walk_study(*MADE[command](), given)
+def walk_command(command: str, given: Replayed) -> None:
+    """Play an experiment as its command does, with the cache of a replay."""
+    walk(_made(command, given), given)
+
+
+def _made(command: str, given: Replayed) -> Any:
+    made = COMMANDS[command].made
+    if made is None:
+        raise AssertionError(f"{command} is no experiment, and is not replayed")
+    return made.make(given.out)
 
 
 def _impact(given: Replayed) -> None:
     from hrc_env.experiments.impact.policies import PPO
 
-    study, config = MADE["impact"]()
+    impact = _made("impact", given)
     if not all((given.cache.folder / f"{PPO}.{kind}").exists() for kind in ("zip", "json")):
-        kept = tuple(name for name in config.policies if name != PPO)
-        config = replace(config, policies=kept)
-    walk_study(study, config, given)
+        impact = replace(impact, policies=tuple(name for name in impact.policies if name != PPO))
+    walk(impact, given)
 
 
 def _price(command: str, given: Replayed) -> None:
     from hrc_env.experiments.price.experiment import replay
 
     margins_m = {label: notes["margin_m"] for label, notes in given.notes.items()}
-    replay(MADE[command]()[1], given.cache, margins_m)
-
-
-def _experts(given: Replayed) -> None:
-    from benchmarks import experts
-
-    arguments = experts.Arguments(out=given.out)
-    cache = replace(given.cache, key=experts.key(arguments), n_parts=len(experts.ROWS))
-    for task, way in experts.ROWS:
-        experts.played(cache, arguments, task, way)
-
-
-def _shielded(given: Replayed) -> None:
-    from benchmarks import shielded
-
-    arguments = shielded.Arguments(out=given.out)
-    cache = replace(given.cache, key=shielded.key(arguments))
-    for name, row in shielded.ROWS.items():
-        shielded.episodes_of(name, row, cache, arguments)
-
-
-def _baselines(given: Replayed) -> None:
-    from benchmarks import baselines
-
-    arguments = baselines.Arguments(out=given.out)
-    cache = replace(given.cache, key=baselines.key(arguments))
-    for level in baselines.ORDER:
-        for agent in baselines.ROWS:
-            is_learnt = agent in baselines.PPO
-            policy = baselines.policy_of(arguments, level, agent) if is_learnt else None
-            if policy is None or policy.exists():
-                baselines.played(cache, arguments, level, agent, policy)
-
-
-def _learners(given: Replayed) -> None:
-    from benchmarks import learners
-
-    arguments = learners.Arguments(out=given.out)
-    cache = replace(given.cache, key=learners.key(arguments))
-    for task in arguments.ids:
-        learners.played(cache, arguments, task)
-        for seed in arguments.seeds:
-            policy = learners.folder_of(arguments, task, seed) / "policy.zip"
-            if policy.exists():
-                learners.played(cache, arguments, task, policy)
-
-
-def _limited(given: Replayed) -> None:
-    from benchmarks import limited
-
-    arguments = limited.Arguments(out=given.out)
-    cache = replace(given.cache, key=limited.key(arguments))
-    for seed in arguments.seeds:
-        for row, name, shield in limited.rows(arguments, seed):
-            folder = limited.folder_of(arguments, name, seed)
-            if (folder / "policy.zip").exists():
-                limited.played(cache, arguments, row, folder, shield)
-
-
-def _kept(given: Replayed) -> None:
-    from benchmarks import kept
-
-    arguments = kept.Arguments(out=given.out)
-    cache = replace(given.cache, key=kept.key(arguments))
-    for row in kept.rows():
-        kept.played(cache, arguments, row)
-
-
-def _facing(given: Replayed) -> None:
-    from benchmarks import facing
-
-    arguments = facing.Arguments(out=given.out)
-    facing.played(replace(given.cache, key=facing.key(arguments)), arguments)
+    replay(_made(command, given), given.cache, margins_m)
 
 
 def _trueness(given: Replayed) -> None:
@@ -173,24 +104,24 @@ def _trueness(given: Replayed) -> None:
         holdout.judged(given.cache, config, holdout.ROUNDS, None)
 
 
+def _usual(command: str, **known: Any) -> Replay:
+    return Replay(partial(walk_command, command), **known)
+
+
 REPLAYS: dict[str, Replay] = {
-    "footage": Replay(partial(walk_usual, "footage")),
-    "facing": Replay(_facing),
-    "site": Replay(partial(walk_usual, "site")),
-    "lab": Replay(partial(walk_usual, "lab")),
-    "tracking": Replay(partial(walk_usual, "tracking"), timed=("timing.",)),
-    "perception": Replay(partial(walk_usual, "perception"), timed=("speed.", "network.")),
+    **{name: _usual(name) for name in ("footage", "facing", "site", "lab", "shielded")},
+    "ablations": _usual("ablations"),
+    "tracking": _usual("tracking", timed=("timing.",)),
+    "perception": _usual("perception", timed=("speed.", "network.")),
     "trueness": Replay(_trueness, learnt=("",)),
-    "baselines": Replay(_baselines, learnt=(".ppo",)),
-    "experts": Replay(_experts),
-    "learners": Replay(_learners, learnt=(".policy.",)),
-    "shielded": Replay(_shielded),
-    "limited": Replay(_limited, learnt=("",)),
-    "kept": Replay(_kept, row_words=3),
-    "ablations": Replay(partial(walk_usual, "ablations")),
+    "baselines": _usual("baselines", learnt=(".ppo",)),
+    "experts": _usual("experts"),
+    "learners": _usual("learners", learnt=(".policy_",)),
+    "limited": _usual("limited", learnt=("",)),
+    "kept": _usual("kept", row_words=3),
     "impact": Replay(_impact, trainings=("ppo",), learnt=("ppo",)),
     "price": Replay(partial(_price, "price"), row_words=2),
-    "frontier": Replay(partial(_price, "frontier"), trainings=("training.",), row_words=2),
+    "frontier": Replay(partial(_price, "frontier"), row_words=2),
 }
 """By command of a study; one that is not here keeps no parts."""
 

@@ -20,7 +20,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,11 +31,12 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import defaults, records
+from benchmarks import records
 from benchmarks.studies import COMMANDS, STUDIES, Command, commands_of
 from docs import generate, tables
 from hrc_env.core.errors import HRCError
 from hrc_env.core.results import provenance
+from hrc_env.experiments.runner import settings_of
 from hrc_env.experiments.versions import versions_of
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -138,12 +139,39 @@ def why_stale(name: str) -> str:
     if made.get("command") != command.command:
         found.append("another command")
     else:
-        found += defaults.changed_settings(made.get("config", {}), defaults.settings_of(name))
+        found += changed_settings(made.get("config", {}), current_settings(name))
     if spoiled := records.read(name).spoiled:
         first, words = next(iter(spoiled.items()))
         rest = f" (and {len(spoiled) - 1} more)" if len(spoiled) > 1 else ""
         found.append(f"replayed, part {first}{rest} differs: {words}")
     return ", ".join(found)
+
+
+def current_settings(name: str) -> dict[str, Any]:
+    """Return the settings of a command as its results.json has them; empty where it has none."""
+    made = COMMANDS[name].made
+    return {} if made is None else json.loads(json.dumps(settings_of(made.make(OUT / name))))
+
+
+def changed_settings(recorded: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the settings that have other values now: "n_seeds 10 -> 9".
+
+    A setting that only one of them has is left out: a new one begins with what was done before,
+    and one whose name was changed has kept its value.
+    """
+    for name in recorded:
+        if name not in now or recorded[name] == now[name]:
+            continue
+        if isinstance(recorded[name], Mapping) and isinstance(now[name], Mapping):
+            yield from changed_settings(recorded[name], now[name])
+        else:
+            yield f"{name} {_shorten(recorded[name])} -> {_shorten(now[name])}"
+
+
+def _shorten(value: Any) -> str:
+    """Return a value in a few letters."""
+    text = json.dumps(value, ensure_ascii=False)
+    return text if len(text) <= 24 else f"{text[:20]} ..."
 
 
 def made_by(name: str) -> dict[str, Any]:
@@ -220,8 +248,10 @@ def publish(name: str) -> None:
     kept.write_text(tables.written(content))
     records.write(name, mark["depends"], out / "parts", mark["began_s"])
     for each in command.tables:
-        table = tables.renewed(tables.read(each), kept) | {"command": command.command}
-        (tables.RESULTS / f"{each}.json").write_text(tables.written(table))
+        path = tables.RESULTS / f"{each}.json"
+        if path.exists():  # else the experiment declares it, and the page reads its numbers
+            table = tables.renewed(tables.read(each), kept) | {"command": command.command}
+            path.write_text(tables.written(table))
     for picture, figure in command.pictures.items():
         drawn = out / "figures" / figure
         if picture.endswith(".png"):
@@ -238,7 +268,7 @@ def try_out(console: Console, name: str) -> int:
         console.print(f"{name}: ended with status {status}")
         return status
     made = json.loads((out / "results.json").read_text())["metrics"].keys()
-    asked = {each for table in command.tables for each in tables.asked(tables.read(table))}
+    asked = {each for table in command.tables for each in tables.asked(table)}
     missing = {each for each in command.pictures.values() if not (out / "figures" / each).exists()}
     missing |= asked - made
     took_s = time.monotonic() - started_s

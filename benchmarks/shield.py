@@ -22,7 +22,8 @@ from hrc_env.agents.env_info import env_info
 from hrc_env.agents.registry import make_agent
 from hrc_env.core.results import Metric, over
 from hrc_env.core.typing import Floats
-from hrc_env.experiments.report import Column, Report, table_of
+from hrc_env.experiments.columns import Column
+from hrc_env.experiments.report import Report, table_of
 from hrc_env.safety.config import PRESETS
 from hrc_env.safety.guard import constraints, guarded, softened
 from hrc_env.safety.rows import MOST_ROWS

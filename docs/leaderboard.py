@@ -1,7 +1,9 @@
 """The leaderboard's page: what policies were worth, from the entries of the benchmark."""
 
-from hrc_env.experiments.benchmark.conditions import CONDITIONS, MAIN, SEED, VERSION
-from hrc_env.experiments.benchmark.entries import PER, Entry, entries
+from collections.abc import Mapping
+
+from docs.tables import RESULTS
+from hrc_env.experiments.leaderboard import CONDITIONS, MAIN, PER, SEED, VERSION, Entry, read_entry
 from hrc_env.experiments.report import said, table
 from hrc_env.tasks import BUILT_IN
 
@@ -17,7 +19,7 @@ with `qp`. Contacts and cost are counted on the truth.
 Here: unaware people, four cameras, without a shield and with it, sorted by goals with it. Numbers
 have 95 % intervals, of contacts exact ones, which show how little so few episodes tell of rare
 contacts; a cost of 0.0 without one was 0 in every episode. Entries stand as they were sent and are
-not played again. All numbers are in `hrc_env/experiments/benchmark/entries/`.
+not played again. All numbers are in `docs/results/leaderboard/`.
 
 ## How to enter
 
@@ -25,32 +27,33 @@ not played again. All numbers are in `hrc_env/experiments/benchmark/entries/`.
 # a checkpoint of train
 python -m hrc_env benchmark --policy runs/mine/policy.zip --ids HRCReach-v0
 # what my_module.make(env_info) returns
-python -m hrc_env benchmark --policy my_module:make --ids HRCReach-v0 --enter mine
+python -m hrc_env benchmark --policy my_module:make --ids HRCReach-v0 \\
+    --enter docs/results/leaderboard/mine.json
 ```
 
-`--enter NAME` writes the file of an entry in a clone; `python -m docs.generate` puts it into this
-page: send both.
+`--enter FILE` writes an entry; `python -m docs.generate` puts it into this page: send both.
 """
 
 
 def page() -> str:
     """The page."""
-    everybody = entries()
+    paths = sorted((RESULTS / "leaderboard").glob("*.json"))
+    everybody = {path.stem: read_entry(path) for path in paths}
     return "\n".join([HEAD, *(_section(task, everybody) for task in BUILT_IN)])
 
 
-def _section(task: str, everybody: list[Entry]) -> str:
+def _section(task: str, everybody: Mapping[str, Entry]) -> str:
     """A task's table, who reaches most under the shield first."""
     keys = [f"{task}.{name}" for name in MAIN]
-    here = [each for each in everybody if f"{keys[-1]}.goals_per_minute" in each.scores]
-    here.sort(key=lambda each: -each.scores[f"{keys[-1]}.goals_per_minute"].value)
+    goals = f"{keys[-1]}.goals_per_minute"
+    here = [(name, each.scores) for name, each in everybody.items() if goals in each.scores]
+    here.sort(key=lambda each: -each[1][goals].value)
     if not here:
         return f"## {task}\n\nNobody has entered yet.\n"
     rows = [
-        (each.name if k == 0 else "", CONDITIONS[MAIN[k]].shield or "none",
-         str(each.scores[f"{key}.goals_per_minute"].n),
-         *(said(each.scores[f"{key}.{what}"], digits=2 if what == "success" else 1)
-           for what in PER))
-        for each in here for k, key in enumerate(keys)
+        (name if k == 0 else "", CONDITIONS[MAIN[k]].shield or "none",
+         str(scores[f"{key}.goals_per_minute"].n),
+         *(said(scores[f"{key}.{what}"], digits=2 if what == "success" else 1) for what in PER))
+        for name, scores in here for k, key in enumerate(keys)
     ]  # fmt: skip
     return f"## {task}\n\n{table(('policy', 'shield', 'episodes', *PER.values()), rows)}\n"

@@ -21,6 +21,9 @@ both may have
 - "beside": another metric that stands behind it, "85 (190)".
 
 A note shows a number where it says {NAME}.
+
+Where there is no such file the experiment itself declares the table, rows and columns
+(`hrc_env.experiments.report.Table`); its numbers are those in `docs/results/whole/COMMAND.json`.
 """
 
 import datetime
@@ -28,10 +31,14 @@ import json
 import math
 import re
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
-from hrc_env.experiments.report import with_interval
+from benchmarks.studies import COMMANDS
+from hrc_env.core.results import Metric
+from hrc_env.experiments.columns import Column
+from hrc_env.experiments.report import Table, with_interval
 from hrc_env.experiments.versions import SUBSYSTEMS, versions_of
 
 RESULTS = Path(__file__).parent / "results"
@@ -47,16 +54,77 @@ GENERATED = (BLOCK, NUMBER, PROVENANCE, EXAMPLE)
 
 
 def read(name: str) -> dict[str, Any]:
-    """One file of results, with its rows as long as its columns.
+    """Return one table with its numbers, its rows as long as its columns.
 
     Raises:
         ValueError: rows of another length.
+        KeyError: no file and no experiment has a table of that name.
     """
-    table = json.loads((RESULTS / f"{name}.json").read_text())
+    path = RESULTS / f"{name}.json"
+    if not path.exists():
+        return _filled_table(*declared(name))
+    table = json.loads(path.read_text())
     wrong = [row for row in table["rows"] if len(row) != len(table["columns"])]
     if wrong:
         raise ValueError(f"{name}: {len(table['columns'])} columns, but a row is {wrong[0]}.")
     return table
+
+
+def names() -> list[str]:
+    """Return the names of all tables."""
+    return sorted({name for command in COMMANDS.values() for name in command.tables})
+
+
+@cache
+def declared(name: str) -> tuple[str, Table]:
+    """Return a table that an experiment declares, after the name of its command.
+
+    Raises:
+        KeyError: no experiment does.
+    """
+    for which, command in COMMANDS.items():
+        if name in command.tables and (table := command.declared_tables.get(name)) is not None:
+            return which, table
+    raise KeyError(f"There is no docs/results/{name}.json, and no experiment declares {name!r}.")
+
+
+def _filled_table(command: str, table: Table) -> dict[str, Any]:
+    """Return a declared table in the form of a file."""
+    whole = json.loads((RESULTS / "whole" / f"{command}.json").read_text())
+    metrics = {name: Metric(**each) for name, each in whole["metrics"].items()}
+    heads = [{"name": head} for head in table.heads]
+    rows = [
+        [*cells, *(_number_of(metrics.get(column.metric.format(row)), column)
+                   for column in table.columns)]
+        for row, cells in table.rows.items()
+    ]  # fmt: skip
+    return {
+        "title": table.title,
+        "command": whole["command"],
+        "version": whole["hrc_env"],
+        "depends": whole["depends"],
+        "date": whole["date"],
+        "machine": f"{whole['machine']['cores']} cores, no GPU",
+        "note": table.note_of(metrics),
+        "columns": [*heads, *map(_heading_of, table.columns)],
+        "rows": rows,
+    }
+
+
+def _heading_of(column: Column) -> dict[str, Any]:
+    name, _, unit = column.heading.partition(" [")
+    return {"name": name, "unit": unit.removesuffix("]"), "digits": column.digits,
+            "counted": column.counted, "plain": column.plain}  # fmt: skip
+
+
+def _number_of(metric: Metric | None, column: Column) -> Any:
+    """Return the cell of a metric."""
+    if metric is None or not math.isfinite(metric.value):
+        return None
+    if column.is_n:
+        return metric.n
+    low, high = sorted((column.scale * metric.low, column.scale * metric.high))
+    return [round(each, column.digits + 2) for each in (column.scale * metric.value, low, high)]
 
 
 def filled(page: str) -> str:
@@ -159,8 +227,14 @@ def renewed(table: Mapping[str, Any], path: Path) -> dict[str, Any]:
     return {**table, **new, **({"numbers": numbers} if numbers else {})}
 
 
-def asked(table: Mapping[str, Any]) -> set[str]:
-    """The metrics that a file needs of its command's results.json."""
+def asked(name: str) -> set[str]:
+    """Return the metrics that a table needs of its command's results.json."""
+    if not (RESULTS / f"{name}.json").exists():
+        command, each = declared(name)
+        whole = json.loads((RESULTS / "whole" / f"{command}.json").read_text())["metrics"]
+        found = {column.metric.format(row) for row in each.rows for column in each.columns}
+        return found & whole.keys()
+    table = read(name)
     cells = [
         (part, key, cell)
         for key, row in _keyed(table)

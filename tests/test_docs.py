@@ -56,7 +56,7 @@ def test_every_table_is_shown_with_where_it_comes_from():
         names = [found["name"] for found in tables.BLOCK.finditer(page.read_text())]
         assert bool(names) == bool(tables.PROVENANCE.search(page.read_text())), page
         shown |= set(names)
-    assert shown == {path.stem for path in tables.RESULTS.glob("*.json")}
+    assert shown == set(tables.names())
 
 
 def test_the_baselines_are_in_the_readme_and_in_learning():
@@ -67,12 +67,13 @@ def test_the_baselines_are_in_the_readme_and_in_learning():
 
 
 FILES = sorted(path.stem for path in tables.RESULTS.glob("*.json"))
+"""Tables whose columns stand beside their numbers; of the others experiments declare them."""
 
 
 def results_of(name: str, path: Path) -> Path:
     """A results.json with all that a file needs."""
     metric = {"value": 1.0, "low": 0.5, "high": 2.0, "unit": "1", "n": 3}
-    metrics = dict.fromkeys(tables.asked(tables.read(name)), metric)
+    metrics = dict.fromkeys(tables.asked(name), metric)
     content = {"hrc_env": "0.2.0", "depends": {"env": 3}, "machine": {"cores": 2}}
     path.write_text(tables.written({**content, "metrics": metrics}))
     return path
@@ -115,6 +116,19 @@ def test_a_metric_that_a_command_does_not_write_is_missed(tmp_path):
         tables.renewed(tables.read("lab"), path)
 
 
+def test_a_table_that_an_experiment_declares_has_the_numbers_of_its_last_run():
+    table, whole = tables.read("shielded"), results.whole("shielded")
+    assert not (tables.RESULTS / "shielded.json").exists()
+    assert [cell for row in table["rows"] for cell in row[2:]].count(None) == 0
+    four = whole["metrics"]["four.share"]
+    assert table["rows"][1][1] == four["n"]
+    assert table["rows"][1][2][0] == pytest.approx(100 * four["value"], abs=1e-3)
+    assert table["depends"] == whole["depends"]
+    assert "four.share" in tables.asked("shielded")
+    with pytest.raises(KeyError, match="no experiment declares 'shields'"):
+        tables.read("shields")
+
+
 def test_cells_are_intervals_counts_and_pairs():
     metrics = {"a": {"value": 0.25, "low": 0.2, "high": 0.5, "n": 8},
                "b": {"value": math.nan, "low": 0.0, "high": 0.0, "n": 0}}  # fmt: skip
@@ -149,7 +163,7 @@ def test_no_interval_has_no_width(page):
 def test_counts_stand_with_their_intervals():
     counted = [
         (name, column, cell)
-        for name in FILES
+        for name in tables.names()
         for k, column in enumerate(tables.read(name)["columns"])
         for cell in (row[k] for row in tables.read(name)["rows"])
         if "contact" in column["name"] or column.get("unit") == "in 1,000"

@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +12,8 @@ from benchmarks.motion.statistics import gait_of, statistics_of
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric, over
 from hrc_env.experiments.cache import PartCache
-from hrc_env.experiments.runner import Study, at_least_one
+from hrc_env.experiments.report import Metrics, Report
+from hrc_env.experiments.runner import at_least_one
 from hrc_env.motion import state as st
 from hrc_env.motion.repertoire import SCENES, Film, alone, perform
 from hrc_env.worker.body import Body, load_body, worker_names
@@ -20,9 +23,12 @@ DT_S = 0.01
 
 
 @dataclass(frozen=True, slots=True)
-class MotionBenchConfig:
-    """How much is played."""
+class MotionBench:
+    """The experiment, and how much is played."""
 
+    name = "bench motion"
+    depends = ("motion",)
+    n_parts = 1
     n_seeds: int = 12
     """How often each worker plays a scene; right-handed and left-handed in turn."""
     bodies: tuple[str, ...] = worker_names()
@@ -34,21 +40,37 @@ class MotionBenchConfig:
         if not self.bodies:
             raise ConfigError(f"bodies must name some of {worker_names()}.")
 
+    @property
+    def seeds(self) -> list[int]:
+        """One a film of each worker."""
+        return list(range(self.n_seeds))
 
-QUICK = MotionBenchConfig(n_seeds=2, bodies=("worker_1",))
+    def settings(self) -> dict[str, Any]:
+        """Return what all numbers depend on."""
+        return {"bench": asdict(self)}
+
+    def play(self, cache: PartCache) -> dict[str, Metric]:
+        """Play and measure every scene."""
+        metrics: dict[str, Metric] = {}
+        for scene in SCENES:
+            metrics |= _measure(scene, self)
+            cache.progress(1 / len(SCENES), scene)
+        return metrics
+
+    def metrics(self, played: dict[str, Metric]) -> dict[str, Metric]:
+        """Return every number."""
+        return played
+
+    def report(self, played: dict[str, Metric], metrics: Metrics, figures: Path) -> Report:
+        """Return the tables."""
+        return report(metrics)
+
+
+QUICK = MotionBench(n_seeds=2, bodies=("worker_1",))
 """Every number, from little."""
 
 
-def play(config: MotionBenchConfig, parts: PartCache) -> dict[str, Metric]:
-    """Play and measure every scene."""
-    metrics: dict[str, Metric] = {}
-    for scene in SCENES:
-        metrics |= _measure(scene, config)
-        parts.progress(1 / len(SCENES), scene)
-    return metrics
-
-
-def _measure(scene: str, config: MotionBenchConfig) -> dict[str, Metric]:
+def _measure(scene: str, config: MotionBench) -> dict[str, Metric]:
     """A scene's statistics: the median over its films, the smallest and the largest body's."""
     by_body: list[dict[str, float]] = []
     for name in config.bodies:
@@ -82,15 +104,3 @@ def _unit(key: str) -> str:
         if key.endswith(ending):
             return unit
     return ""
-
-
-MOTION = Study(
-    name="bench motion",
-    depends=("motion",),
-    settings=lambda config: {"bench": asdict(config)},
-    seeds=lambda config: list(range(config.n_seeds)),
-    n_parts=lambda _: 1,
-    play=play,
-    metrics=lambda _, played: played,
-    report=lambda _, played, metrics, figures: report(metrics),
-)

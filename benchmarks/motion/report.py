@@ -2,7 +2,8 @@
 
 from benchmarks.motion.targets import ANY, Target, targets_of
 from hrc_env.core.results import Metric
-from hrc_env.experiments.report import Column, Metrics, Report, said, table, table_of
+from hrc_env.experiments.columns import Column
+from hrc_env.experiments.report import Metrics, Report, said, table, table_of
 
 COLUMNS = (
     Column("{}.seconds", "s"),

@@ -20,8 +20,10 @@ from benchmarks.perception.metrics import EMULATED, NO_FAULT, PIXELS, metrics_of
 from benchmarks.perception.report import report
 from benchmarks.perception.views import PLAIN, View, in_turns
 from hrc_env.core.errors import ConfigError
+from hrc_env.core.results import Metric
 from hrc_env.experiments.cache import PartCache, PartProgress
-from hrc_env.experiments.runner import Study, at_least_one
+from hrc_env.experiments.report import Metrics, Report
+from hrc_env.experiments.runner import at_least_one
 from hrc_env.perception import vino
 from hrc_env.perception.faults.fault import IMAGE, KINDS, FaultConfig
 from hrc_env.scene.build import SCENES, Scene, SceneConfig, build
@@ -36,11 +38,16 @@ FIRST_SEED = 500
 BLOCK = 5
 """Episodes of a part: so many are lost at most when the bench is stopped."""
 
+Parts = dict[str, dict[str, Any]]
+"""By label."""
+
 
 @dataclass(frozen=True, slots=True)
-class PerceptionBenchConfig:
-    """How much is measured."""
+class PerceptionBench:
+    """The experiment, and how much is measured."""
 
+    name = "bench perception"
+    depends = ("env", "tracker", "emulator", "detector", "motion")
     episodes: tuple[tuple[str, int], ...] = (("lab", 15), ("site", 8))
     """Episodes at `pixels`, scene by scene; faults are compared with the lab's first ones."""
     n_steps: int = 250
@@ -79,8 +86,39 @@ class PerceptionBenchConfig:
         if not self.bodies:
             raise ConfigError(f"bodies must name some of {worker_names()}.")
 
+    @property
+    def seeds(self) -> list[int]:
+        """One an episode."""
+        return [FIRST_SEED + k for k in range(max(n for _, n in self.episodes))]
 
-QUICK = PerceptionBenchConfig(
+    @property
+    def n_parts(self) -> int:
+        """Tasks."""
+        return len(list(tasks_of(self)))
+
+    def settings(self) -> dict[str, Any]:
+        """Return what all numbers depend on."""
+        return {"bench": asdict(self)}
+
+    def play(self, cache: PartCache) -> Parts:
+        """Return all parts by their labels."""
+        tasks = list(tasks_of(self, cache.folder.parent / "figures"))
+        total = sum(task.cost for task in tasks)
+        return {
+            task.label: replace(cache, n_parts=total / task.cost).part(task.label, task.make)
+            for task in tasks
+        }
+
+    def metrics(self, played: Parts) -> dict[str, Metric]:
+        """Return every number."""
+        return metrics_of(played, self.n_faults, self.fault_steps)
+
+    def report(self, played: Parts, metrics: Metrics, figures: Path) -> Report:
+        """Return the tables."""
+        return report(self, played, metrics, figures)
+
+
+QUICK = PerceptionBench(
     episodes=(("lab", 4), ("site", 2)), n_steps=80, n_faults=4, fault_steps=40,
     n_emulated=8, bodies=("worker_1", "worker_2"), n_instants=10, emulator_rounds=0,
     speed_steps=30,
@@ -97,7 +135,7 @@ class Task(NamedTuple):
     make: Callable[[PartProgress], dict[str, Any]]
 
 
-def tasks_of(config: PerceptionBenchConfig, figures: Path | None = None) -> Iterator[Task]:
+def tasks_of(config: PerceptionBench, figures: Path | None = None) -> Iterator[Task]:
     """All parts, times last; the emulator's plot is drawn into a folder."""
     yield from _crops(config)
     yield from _episodes(config)
@@ -108,7 +146,7 @@ def tasks_of(config: PerceptionBenchConfig, figures: Path | None = None) -> Iter
     yield from _speeds(config)
 
 
-def _speeds(config: PerceptionBenchConfig) -> Iterator[Task]:
+def _speeds(config: PerceptionBench) -> Iterator[Task]:
     """The lab in all sizes; its largest rig once more on the site and on the other runtime."""
     most, fewest = max(config.cameras), min(config.workers)
     runtimes = (speed.LITERT, speed.OPENVINO) if vino.installed() else (speed.LITERT,)
@@ -125,7 +163,7 @@ def _speeds(config: PerceptionBenchConfig) -> Iterator[Task]:
         yield Task(f"network.{runtime}", 3, partial(speed.network_ms, runtime))
 
 
-def _episodes(config: PerceptionBenchConfig) -> Iterator[Task]:
+def _episodes(config: PerceptionBench) -> Iterator[Task]:
     for scene, n in config.episodes:
         for first in range(0, n, BLOCK):
             seeds = [FIRST_SEED + k for k in range(first, min(first + BLOCK, n))]
@@ -134,7 +172,7 @@ def _episodes(config: PerceptionBenchConfig) -> Iterator[Task]:
             yield Task(f"loop.{scene}.{first}", cost, make)
 
 
-def _faults(config: PerceptionBenchConfig) -> Iterator[Task]:
+def _faults(config: PerceptionBench) -> Iterator[Task]:
     """Every fault at the levels that know it; at `keypoints` also the same without."""
     for kind in config.kinds:
         make = partial(_play_fault, kind, config.n_faults, config.fault_steps, PIXELS)
@@ -168,7 +206,7 @@ def _play_fault(kind: str, n: int, n_steps: int, level: str, tick: PartProgress)
     return {"episodes": played}
 
 
-def _crops(config: PerceptionBenchConfig) -> Iterator[Task]:
+def _crops(config: PerceptionBench) -> Iterator[Task]:
     """Crops of every body in every scene; of one body through every lens, in every appearance."""
     n, first = config.n_instants, config.bodies[0]
     cost = 3 + 0.12 * n
@@ -215,25 +253,3 @@ def _look(variant: str, make: Callable[[], Scene], n: int, tick: PartProgress) -
 def _emulator(rounds: int, picture: Path | None, tick: PartProgress) -> dict[str, Any]:
     ratios = error_ratios(rounds, say=lambda share, label: tick(share), picture=picture)
     return {name: asdict(metric) for name, metric in ratios.items()}
-
-
-def play(config: PerceptionBenchConfig, parts: PartCache) -> dict[str, dict[str, Any]]:
-    """All parts by their labels."""
-    tasks = list(tasks_of(config, parts.folder.parent / "figures"))
-    total = sum(task.cost for task in tasks)
-    return {
-        task.label: replace(parts, n_parts=total / task.cost).part(task.label, task.make)
-        for task in tasks
-    }
-
-
-PERCEPTION = Study(
-    name="bench perception",
-    depends=("env", "tracker", "emulator", "detector", "motion"),
-    settings=lambda config: {"bench": asdict(config)},
-    seeds=lambda config: [FIRST_SEED + k for k in range(max(n for _, n in config.episodes))],
-    n_parts=lambda config: len(list(tasks_of(config))),
-    play=play,
-    metrics=lambda config, found: metrics_of(found, config.n_faults, config.fault_steps),
-    report=report,
-)

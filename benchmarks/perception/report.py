@@ -6,7 +6,8 @@ from typing import Any
 from benchmarks.common import keys
 from benchmarks.perception.speed import REST, STAGES
 from benchmarks.perception.views import ROWS
-from hrc_env.experiments.report import Column, Metrics, Report, table_of
+from hrc_env.experiments.columns import Column
+from hrc_env.experiments.report import Metrics, Report, table_of
 from hrc_env.perception.faults.fault import KINDS
 
 _LEAD = """\

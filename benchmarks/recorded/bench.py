@@ -1,7 +1,9 @@
 """The tracking bench on recorded films: every estimator on the same detections."""
 
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
 from benchmarks.recorded.calibration import read_calibration, tracker_config
 from benchmarks.recorded.detections import FOLLOWER, Detections, detections_of
@@ -18,8 +20,8 @@ from benchmarks.recorded.metrics import (
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats
 from hrc_env.experiments.cache import PartCache
-from hrc_env.experiments.report import Column, Metrics, Report, table_of
-from hrc_env.experiments.runner import Study
+from hrc_env.experiments.columns import Column
+from hrc_env.experiments.report import Metrics, Report, table_of
 from hrc_env.geometry.cameras import projections
 from hrc_env.tracking.config import TrackerConfig
 
@@ -42,24 +44,45 @@ _COLUMNS = [
 ]
 
 
-def play(config: None, parts: PartCache) -> dict[str, Metric]:
-    """Fetch, detect, estimate; detections that are there already are not made again.
+@dataclass(frozen=True, slots=True)
+class RecordedBench:
+    """The experiment, which has no settings."""
 
-    Raises:
-        DownloadError: the recording is not there and cannot be fetched.
-        WeightsError: the pose network's weights are not there.
-    """
-    recording = fetch_recording(lambda sentence: parts.progress(0.0, sentence))
-    with closing(Films(recording.films)) as films:
-        cameras = read_calibration(recording.calibration, films.sizes_px)
-        detections = detections_of(films, cameras, replace(parts, n_parts=1 / _DETECTING))
-    pinholes = [replace(camera, lens=None) for camera in cameras]
-    P, tracker = projections(tuple(pinholes)), tracker_config(pinholes)
-    metrics: dict[str, Metric] = {}
-    for name in NAMES:
-        metrics |= _of_estimator(name, P, tracker, detections)
-        parts.progress((1 - _DETECTING) / len(NAMES), name)
-    return dict(sorted(metrics.items()))
+    name = "bench recorded"
+    depends = ("tracker", "detector")
+    seeds = (0,)
+    n_parts = 1
+
+    def settings(self) -> dict[str, Any]:
+        """Return what all numbers depend on."""
+        return {"recording": POSE2SIM.requirement, "follower": FOLLOWER}
+
+    def play(self, cache: PartCache) -> dict[str, Metric]:
+        """Fetch, detect, estimate; detections that are there already are not made again.
+
+        Raises:
+            DownloadError: the recording is not there and cannot be fetched.
+            WeightsError: the pose network's weights are not there.
+        """
+        recording = fetch_recording(lambda sentence: cache.progress(0.0, sentence))
+        with closing(Films(recording.films)) as films:
+            cameras = read_calibration(recording.calibration, films.sizes_px)
+            detections = detections_of(films, cameras, replace(cache, n_parts=1 / _DETECTING))
+        pinholes = [replace(camera, lens=None) for camera in cameras]
+        P, tracker = projections(tuple(pinholes)), tracker_config(pinholes)
+        metrics: dict[str, Metric] = {}
+        for name in NAMES:
+            metrics |= _of_estimator(name, P, tracker, detections)
+            cache.progress((1 - _DETECTING) / len(NAMES), name)
+        return dict(sorted(metrics.items()))
+
+    def metrics(self, played: dict[str, Metric]) -> dict[str, Metric]:
+        """Return every number."""
+        return played
+
+    def report(self, played: dict[str, Metric], metrics: Metrics, figures: Path) -> Report:
+        """Return the table."""
+        return report(metrics)
 
 
 def _of_estimator(
@@ -83,15 +106,3 @@ def report(metrics: Metrics) -> Report:
     parts = [table_of("", rows, _COLUMNS, metrics)]
     spread = "95 % intervals over blocks of frames, those of bones and jerk with least and largest"
     return Report("Tracking on recorded films", _LEAD, parts, spread)
-
-
-RECORDED = Study(
-    name="bench recorded",
-    depends=("tracker", "detector"),
-    settings=lambda _: {"recording": POSE2SIM.requirement, "follower": FOLLOWER},
-    seeds=lambda _: [0],
-    n_parts=lambda _: 1,
-    play=play,
-    metrics=lambda _, played: played,
-    report=lambda _, played, metrics, figures: report(metrics),
-)

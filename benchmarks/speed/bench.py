@@ -9,6 +9,8 @@ from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
 
 from benchmarks.common import keys
 from benchmarks.speed.contenders import OURS, PEER, Contender, Single, Starts, Vector
@@ -18,7 +20,8 @@ from benchmarks.speed.tasks import Tasks, shares
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric, over
 from hrc_env.experiments.cache import PartCache, Progress
-from hrc_env.experiments.runner import Study, at_least_one
+from hrc_env.experiments.report import Metrics, Report
+from hrc_env.experiments.runner import at_least_one
 from hrc_env.safety.shield import shield_called
 from hrc_env.tasks.task import find_task
 
@@ -32,10 +35,20 @@ _MAKING = 0.1
 """The share of the progress that goes to making environments."""
 
 
-@dataclass(frozen=True, slots=True)
-class SpeedBenchConfig:
-    """How much is run."""
+Measured = defaultdict[str, list[float]]
+"""One number a round, by "<kind>.<name>"; configurations: "single" and "<num_envs>.<threads>"."""
+BY_TASK = "task_steps_per_s"
+"""The kind of the ids' numbers."""
 
+
+@dataclass(frozen=True, slots=True)
+class SpeedBench:
+    """The experiment, and how much is run."""
+
+    name = "bench speed"
+    depends = ("env", "tracker", "emulator", "motion")
+    seeds = (0,)
+    n_parts = 1
     task: str = OURS
     """Which environment, by its id; "every": the speed of each, and nothing else."""
     shield: str | None = None
@@ -64,15 +77,36 @@ class SpeedBenchConfig:
         if WATCHED not in self.levels:
             raise ConfigError(f"levels must have {WATCHED!r} in them, got {self.levels}.")
 
+    def settings(self) -> dict[str, Any]:
+        """Return what all numbers depend on."""
+        return {"bench": asdict(self)}
 
-QUICK = SpeedBenchConfig(n_rounds=1, least_steps=1000, task_steps=25)
+    def play(self, cache: PartCache) -> Measured:
+        """Return the numbers of all rounds; nothing is kept between runs.
+
+        Raises:
+            HRCError: an organ's function is no longer called, so that its time would be missed.
+        """
+        measured = Measured(list)
+        if self.task != EVERY:
+            _play_sizes(self, cache, measured)
+        if self.task in (OURS, EVERY):
+            _play_tasks(self, cache, measured)
+        return measured
+
+    def metrics(self, played: Measured) -> dict[str, Metric]:
+        """Return every number."""
+        return metrics_of(played)
+
+    def report(self, played: Measured, metrics: Metrics, figures: Path) -> Report:
+        """Draw the figure; return the tables beside it."""
+        return report(metrics, figures)
+
+
+QUICK = SpeedBench(n_rounds=1, least_steps=1000, task_steps=25)
 """Every number, from one short turn."""
 
 
-Measured = defaultdict[str, list[float]]
-"""One number a round, by "<kind>.<name>"; configurations: "single" and "<num_envs>.<threads>"."""
-BY_TASK = "task_steps_per_s"
-"""The kind of the ids' numbers."""
 UNITS = {"env_steps_per_s": "1/s", "us_per_env_step": "us", "reset_ms": "ms"}
 """By kind."""
 
@@ -90,21 +124,7 @@ class Turn:
     """What share of a round it takes, roughly and in any unit."""
 
 
-def play(config: SpeedBenchConfig, parts: PartCache) -> Measured:
-    """All rounds; nothing is kept between runs.
-
-    Raises:
-        HRCError: an organ's function is no longer called, so that its time would be missed.
-    """
-    measured = Measured(list)
-    if config.task != EVERY:
-        _play_sizes(config, parts, measured)
-    if config.task in (OURS, EVERY):
-        _play_tasks(config, parts, measured)
-    return measured
-
-
-def _play_tasks(config: SpeedBenchConfig, parts: PartCache, measured: Measured) -> None:
+def _play_tasks(config: SpeedBench, parts: PartCache, measured: Measured) -> None:
     """Every id."""
     share = (config.task == EVERY) / config.n_rounds
     with closing(Tasks()) as tasks:
@@ -114,7 +134,7 @@ def _play_tasks(config: SpeedBenchConfig, parts: PartCache, measured: Measured) 
             parts.progress(share, "every id")
 
 
-def _play_sizes(config: SpeedBenchConfig, parts: PartCache, measured: Measured) -> None:
+def _play_sizes(config: SpeedBench, parts: PartCache, measured: Measured) -> None:
     """One id in all sizes, organs, resets."""
     organs = Organs()
     with ExitStack() as exits:
@@ -142,7 +162,7 @@ def _take(turn: Turn, measured: Measured, organs: Organs) -> None:
             measured[f"us_per_env_step.{organ}.{turn.configuration}"].append(us)
 
 
-def _turns(config: SpeedBenchConfig, exits: ExitStack, progress: Progress) -> Iterator[Turn]:
+def _turns(config: SpeedBench, exits: ExitStack, progress: Progress) -> Iterator[Turn]:
     """Make everybody, ready to run, to be closed in the end."""
     known = [
         (size, threads) for size in config.sizes for threads in config.threads if threads <= size
@@ -174,15 +194,3 @@ def metrics_of(measured: Measured) -> dict[str, Metric]:
     by_task = {name: measured[f"{BY_TASK}.{name}"] for name in keys(measured, f"{BY_TASK}.")}
     found = {name: over(values, UNITS[name.split(".")[0]]) for name, values in own.items()}
     return found | (shares(by_task) if by_task else {})
-
-
-SPEED = Study(
-    name="bench speed",
-    depends=("env", "tracker", "emulator", "motion"),
-    settings=lambda config: {"bench": asdict(config)},
-    seeds=lambda _: [0],
-    n_parts=lambda _: 1,
-    play=play,
-    metrics=lambda _, measured: metrics_of(measured),
-    report=lambda _, __, *rest: report(*rest),
-)

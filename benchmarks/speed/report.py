@@ -7,8 +7,9 @@ from matplotlib.axes import Axes
 
 from benchmarks.common import keys
 from benchmarks.speed.organs import ORGANS, REST, TOTAL
+from hrc_env.experiments.columns import Column
 from hrc_env.experiments.plots import label, new_figure, save
-from hrc_env.experiments.report import Column, Metrics, Report, picture, table_of
+from hrc_env.experiments.report import Metrics, Report, picture, table_of
 
 SINGLE = "single"
 """The environment that `gymnasium.make` gives, as opposed to a vector of one."""

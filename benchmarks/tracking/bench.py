@@ -8,6 +8,7 @@ import multiprocessing
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, replace
 from functools import cache, partial
+from pathlib import Path
 from typing import Any
 
 from benchmarks.tracking.cells import run_cell
@@ -19,15 +20,19 @@ from benchmarks.tracking.report import report
 from benchmarks.tracking.rigs import RIGS, SIGMA_PX, Rig, make_rig
 from benchmarks.tracking.sequences import MATCHED, Sequences, make_sequences
 from benchmarks.tracking.timing import BATCH, time_estimator
+from hrc_env.core.results import Metric
 from hrc_env.experiments.cache import PartCache, PartProgress
-from hrc_env.experiments.runner import Study, at_least_one
+from hrc_env.experiments.report import Metrics, Report
+from hrc_env.experiments.runner import at_least_one
 from hrc_env.tracking.estimators import ESTIMATORS
 
 
 @dataclass(frozen=True, slots=True)
-class TrackingBenchConfig:
-    """How much is run."""
+class TrackingBench:
+    """The experiment, and how much is run."""
 
+    name = "bench tracking"
+    depends = ("env", "tracker", "emulator", "motion")
     n_seeds: int = 70
     """Sequences per rig and condition."""
     first_seed: int = 20_000
@@ -46,43 +51,59 @@ class TrackingBenchConfig:
         """Raise `ConfigError` for numbers that cannot work."""
         at_least_one(self, "n_seeds", "n_matched", "n_smoothed", "timing_repeats", "processes")
 
+    @property
+    def seeds(self) -> list[int]:
+        """Of sequences that are not matched."""
+        return seeds_of(self)
 
-QUICK = TrackingBenchConfig(n_seeds=8, n_matched=30, n_smoothed=2, timing_repeats=2)
+    @property
+    def n_parts(self) -> int:
+        """Estimators on every condition, and their times."""
+        return sum(len(names_of(each)) for _, each in conditions()) + len(ESTIMATORS)
+
+    def settings(self) -> dict[str, Any]:
+        """Return what all numbers depend on."""
+        bench = {name: value for name, value in asdict(self).items() if name != "processes"}
+        return {
+            "bench": bench,
+            "default": DEFAULT,
+            "sigma_px": SIGMA_PX,
+            "tracker": {name: asdict(_rig(name).tracker) for name in (*RIGS, ENV)},
+            "conditions": {name: asdict(damage) for name, damage in CONDITIONS.items()},
+        }
+
+    def play(self, cache: PartCache) -> Parts:
+        """Return every estimator on everything; several processes first fill the cache."""
+        quiet = replace(cache, progress=_silent)
+        if self.processes > 1:
+            context = multiprocessing.get_context("spawn")
+            with ProcessPoolExecutor(self.processes, mp_context=context) as pool:
+                running = {
+                    pool.submit(play_condition, self, quiet, *each): each for each in conditions()
+                }
+                for done in as_completed(running):
+                    done.result()
+                    share = len(names_of(running[done][1])) / cache.n_parts
+                    cache.progress(share, ".".join(running[done]))
+        played: Parts = {}
+        for each in conditions():
+            played |= play_condition(self, quiet if self.processes > 1 else cache, *each)
+        return played | _timing(self, cache)
+
+    def metrics(self, played: Parts) -> dict[str, Metric]:
+        """Return every number."""
+        return metrics_of(played)
+
+    def report(self, played: Parts, metrics: Metrics, figures: Path) -> Report:
+        """Return the tables."""
+        return report(metrics)
+
+
+QUICK = TrackingBench(n_seeds=8, n_matched=30, n_smoothed=2, timing_repeats=2)
 """Every number, from fewer sequences."""
 
 
-def settings(config: TrackingBenchConfig) -> dict[str, Any]:
-    """What all numbers depend on."""
-    bench = {name: value for name, value in asdict(config).items() if name != "processes"}
-    return {
-        "bench": bench,
-        "default": DEFAULT,
-        "sigma_px": SIGMA_PX,
-        "tracker": {name: asdict(_rig(name).tracker) for name in (*RIGS, ENV)},
-        "conditions": {name: asdict(damage) for name, damage in CONDITIONS.items()},
-    }
-
-
-def play(config: TrackingBenchConfig, parts: PartCache) -> Parts:
-    """Every estimator on everything; several processes first leave their parts in the cache."""
-    asked, quiet = conditions(), replace(parts, progress=_silent)
-    if config.processes > 1:
-        context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(config.processes, mp_context=context) as pool:
-            running = {pool.submit(play_condition, config, quiet, *each): each for each in asked}
-            for done in as_completed(running):
-                done.result()
-                share = len(names_of(running[done][1])) / parts.n_parts
-                parts.progress(share, ".".join(running[done]))
-    played: Parts = {}
-    for each in asked:
-        played |= play_condition(config, quiet if config.processes > 1 else parts, *each)
-    return played | _timing(config, parts)
-
-
-def play_condition(
-    config: TrackingBenchConfig, parts: PartCache, rig_name: str, condition: str
-) -> Parts:
+def play_condition(config: TrackingBench, parts: PartCache, rig_name: str, condition: str) -> Parts:
     """Everybody on one rig and condition; the sequences are made if a part is missing."""
     seeds = seeds_of(config, condition)
 
@@ -104,7 +125,7 @@ def play_condition(
     }
 
 
-def seeds_of(config: TrackingBenchConfig, condition: str = "clean") -> list[int]:
+def seeds_of(config: TrackingBench, condition: str = "clean") -> list[int]:
     """Of a condition's sequences."""
     n = config.n_matched if condition == MATCHED else config.n_seeds
     return [config.first_seed + k for k in range(n)]
@@ -118,7 +139,7 @@ def _rig(name: str) -> Rig:
     return make_env_rig() if name == ENV else make_rig(name)
 
 
-def _timing(config: TrackingBenchConfig, parts: PartCache) -> Parts:
+def _timing(config: TrackingBench, parts: PartCache) -> Parts:
     """Microseconds per update of every estimator, on the lab's sequences."""
     rig = make_rig("lab")
     frames = cache(lambda kind: make_sequences(rig, kind, list(range(BATCH))))
@@ -131,15 +152,3 @@ def _timing(config: TrackingBenchConfig, parts: PartCache) -> Parts:
         ("lab", TIMING, name): parts.part(f"{TIMING}.{name}", partial(make, name))
         for name in ESTIMATORS
     }
-
-
-TRACKING = Study(
-    name="bench tracking",
-    depends=("env", "tracker", "emulator", "motion"),
-    settings=settings,
-    seeds=seeds_of,
-    n_parts=lambda _: sum(len(names_of(each)) for _, each in conditions()) + len(ESTIMATORS),
-    play=play,
-    metrics=lambda _, played: metrics_of(played),
-    report=lambda _, played, metrics, figures: report(metrics),
-)

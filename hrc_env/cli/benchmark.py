@@ -5,7 +5,7 @@ from functools import partial
 from importlib import import_module
 from pathlib import Path
 
-from hrc_env.cli.checks import at_least
+from hrc_env.cli.checks import at_least, writable_file
 from hrc_env.cli.progress import show
 from hrc_env.tasks import BUILT_IN
 
@@ -15,8 +15,8 @@ class Benchmark:
     """Judge a policy on fixed seeds: beside unaware, hurried and attentive people, with four
     cameras, late ones, one, and the truth, without and with a shield.
 
-    Goals a minute, contacts by kind, cost, and regret to the best entry of the leaderboard. What is
-    finished stays in the folder: a run that was stopped goes on there.
+    Goals a minute, contacts by kind, and cost. What is finished stays in the folder: a run that was
+    stopped goes on there.
     """
 
     policy: str
@@ -30,21 +30,24 @@ class Benchmark:
     """Folder for report.html and results.json; out/benchmark/POLICY if not given."""
     seeds: int = 64
     """Episodes of every row."""
-    enter: str | None = None
-    """Write the numbers into the leaderboard, under this name (in a clone)."""
+    enter: Path | None = None
+    """Write the numbers as an entry of the leaderboard, a JSON file of this name: in a clone
+    docs/results/leaderboard/NAME.json."""
     overwrite: bool = False
     """Delete the results of something else in the folder."""
 
     def run(self) -> int:
         """Judge it."""
         at_least("--seeds", self.seeds, 1)
-        experiment = import_module("hrc_env.experiments.benchmark.experiment")
+        if self.enter is not None:
+            writable_file(self.enter, ".json", "--enter")
+        leaderboard = import_module("hrc_env.experiments.leaderboard")
         runner = import_module("hrc_env.experiments.runner")
-        config = experiment.config_for(self.policy, self.ids, self.control, self.seeds)
+        study = leaderboard.make_study(self.policy, self.ids, self.control, self.seeds)
         words = self.policy.removeprefix("hrc://").replace("/", "-").replace(":", "-")
         out = self.out or Path("out/benchmark") / words
-        run = partial(runner.run, experiment.STUDY, config, overwrite=self.overwrite)
-        status = show(run, out, "benchmark")
+        status = show(partial(runner.run, study, overwrite=self.overwrite), out, "benchmark")
         if self.enter is not None:
-            print(f"Entered: {experiment.entered(self.enter, config, out)}")
+            leaderboard.enter(self.enter, self.policy, out / "results.json")
+            print(f"Entered: {self.enter}")
         return status

@@ -34,9 +34,8 @@ class AnyExperiment:
         runner = import_module("hrc_env.experiments.runner")
         asked = {each.name: getattr(self, each.name) for each in fields(self)}
         out, overwrite = asked.pop("out"), asked.pop("overwrite")
-        config = experiment.config_for(**asked)
-        run = partial(runner.run, experiment.STUDY, config, overwrite=overwrite)
-        return show(run, out, "experiment")
+        made = experiment.make_experiment(**asked)
+        return show(partial(runner.run, made, overwrite=overwrite), out, "experiment")
 
 
 @dataclass(frozen=True)
@@ -93,8 +92,6 @@ class PriceExperiment(AnyExperiment):
     instead of 1000 (600 if quick)."""
     eyes: tuple[str, ...] = ()
     """Compare these only, by name, as truth particle one_camera; quick: twelve."""
-    trainings: bool = False
-    """Also train robots, to see whether reward on belief teaches them to blind themselves."""
 
 
 @dataclass(frozen=True)

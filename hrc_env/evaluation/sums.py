@@ -18,6 +18,12 @@ SUMS = np.dtype(
 ACHIEVED, FAILED = "goals_reached", "goals_missed"
 """What an episode's statistics call the attempts of every task (`Task.achieved`, `Task.failed`)."""
 
+STATISTICS = (
+    "r", "l", "seconds", "cost", "cost_steps", "contacts",
+    *(f"contacts_{kind}" for kind in KINDS), ACHIEVED, FAILED, "success", "min_separation_m",
+)  # fmt: skip
+"""What an episode comes to, by name (`EpisodeSums.summarize`)."""
+
 
 class EpisodeSums:
     """Sums over the episode of each of some environments."""

@@ -3,15 +3,19 @@
 import base64
 import html
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections import defaultdict
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from markdown_it import MarkdownIt
 
+from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric, provenance, write_results, write_whole
+from hrc_env.experiments.columns import Column
 
+Metrics = Mapping[str, Metric]
 _STYLE = """
 body { font: 17px/1.55 system-ui, sans-serif; color: #1c2430; max-width: 66rem;
        margin: 2.5rem auto; padding: 0 1.2rem; }
@@ -22,32 +26,54 @@ th, td { padding: .25rem .55rem; border-bottom: 1px solid #d8dde6; text-align: r
 td { white-space: nowrap; } td:first-child, th:first-child { text-align: left; }
 code { background: #f0f2f6; padding: .1rem .3rem; border-radius: 3px; }
 """
-Metrics = Mapping[str, Metric]
 
 
 @dataclass(frozen=True, slots=True)
-class Column:
-    """A column of a table of metrics."""
+class Table:
+    """Rows of numbers under one title."""
 
-    key: str
-    """Of the metric, with `{}` for the row's."""
-    words: str
-    digits: int = 1
-    scale: float = 1.0
-    signed: bool = False
-    """Whether it is a difference."""
-    marked: bool = True
-    """Whether a difference has a dot where its interval leaves out zero."""
+    name: str
+    """By which a page of the documentation asks for it."""
+    title: str
+    rows: Mapping[str, tuple[str, ...]]
+    """Cells before the numbers, by row."""
+    columns: Sequence[Column]
+    heads: tuple[str, ...] = ("",)
+    """Headings of the cells before the numbers."""
+    note: str = ""
+    """What stands below; `{n[METRIC]}` is how many observations a metric is made of."""
 
-    def cell(self, metrics: Metrics, row: str) -> str:
-        """The number with its interval; a dash where there is none."""
-        metric = metrics.get(self.key.format(row))
-        return "-" if metric is None else self._said(metric)
+    def check(self, known: Collection[str]) -> None:
+        """Raise `ConfigError` for a row that has another number of cells than there are heads, and
+        for a column of which no row has a metric."""
+        for row, cells in self.rows.items():
+            if len(cells) != len(self.heads):
+                raise ConfigError(
+                    f"Table {self.name!r}: row {row!r} must have a cell for each of the heads "
+                    f"{self.heads}, got {cells}."
+                )
+        for column in self.columns:
+            names = [column.metric.format(row) for row in self.rows]
+            if not any(name in known for name in names):
+                raise ConfigError(
+                    f"Table {self.name!r}: no row has the metric {column.metric!r}; a row has "
+                    f"{', '.join(sorted({name.rpartition('.')[2] for name in known}))}."
+                )
 
-    def _said(self, metric: Metric) -> str:
-        is_told_apart = self.signed and (metric.low > 0 or metric.high < 0)
-        dot = " ●" if self.marked and is_told_apart else ""
-        return said(metric, self.scale, self.digits, self.signed) + dot
+    def note_of(self, metrics: Metrics) -> str:
+        """Return the note with its numbers; 0 where rows were left out."""
+        return self.note.format(n=defaultdict(int, {k: each.n for k, each in metrics.items()}))
+
+    def markdown(self, metrics: Metrics) -> str:
+        """Return the table with its title and note, without rows of which there is no number."""
+        lines = [
+            (*cells, *(cell(each, metrics, row) for each in self.columns))
+            for row, cells in self.rows.items()
+            if any(each.metric.format(row) in metrics for each in self.columns)
+        ]
+        heads = (*self.heads, *(each.heading for each in self.columns))
+        parts = (f"**{self.title}**", table(heads, lines), self.note_of(metrics))
+        return "\n\n".join(filter(None, parts))
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,8 +122,24 @@ def table_of(
     name: str, rows: Mapping[str, str], columns: Sequence[Column], metrics: Metrics
 ) -> str:
     """A table of metrics; `rows` by the part of their keys in place of `{}`, with their words."""
-    lines = ((words, *(each.cell(metrics, row) for each in columns)) for row, words in rows.items())
-    return table((name, *(each.words for each in columns)), lines)
+    lines = (
+        (words, *(cell(each, metrics, row) for each in columns)) for row, words in rows.items()
+    )
+    return table((name, *(each.heading for each in columns)), lines)
+
+
+def cell(column: Column, metrics: Metrics, row: str) -> str:
+    """Return the number of a row with its interval; a dash where there is none."""
+    metric = metrics.get(column.metric.format(row))
+    if metric is None:
+        return "-"
+    if column.is_n:
+        return f"{metric.n:,}"
+    if column.plain:
+        metric = replace(metric, low=metric.value, high=metric.value)
+    is_told_apart = column.signed and (metric.low > 0 or metric.high < 0)
+    dot = " ●" if column.marked and is_told_apart else ""
+    return said(metric, column.scale, column.digits, column.signed) + dot
 
 
 def said(metric: Metric, scale: float = 1.0, digits: int = 1, signed: bool = False) -> str:

@@ -1,71 +1,112 @@
-"""Runs a study: plays the parts that are not there yet, then writes numbers, figures, report."""
+"""Runs an experiment: plays the parts that are not there yet, then writes numbers and report."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric
 from hrc_env.experiments.cache import PartCache, Progress, own_folder
 from hrc_env.experiments.report import Report
-from hrc_env.experiments.versions import check_subsystems, key_of
+from hrc_env.experiments.versions import key_of
 
-ConfigT = TypeVar("ConfigT")
 PlayedT = TypeVar("PlayedT")
-Settings = Mapping[str, Any]
+RecordT = TypeVar("RecordT")
 
 
-@dataclass(frozen=True, slots=True)
-class Study(Generic[ConfigT, PlayedT]):
-    """A question asked of simulated episodes with some configuration."""
+class Experiment(Protocol[PlayedT]):
+    """What the runner asks of an experiment, whose fields are its settings.
 
-    name: str
-    depends: tuple[str, ...]
-    """Subsystems that all numbers depend on; their versions are in the parts' key."""
-    settings: Callable[[ConfigT], Settings]
-    """What all numbers depend on."""
-    seeds: Callable[[ConfigT], Sequence[int]]
-    n_parts: Callable[[ConfigT], float]
-    play: Callable[[ConfigT, PartCache], PlayedT]
-    """All parts, each from the cache or anew."""
-    metrics: Callable[[ConfigT, PlayedT], dict[str, Metric]]
-    report: Callable[[ConfigT, PlayedT, dict[str, Metric], Path], Report]
-    """Draws the figures into a folder; what is to be read."""
+    `hrc_env.experiments.study.Study` is one for whole episodes. Others play parts of their own.
+    """
 
-    def __post_init__(self) -> None:
-        """Raise `ConfigError` unless subsystems are named, and exist."""
-        check_subsystems(self.depends)
+    @property
+    def name(self) -> str:
+        """As its folder and its results are called."""
+        ...
+
+    @property
+    def depends(self) -> tuple[str, ...]:
+        """Subsystems that its numbers depend on; their versions are in the parts' keys."""
+        ...
+
+    @property
+    def seeds(self) -> Sequence[int]:
+        """Of everything that is drawn."""
+        ...
+
+    @property
+    def n_parts(self) -> float:
+        """How many parts the progress is made of."""
+        ...
+
+    def settings(self) -> Mapping[str, Any]:
+        """Return all that its numbers depend on, as JSON can hold it."""
+        ...
+
+    def play(self, cache: PartCache) -> PlayedT:
+        """Return what all parts came to, each from the cache or anew."""
+        ...
+
+    def metrics(self, played: PlayedT) -> dict[str, Metric]:
+        """Return every number."""
+        ...
+
+    def report(self, played: PlayedT, metrics: dict[str, Metric], figures: Path) -> Report:
+        """Draw the figures into a folder; return what is to be read."""
+        ...
+
+
+def settings_of(experiment: Experiment[Any]) -> dict[str, Any]:
+    """Return the settings of an experiment with its name, as results.json has them."""
+    return {"experiment": experiment.name, **experiment.settings()}
+
+
+def cache_of(experiment: Experiment[Any], parts: Path, progress: Progress) -> PartCache:
+    """Return the cache of an experiment's parts in a folder."""
+    key = key_of(settings_of(experiment), experiment.depends)
+    return PartCache(parts, key, experiment.n_parts, progress)
 
 
 def run(
-    study: Study[ConfigT, Any],
-    config: ConfigT,
+    experiment: Experiment[Any],
     out: Path,
-    progress: Progress,
+    progress: Progress = lambda share, label: None,
     overwrite: bool = False,
 ) -> dict[str, Metric]:
-    """Play what an earlier run with the same settings and versions did not finish in `out`; write
-    results.json, figures/, report.html and report.md there, over other results only if asked."""
-    own_folder(out, study.name, overwrite)
-    settings = {"experiment": study.name, **study.settings(config)}
-    key = key_of(settings, study.depends)
-    played = study.play(config, PartCache(out / "parts", key, study.n_parts(config), progress))
-    metrics = study.metrics(config, played)
-    report = study.report(config, played, metrics, out / "figures")
-    report.write(out, settings, study.seeds(config), metrics)
+    """Run an experiment, and write results.json, figures/, report.html and report.md.
+
+    Args:
+        experiment: what is played and counted.
+        out: folder of the results, and of parts: those that an earlier run with the same settings
+            and versions finished there are not played again.
+        progress: is told by how much the share that is done grew, and what is being done.
+        overwrite: delete the results of something else in the folder.
+
+    Returns:
+        Every number by its name.
+
+    Raises:
+        ConfigError: the folder holds the results of something else.
+    """
+    own_folder(out, experiment.name, overwrite)
+    played = experiment.play(cache_of(experiment, out / "parts", progress))
+    metrics = experiment.metrics(played)
+    report = experiment.report(played, metrics, out / "figures")
+    report.write(out, settings_of(experiment), experiment.seeds, metrics)
     return metrics
 
 
-def changed(config: ConfigT, **values: Any) -> ConfigT:
-    """A configuration with the values that are given; None leaves a field as it is."""
+def changed(record: RecordT, **values: Any) -> RecordT:
+    """Return a record with the values that are given; None leaves a field as it is."""
     given = {name: value for name, value in values.items() if value is not None}
-    return replace(config, **given)  # type: ignore[type-var]
+    return replace(record, **given)  # type: ignore[type-var]
 
 
-def at_least_one(config: Any, *names: str) -> None:
-    """Raise `ConfigError` unless these fields of a configuration are at least 1."""
+def at_least_one(record: Any, *names: str) -> None:
+    """Raise `ConfigError` unless these fields of a record are at least 1."""
     for name in names:
-        if getattr(config, name) < 1:
+        if getattr(record, name) < 1:
             option = "--seeds" if name == "n_seeds" else name
-            raise ConfigError(f"{option} must be at least 1, got {getattr(config, name)}.")
+            raise ConfigError(f"{option} must be at least 1, got {getattr(record, name)}.")

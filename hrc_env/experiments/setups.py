@@ -60,6 +60,11 @@ class PerceptionSetup:
         return words
 
     @property
+    def is_plain(self) -> bool:
+        """Whether all cameras are there, on time."""
+        return self.n_cameras == 4 and not self.latency_s
+
+    @property
     def turns(self) -> tuple[Turn, ...]:
         """Cameras and their faults, in which episodes take turns."""
         return self.turns_of(RIGS["lab"])

@@ -87,6 +87,11 @@ def key_of(settings: Mapping[str, Any], subsystems: Iterable[str]) -> str:
     return hashlib.sha256(content.encode()).hexdigest()[:16]
 
 
+def digest_of(path: Path) -> str:
+    """Return the digest of a file."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
 def source_digest(made: object) -> str:
     """Return the digest of the file that defines something that a user registered.
 
@@ -96,6 +101,6 @@ def source_digest(made: object) -> str:
     try:
         path = Path(inspect.getfile(made)).absolute()  # type: ignore[arg-type]
         is_ours = path.is_relative_to(_PACKAGE)
-        return "" if is_ours else hashlib.sha256(path.read_bytes()).hexdigest()
+        return "" if is_ours else digest_of(path)
     except (OSError, TypeError):
         return ""

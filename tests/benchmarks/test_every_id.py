@@ -2,11 +2,11 @@
 
 import pytest
 
-from benchmarks.speed.bench import SpeedBenchConfig
+from benchmarks.speed.bench import SpeedBench
 from benchmarks.speed.contenders import Starts
 from hrc_env.core.errors import ConfigError
 from hrc_env.experiments.impact.episodes import Stage
-from hrc_env.experiments.impact.experiment import ImpactConfig, config_for
+from hrc_env.experiments.impact.experiment import Impact, make_experiment
 from hrc_env.experiments.impact.policies import Policy, maker
 from hrc_env.experiments.setups import REFERENCE, setup_called
 from hrc_env.tasks.task import find_task
@@ -27,9 +27,9 @@ def test_impact_plays_it(task, tmp_path):
 
 def test_an_episode_of_impact_is_as_long_as_the_tasks():
     for task in ("HRCReach-v0", *IDS):
-        config = config_for(task=task)
+        config = make_experiment(task=task)
         assert (config.task, config.n_steps) == (task, find_task(task).max_episode_steps)
-    assert config_for(quick=True, task=IDS[0]).n_steps == 100
+    assert make_experiment(quick=True, task=IDS[0]).n_steps == 100
 
 
 @pytest.mark.parametrize("task", IDS)
@@ -40,7 +40,7 @@ def test_speed_times_its_resets(task):
     starts.close()
 
 
-@pytest.mark.parametrize("config", [SpeedBenchConfig, ImpactConfig])
+@pytest.mark.parametrize("config", [SpeedBench, Impact])
 def test_a_task_that_there_is_not_is_refused_in_words(config):
     with pytest.raises(ConfigError, match="Did you mean 'HRCReach-v0'"):
         config(task="HRCReach-v1")

@@ -48,7 +48,7 @@ def test_every_joint_that_is_free_counts_once_at_its_yaw():
 
 def test_numbers_of_every_yaw_are_there(monkeypatch):
     monkeypatch.setattr(facing, "ESTIMATORS", {"keypoints": ("kalman",)})
-    metrics = metrics_of("keypoints", 4, facing.Arguments(seconds=1.2))
+    metrics = metrics_of("keypoints", 4, facing.Facing(seconds=1.2))
     assert {name.split(".")[2] for name in metrics} == {str(yaw) for yaw in YAWS}
     there = [metrics[f"missed.keypoints.{yaw}"].value for yaw in YAWS]
     assert all(0 <= share <= 1 for share in there if share == share)

@@ -13,7 +13,7 @@ from hrc_env.experiments.runner import run
 from hrc_env.motion.repertoire import SCENES
 
 PLAYED = ("stand", "walk 1.1 m/s", "saw")
-TINY = bench.MotionBenchConfig(n_seeds=1, bodies=("worker_1",))
+TINY = bench.MotionBench(n_seeds=1, bodies=("worker_1",))
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +21,7 @@ def done(tmp_path_factory):
     out, said = tmp_path_factory.mktemp("motion"), []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(bench, "SCENES", {name: SCENES[name] for name in PLAYED})
-        metrics = run(bench.MOTION, TINY, out, lambda share, label: said.append(share))
+        metrics = run(TINY, out, lambda share, label: said.append(share))
     return out, metrics, said
 
 
@@ -54,6 +54,6 @@ def test_every_target_names_a_scene_that_exists():
 
 def test_an_empty_bench_is_refused():
     with pytest.raises(ConfigError, match="seeds"):
-        bench.MotionBenchConfig(n_seeds=0)
+        bench.MotionBench(n_seeds=0)
     with pytest.raises(ConfigError, match="bodies"):
-        bench.MotionBenchConfig(bodies=())
+        bench.MotionBench(bodies=())

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.perception import speed
-from benchmarks.perception.bench import PERCEPTION, PerceptionBenchConfig
+from benchmarks.perception.bench import PerceptionBench
 from benchmarks.perception.episodes import Episode, episode_of, some_steps
 from benchmarks.perception.metrics import EMULATED, NO_FAULT, PIXELS, metrics_of
 from benchmarks.perception.report import report
@@ -17,7 +17,7 @@ from hrc_env.core.results import Metric
 from hrc_env.experiments.runner import run
 from hrc_env.motion.generator import activity_names
 
-TINY = PerceptionBenchConfig(
+TINY = PerceptionBench(
     episodes=(("lab", 1),), n_steps=4, n_faults=1, fault_steps=3, n_emulated=1,
     kinds=("lost",), bodies=("worker_1",), n_instants=1, emulator_rounds=None,
     cameras=(1,), workers=(1,), speed_steps=2,
@@ -116,17 +116,17 @@ def test_distances_are_rows_in_order():
 
 def test_more_faulty_episodes_than_faultless_ones_are_refused():
     with pytest.raises(ConfigError, match="lab's first episodes"):
-        PerceptionBenchConfig(n_faults=31)
+        PerceptionBench(n_faults=31)
 
 
 def test_a_bench_writes_everything_and_goes_on_where_it_was(pixels, tmp_path):
     said = []
-    run(PERCEPTION, TINY, tmp_path, lambda share, label: said.append(share))
+    run(TINY, tmp_path, lambda share, label: said.append(share))
     assert sum(said) == pytest.approx(1.0)
     for name in ("report.md", "report.html", "results.json"):
         assert (tmp_path / name).stat().st_size > 0
     content = json.loads((tmp_path / "results.json").read_text())
     assert "error_ratio.lost" in content["metrics"]
     before = {path: path.stat().st_mtime_ns for path in (tmp_path / "parts").glob("*.json")}
-    run(PERCEPTION, TINY, tmp_path, lambda share, label: None)
+    run(TINY, tmp_path, lambda share, label: None)
     assert before == {path: path.stat().st_mtime_ns for path in (tmp_path / "parts").glob("*.json")}

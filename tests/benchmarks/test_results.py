@@ -1,6 +1,5 @@
 """make results: what is stale is run, what is finished is kept, numbers reach their tables."""
 
-import importlib
 import json
 import os
 import sys
@@ -9,7 +8,8 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
-from benchmarks import defaults, records, results
+from assets.emulator import shelf
+from benchmarks import records, results
 from benchmarks.replays import REPLAYS
 from benchmarks.results import COMMANDS, STUDIES, Arguments, Command, main, why_stale
 from benchmarks.studies import Study, commands_of
@@ -40,21 +40,6 @@ TABLE = {
                                     "factor": 100}],
     "keys": [["lab"]], "rows": [["lab", 1]],
 }  # fmt: skip
-
-
-EXPERIMENTS = "hrc_env.experiments"
-PARTS_OF = {
-    **{name: f"{EXPERIMENTS}.{name}.experiment:STUDY"
-       for name in ("site", "lab", "ablations", "impact", "price")},
-    "tracking": "benchmarks.tracking.bench:TRACKING",
-    "perception": "benchmarks.perception.bench:PERCEPTION",
-    "footage": "benchmarks.recorded.bench:RECORDED",
-    "speed": "benchmarks.speed.bench:SPEED",
-    **{name: f"benchmarks.{name}:DEPENDS"
-       for name in ("experts", "shielded", "baselines", "learners", "limited", "kept", "facing")},
-    "trueness": "assets.emulator.shelf:DEPENDS",
-}  # fmt: skip
-"""Where a study's parts get their subsystems from."""
 
 
 def declare(monkeypatch, command):
@@ -157,7 +142,7 @@ def test_another_value_of_a_setting_makes_a_study_stale_and_another_name_does_no
     config = {"n_seeds": 10, "bench": {"levels": ["truth"], "old_name": 3}}
     path.write_text(json.dumps(json.loads(path.read_text()) | {"config": config}))
     now = {"n_seeds": 10, "bench": {"levels": ["truth"], "new_name": 3}, "added": 1}
-    monkeypatch.setattr(results.defaults, "settings_of", lambda name: now)
+    monkeypatch.setattr(results, "current_settings", lambda name: now)
     assert why_stale("one") == ""
     now["bench"]["levels"] = ["truth", "none"]
     now["n_seeds"] = 9
@@ -165,8 +150,10 @@ def test_another_value_of_a_setting_makes_a_study_stale_and_another_name_does_no
 
 
 def test_the_settings_of_a_command_are_called_as_its_results_call_them():
-    for name in (*defaults.MADE, *defaults.SCRIPTS):
-        recorded, now = results.whole(name).get("config"), defaults.settings_of(name)
+    for name, command in COMMANDS.items():
+        if command.made is None or command.declared_tables:  # results are older than rows in them
+            continue
+        recorded, now = results.whole(name).get("config"), results.current_settings(name)
         assert recorded is None or now.keys() & recorded.keys(), name
 
 
@@ -255,11 +242,10 @@ def test_a_study_that_names_no_subsystem_or_an_unknown_one_is_refused(depends, w
 
 
 def test_a_study_names_the_subsystems_that_its_parts_are_keyed_by():
-    for name, place in PARTS_OF.items():
-        module, _, variable = place.partition(":")
-        made = getattr(importlib.import_module(module), variable)
-        depends = getattr(made, "depends", made)
-        assert set(COMMANDS[name].depends) == set(depends), name
+    for name, command in COMMANDS.items():
+        if command.made is not None:
+            assert set(command.depends) == set(command.made.make(results.OUT / name).depends), name
+    assert set(COMMANDS["trueness"].depends) == set(shelf.DEPENDS)
 
 
 def test_every_study_can_be_replayed_or_keeps_no_parts():
@@ -268,8 +254,11 @@ def test_every_study_can_be_replayed_or_keeps_no_parts():
 
 
 def test_every_file_of_results_is_one_studys():
-    files = [name for command in COMMANDS.values() for name in command.tables]
-    assert sorted(files) == sorted(path.stem for path in tables.RESULTS.glob("*.json"))
+    files = {path.stem for path in tables.RESULTS.glob("*.json")}
+    for command in COMMANDS.values():
+        for name in command.tables:  # in one place, not in two
+            assert (name in files) != (name in command.declared_tables), name
+    assert files <= {name for command in COMMANDS.values() for name in command.tables}
     recorded = {results.whole(name).get("command") for name in COMMANDS}
     for name, command in COMMANDS.items():  # a table of an older command says so
         known = {command.command, *recorded}

@@ -16,7 +16,7 @@ from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.experiments.runner import run
 from hrc_env.tasks import BUILT_IN
 
-TINY = bench.SpeedBenchConfig(
+TINY = bench.SpeedBench(
     n_rounds=1, least_steps=1, n_resets=1, levels=("keypoints",), sizes=(1, 3), threads=(1, 2),
     task_steps=1,
 )  # fmt: skip
@@ -25,7 +25,7 @@ TINY = bench.SpeedBenchConfig(
 @pytest.fixture(scope="module")
 def end_to_end(tmp_path_factory):
     out, said = tmp_path_factory.mktemp("speed"), []
-    metrics = run(bench.SPEED, TINY, out, lambda share, label: said.append(share))
+    metrics = run(TINY, out, lambda share, label: said.append(share))
     return out, metrics, said
 
 
@@ -56,8 +56,8 @@ def test_of_every_id_nothing_else_is_timed(tmp_path, monkeypatch):
     monkeypatch.setattr(bench.Tasks, "close", lambda self: None)
     monkeypatch.setattr(bench.Tasks, "run", lambda self, n: {"HRCReach-v0": 10.0 * n})
     said = []
-    config = bench.SpeedBenchConfig(task="every", n_rounds=2)
-    metrics = run(bench.SPEED, config, tmp_path, lambda share, label: said.append(share))
+    config = bench.SpeedBench(task="every", n_rounds=2)
+    metrics = run(config, tmp_path, lambda share, label: said.append(share))
     assert set(metrics) == {"task_steps_per_s.HRCReach-v0", "task_share.HRCReach-v0"}
     assert sum(said) == pytest.approx(1.0)
 
@@ -142,6 +142,6 @@ def test_inside_a_whole_nothing_is_told_apart():
 
 def test_numbers_that_cannot_work_are_refused():
     with pytest.raises(ConfigError, match="n_rounds"):
-        bench.SpeedBenchConfig(n_rounds=0)
+        bench.SpeedBench(n_rounds=0)
     with pytest.raises(ConfigError, match="keypoints"):
-        bench.SpeedBenchConfig(levels=("truth",))
+        bench.SpeedBench(levels=("truth",))

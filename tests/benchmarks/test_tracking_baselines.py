@@ -66,8 +66,8 @@ def test_the_bench_writes_what_ran_and_names_what_did_not(tmp_path, monkeypatch)
     monkeypatch.setattr(bench, "RIGS", ("lab",))
     monkeypatch.setattr(bench, "OURS", ("dlt",))  # no kernels to compile
     monkeypatch.setattr(bench, "installed", lambda name: False)
-    shares, config = [], bench.BaselinesConfig(n_seeds=2)
-    metrics = run(bench.BASELINES, config, tmp_path, lambda share, _: shares.append(share))
+    shares, config = [], bench.BaselinesBench(n_seeds=2)
+    metrics = run(config, tmp_path, lambda share, _: shares.append(share))
     assert sum(shares) == pytest.approx(1)
     assert "rmse_m.lab.after_return.dlt" in metrics
     assert metrics["rmse_m.lab.one_camera.dlt"].n == 2

@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks.tracking import bench as tracking_bench
 from benchmarks.tracking import sequences
-from benchmarks.tracking.bench import TRACKING, TrackingBenchConfig
+from benchmarks.tracking.bench import TrackingBench
 from benchmarks.tracking.cells import tally
 from benchmarks.tracking.names import DLT, rows
 from benchmarks.tracking.rigs import RIGS, make_rig
@@ -21,7 +21,7 @@ from hrc_env.tracking.estimators import ESTIMATORS
 
 pytestmark = pytest.mark.slow  # a study is played
 
-TINY = TrackingBenchConfig(n_seeds=2, n_matched=2, n_smoothed=1, timing_repeats=1)
+TINY = TrackingBench(n_seeds=2, n_matched=2, n_smoothed=1, timing_repeats=1)
 
 
 def no_time(name, rig, clean, hard, n_repeats, tick):
@@ -47,7 +47,7 @@ def end_to_end(tmp_path_factory):
     """The folder of a bench on a few frames of two sequences, and what it said."""
     out, said = tmp_path_factory.mktemp("bench"), []
     with small():
-        runner.run(TRACKING, TINY, out, lambda share, label: said.append((share, label)))
+        runner.run(TINY, out, lambda share, label: said.append((share, label)))
     return out, said
 
 
@@ -95,7 +95,7 @@ def test_a_second_run_makes_only_what_is_missing(end_to_end):
     real = tracking_bench.run_cell
     with small() as patch:
         patch.setattr(tracking_bench, "run_cell", lambda *a: made.append(a[0]) or real(*a))
-        runner.run(TRACKING, TINY, out, lambda share, label: None)
+        runner.run(TINY, out, lambda share, label: None)
     assert made == ["paper"]
     again = json.loads(missing.read_text())
     assert {**again, "seconds": before["seconds"]} == before
@@ -115,7 +115,7 @@ def test_time_per_update_is_positive():
 
 def test_sizes_that_cannot_work_are_answered():
     with pytest.raises(ConfigError, match="seeds"):
-        TrackingBenchConfig(n_seeds=0)
+        TrackingBench(n_seeds=0)
 
 
 def test_a_right_covariance_is_found_calibrated():

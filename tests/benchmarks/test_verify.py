@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 
 from benchmarks import records, results, verify
-from benchmarks.replays import Replay, row_of, walk_study
+from benchmarks.replays import Replay, row_of, walk
 from benchmarks.studies import COMMANDS, Command
 from benchmarks.verify import Arguments, draw, found_share, main
 from docs import tables
 from hrc_env.core.errors import ConfigError, DownloadError
-from hrc_env.experiments import runner
-from hrc_env.experiments.cache import PartCache
+from hrc_env.experiments.runner import cache_of
 
 ROWS = ("lab", "site")
 SEEDS = range(5)
@@ -21,30 +20,31 @@ SEEDS = range(5)
 
 @dataclass(frozen=True)
 class Toy:
-    """How much is played."""
+    """An experiment, and how much is played."""
 
     n: int = 1
+    name = "toy"
+    depends = ("env", "tracker")
+    seeds = (0,)
+    n_parts = 11
 
+    def settings(self):
+        return {"asked": "always the same"}
 
-def play(config, cache):
-    """Numbers of every row and seed; nobody looks into parts before all are there."""
-    found = {}
-    for row in ROWS:
-        for seed in SEEDS:
+    def play(self, cache):
+        """Numbers of every row and seed; nobody looks into parts before all are there."""
+        found = {}
+        for row in ROWS:
+            for seed in SEEDS:
 
-            def make(tick, row=row, seed=seed):
-                values = np.random.default_rng([len(row), seed]).normal(size=50)
-                return {"t": [float(seed)], "values": (config.n * values).tolist(), "row": row}
+                def make(tick, row=row, seed=seed):
+                    values = np.random.default_rng([len(row), seed]).normal(size=50)
+                    values = (self.n * values).tolist()
+                    return {"t": [float(seed)], "values": values, "row": row}
 
-            found[row, seed] = cache.part(f"{row}.{seed}", make)
-    found["learnt"] = cache.part("training.0", lambda tick: {"sha256": "abc"})
-    return found
-
-
-TOY = runner.Study(
-    "toy", ("env", "tracker"), lambda config: {"asked": "always the same"}, lambda config: [0],
-    lambda config: 11, play, lambda config, played: {}, lambda *of: None,
-)  # fmt: skip
+                found[row, seed] = cache.part(f"{row}.{seed}", make)
+        found["learnt"] = cache.part("training.0", lambda tick: {"sha256": "abc"})
+        return found
 
 
 @pytest.fixture
@@ -55,29 +55,23 @@ def toy(tmp_path, monkeypatch):
         monkeypatch.setattr(results, name, tmp_path / path)
     for name in list(COMMANDS):
         monkeypatch.delitem(COMMANDS, name)
-    monkeypatch.setitem(COMMANDS, "toy", Command("python -m toy", 1, TOY.depends))
+    monkeypatch.setitem(COMMANDS, "toy", Command("python -m toy", 1, Toy.depends))
     replays = {}
     monkeypatch.setattr(verify, "REPLAYS", replays)
 
     def replayed_with(config, **changes):
         replays["toy"] = Replay(
-            lambda given: walk_study(TOY, config, given), trainings=("training.",), **changes
+            lambda given: walk(config, given), trainings=("training.",), **changes
         )
 
-    key = verify_key()
-    play(Toy(), PartCache(tmp_path / "made", key, 11, lambda share, label: None))
-    versions = results.versions_of(TOY.depends)
+    Toy().play(cache_of(Toy(), tmp_path / "made", lambda share, label: None))
+    versions = results.versions_of(Toy.depends)
     records.write("toy", versions, tmp_path / "made", 0.0)
     (tmp_path / "results" / "whole").mkdir(parents=True)
     whole = {"command": "python -m toy", "depends": versions}
     (tmp_path / "results" / "whole" / "toy.json").write_text(json.dumps(whole))
     replayed_with(Toy())
     return replayed_with
-
-
-def verify_key():
-    """The key of the toy's parts."""
-    return runner.key_of({"experiment": "toy", **TOY.settings(Toy())}, TOY.depends)
 
 
 def verified(tmp_path, **arguments):
@@ -140,10 +134,10 @@ def test_a_part_with_other_settings_or_that_is_no_longer_made_or_fails_is_found(
 
 
 def test_what_a_machine_lacks_spoils_nothing_and_is_named(toy, tmp_path, monkeypatch, capsys):
-    def walk(given):
+    def fail(given):
         raise DownloadError("The film cannot be fetched.")
 
-    monkeypatch.setitem(verify.REPLAYS, "toy", Replay(walk))
+    monkeypatch.setitem(verify.REPLAYS, "toy", Replay(fail))
     status, outcome = verified(tmp_path, share=0.0)
     assert (status, outcome["spoiled"]) == (0, {})
     assert len(outcome["lacking"]["toy"]) == 3
@@ -232,6 +226,6 @@ def test_arguments_that_cannot_work_are_refused_in_words(given, words):
 def test_rows_are_those_of_the_tables():
     assert row_of("site", "one_camera.3") == "one_camera"
     assert row_of("price", "HRCReach-v0.one_camera.fresh.-1980") == "HRCReach-v0.one_camera"
-    assert row_of("kept", "HRCReach-v0.limited.qp.eb6e") == "HRCReach-v0.limited.qp"
+    assert row_of("kept", "HRCReach-v0.limited.qp.1000000") == "HRCReach-v0.limited.qp"
     recorded = {row_of("kept", label) for label in records.read("kept").parts}
     assert len(recorded) == len(records.read("kept").parts)

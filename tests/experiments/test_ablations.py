@@ -15,9 +15,8 @@ from hrc_env.experiments.ablations import play as playing
 from hrc_env.experiments.ablations.ablation import Setting
 from hrc_env.experiments.ablations.experiment import (
     ABLATIONS,
-    STUDY,
-    AblationsConfig,
-    config_for,
+    Ablations,
+    make_experiment,
     metrics_of,
 )
 from hrc_env.experiments.ablations.handicaps import handicap, lengths_m
@@ -28,7 +27,7 @@ from hrc_env.experiments.rigs import DT_S, N_WARM_UP, left_of
 from hrc_env.experiments.runner import run
 from hrc_env.tracking.tree.gaussian import PARENT, ROOT
 
-TINY = AblationsConfig(n_seeds=1, seconds=1.24)
+TINY = Ablations(n_seeds=1, seconds=1.24)
 SEEDS = (7, 8, 9)
 N_STEPS = N_WARM_UP + 5
 
@@ -60,14 +59,14 @@ def state_of(setting):
 def end_to_end(tmp_path_factory):
     """A run of all studies: folder, numbers, told progress."""
     out, shares = tmp_path_factory.mktemp("ablations"), []
-    metrics = run(STUDY, TINY, out, lambda share, label: shares.append(share))
+    metrics = run(TINY, out, lambda share, label: shares.append(share))
     return out, metrics, shares
 
 
 def test_every_number_of_every_setting_is_there_and_finite(end_to_end):
     out, metrics, _ = end_to_end
     written = json.loads((out / "results.json").read_text())["metrics"]
-    assert tables.asked(tables.read("ablations")) <= written.keys() == metrics.keys()
+    assert tables.asked("ablations") <= written.keys() == metrics.keys()
     for study in ABLATIONS.values():
         for setting in study.settings:
             key = f"{study.name}.{setting.name}"
@@ -125,7 +124,7 @@ def test_what_is_finished_is_used_again(end_to_end, monkeypatch):
     monkeypatch.setattr(experiment, "part", never)
     monkeypatch.setattr(experiment, "report", lambda *args: Report("", "", ()))
     before = (out / "results.json").read_text()
-    run(STUDY, TINY, out, silent)
+    run(TINY, out, silent)
     assert (out / "results.json").read_text() == before
 
 
@@ -133,11 +132,11 @@ def test_a_run_that_is_killed_goes_on_to_the_same_numbers(process, tmp_path):
     config = replace(TINY, n_seeds=2, studies=("workers",))
     script = (
         "import os, sys; from pathlib import Path; "
-        "from hrc_env.experiments.ablations.experiment import STUDY, AblationsConfig\n"
+        "from hrc_env.experiments.ablations.experiment import Ablations\n"
         "from hrc_env.experiments.runner import run\n"
         "def say(share, label):\n"
         "    if label == 'workers.lab_3': os.kill(os.getpid(), 9)\n"
-        f"run(STUDY, {config!r}, Path(sys.argv[1]), say)"
+        f"run({config!r}, Path(sys.argv[1]), say)"
     )
     out, other = tmp_path / "killed", tmp_path / "whole"
     killed = process("-c", script, out)
@@ -145,7 +144,7 @@ def test_a_run_that_is_killed_goes_on_to_the_same_numbers(process, tmp_path):
     kept = {path.name: path.stat().st_mtime_ns for path in (out / "parts").iterdir()}
     assert set(kept) == {"workers.lab_1.json", "workers.lab_2.json"}
     assert not (out / "results.json").exists()
-    resumed, whole = run(STUDY, config, out, silent), run(STUDY, config, other, silent)
+    resumed, whole = run(config, out, silent), run(config, other, silent)
     assert resumed.keys() == whole.keys()
     for name, metric in whole.items():  # sums of another process may round otherwise
         numbers = (resumed[name].value, resumed[name].low, resumed[name].high)
@@ -155,23 +154,23 @@ def test_a_run_that_is_killed_goes_on_to_the_same_numbers(process, tmp_path):
 
 def test_what_cannot_work_is_explained(tmp_path):
     with pytest.raises(ConfigError, match="Did you mean 'cameras'"):
-        config_for(studies=("camera",))
+        make_experiment(studies=("camera",))
     with pytest.raises(ConfigError, match="--studies needs a name"):
-        config_for(studies=())
+        make_experiment(studies=())
     with pytest.raises(ConfigError, match="--seeds must be at least 1"):
-        config_for(seeds=0)
+        make_experiment(seeds=0)
     with pytest.raises(ConfigError, match="longer than the warm-up"):
         replace(TINY, seconds=1.0)
     with pytest.raises(ConfigError, match="got 'paper'"):
         Setting("x", "x", estimator="paper", bones="known")
     (tmp_path / "experiment.json").write_text('{"experiment": "lab"}')
     with pytest.raises(ConfigError, match="--overwrite"):
-        run(STUDY, TINY, tmp_path, silent)
+        run(TINY, tmp_path, silent)
 
 
 def test_quick_asks_everything():
-    assert config_for(quick=True).studies == config_for().studies == tuple(ABLATIONS)
-    assert config_for(seeds=3).n_seeds == 3
+    assert make_experiment(quick=True).studies == make_experiment().studies == tuple(ABLATIONS)
+    assert make_experiment(seeds=3).n_seeds == 3
 
 
 def test_nothing_depends_on_the_number_of_threads(monkeypatch):

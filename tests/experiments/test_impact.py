@@ -15,7 +15,7 @@ from hrc_env.evaluation.intervals import counted_quantile_over
 from hrc_env.experiments.cache import PartCache
 from hrc_env.experiments.impact import policies
 from hrc_env.experiments.impact.episodes import STEP, Stage, sums_of
-from hrc_env.experiments.impact.experiment import STUDY, ImpactConfig, check_walks, config_for, play
+from hrc_env.experiments.impact.experiment import Impact, check_walks, make_experiment
 from hrc_env.experiments.impact.metrics import COMPARED, margin_needed, metrics_of
 from hrc_env.experiments.impact.policies import Policy, maker, trained
 from hrc_env.experiments.impact.report import report
@@ -29,7 +29,7 @@ from hrc_env.experiments.setups import (
 from hrc_env.safety.incidents import KINDS
 
 LATE = PerceptionSetup(latency_s=0.12).name
-TINY = ImpactConfig(
+TINY = Impact(
     n_seeds=2,
     n_steps=12,
     policies=("scripted", "scripted_slowed"),
@@ -58,7 +58,7 @@ def sums(*steps, margin_m=0.0):
 def end_to_end(tmp_path_factory):
     """A run from beginning to end: its folder and its numbers."""
     out = tmp_path_factory.mktemp("impact")
-    return out, run(STUDY, TINY, out, silent)
+    return out, run(TINY, out, silent)
 
 
 def test_eyes_are_called_what_they_are():
@@ -101,9 +101,9 @@ def test_what_cannot_be_played_is_refused(change, words):
 
 
 def test_quick_plays_every_row_of_the_full_run():
-    full, quick = config_for(), config_for(quick=True)
+    full, quick = make_experiment(), make_experiment(quick=True)
     assert (quick.setups, quick.policies) == (full.setups, full.policies)
-    assert config_for(seeds=7).n_seeds == 7
+    assert make_experiment(seeds=7).n_seeds == 7
 
 
 def test_a_stop_is_missed_where_the_belief_is_too_hopeful():
@@ -173,7 +173,7 @@ def test_every_row_says_everything(end_to_end):
             assert 0 < metrics[f"p.{policy}.truth.{what}"].value <= 1
     written = json.loads((out / "results.json").read_text())
     assert set(written["metrics"]) == set(metrics)
-    asked = tables.asked(tables.read("impact")) | tables.asked(tables.read("lateness"))
+    asked = tables.asked("impact") | tables.asked("lateness")
     asked = {name for name in asked if name.split(".")[-2] in TINY.setups and "ppo" not in name}
     assert len(asked) > 20
     assert asked <= metrics.keys()
@@ -214,19 +214,19 @@ def test_a_run_that_is_killed_goes_on_to_the_same_numbers(end_to_end, process, t
     _, metrics = end_to_end
     script = (
         "import os, sys; from pathlib import Path; "
-        "from hrc_env.experiments.impact.experiment import STUDY, ImpactConfig\n"
+        "from hrc_env.experiments.impact.experiment import Impact\n"
         "from hrc_env.experiments.runner import run\n"
         f"config = {TINY!r}\n"
         "def say(share, label):\n"
         f"    if label == 'scripted.{REFERENCE}': os.kill(os.getpid(), 9)\n"
-        "run(STUDY, config, Path(sys.argv[1]), say)"
+        "run(config, Path(sys.argv[1]), say)"
     )
     killed = process("-c", script, tmp_path)
     assert killed.returncode == -signal.SIGKILL
     kept = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "parts").iterdir()}
     assert len(kept) == 4  # truth and none, two policies each
     assert not (tmp_path / "results.json").exists()
-    assert run(STUDY, TINY, tmp_path, silent) == metrics
+    assert run(TINY, tmp_path, silent) == metrics
     for name, time_ns in kept.items():
         assert (tmp_path / "parts" / name).stat().st_mtime_ns == time_ns
 
@@ -239,7 +239,7 @@ def test_a_policy_is_learnt_once_and_again_only_if_its_file_is_lost(tmp_path, mo
         path.write_bytes(b"policy")
         return {"sha256": hashlib.sha256(b"policy").hexdigest()}
 
-    monkeypatch.setattr(policies, "_train", learn)
+    monkeypatch.setattr(policies, "learn_ppo", learn)
     cache, path = PartCache(tmp_path, "here", 1, silent), tmp_path / "ppo.zip"
     digests = {trained(cache, 1, path, "key") for _ in range(2)}
     assert len(learnt) == 1
@@ -252,18 +252,22 @@ def test_a_policy_is_learnt_once_and_again_only_if_its_file_is_lost(tmp_path, mo
 def test_a_report_is_made_without_the_policy_that_yields(end_to_end, tmp_path):
     _, metrics = end_to_end
     config = replace(TINY, policies=("scripted",), setups=("truth", REFERENCE))
-    table = play(config, PartCache(tmp_path / "parts", "", 1, silent))
+    table = config.play(PartCache(tmp_path / "parts", "", 1, silent))
     found = report(tmp_path / "figures", table, metrics)
     assert (tmp_path / "figures" / "tradeoff.png").exists()
     assert "scripted_slowed" not in str(found.parts[1])
 
 
 def test_a_quick_run_says_so_and_marks_nothing(tmp_path):
-    assert not config_for().is_quick
-    for quick in (config_for(quick=True), config_for(quick=True, seeds=90), config_for(seeds=8)):
+    assert not make_experiment().is_quick
+    for quick in (
+        make_experiment(quick=True),
+        make_experiment(quick=True, seeds=90),
+        make_experiment(seeds=8),
+    ):
         assert quick.is_quick
     config = replace(
-        config_for(quick=True),
+        make_experiment(quick=True),
         n_seeds=3,
         policies=("scripted_slowed",),
         setups=("truth", REFERENCE),
@@ -274,14 +278,14 @@ def test_a_quick_run_says_so_and_marks_nothing(tmp_path):
         table["scripted_slowed", name] = {what: [each] * 3 for what, each in episode.items()}
     metrics = metrics_of(table, ())
     assert metrics["difference.scripted_slowed.truth.goals_per_min"].low > 0
-    STUDY.report(config, table, metrics, tmp_path / "figures").write(tmp_path, {}, [0], metrics)
+    config.report(table, metrics, tmp_path / "figures").write(tmp_path, {}, [0], metrics)
     for page in ("report.md", "report.html"):
         text = (tmp_path / page).read_text()
         assert "This run was quick: 3 episodes of 4 s a row" in text
         assert "not enough to compare estimators" in text
         assert "●" not in text
         assert "a dot" not in text
-    whole = STUDY.report(config_for(), table, metrics, tmp_path / "figures")
+    whole = make_experiment().report(table, metrics, tmp_path / "figures")
     assert "quick" not in whole.title + whole.asked
     assert "●" in str(whole.parts)
 
@@ -289,8 +293,11 @@ def test_a_quick_run_says_so_and_marks_nothing(tmp_path):
 def test_an_estimator_that_a_file_registers_is_compared(tmp_path, process, brought):
     """One command, one file."""
     config = replace(
-        config_for(True, 2, ["alpha_beta"]), n_steps=12, policies=("scripted_slowed",), margins_m=()
+        make_experiment(True, 2, ["alpha_beta"]),
+        n_steps=12,
+        policies=("scripted_slowed",),
+        margins_m=(),
     )
-    metrics = run(STUDY, config, tmp_path, silent)
+    metrics = run(config, tmp_path, silent)
     assert "scripted_slowed.keypoints_alpha_beta_4cam_0ms.cost" in metrics
     assert (tmp_path / "figures").is_dir()

@@ -9,27 +9,27 @@ from docs import tables
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import JOINT
 from hrc_env.experiments.lab import experiment
-from hrc_env.experiments.lab.experiment import STUDY, LabConfig, config_for, laboratory
+from hrc_env.experiments.lab.experiment import Lab, laboratory, make_experiment
 from hrc_env.experiments.lab.motions import MOTIONS, play
 from hrc_env.experiments.lab.sides import LEFT, RIGHT, turned_away
 from hrc_env.experiments.recording import replay
 from hrc_env.experiments.report import Report
 from hrc_env.experiments.runner import run
 
-TINY = LabConfig(n_seeds=1, max_frames=26)
+TINY = Lab(n_seeds=1, max_frames=26)
 CAMERAS = (*(f"camera_{k}" for k in range(1, 5)), "multi")
 
 
 @pytest.fixture(scope="module")
 def end_to_end(weights, tmp_path_factory):
     out = tmp_path_factory.mktemp("lab")
-    return out, run(STUDY, TINY, out, lambda share, label: None)
+    return out, run(TINY, out, lambda share, label: None)
 
 
 def test_every_number_is_there(end_to_end):
     out, metrics = end_to_end
     written = json.loads((out / "results.json").read_text())["metrics"]
-    assert tables.asked(tables.read("lab")) <= written.keys() == metrics.keys()
+    assert tables.asked("lab") <= written.keys() == metrics.keys()
     for motion in MOTIONS:
         for camera in CAMERAS:
             for word in ("median", "p95"):
@@ -60,7 +60,7 @@ def test_what_is_finished_is_used_again(end_to_end, monkeypatch):
     monkeypatch.setattr(experiment, "film", never)
     monkeypatch.setattr(experiment, "report", lambda *args: Report("", "", ()))
     before = (out / "results.json").read_text()
-    run(STUDY, TINY, out, lambda share, label: None)
+    run(TINY, out, lambda share, label: None)
     assert (out / "results.json").read_text() == before
 
 
@@ -86,7 +86,7 @@ def test_the_side_turned_away_is_the_far_one():
 
 def test_what_cannot_work_is_explained():
     with pytest.raises(ConfigError, match="--seeds must be at least 1"):
-        config_for(True, 0)
+        make_experiment(True, 0)
 
 
 def test_a_replay_with_all_cameras_believes_what_was_believed_when_filming(pixels):

@@ -3,7 +3,6 @@
 import json
 import signal
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,27 +12,24 @@ from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats
 from hrc_env.experiments.cache import PartCache
-from hrc_env.experiments.price import blindness, experiment, report, trainings
-from hrc_env.experiments.price.blindness import TrainingConfig
+from hrc_env.experiments.price import experiment
 from hrc_env.experiments.price.episodes import STEP, Stage, sums_of
 from hrc_env.experiments.price.experiment import (
-    STUDY,
-    PriceConfig,
+    Price,
     check_walks,
-    config_for,
+    make_experiment,
 )
 from hrc_env.experiments.price.eyes import ELSEWHERE, QUICK, all_eyes, eyes_called
 from hrc_env.experiments.price.metrics import CONTRASTS, Row, metrics_of, supposed_m
-from hrc_env.experiments.price.report import QUESTIONS
+from hrc_env.experiments.price.report import QUESTIONS, choose_bars
 from hrc_env.experiments.price.search import Tried, draws, searched
 from hrc_env.experiments.price.shield import Widened
 from hrc_env.experiments.runner import run
 from hrc_env.experiments.setups import PerceptionSetup
-from hrc_env.rewards import RewardConfig
 from hrc_env.safety.shield import SHIELDS
 from hrc_env.simulation import Simulation
 
-TINY = PriceConfig(
+TINY = Price(
     eyes=("truth", "two_cameras"), n_seeds=5, n_fresh=6, n_search=1, n_pixels=0, n_steps=50
 )
 
@@ -46,7 +42,7 @@ def silent(share, label):
 def end_to_end(tmp_path_factory):
     """A run from beginning to end: its folder and its numbers."""
     out = tmp_path_factory.mktemp("price")
-    return out, run(STUDY, TINY, out, silent)
+    return out, run(TINY, out, silent)
 
 
 def contacts_at(margin_m: float) -> float:
@@ -171,23 +167,22 @@ def test_a_task_that_nobody_has_scripted_is_refused(monkeypatch):
 def test_a_folder_of_other_results_is_refused(tmp_path):
     (tmp_path / "experiment.json").write_text(json.dumps({"experiment": "impact"}))
     with pytest.raises(ConfigError, match="holds the results of 'impact'; this is 'price'"):
-        run(STUDY, TINY, tmp_path, silent)
+        run(TINY, tmp_path, silent)
 
 
 def test_what_the_command_asks_for():
-    full, quick = config_for(), config_for(quick=True)
+    full, quick = make_experiment(), make_experiment(quick=True)
     assert quick.eyes == QUICK
     assert (quick.others, quick.n_pixels) == ((), 0)
     assert (quick.n_seeds, quick.n_fresh, quick.n_search) == (300, 600, 4)
     assert full.n_fresh == 1000
     assert len(full.others) == 6
     assert full.n_pixels == 40
-    assert config_for(seeds=3).n_fresh == 10
-    elsewhere = config_for(task="HRCHandover-v0")
+    assert make_experiment(seeds=3).n_fresh == 10
+    elsewhere = make_experiment(task="HRCHandover-v0")
     assert elsewhere.eyes == ELSEWHERE
-    assert len(elsewhere.seeds("HRCHandover-v0", 300)) == 100  # as much time
-    assert config_for(eyes=("truth", "truth")).eyes == ("truth",)
-    assert config_for(trainings=True).trainings == TrainingConfig()
+    assert len(elsewhere.seeds_of("HRCHandover-v0", 300)) == 100  # as much time
+    assert make_experiment(eyes=("truth", "truth")).eyes == ("truth",)
 
 
 def test_a_wider_shield_intervenes_more_and_covariances_are_told():
@@ -242,17 +237,17 @@ def test_a_run_that_is_killed_goes_on_to_the_same_numbers(end_to_end, process, t
     _, metrics = end_to_end
     script = (
         "import os, sys; from pathlib import Path; "
-        "from hrc_env.experiments.price.experiment import STUDY, PriceConfig\n"
+        "from hrc_env.experiments.price.experiment import Price\n"
         "from hrc_env.experiments.runner import run\n"
         f"config = {TINY!r}\n"
         "def say(share, label):\n"
         "    if label.startswith('HRCReach-v0.two_cameras'): os.kill(os.getpid(), 9)\n"
-        "run(STUDY, config, Path(sys.argv[1]), say)"
+        "run(config, Path(sys.argv[1]), say)"
     )
     assert process("-c", script, tmp_path).returncode == -signal.SIGKILL
     kept = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "parts").iterdir()}
     assert len(kept) >= 6  # without a shield; of the truth four that were searched, and the fresh
-    assert run(STUDY, TINY, tmp_path, silent) == metrics
+    assert run(TINY, tmp_path, silent) == metrics
     for name, time_ns in kept.items():
         assert (tmp_path / "parts" / name).stat().st_mtime_ns == time_ns
 
@@ -295,7 +290,7 @@ def test_a_search_goes_on_where_fresh_seeds_say_so(tmp_path, monkeypatch):
 
     monkeypatch.setattr(Stage, "play", play)
     cache = PartCache(tmp_path, "", 1, silent)
-    row = experiment._price(TINY, cache, "HRCReach-v0", all_eyes()["truth"])
+    row = experiment.search_margin(TINY, cache, "HRCReach-v0", all_eyes()["truth"])
     assert sorted(row.searched) == pytest.approx([-0.8, -0.4, 0.0, 0.4, 0.45, 0.55, 0.75])
     assert row.ends_at(row.at(30.0)[0, 0])
     assert row.margin_m == pytest.approx(0.75)  # what is achieved at the end is played there
@@ -309,76 +304,11 @@ def test_workers_who_walk_otherwise_are_noticed_where_nobody_waits():
         check_walks("HRCReach-v0", other, one)
 
 
-def test_the_best_eyes_stand_above(tmp_path, monkeypatch):
-    shown = []
-    monkeypatch.setattr(report, "_say", lambda axis, eyes, values: shown.append(eyes))
+def test_the_best_eyes_stand_above():
     metrics = {
         f"HRCReach-v0.{name}.share": Metric(k / 10, k / 10, k / 10, "share", 1)
         for k, name in enumerate(("truth", "one_camera", "particle"))
     }
     eyes = eyes_called(["truth", "particle", "one_camera"])
-    report.draw_price(tmp_path / "price.png", metrics, "HRCReach-v0", eyes, 30.0)
-    assert [each.name for each in shown[0]] == ["truth", "one_camera", "particle"]
-
-
-class Fixed:
-    """A vector environment whose steps are always the same."""
-
-    num_envs = 2
-
-    def __init__(self):
-        weights = RewardConfig(proximity=2.0, proximity_reach_m=0.3)
-        self.shards = SimpleNamespace(first=SimpleNamespace(reward_weights=weights))
-
-    def step(self, actions):
-        known = np.ones(2, bool)
-        infos = {"reward/proximity": np.array([-0.5, 0.0]), "_reward/proximity": known,
-                 "safety/min_separation_m": np.array([0.3, 0.0]),
-                 "_safety/min_separation_m": known}  # fmt: skip
-        return None, np.array([1.0, 1.0]), None, None, infos
-
-
-def test_reward_on_the_truth_knows_the_true_separation():
-    _, reward, *_ = trainings.TrueProximity(Fixed()).step(None)
-    assert reward.tolist() == [1.5, -1.0]  # far in truth; touched in truth, nobody believed near
-    assert trainings.TrueProximity(Fixed()).num_envs == 2
-
-
-def test_optimism_counts_who_is_lost_as_a_metre_away():
-    step = {name: np.zeros(3) for name in ("hidden", "unseen")}
-    step |= {"believed_m": np.array([np.inf, 0.25, 0.1]), "true_m": np.array([0.4, 0.35, 2.0])}
-    step["tracked"] = np.array([0.0, 1.0, 1.0])
-    found = trainings._summed([step])
-    assert found["optimism_m"] == pytest.approx((0.6 - 0.1) / 2)
-    assert found["lost"] == 0.5
-
-
-def test_numbers_of_trainings_are_paired_seed_by_seed():
-    def curves(*ends):
-        return [{what: [0.0, end] for what in blindness.MEASURED} for end in ends]
-
-    learnt = {("truth", 1): curves(0.1, 0.5), ("belief", 1): curves(0.3, 0.7)}
-    found = blindness.metrics_of(learnt)
-    assert found["blind.belief_1cam.lost"].value == pytest.approx(0.5)
-    off = found["blind.difference.belief_1cam.lost"]
-    assert (off.value, off.low, off.high) == pytest.approx((0.2, 0.2, 0.2))
-
-
-def test_trainings_are_played_and_reported(tmp_path, monkeypatch):
-    measured = {what: [0.0, 1.0] for what in (*blindness.MEASURED, "steps")}
-    monkeypatch.setattr(blindness, "learn", lambda training, tick: measured)
-    config = TrainingConfig(n_seeds=2, cameras=(4, 1))
-    cache = PartCache(tmp_path / "parts", "", config.n_parts, silent)
-    learnt = blindness.play(config, cache)
-    assert len(list((tmp_path / "parts").iterdir())) == config.n_parts == 12
-    text = "\n".join(report.blind(tmp_path, learnt, blindness.metrics_of(learnt)))
-    assert (tmp_path / "blindness.png").exists()
-    assert "belief; who is lost counts as far away; 1 camera |" in text
-
-
-@pytest.mark.slow
-def test_a_robot_is_watched_before_while_and_after_it_learns():
-    training = trainings.Training("truth", 1, 0, 8192, 2, 2)
-    found = trainings.learn(training, lambda share: None)
-    assert found["steps"] == [0, 4096, 8192]
-    assert all(np.isfinite(each).all() for each in found.values())
+    shown = choose_bars(metrics, "HRCReach-v0", eyes)
+    assert [each.name for each in shown] == ["truth", "one_camera", "particle"]

@@ -9,9 +9,9 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.experiments.report import Report
 from hrc_env.experiments.runner import run
 from hrc_env.experiments.site import experiment
-from hrc_env.experiments.site.experiment import STUDY, SiteConfig, config_for
+from hrc_env.experiments.site.experiment import Site, make_experiment
 
-TINY = SiteConfig(n_seeds=1, seconds=2.0, estimators=("particle",))
+TINY = Site(n_seeds=1, seconds=2.0, estimators=("particle",))
 CAMERAS = (*(f"camera_{k}" for k in range(1, 5)), "multi")
 
 
@@ -19,7 +19,7 @@ CAMERAS = (*(f"camera_{k}" for k in range(1, 5)), "multi")
 def end_to_end(weights, tmp_path_factory):
     out = tmp_path_factory.mktemp("site")
     shares: list[float] = []
-    metrics = run(STUDY, TINY, out, lambda share, label: shares.append(share))
+    metrics = run(TINY, out, lambda share, label: shares.append(share))
     return out, metrics, shares
 
 
@@ -36,7 +36,7 @@ def test_every_number_is_there(end_to_end):
     for name in ("kalman", "paper_restarts"):
         assert f"difference.rmse_m.{name}.multi" in metrics
         assert 0 < metrics[f"p.rmse_m.{name}.camera_1"].value <= 1
-    asked = tables.asked(tables.read("site"))
+    asked = tables.asked("site")
     assert {name for name in asked if name.split(".")[-2] in TINY.estimators} <= metrics.keys()
 
 
@@ -75,15 +75,15 @@ def test_what_is_finished_is_used_again(end_to_end, monkeypatch):
     monkeypatch.setattr(experiment, "closed_loop", never)
     monkeypatch.setattr(experiment, "report", lambda *args: Report("", "", ()))
     before = (out / "results.json").read_text()
-    run(STUDY, TINY, out, lambda share, label: None)
+    run(TINY, out, lambda share, label: None)
     assert (out / "results.json").read_text() == before
 
 
 def test_what_cannot_work_is_explained(tmp_path):
     with pytest.raises(ConfigError, match="Did you mean 'particle'"):
-        config_for(True, None, ("partical",))
+        make_experiment(True, None, ("partical",))
     with pytest.raises(ConfigError, match="--seeds must be at least 1"):
-        config_for(True, 0, ("particle",))
+        make_experiment(True, 0, ("particle",))
     (tmp_path / "experiment.json").write_text('{"experiment": "lab"}')
     with pytest.raises(ConfigError, match="--overwrite"):
-        run(STUDY, TINY, tmp_path, lambda share, label: None)
+        run(TINY, tmp_path, lambda share, label: None)

@@ -7,9 +7,9 @@ import pytest
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.experiments import versions
-from hrc_env.experiments.runner import Study
 from hrc_env.experiments.versions import (
     SUBSYSTEMS,
+    check_subsystems,
     key_of,
     read_versions,
     source_digest,
@@ -84,7 +84,7 @@ def test_a_file_that_is_missing_or_leaves_a_subsystem_out_is_refused_in_words(tm
 )
 def test_a_study_that_names_no_subsystem_or_an_unknown_one_is_refused_in_words(depends, words):
     with pytest.raises(ConfigError, match=words):
-        Study("one", depends, *[None] * 6)
+        check_subsystems(depends)
     with pytest.raises(ConfigError, match=words):
         key_of({}, depends)
 

@@ -19,6 +19,7 @@ from functools import partial
 from importlib import import_module
 from importlib.metadata import version
 from importlib.util import find_spec
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,7 @@ from hrc_env.core.results import Metric, over
 from hrc_env.core.typing import Floats, Points2, Points3
 from hrc_env.experiments.cache import PartCache, PartProgress
 from hrc_env.experiments.report import Metrics, Report, table
-from hrc_env.experiments.runner import Study, at_least_one
+from hrc_env.experiments.runner import at_least_one
 
 LIBRARIES = ("aniposelib", "particles", "filterpy")
 INSTALL = 'pip install -c constraints.txt -e ".[baselines]"'
@@ -45,9 +46,11 @@ Played = Mapping[tuple[str, str], list[dict[str, float]]]
 
 
 @dataclass(frozen=True, slots=True)
-class BaselinesConfig:
-    """How much is run."""
+class BaselinesBench:
+    """The experiment, and how much is run."""
 
+    name = "bench baselines"
+    depends = ("tracker",)
     n_seeds: int = 5
     """Sequences per rig and condition; these libraries take about a minute for each."""
     first_seed: int = 1000
@@ -56,6 +59,40 @@ class BaselinesConfig:
     def __post_init__(self) -> None:
         """Raise `ConfigError` for numbers that cannot work."""
         at_least_one(self, "n_seeds")
+
+    @property
+    def seeds(self) -> list[int]:
+        """One a sequence."""
+        return [self.first_seed + k for k in range(self.n_seeds)]
+
+    @property
+    def n_parts(self) -> int:
+        """Sequences of everybody."""
+        return len(RIGS) * len(CONDITIONS) * len(names()) * self.n_seeds
+
+    def settings(self) -> dict[str, Any]:
+        """Return what all numbers depend on."""
+        versions = {name: version(name) for name in LIBRARIES if installed(name)}
+        return {"baselines": asdict(self), "versions": versions, "missing": missing()}
+
+    def play(self, cache: PartCache) -> Played:
+        """Return what everybody made of every sequence."""
+        cells: dict[tuple[str, str], list[dict[str, float]]] = {}
+        for rig, condition in product(map(make_rig, RIGS), CONDITIONS):
+            for seed, name in product(self.seeds, names()):
+                make = partial(_part, name, rig, condition, seed)
+                part = cache.part(f"{rig.name}.{condition}.{name}.{seed}", make)
+                for window, sums in part.items():
+                    cells.setdefault((f"{rig.name}.{window}", name), []).append(sums)
+        return cells
+
+    def metrics(self, played: Played) -> dict[str, Metric]:
+        """Return every number."""
+        return metrics_of(played)
+
+    def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
+        """Return the table."""
+        return report(metrics)
 
 
 def installed(name: str) -> bool:
@@ -71,25 +108,6 @@ def follow_of(name: str) -> Callable[[Floats, Points2, int], Points3]:
 def names() -> list[str]:
     """Who is run."""
     return [*OURS, *filter(installed, LIBRARIES)]
-
-
-def play(config: BaselinesConfig, parts: PartCache) -> Played:
-    """Everybody on every sequence."""
-    cells: dict[tuple[str, str], list[dict[str, float]]] = {}
-    for rig in map(make_rig, RIGS):
-        for condition in CONDITIONS:
-            for seed in seeds_of(config):
-                for name in names():
-                    make = partial(_part, name, rig, condition, seed)
-                    part = parts.part(f"{rig.name}.{condition}.{name}.{seed}", make)
-                    for window, sums in part.items():
-                        cells.setdefault((f"{rig.name}.{window}", name), []).append(sums)
-    return cells
-
-
-def seeds_of(config: BaselinesConfig) -> list[int]:
-    """Of the sequences."""
-    return [config.first_seed + k for k in range(config.n_seeds)]
 
 
 def _part(name: str, rig: Rig, condition: str, seed: int, tick: PartProgress) -> dict[str, Any]:
@@ -129,9 +147,8 @@ def metrics_of(played: Played) -> dict[str, Metric]:
     return dict(sorted(metrics.items()))
 
 
-def report(config: Any, played: Played, metrics: Metrics, figures: Path) -> Report:
-    """The table of errors and times, and who is missing."""
-    del config, played, figures
+def report(metrics: Metrics) -> Report:
+    """Return the table of errors and times, and who is missing."""
     lines = [
         [row, *(cell(metrics[f"rmse_m.{row}.{name}"], 100) for name in names())]
         for row in (f"{rig}.{window}" for rig in RIGS for window in ROWS)
@@ -156,19 +173,3 @@ def missing_sentence() -> str:
     if not missing():
         return "All libraries are installed."
     return f"Not installed, so not run: {', '.join(missing())}. Get them with: {INSTALL}"
-
-
-BASELINES = Study(
-    name="bench baselines",
-    depends=("tracker",),
-    settings=lambda config: {
-        "baselines": asdict(config),
-        "versions": {name: version(name) for name in LIBRARIES if installed(name)},
-        "missing": missing(),
-    },
-    seeds=seeds_of,
-    n_parts=lambda config: len(RIGS) * len(CONDITIONS) * len(names()) * config.n_seeds,
-    play=play,
-    metrics=lambda _, played: metrics_of(played),
-    report=report,
-)

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,8 +22,9 @@ from hrc_env.experiments.ablations.questions.filters import ALGORITHM_1, FILTER,
 from hrc_env.experiments.ablations.questions.rigs import CAMERAS, OCCLUSION, WORKERS
 from hrc_env.experiments.ablations.report import report
 from hrc_env.experiments.cache import PartCache, PartProgress
+from hrc_env.experiments.report import Metrics, Report
 from hrc_env.experiments.rigs import DT_S, WARM_UP_S
-from hrc_env.experiments.runner import Study, at_least_one, changed
+from hrc_env.experiments.runner import at_least_one, changed
 from hrc_env.experiments.versions import key_of
 
 ABLATIONS: dict[str, Ablation] = {
@@ -32,16 +34,16 @@ ABLATIONS: dict[str, Ablation] = {
     )
 }  # fmt: skip
 """By name, in the order of the report."""
-DEPENDS = ("env", "tracker", "emulator", "motion")
-"""Subsystems that finished parts depend on."""
 Played = Mapping[str, Mapping[str, Sums]]
 """Sums by question and setting."""
 
 
 @dataclass(frozen=True, slots=True)
-class AblationsConfig:
-    """How much is played."""
+class Ablations:
+    """The experiment, and how much is played."""
 
+    name = "ablations"
+    depends = ("env", "tracker", "emulator", "motion")
     n_seeds: int = 30
     """Episodes of every setting."""
     first_seed: int = 2_000_000
@@ -72,39 +74,50 @@ class AblationsConfig:
         """The questions, in the order of the report."""
         return tuple(each for name, each in ABLATIONS.items() if name in self.studies)
 
+    @property
+    def n_parts(self) -> int:
+        """Settings of all questions."""
+        return sum(len(ablation.settings) for ablation in self.asked)
 
-QUICK = AblationsConfig(n_seeds=4, seconds=5.0)
+    def settings(self) -> dict[str, Any]:
+        """Return what all numbers depend on; which questions are asked changes none of them."""
+        return {name: value for name, value in asdict(self).items() if name != "studies"}
+
+    def play(self, cache: PartCache) -> Played:
+        """Return every setting's sums; those that share walks are played one after the other."""
+        order = sorted(
+            ((ablation.name, setting) for ablation in self.asked for setting in ablation.settings),
+            key=lambda each: (each[1].scene, each[1].n_workers),
+        )
+        played: dict[str, dict[str, Sums]] = {ablation.name: {} for ablation in self.asked}
+        for name, setting in order:
+            made_of = self.settings() | {"setting": asdict(setting) | {"words": ""}}
+            key, make = key_of(made_of, self.depends), partial(part, self, setting)
+            played[name][setting.name] = cache.part(f"{name}.{setting.name}", make, key)
+        return played
+
+    def metrics(self, played: Played) -> dict[str, Metric]:
+        """Return every number."""
+        return metrics_of(played)
+
+    def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
+        """Draw a figure for each question; return the tables beside them."""
+        return report(figures, self.asked, metrics)
+
+
+QUICK = Ablations(n_seeds=4, seconds=5.0)
 """Every number, from little."""
 
 
-def config_for(
+def make_experiment(
     quick: bool = False, seeds: int | None = None, studies: Sequence[str] | None = None
-) -> AblationsConfig:
+) -> Ablations:
     """The settings that the command line asks for; None: as usual."""
     names = None if studies is None else tuple(dict.fromkeys(studies))
-    return changed(QUICK if quick else AblationsConfig(), n_seeds=seeds, studies=names)
+    return changed(QUICK if quick else Ablations(), n_seeds=seeds, studies=names)
 
 
-def settings_of(config: AblationsConfig) -> dict[str, Any]:
-    """What all numbers depend on; which studies are asked for changes none of them."""
-    return {name: value for name, value in asdict(config).items() if name != "studies"}
-
-
-def play_all(config: AblationsConfig, cache: PartCache) -> Played:
-    """Every setting's sums; those that share their walks are played one after the other."""
-    order = sorted(
-        ((ablation.name, setting) for ablation in config.asked for setting in ablation.settings),
-        key=lambda each: (each[1].scene, each[1].n_workers),
-    )
-    played: dict[str, dict[str, Sums]] = {ablation.name: {} for ablation in config.asked}
-    for name, setting in order:
-        made_of = settings_of(config) | {"setting": asdict(setting) | {"words": ""}}
-        key, make = key_of(made_of, DEPENDS), partial(part, config, setting)
-        played[name][setting.name] = cache.part(f"{name}.{setting.name}", make, key)
-    return played
-
-
-def part(config: AblationsConfig, setting: Setting, tick: PartProgress) -> Sums:
+def part(config: Ablations, setting: Setting, tick: PartProgress) -> Sums:
     """Sums of one setting's episodes."""
     n_steps = round(config.seconds / DT_S)
     walks = walks_of(setting.scene, setting.n_workers, config.seeds, n_steps)
@@ -159,15 +172,3 @@ def _by_sight(of_settings: Mapping[str, Sums]) -> dict[str, dict[str, Any]]:
         for name, sums in sorted(found.items())
         if sums["joints"].any()
     }
-
-
-STUDY = Study(
-    name="ablations",
-    depends=DEPENDS,
-    settings=settings_of,
-    seeds=lambda config: config.seeds,
-    n_parts=lambda config: sum(len(ablation.settings) for ablation in config.asked),
-    play=play_all,
-    metrics=lambda config, played: metrics_of(played),
-    report=lambda config, played, metrics, figures: report(figures, config.asked, metrics),
-)

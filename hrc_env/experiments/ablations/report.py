@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from hrc_env.experiments.ablations.ablation import Ablation
+from hrc_env.experiments.columns import Column
 from hrc_env.experiments.plots import ends, label, new_figure, plain_log, save
-from hrc_env.experiments.report import Column, Metrics, Report, picture, table_of
+from hrc_env.experiments.report import Metrics, Report, picture, table_of
 
 QUANTILES = {"median": ("median", "o", "#1565c0"), "p95": ("95th percentile", "s", "#e65100")}
 ASKED = """\

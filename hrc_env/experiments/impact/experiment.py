@@ -4,16 +4,19 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass, field
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from hrc_env.core.errors import ConfigError, HRCError, check_names
+from hrc_env.core.results import Metric
 from hrc_env.experiments.cache import PartCache
 from hrc_env.experiments.impact.episodes import PEOPLE, Stage
 from hrc_env.experiments.impact.metrics import Table, metrics_of
 from hrc_env.experiments.impact.policies import POLICIES, PPO, SLOWED, Policy, maker, trained
 from hrc_env.experiments.impact.report import report
+from hrc_env.experiments.report import Metrics, Report
 from hrc_env.experiments.rigs import DT_S
-from hrc_env.experiments.runner import Study, at_least_one, changed
+from hrc_env.experiments.runner import at_least_one, changed
 from hrc_env.experiments.setups import (
     LATE,
     REFERENCE,
@@ -28,16 +31,18 @@ from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import find_task
 from hrc_env.tracking.estimators import estimator_called
 
-DEPENDS = ("env", "tracker", "emulator", "detector", "motion", "shield", "agents")
-"""Subsystems that finished parts depend on."""
 FIRST_SEED = 1_000_000
 """Of the episodes, far from those that the policy learns in."""
 
 
 @dataclass(frozen=True, slots=True)
-class ImpactConfig:
-    """How much is played."""
+class Impact:
+    """The experiment, and how much is played."""
 
+    name = "impact"
+    depends = (
+        "env", "tracker", "emulator", "detector", "motion", "shield", "agents",
+    )  # fmt: skip
     task: str = DEFAULT
     """What the robots do."""
     shield: str | None = None
@@ -69,8 +74,13 @@ class ImpactConfig:
                 f"setups must hold the reference {REFERENCE!r}; policies at least one."
             )
 
-    def seeds(self, level: str = "keypoints") -> list[int]:
+    @property
+    def seeds(self) -> list[int]:
         """One an episode."""
+        return self.seeds_at("keypoints")
+
+    def seeds_at(self, level: str) -> list[int]:
+        """Return those of a perception level."""
         n = min(self.n_seeds, self.n_pixels) if level == "pixels" else self.n_seeds
         return [FIRST_SEED + k for k in range(n)]
 
@@ -99,57 +109,73 @@ class ImpactConfig:
             policies = [Policy(policy) for policy in self.policies]
             yield setup_called(name), policies + [Policy(SLOWED, m) for m in margins_m]
 
+    @property
+    def n_parts(self) -> int:
+        """Rows, and a training."""
+        return sum(len(policies) for _, policies in self.rows()) + (PPO in self.policies)
+
+    def settings(self) -> dict[str, Any]:
+        """Return what all numbers depend on."""
+        return {"people": PEOPLE, **asdict(self)}
+
+    def play(self, cache: PartCache) -> Table:
+        """Return every row; `HRCError` if workers walked otherwise in some."""
+        table: dict[tuple[str, str], dict[str, list[Any]]] = {}
+        checkpoint, ppo = cache.folder / "ppo.zip", ""
+        if PPO in self.policies:
+            n = self.learning_steps
+            learnt = {"task": self.task, "people": PEOPLE, "learning_steps": n}
+            key = key_of(learnt, self.depends)
+            ppo = trained(cache, n, checkpoint, key, self.task)
+        for setup, policies in self.rows():
+            made_of = {
+                "people": PEOPLE,
+                "task": self.task,
+                **({} if self.shield is None else {"shield": self.shield}),
+                "seeds": self.seeds_at(setup.level),
+                "n_steps": self.n_steps,
+                "setup": asdict(setup),
+                "estimator": source_digest(estimator_called(setup.estimator).make),
+            }
+            stage = Stage(setup, made_of["seeds"], self.n_steps, self.task, self.shield)
+            with closing(stage):
+                for policy in policies:
+                    who = {"policy": asdict(policy), "ppo": ppo if policy.name == PPO else ""}
+                    table[policy.label, setup.name] = cache.part(
+                        f"{policy.label}.{setup.name}",
+                        partial(stage.play, maker(policy, checkpoint), policy.margin_m),
+                        key_of(made_of | who, self.depends),
+                    )
+        check_walks(table)
+        return table
+
+    def metrics(self, played: Table) -> dict[str, Metric]:
+        """Return every number."""
+        return metrics_of(played, self.margins_m)
+
+    def report(self, played: Table, metrics: Metrics, figures: Path) -> Report:
+        """Draw the figure; return the tables beside it."""
+        return report(figures, played, metrics, self.warning)
+
 
 QUICK: dict[str, Any] = {"n_seeds": 8, "n_pixels": 1, "n_steps": 100, "learning_steps": 65_536}
 """Every number, from little, and for 4 s: what takes the time is the number of steps."""
 
 
-def config_for(
+def make_experiment(
     quick: bool = False,
     seeds: int | None = None,
     estimator: Sequence[str] = (),
     task: str = DEFAULT,
     shield: str | None = None,
-) -> ImpactConfig:
+) -> Impact:
     """The settings that the command line asks for; if estimators are named, only these, the
     reference, the truth and nothing are compared."""
-    whole = ImpactConfig(n_steps=find_task(task).max_episode_steps)
-    config = changed(ImpactConfig(**QUICK) if quick else whole, task=task, shield=shield)
+    whole = Impact(n_steps=find_task(task).max_episode_steps)
+    config = changed(Impact(**QUICK) if quick else whole, task=task, shield=shield)
     asked = [PerceptionSetup(estimator=estimator_called(name).name).name for name in estimator]
     setups = tuple(dict.fromkeys(("truth", "none", REFERENCE, *asked))) if asked else None
     return changed(config, n_seeds=seeds, setups=setups)
-
-
-def play(config: ImpactConfig, cache: PartCache) -> Table:
-    """Every row, by policy and setup; an `HRCError` if workers walked otherwise in some."""
-    table: dict[tuple[str, str], dict[str, list[Any]]] = {}
-    checkpoint, ppo = cache.folder / "ppo.zip", ""
-    if PPO in config.policies:
-        n = config.learning_steps
-        learnt = {"task": config.task, "people": PEOPLE, "learning_steps": n}
-        key = key_of(learnt, DEPENDS)
-        ppo = trained(cache, n, checkpoint, key, config.task)
-    for setup, policies in config.rows():
-        made_of = {
-            "people": PEOPLE,
-            "task": config.task,
-            **({} if config.shield is None else {"shield": config.shield}),
-            "seeds": config.seeds(setup.level),
-            "n_steps": config.n_steps,
-            "setup": asdict(setup),
-            "estimator": source_digest(estimator_called(setup.estimator).make),
-        }
-        stage = Stage(setup, made_of["seeds"], config.n_steps, config.task, config.shield)
-        with closing(stage):
-            for policy in policies:
-                who = {"policy": asdict(policy), "ppo": ppo if policy.name == PPO else ""}
-                table[policy.label, setup.name] = cache.part(
-                    f"{policy.label}.{setup.name}",
-                    partial(stage.play, maker(policy, checkpoint), policy.margin_m),
-                    key_of(made_of | who, DEPENDS),
-                )
-    check_walks(table)
-    return table
 
 
 def check_walks(table: Mapping[tuple[str, str], Mapping[str, list[Any]]]) -> None:
@@ -161,17 +187,3 @@ def check_walks(table: Mapping[tuple[str, str], Mapping[str, list[Any]]]) -> Non
                 f"With {policy} and {setup} the workers walked otherwise than in other rows: "
                 "nothing can be compared. Delete the folder's parts and start again."
             )
-
-
-STUDY = Study(
-    name="impact",
-    depends=DEPENDS,
-    settings=lambda config: {"people": PEOPLE, **asdict(config)},
-    seeds=lambda config: config.seeds(),
-    n_parts=lambda config: (
-        sum(len(policies) for _, policies in config.rows()) + (PPO in config.policies)
-    ),
-    play=play,
-    metrics=lambda config, table: metrics_of(table, config.margins_m),
-    report=lambda config, table, metrics, figures: report(figures, table, metrics, config.warning),
-)

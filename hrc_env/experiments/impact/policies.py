@@ -60,7 +60,7 @@ def maker(policy: Policy, checkpoint: Path) -> MakeAgent:
 
 def trained(cache: PartCache, n_steps: int, path: Path, key: str, task: str = DEFAULT) -> str:
     """The digest of PPO's checkpoint, which is made anew where it is not what the part says."""
-    learn = partial(_train, n_steps, path, task=task)
+    learn = partial(learn_ppo, n_steps, path, task=task)
     part = cache.part(PPO, learn, key)
     if not path.exists() or _digest(path) != part["sha256"]:
         (cache.folder / f"{PPO}.json").unlink(missing_ok=True)
@@ -68,7 +68,7 @@ def trained(cache: PartCache, n_steps: int, path: Path, key: str, task: str = DE
     return part["sha256"]
 
 
-def _train(n_steps: int, path: Path, tick: PartProgress, task: str = DEFAULT) -> dict[str, Any]:
+def learn_ppo(n_steps: int, path: Path, tick: PartProgress, task: str = DEFAULT) -> dict[str, Any]:
     """Learn on the camera emulator with the default estimator; write the checkpoint."""
     from hrc_env.agents import checkpoints  # here: it imports the learner
     from hrc_env.sb3 import HRCVecEnv

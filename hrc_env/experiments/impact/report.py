@@ -5,11 +5,12 @@ from pathlib import Path
 
 from matplotlib.axes import Axes
 
+from hrc_env.experiments.columns import Column
 from hrc_env.experiments.impact.episodes import SLOW_M, STOP_M
 from hrc_env.experiments.impact.metrics import COMPARED, NOMINAL_MPS, Table
 from hrc_env.experiments.impact.policies import POLICIES, SCRIPTED, SLOWED
 from hrc_env.experiments.plots import ends, label, new_figure, save
-from hrc_env.experiments.report import Column, Metrics, Report, picture, table_of
+from hrc_env.experiments.report import Metrics, Report, picture, table_of
 from hrc_env.experiments.setups import LATE, LATE_S, REFERENCE, setup_called
 from hrc_env.safety.incidents import MOVING_M_S
 from hrc_env.tracking.estimators import ESTIMATORS

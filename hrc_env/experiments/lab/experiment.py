@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,8 +18,9 @@ from hrc_env.experiments.lab.motions import MOTIONS, play
 from hrc_env.experiments.lab.report import ALL, COLUMNS, ESTIMATORS, WARM_UP, report
 from hrc_env.experiments.lab.sides import MISSED_SHARE, away_from_cameras, missed_by_camera
 from hrc_env.experiments.recording import Recording, record, replay
+from hrc_env.experiments.report import Metrics, Report
 from hrc_env.experiments.rigs import CHOICES, MULTI
-from hrc_env.experiments.runner import Study, at_least_one, changed
+from hrc_env.experiments.runner import at_least_one, changed
 from hrc_env.perception.detector import DetectorConfig
 from hrc_env.scene.build import Scene, SceneConfig, build
 from hrc_env.scene.rigs import RIGS
@@ -35,9 +37,11 @@ Films = Mapping[tuple[str, int], Film]
 
 
 @dataclass(frozen=True, slots=True)
-class LabConfig:
-    """How much is run."""
+class Lab:
+    """The experiment, and how much is run."""
 
+    name = "lab"
+    depends = ("env", "tracker", "emulator", "detector", "motion")
     n_seeds: int = 7
     """Films of every motion."""
     max_frames: int = 250
@@ -56,14 +60,40 @@ class LabConfig:
         """One a film of every motion."""
         return [FIRST_SEED + k for k in range(self.n_seeds)]
 
+    @property
+    def n_parts(self) -> int:
+        """Films."""
+        return self.n_seeds * len(MOTIONS)
 
-QUICK = LabConfig(n_seeds=2, max_frames=100)
+    def settings(self) -> dict[str, Any]:
+        """Return what all numbers depend on."""
+        return {**asdict(self), "rig": RIG, "estimators": ESTIMATORS, "crops": CROPS}
+
+    def play(self, cache: PartCache) -> Films:
+        """Return every film."""
+        return {
+            (motion, seed): cache.part(f"{motion}.{seed}", partial(film, self, motion, seed))
+            for seed in self.seeds
+            for motion in MOTIONS
+        }
+
+    def metrics(self, played: Films) -> dict[str, Metric]:
+        """Return every number of results.json."""
+        return metrics_of(played)
+
+    def report(self, played: Films, metrics: Metrics, figures: Path) -> Report:
+        """Draw the figure; return the tables beside it."""
+        take = partial(taken, self, seed=self.seeds[0], tick=lambda share: None)
+        return report(figures, take, metrics)
+
+
+QUICK = Lab(n_seeds=2, max_frames=100)
 """Every number, from fewer and shorter films."""
 
 
-def config_for(quick: bool = False, seeds: int | None = None, folded: str = "full") -> LabConfig:
+def make_experiment(quick: bool = False, seeds: int | None = None, folded: str = "full") -> Lab:
     """The settings that the command line asks for."""
-    return changed(QUICK if quick else LabConfig(), n_seeds=seeds, folded=folded)
+    return changed(QUICK if quick else Lab(), n_seeds=seeds, folded=folded)
 
 
 def laboratory(seed: int, folded: str = "full") -> tuple[Scene, HRCConfig]:
@@ -77,14 +107,14 @@ def laboratory(seed: int, folded: str = "full") -> tuple[Scene, HRCConfig]:
     return build(config.scene, "lab", 1, config.worker), config
 
 
-def taken(config: LabConfig, motion: str, seed: int, tick: PartProgress) -> Recording:
+def taken(config: Lab, motion: str, seed: int, tick: PartProgress) -> Recording:
     """One film of one motion."""
     scene, settings = laboratory(seed, config.folded)
     motions = play(scene, motion, seed, config.max_frames, settings.ctrl_dt)
     return record(scene, motions, settings, CROPS, seed, tick)
 
 
-def film(config: LabConfig, motion: str, seed: int, tick: PartProgress) -> dict[str, Any]:
+def film(config: Lab, motion: str, seed: int, tick: PartProgress) -> dict[str, Any]:
     """What everybody made of one film, after the warm-up."""
     recording = taken(config, motion, seed, lambda share: tick(0.8 * share))
     body = recording.scene.bodies[0]
@@ -101,15 +131,6 @@ def film(config: LabConfig, motion: str, seed: int, tick: PartProgress) -> dict[
         "errors_m": errors,
         "missed": missed_by_camera(recording)[WARM_UP:].astype(int).tolist(),
         "away": away_from_cameras(recording)[WARM_UP:].astype(int).tolist(),
-    }
-
-
-def play_all(config: LabConfig, cache: PartCache) -> Films:
-    """Every film."""
-    return {
-        (motion, seed): cache.part(f"{motion}.{seed}", partial(film, config, motion, seed))
-        for seed in config.seeds
-        for motion in MOTIONS
     }
 
 
@@ -162,19 +183,3 @@ def _errors_m(film: Film, key: str) -> Floats:
 def _known(film: Film) -> Bools:
     """(T, J) which joints the estimate of all cameras has near enough."""
     return _errors_m(film, f"{ESTIMATORS[0]}.{MULTI}") <= MISSED_SHARE * film["stature_m"]
-
-
-STUDY = Study(
-    name="lab",
-    depends=("env", "tracker", "emulator", "detector", "motion"),
-    settings=lambda config: {
-        **asdict(config), "rig": RIG, "estimators": ESTIMATORS, "crops": CROPS,
-    },
-    seeds=lambda config: config.seeds,
-    n_parts=lambda config: config.n_seeds * len(MOTIONS),
-    play=play_all,
-    metrics=lambda config, films: metrics_of(films),
-    report=lambda config, films, metrics, figures: report(
-        figures, partial(taken, config, seed=config.seeds[0], tick=lambda share: None), metrics
-    ),
-)  # fmt: skip

@@ -11,11 +11,12 @@ from matplotlib.ticker import MultipleLocator
 from hrc_env.core.batching import one
 from hrc_env.core.skeleton import BONES
 from hrc_env.core.typing import Image, Points3
+from hrc_env.experiments.columns import Column
 from hrc_env.experiments.lab import sides
 from hrc_env.experiments.lab.motions import MOTIONS
 from hrc_env.experiments.plots import new_figure, save
 from hrc_env.experiments.recording import Recording, replay
-from hrc_env.experiments.report import Column, Metrics, Report, picture, table, table_of
+from hrc_env.experiments.report import Metrics, Report, picture, table, table_of
 from hrc_env.experiments.rigs import SPOKEN
 from hrc_env.geometry.cameras import image_from_pinhole
 from hrc_env.perception.lensed import Lensed

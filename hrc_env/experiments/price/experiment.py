@@ -4,15 +4,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass, field
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hrc_env.agents.experts import EXPERTS
 from hrc_env.core.errors import ConfigError, HRCError
+from hrc_env.core.results import Metric
 from hrc_env.experiments.cache import PartCache
 from hrc_env.experiments.impact.episodes import PEOPLE, Rows
-from hrc_env.experiments.price import blindness
 from hrc_env.experiments.price.episodes import Stage
 from hrc_env.experiments.price.eyes import (
     ELSEWHERE,
@@ -23,18 +24,17 @@ from hrc_env.experiments.price.eyes import (
     eyes_called,
     usual_eyes,
 )
-from hrc_env.experiments.price.metrics import PER, Row, metrics_of, supposed_m
+from hrc_env.experiments.price.metrics import PER, Played, Row, metrics_of, supposed_m
 from hrc_env.experiments.price.report import report
 from hrc_env.experiments.price.search import searched
 from hrc_env.experiments.price.shield import SHIELD
-from hrc_env.experiments.runner import Study, at_least_one, changed
+from hrc_env.experiments.report import Metrics, Report
+from hrc_env.experiments.runner import at_least_one, changed
 from hrc_env.experiments.versions import key_of, source_digest
 from hrc_env.tasks import BUILT_IN, DEFAULT
 from hrc_env.tasks.task import Task, find_task
 from hrc_env.tracking.estimators import estimator_called
 
-DEPENDS = ("env", "tracker", "emulator", "detector", "motion", "shield", "agents")
-"""Subsystems that finished parts depend on."""
 FIRST_SEED, FIRST_FRESH, FIRST_PIXELS = 3_000_000, 4_000_000, 5_000_000
 """Of the search, of the episodes that confirm it, of those with rendered images."""
 BEYOND_M = (0.05, 0.1, 0.2)
@@ -42,9 +42,14 @@ BEYOND_M = (0.05, 0.1, 0.2)
 
 
 @dataclass(frozen=True, slots=True)
-class PriceConfig:
-    """How much is played. Numbers of episodes are those of 10 s; of longer ones as much time."""
+class Price:
+    """The experiment, and how much is played. Numbers of episodes are those of 10 s; of longer ones
+    as much time."""
 
+    name = "price"
+    depends = (
+        "env", "tracker", "emulator", "detector", "motion", "shield", "agents",
+    )  # fmt: skip
     task: str = DEFAULT
     """What the robot does."""
     others: tuple[str, ...] = ()
@@ -65,8 +70,6 @@ class PriceConfig:
     """Episodes with rendered images and a network, and as many with the emulator; 0: none."""
     n_steps: int | None = None
     """Control steps of an episode; None: the task's."""
-    trainings: blindness.TrainingConfig | None = None
-    """What is learnt to see whether robots blind themselves; None: nothing."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for what cannot work."""
@@ -93,10 +96,45 @@ class PriceConfig:
         """Control steps of an episode."""
         return self.n_steps or find_task(task).max_episode_steps
 
-    def seeds(self, task: str, n: int, first: int = FIRST_SEED) -> list[int]:
-        """One an episode: as many as last as long as `n` of the first task's."""
+    @property
+    def seeds(self) -> list[int]:
+        """Of the search, and of the episodes that confirm it."""
+        fresh = self.seeds_of(self.task, self.n_fresh, FIRST_FRESH)
+        return self.seeds_of(self.task, self.n_seeds) + fresh
+
+    def seeds_of(self, task: str, n: int, first: int = FIRST_SEED) -> list[int]:
+        """Return one an episode: as many as last as long as `n` of the first task's."""
         share = find_task(DEFAULT).max_episode_steps / find_task(task).max_episode_steps
         return [first + k for k in range(max(round(n * share), 1))]
+
+    @property
+    def n_parts(self) -> int:
+        """Steps of all searches at most, episodes without a shield and with pixels."""
+        n_pairs = sum(1 for _ in self.pairs())
+        n_levels = 2 if self.n_pixels and FOUR in self.eyes else 0
+        n_each = self.n_search + 4 + len(BEYOND_M)
+        return n_pairs * n_each + 1 + len(self.others) + n_levels
+
+    def settings(self) -> dict[str, Any]:
+        """Return what all numbers depend on."""
+        return {"people": PEOPLE, "shield": SHIELD, **asdict(self)}
+
+    def play(self, cache: PartCache) -> Played:
+        """Return what every search came to."""
+        table: dict[str, dict[str, Row]] = {}
+        alone = {task: _unshielded(self, cache, task) for task in (self.task, *self.others)}
+        for task, eyes in self.pairs():
+            table.setdefault(task, {})[eyes.name] = row = search_margin(self, cache, task, eyes)
+            check_walks(task, alone[task], row)
+        return Played(table, alone, _pixels(self, cache, table))
+
+    def metrics(self, played: Played) -> dict[str, Metric]:
+        """Return every number."""
+        return metrics_of(played.table, played.alone, played.pixels, self.level)
+
+    def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
+        """Draw the figure; return the tables beside it."""
+        return report(figures, self, played, metrics)
 
 
 def _check_task(task: str) -> None:
@@ -109,16 +147,15 @@ def _check_task(task: str) -> None:
         )
 
 
-def config_for(
+def make_experiment(
     quick: bool = False,
     seeds: int | None = None,
     task: str = DEFAULT,
     eyes: Sequence[str] = (),
-    trainings: bool = False,
-) -> PriceConfig:
+) -> Price:
     """The settings that the command line asks for. Quick: twelve pairs of eyes, the first task. Of
     another task than the first three pairs of eyes, if none are named."""
-    usual = PriceConfig(eyes=QUICK, n_fresh=600, n_pixels=0) if quick else PriceConfig(
+    usual = Price(eyes=QUICK, n_fresh=600, n_pixels=0) if quick else Price(
         others=tuple(each for each in BUILT_IN if each != DEFAULT)
     )  # fmt: skip
     if task != DEFAULT:
@@ -126,34 +163,21 @@ def config_for(
     config = changed(usual, n_seeds=seeds, eyes=tuple(dict.fromkeys(eyes)) or None)
     if seeds is not None:
         config = changed(config, n_fresh=-(-10 * seeds // 3), n_pixels=min(seeds, config.n_pixels))
-    return changed(config, trainings=blindness.config_for(quick) if trainings else None)
+    return config
 
 
-def play(config: PriceConfig, cache: PartCache) -> dict[str, Any]:
-    """Rows by task and eyes, unshielded episodes by task, episodes with pixels, trainings."""
-    table: dict[str, dict[str, Row]] = {}
-    alone = {task: _unshielded(config, cache, task) for task in (config.task, *config.others)}
-    for task, eyes in config.pairs():
-        table.setdefault(task, {})[eyes.name] = row = _price(config, cache, task, eyes)
-        check_walks(task, alone[task], row)
-    played = {"table": table, "alone": alone, "pixels": _pixels(config, cache, table)}
-    if config.trainings is not None:
-        played["trainings"] = blindness.play(config.trainings, cache)
-    return played
-
-
-def _price(config: PriceConfig, cache: PartCache, task: str, eyes: Eyes) -> Row:
+def search_margin(config: Price, cache: PartCache, task: str, eyes: Eyes) -> Row:
     """Search the margin of one pair of eyes, play on with it."""
     tried: dict[float, Rows] = {}
     with closing(Stage(eyes, task, config.steps_of(task))) as stage:
         part = partial(_part, config, cache, stage)
 
         def rate(margin_m: float) -> float:
-            tried[margin_m] = rows = part(config.seeds(task, config.n_seeds), margin_m)
+            tried[margin_m] = rows = part(config.seeds_of(task, config.n_seeds), margin_m)
             return float(PER * np.sum(rows["towards"]) / np.sum(rows["minutes"]))
 
         def confirmed(margin_m: float) -> Row:
-            fresh = part(config.seeds(task, config.n_fresh, FIRST_FRESH), margin_m)
+            fresh = part(config.seeds_of(task, config.n_fresh, FIRST_FRESH), margin_m)
             return Row(tried, margin_m, fresh)
 
         searched(rate, *config.bracket_m, config.level, config.n_search)
@@ -168,14 +192,14 @@ def _price(config: PriceConfig, cache: PartCache, task: str, eyes: Eyes) -> Row:
         return confirmed(end_m) if row.ends_at(end_m) else row
 
 
-def _unshielded(config: PriceConfig, cache: PartCache, task: str) -> Rows:
+def _unshielded(config: Price, cache: PartCache, task: str) -> Rows:
     (eyes,) = eyes_called([TRUTH])
-    seeds = config.seeds(task, config.n_fresh, FIRST_FRESH)
+    seeds = config.seeds_of(task, config.n_fresh, FIRST_FRESH)
     with closing(Stage(eyes, task, config.steps_of(task), is_shielded=False)) as stage:
         return _part(config, cache, stage, seeds, 0.0)
 
 
-def _pixels(config: PriceConfig, cache: PartCache, table: Any) -> dict[str, Rows]:
+def _pixels(config: Price, cache: PartCache, table: Any) -> dict[str, Rows]:
     """The same few episodes with the emulator and with rendered images, with one margin."""
     if not config.n_pixels or FOUR not in table[config.task]:
         return {}
@@ -195,9 +219,7 @@ def _at_level(eyes: Eyes, level: str) -> Eyes:
     return changed(eyes, name=f"{FOUR}_{level}", setup=setup)
 
 
-def _part(
-    config: PriceConfig, cache: PartCache, stage: Stage, seeds: list[int], margin_m: float
-) -> Rows:
+def _part(config: Price, cache: PartCache, stage: Stage, seeds: list[int], margin_m: float) -> Rows:
     """Episodes with one margin, from the cache or anew."""
     eyes = stage.eyes
     sight = {name: each for name, each in asdict(eyes).items() if name not in ("words", "group")}
@@ -208,13 +230,13 @@ def _part(
     }  # fmt: skip
     which = {FIRST_SEED: "searched", FIRST_FRESH: "fresh", FIRST_PIXELS: "pixels"}[seeds[0]]
     kept = f"{1e4 * margin_m:+.0f}" if stage.is_shielded else "unshielded"
-    key = key_of(made_of, DEPENDS)
+    key = key_of(made_of, config.depends)
     make = partial(stage.play, seeds, margin_m)
     label = f"{stage.task}.{eyes.name}.{which}.{kept}"
     return cache.part(label, make, key, {"margin_m": margin_m})
 
 
-def replay(config: PriceConfig, cache: PartCache, margins_m: Mapping[str, float]) -> None:
+def replay(config: Price, cache: PartCache, margins_m: Mapping[str, float]) -> None:
     """Play parts of a search by themselves, not in the order in which it came to them.
 
     Args:
@@ -226,8 +248,8 @@ def replay(config: PriceConfig, cache: PartCache, margins_m: Mapping[str, float]
         task, _, rest = label.partition(".")
         name, which, kept = rest.rsplit(".", 2)
         seeds = {
-            "searched": config.seeds(task, config.n_seeds),
-            "fresh": config.seeds(task, config.n_fresh, FIRST_FRESH),
+            "searched": config.seeds_of(task, config.n_seeds),
+            "fresh": config.seeds_of(task, config.n_fresh, FIRST_FRESH),
             "pixels": [FIRST_PIXELS + k for k in range(config.n_pixels)],
         }[which]
         known, level = (FOUR, name.removeprefix(f"{FOUR}_")) if which == "pixels" else (name, None)
@@ -246,34 +268,3 @@ def check_walks(task: str, alone: Rows, row: Row) -> None:
             f"In {task} workers walked otherwise than beside other robots: nothing can be "
             "compared. Delete the folder's parts and start again."
         )
-
-
-def _n_parts(config: PriceConfig) -> float:
-    n_pairs = sum(1 for _ in config.pairs())
-    n_levels = 2 if config.n_pixels and FOUR in config.eyes else 0
-    n_trained = 0 if config.trainings is None else config.trainings.n_parts
-    return (
-        n_pairs * (config.n_search + 4 + len(BEYOND_M))
-        + 1
-        + len(config.others)
-        + n_levels
-        + n_trained
-    )
-
-
-STUDY = Study(
-    name="price",
-    depends=DEPENDS,
-    settings=lambda config: {"people": PEOPLE, "shield": SHIELD, **asdict(config)},
-    seeds=lambda config: (
-        config.seeds(config.task, config.n_seeds)
-        + config.seeds(config.task, config.n_fresh, FIRST_FRESH)
-    ),
-    n_parts=_n_parts,
-    play=play,
-    metrics=lambda config, played: {
-        **metrics_of(played["table"], played["alone"], played["pixels"], config.level),
-        **blindness.metrics_of(played.get("trainings", {})),
-    },
-    report=lambda config, played, metrics, figures: report(figures, config, played, metrics),
-)

@@ -78,6 +78,18 @@ class Row:
         return margin_m in (min(self.searched), max(self.searched))
 
 
+@dataclass(frozen=True, slots=True)
+class Played:
+    """All episodes of the experiment."""
+
+    table: Mapping[str, Mapping[str, Row]]
+    """By task and eyes."""
+    alone: Mapping[str, Rows]
+    """Without a shield, by task."""
+    pixels: Mapping[str, Rows]
+    """The few that are played at two perception levels, by level."""
+
+
 def supposed_m(tried: Mapping[float, Rows], level: float) -> float:
     """The margin [m] at which a search supposes the level, to a millimetre."""
     margins_m = sorted(tried)

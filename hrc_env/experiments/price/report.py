@@ -1,4 +1,4 @@
-"""The report: bars of the work that is left, the margins behind them, questions, blindness."""
+"""The report: bars of the work that is left, the margins behind them, questions."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -6,12 +6,11 @@ from typing import Any
 
 from matplotlib.axes import Axes
 
+from hrc_env.experiments.columns import Column
 from hrc_env.experiments.plots import ends, label, new_figure, save
-from hrc_env.experiments.price.blindness import MEASURED, WORDS, Learnt
 from hrc_env.experiments.price.eyes import ELSEWHERE, FOUR, GROUPS, QUICK, Eyes, all_eyes
-from hrc_env.experiments.price.metrics import PER, Row
-from hrc_env.experiments.price.trainings import TRUE
-from hrc_env.experiments.report import Column, Metrics, Report, picture, table_of
+from hrc_env.experiments.price.metrics import PER, Played, Row
+from hrc_env.experiments.report import Metrics, Report, picture, table_of
 
 COLUMNS = {
     "margin_m": ("margin [m]", 3, 1.0),
@@ -63,9 +62,9 @@ are not made equal. With true joints the shield still has its own model of the b
 a stricter level, or with another shield, the order may be another one."""
 
 
-def report(figures: Path, config: Any, played: Mapping[str, Any], metrics: Metrics) -> Report:
+def report(figures: Path, config: Any, played: Played, metrics: Metrics) -> Report:
     """Draw the figures; the tables beside them."""
-    task, table = config.task, played["table"]
+    task, table = config.task, played.table
     eyes = [all_eyes()[name] for name in table[task]]
     draw_price(figures / "price.png", metrics, task, eyes, config.level)
     parts = [
@@ -76,7 +75,7 @@ def report(figures: Path, config: Any, played: Mapping[str, Any], metrics: Metri
     if config.others:
         parts.append("## Other tasks")
         parts += [_other(each, metrics) for each in config.others]
-    if played["pixels"]:
+    if played.pixels:
         columns = [Column("slice.{}." + name.removeprefix("confirmed."), *words)
                    for name, words in RATES.items() if name != "confirmed.margin_m"]  # fmt: skip
         levels = {"keypoints": "the emulator", "pixels": "rendered images and the network"}
@@ -85,8 +84,6 @@ def report(figures: Path, config: Any, played: Mapping[str, Any], metrics: Metri
             f"`{FOUR}`; too few for a bar, the same for both.",
             table_of("level", levels, columns, metrics),
         ]
-    if "trainings" in played:
-        parts += blind(figures, played["trainings"], metrics)
     asked = ASKED.format(
         level=config.level, hourly=an_hour(config.level), shield="qp", n_seeds=config.n_seeds,
         n_fresh=config.n_fresh,
@@ -145,6 +142,12 @@ def _other(task: str, metrics: Metrics) -> str:
     )
 
 
+def choose_bars(metrics: Metrics, task: str, eyes: Sequence[Eyes]) -> list[Eyes]:
+    """Return the eyes that the picture shows, the longest bar last; of many only `QUICK`."""
+    shown = [each for each in eyes if len(eyes) <= len(QUICK) or each.name in QUICK]
+    return sorted(shown, key=lambda each: metrics[f"{task}.{each.name}.share"].value)
+
+
 def draw_price(path: Path, metrics: Metrics, task: str, eyes: Sequence[Eyes], level: float) -> None:
     """Draw a bar for each pair of eyes, the longest above; of many only `QUICK`.
 
@@ -155,12 +158,10 @@ def draw_price(path: Path, metrics: Metrics, task: str, eyes: Sequence[Eyes], le
         eyes: of which the task has metrics.
         level: contacts in 1,000 episodes of 10 s at which they are compared.
     """
-    shown = [each for each in eyes if len(eyes) <= len(QUICK) or each.name in QUICK]
-    shares = {each.name: metrics[f"{task}.{each.name}.share"] for each in shown}
-    shown = sorted(shown, key=lambda each: shares[each.name].value)
+    shown = choose_bars(metrics, task, eyes)
     figure = new_figure(9.2, 1.6 + 0.42 * len(shown))
     axis = figure.subplots()
-    values = [shares[each.name] for each in shown]
+    values = [metrics[f"{task}.{each.name}.share"] for each in shown]
     axis.barh(
         range(len(shown)), [100 * each.value for each in values], xerr=ends(values, 100.0),
         color=[COLOURS[each.group] for each in shown], height=0.72, ecolor="0.35", capsize=3,
@@ -189,47 +190,3 @@ def _say(axis: Axes, shown: Sequence[Eyes], values: Sequence[Any]) -> None:
     for side in ("top", "right", "left"):
         axis.spines[side].set_visible(False)
     axis.tick_params(axis="y", length=0)
-
-
-def blind(figures: Path, learnt: Learnt, metrics: Metrics) -> list[str]:
-    """Whether robots blind themselves: curves, numbers at the end, differences from the truth."""
-    draw_learning(figures / "blindness.png", learnt)
-    rows = {f"{reward}_{n}cam": f"{WORDS[reward]}; {n} camera{'s' if n > 1 else ''}"
-            for reward, n in learnt}  # fmt: skip
-    others = {key: words for key, words in rows.items() if not key.startswith(TRUE)}
-    units = {what: (f"{what.removesuffix('_m')} [{unit}]", 3) for what, unit in MEASURED.items()}
-    columns = [Column(f"blind.{{}}.{what}", *words) for what, words in units.items()]
-    off = [Column(f"blind.difference.{{}}.{what}", *words, signed=True)
-           for what, words in units.items()]  # fmt: skip
-    return [
-        "## Does reward on belief teach a robot to blind itself?",
-        picture(figures / "blindness.png", "Over training: believed less true separation near the "
-                "worker, steps without a track, lines of sight that the robot cuts; a line a seed.",
-        ),
-        table_of("at the end, closeness rewarded by", rows, columns, metrics),
-        "Less reward on the truth, seed by seed.",
-        table_of("closeness rewarded by", others, off, metrics),
-    ]  # fmt: skip
-
-
-def draw_learning(path: Path, learnt: Learnt) -> None:
-    """Optimism, lost steps, hidden lines of sight over training; a column a number of cameras."""
-    cameras = sorted({n for _, n in learnt}, reverse=True)
-    shown = {"optimism_m": "believed less true separation [m]", "lost": "without a track (share)",
-             "hidden": "lines of sight cut by the robot (share)"}  # fmt: skip
-    figure = new_figure(4.4 * len(cameras) + 0.5, 8.5)
-    axes = figure.subplots(len(shown), len(cameras), squeeze=False, sharey="row", sharex=True)
-    for row, (what, words) in zip(axes, shown.items(), strict=True):
-        for axis, n_cameras in zip(row, cameras, strict=True):
-            for (reward, n), curves in learnt.items():
-                for k, curve in enumerate(curves if n == n_cameras else ()):
-                    colour = f"C{list(WORDS).index(reward)}"
-                    steps = [each / 1000 for each in curve["steps"]]
-                    name = WORDS[reward] if k == 0 else None
-                    axis.plot(steps, curve[what], color=colour, alpha=0.8, label=name)
-            title = f"{n_cameras} camera{'s' if n_cameras > 1 else ''}" if row is axes[0] else ""
-            label(axis, "1,000 steps" if row is axes[-1] else "",
-                  words if axis is row[0] else "", title)  # fmt: skip
-    handles, words = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, words, loc="outside lower center", ncols=1, fontsize=11)
-    save(figure, path)

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,8 +18,9 @@ from hrc_env.core.typing import Floats
 from hrc_env.evaluation.intervals import mean_over, paired, rmse_of, rmse_over
 from hrc_env.experiments.cache import PartCache, PartProgress
 from hrc_env.experiments.recording import Recording, record, replay
+from hrc_env.experiments.report import Metrics, Report
 from hrc_env.experiments.rigs import CHOICES, DT_S, MULTI, N_WARM_UP, left_of
-from hrc_env.experiments.runner import Study, at_least_one, changed
+from hrc_env.experiments.runner import at_least_one, changed
 from hrc_env.experiments.site.report import report, site
 from hrc_env.experiments.site.walk import walk
 from hrc_env.tracking.config import TrackerConfig
@@ -32,14 +34,18 @@ SETTINGS = HRCConfig(tracker=TrackerConfig(prior_std_m=3.0))
 """Unknown people may be far from the middle of the work: walks go all over the place."""
 ALONE = "alone."
 """In keys: cameras that are alone from the first frame on, as the paper's were."""
+ROWS = tuple(CHOICES)
+"""Each camera alone, and all four."""
 ALSO = ("kalman", "paper_restarts")
 """These are given the film, too: single cameras get the best estimator that there is."""
 
 
 @dataclass(frozen=True, slots=True)
-class SiteConfig:
-    """How much is run."""
+class Site:
+    """The experiment, and how much is run."""
 
+    name = "site"
+    depends = ("env", "tracker", "emulator", "detector", "motion")
     n_seeds: int = 9
     """Walks."""
     first_seed: int = 100
@@ -68,39 +74,54 @@ class SiteConfig:
         """All who are given the film."""
         return tuple(dict.fromkeys((*self.estimators, *ALSO)))
 
+    @property
+    def n_parts(self) -> int:
+        """Films, and own crops."""
+        n_closed = len(self.seeds[: self.n_closed])
+        return self.n_seeds + len(self.estimators) * len(ROWS) * n_closed
 
-QUICK = SiteConfig(n_seeds=2, seconds=6.0, n_closed=1)
+    def settings(self) -> dict[str, Any]:
+        """Return what all numbers depend on."""
+        return {**asdict(self), "also": ALSO, "crops": CROPS}
+
+    def play(self, cache: PartCache) -> "Played":
+        """Return all walks, filmed once for everybody; some again with everybody's own crops."""
+        films = {seed: cache.part(f"film.{seed}", partial(film, self, seed)) for seed in self.seeds}
+        closed: dict[str, dict[int, Part]] = {}
+        for name, row in product(self.estimators, ROWS):
+            for seed in self.seeds[: self.n_closed]:
+                make = partial(closed_loop, self, name, row, seed)
+                part = cache.part(f"closed.{name}.{row}.{seed}", make)
+                closed.setdefault(f"{name}.{row}", {})[seed] = part
+        return films, closed
+
+    def metrics(self, played: "Played") -> dict[str, Metric]:
+        """Return every number of results.json."""
+        return metrics_of(self, played)
+
+    def report(self, played: "Played", metrics: Metrics, figures: Path) -> Report:
+        """Draw the figures; return the tables beside them."""
+        return report(figures, self.estimators, self.everybody, played[0], metrics)
+
+
+QUICK = Site(n_seeds=2, seconds=6.0, n_closed=1)
 """Every number, from fewer and shorter walks."""
 
 
-def config_for(
+def make_experiment(
     quick: bool = False, seeds: int | None = None, estimator: Sequence[str] = ("particle", "paper")
-) -> SiteConfig:
+) -> Site:
     """The settings that the command line asks for."""
     names = tuple(dict.fromkeys(estimator))
-    return changed(QUICK if quick else SiteConfig(), estimators=names, n_seeds=seeds)
+    return changed(QUICK if quick else Site(), estimators=names, n_seeds=seeds)
 
 
-ROWS = tuple(CHOICES)
-"""Each camera alone, and all four."""
 Part = Mapping[str, Any]
 Played = tuple[Mapping[int, Part], Mapping[str, Mapping[int, Part]]]
 """Shared films, with what everybody made of them, by seed; own crops in some, by row and seed."""
 
 
-def play(config: SiteConfig, cache: PartCache) -> Played:
-    """All walks, filmed once for everybody; some again with everybody's own crops."""
-    films = {seed: cache.part(f"film.{seed}", partial(film, config, seed)) for seed in config.seeds}
-    closed: dict[str, dict[int, Part]] = {}
-    for name, row in product(config.estimators, ROWS):
-        for seed in config.seeds[: config.n_closed]:
-            make = partial(closed_loop, config, name, row, seed)
-            part = cache.part(f"closed.{name}.{row}.{seed}", make)
-            closed.setdefault(f"{name}.{row}", {})[seed] = part
-    return films, closed
-
-
-def film(config: SiteConfig, seed: int, tick: PartProgress) -> dict[str, Any]:
+def film(config: Site, seed: int, tick: PartProgress) -> dict[str, Any]:
     """One walk, filmed with the crops of the four-camera track, and everybody's word on it."""
     motions = walk(site(), seed, round(config.seconds / DT_S), DT_S)
     taken = record(site(), motions, SETTINGS, CROPS, seed, lambda share: tick(0.7 * share))
@@ -122,7 +143,7 @@ def _first_seen(taken: Recording) -> int:
 
 
 def closed_loop(
-    config: SiteConfig, estimator: str, row: str, seed: int, tick: PartProgress
+    config: Site, estimator: str, row: str, seed: int, tick: PartProgress
 ) -> dict[str, Any]:
     """The same walk with crops of one's own; after a second some cameras are lost."""
     settings = replace(SETTINGS, faults=left_of("site", [CHOICES[row]])[0].faults)
@@ -138,7 +159,7 @@ def _head_path(beliefs: PoseEstimate) -> dict[str, Any]:
     }
 
 
-def metrics_of(config: SiteConfig, played: Played) -> dict[str, Metric]:
+def metrics_of(config: Site, played: Played) -> dict[str, Metric]:
     """Every number of results.json."""
     films, closed = played
     squared = {
@@ -175,19 +196,3 @@ def _squared_m2(film: Part, row: Part) -> Floats:
     estimator's last word, or its prior, is its answer."""
     off_m = np.array(row["head"], float) - np.array(film["truth"], float)
     return (off_m**2).sum(-1)[film["judged_from"] :]
-
-
-STUDY = Study(
-    name="site",
-    depends=("env", "tracker", "emulator", "detector", "motion"),
-    settings=lambda config: {**asdict(config), "also": ALSO, "crops": CROPS},
-    seeds=lambda config: config.seeds,
-    n_parts=lambda config: (
-        config.n_seeds + len(config.estimators) * len(ROWS) * len(config.seeds[: config.n_closed])
-    ),
-    play=play,
-    metrics=metrics_of,
-    report=lambda config, played, metrics, figures: report(
-        figures, config.estimators, config.everybody, played[0], metrics
-    ),
-)

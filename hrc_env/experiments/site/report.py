@@ -12,8 +12,9 @@ from hrc_env.config import HRCConfig
 from hrc_env.core.batching import one
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats
+from hrc_env.experiments.columns import Column
 from hrc_env.experiments.plots import label, new_figure, save
-from hrc_env.experiments.report import Column, Metrics, Report, picture, table_of
+from hrc_env.experiments.report import Metrics, Report, picture, table_of
 from hrc_env.experiments.rigs import MULTI, SPOKEN
 from hrc_env.experiments.site.walk import walk
 from hrc_env.geometry.cameras import pinhole, project

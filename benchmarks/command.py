@@ -1,0 +1,61 @@
+"""How the studies of this folder are called: python -m benchmarks.NAME [--quick] [--out DIR]."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import tyro
+
+from hrc_env.cli.checks import at_least
+from hrc_env.cli.entry import show_errors
+from hrc_env.cli.progress import show
+from hrc_env.experiments.runner import run
+from hrc_env.experiments.study import Study
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """What every experiment is asked; one that was stopped goes on in the same folder."""
+
+    out: Path
+    """Folder for results.json, a report and finished parts."""
+    quick: bool = False
+    """Every number, from a few episodes."""
+
+
+@dataclass(frozen=True)
+class StudyArguments(Arguments):
+    """What every study of whole episodes is asked besides."""
+
+    only: tuple[str, ...] = ()
+    """Rows by the beginnings of their names; all if not given."""
+    threads: int | None = None
+    """Threads that the environments share; all cores by default."""
+
+    def __post_init__(self) -> None:
+        """Raise `ConfigError` for numbers that cannot work."""
+        at_least("--threads", self.threads, 1)
+
+
+def run_study(study: Study, arguments: StudyArguments) -> int:
+    """Run a study as it was asked, and show its report; return the exit status."""
+    study = study.select(arguments.only) if arguments.only else study
+    study = replace(study.quick() if arguments.quick else study, threads=arguments.threads)
+    return show(partial(run, study), arguments.out, study.name)
+
+
+def main(make: Callable[[], Study], about: str | None) -> int:
+    """Run a study as the process's words ask; return the exit status.
+
+    Args:
+        make: makes the study.
+        about: the module's docstring, for `--help`.
+    """
+
+    def run_asked() -> int:
+        study = make()
+        default = StudyArguments(Path("out") / study.name)
+        return run_study(study, tyro.cli(StudyArguments, default=default, description=about))
+
+    return show_errors(run_asked)

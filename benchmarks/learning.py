@@ -1,0 +1,51 @@
+"""Policies that studies judge: learnt by `python -m hrc_env train`, kept in the study's folder."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+
+@dataclass(frozen=True, slots=True)
+class Training:
+    """A run of `train`."""
+
+    folder: Path
+    """Of its own, whose name says what it was learnt with."""
+    options: Mapping[str, Any]
+    """Of the command, without `--`."""
+
+    @property
+    def policy(self) -> Path:
+        """The checkpoint, whether it is there or not."""
+        return self.folder / "policy.zip"
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether the policy has learnt and was judged."""
+        return (self.folder / "score.json").exists()
+
+    @property
+    def score(self) -> dict[str, Any]:
+        """What `train` found at its end."""
+        return json.loads((self.folder / "score.json").read_text())
+
+    def run(self) -> None:
+        """Learn, or learn on, unless it is finished."""
+        if self.is_finished:
+            return
+        place = {"resume" if self.policy.exists() else "out": self.folder}
+        given = {**place, "episodes": 1, **self.options}
+        if self.policy.exists():  # the checkpoint knows its task
+            given.pop("task", None)
+        words = [word for name, value in given.items() for word in (f"--{name}", str(value))]
+        print(f"Learning: {self.folder}", flush=True)
+        path = os.pathsep.join(filter(None, sys.path))
+        subprocess.run(
+            [sys.executable, "-m", "hrc_env", "train", "--no-film", *words],
+            env={**os.environ, "PYTHONPATH": path}, check=True,
+        )  # fmt: skip

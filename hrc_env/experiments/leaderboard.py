@@ -1,0 +1,191 @@
+"""The benchmark of policies: conditions and seeds that are the same for everybody, and entries."""
+
+import datetime
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from hrc_env.agents.registry import control_of
+from hrc_env.core.errors import ConfigError, check_names
+from hrc_env.core.results import Metric, provenance, write_whole
+from hrc_env.evaluation.sums import ACHIEVED
+from hrc_env.experiments.columns import per_minute, rate, share_of_tries
+from hrc_env.experiments.report import Table
+from hrc_env.experiments.setups import PerceptionSetup
+from hrc_env.experiments.study import Row, Study
+from hrc_env.safety.incidents import KINDS
+from hrc_env.tasks import BUILT_IN
+
+VERSION = 1
+"""Of the conditions, seeds and counts: numbers of different versions do not compare."""
+SEED = 5_000_000
+"""Of the first episode, far from those of training and of other evaluations."""
+SETUPS = {
+    "truth": ("the truth", PerceptionSetup("truth")),
+    "keypoints": ("four cameras", PerceptionSetup()),
+    "late": ("four cameras, 200 ms late", PerceptionSetup(latency_s=0.2)),
+    "one": ("one camera after 1 s", PerceptionSetup(n_cameras=1)),
+}
+"""How robots perceive, and that in words; late images say so."""
+COLUMNS = (
+    per_minute(ACHIEVED, "goals a minute", name="goals_per_minute"),
+    share_of_tries("success", digits=2),
+    *(
+        rate(f"contacts_{kind}", words, name=f"{kind}_per_hour", per="hour", digits=0)
+        for kind, words in zip(
+            ("towards", "fleeing", "standing"),
+            ("contacts an hour: towards", "fleeing", "standing"),
+            strict=True,
+        )
+    ),
+    per_minute("cost", "cost a minute"),
+    rate([f"contacts_{kind}" for kind in KINDS], name="contacts_per_hour", per="hour"),
+)
+ABOUT = """\
+What a policy does and how safe it is, on fixed seeds. A contact is *towards* where the robot moved
+towards the worker when it began, *fleeing* where it moved away, *standing* else; contacts and cost
+are counted on the truth."""
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """Beside whom a policy acts, with which perception, under which shield."""
+
+    people: str = "unaware"
+    setup: str = "keypoints"
+    """A name in `SETUPS`."""
+    shield: str | None = None
+
+    @property
+    def name(self) -> str:
+        """As in results.json."""
+        return f"{self.people}.{self.setup}.{self.shield or 'none'}"
+
+    @property
+    def words(self) -> str:
+        """As in tables."""
+        shield = "no shield" if self.shield is None else f"shield `{self.shield}`"
+        return f"{self.people} people, {SETUPS[self.setup][0]}, {shield}"
+
+
+def _conditions() -> tuple[Condition, ...]:
+    """Return everybody with four cameras, unaware people with other perception; each twice."""
+    bare = [Condition(people) for people in ("unaware", "hurried", "attentive")]
+    bare += [Condition(setup=setup) for setup in SETUPS if setup != "keypoints"]
+    return tuple(replace(each, shield=shield) for each in bare for shield in (None, "qp"))
+
+
+CONDITIONS = {each.name: each for each in _conditions()}
+"""By name, in the order of tables."""
+MAIN = (Condition().name, Condition(shield="qp").name)
+"""Conditions that the leaderboard shows."""
+
+
+def make_study(
+    policy: str,
+    ids: Sequence[str] = tuple(BUILT_IN),
+    control: str | None = None,
+    n_seeds: int = 64,
+) -> Study:
+    """Return the study of a policy under all conditions.
+
+    Args:
+        policy: as `hrc_env.agents.registry.make_agent` takes it.
+        ids: which environments; a learnt policy is for one.
+        control: what its actions are; None: as the policy's file says, or else velocities of the
+            joints.
+        n_seeds: episodes of every row.
+
+    Raises:
+        ConfigError: an unknown policy or environment, or no episode.
+    """
+    check_names("environment", ids, BUILT_IN)
+    control = control or control_of(policy)
+    env = {} if control is None else {"control": control}
+    rows = {
+        f"{task}.{name}": Row(
+            each.words, n_seeds, policy, SETUPS[each.setup][1],
+            {"task": task, "people": each.people, "shield": each.shield, **env},
+        )
+        for task in ids
+        for name, each in CONDITIONS.items()
+    }  # fmt: skip
+    shown = [column for column in COLUMNS if column.heading]
+    tables = tuple(
+        Table(task, task, {f"{task}.{name}": (each.words,) for name, each in CONDITIONS.items()},
+              shown, ("condition",))
+        for task in ids
+    )  # fmt: skip
+    return Study(
+        name=f"benchmark, version {VERSION}", title=f"Benchmark: {policy}", about=ABOUT,
+        depends=("env", "tracker", "emulator", "motion", "shield", "agents"), first_seed=SEED,
+        rows=rows, columns=COLUMNS, tables=tables,
+    )  # fmt: skip
+
+
+PER = {
+    "goals_per_minute": "goals a minute",
+    "success": "success",
+    "cost_per_minute": "cost a minute",
+    "towards_per_hour": "contacts towards an hour",
+    "contacts_per_hour": "contacts an hour",
+}
+"""What entries hold of every task and condition, and how the leaderboard calls it."""
+Scores = Mapping[str, Metric]
+"""By "ID.CONDITION.WHAT"."""
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One policy on the leaderboard."""
+
+    policy: str
+    """As `--policy` names it."""
+    commit: str
+    date: str
+    scores: Scores
+
+
+def read_entry(path: Path) -> Entry:
+    """Return an entry.
+
+    Raises:
+        ConfigError: the file is of another version of the benchmark, or no entry.
+    """
+    try:
+        content = json.loads(path.read_text())
+        version, scores = content.pop("version"), content.pop("scores")
+        if version != VERSION:
+            raise ConfigError(
+                f"{path} is of version {version} of the benchmark, this is version {VERSION}: "
+                "their numbers do not compare. Run it again: python -m hrc_env benchmark."
+            )
+        metrics = {key: Metric(v, low, high, "", n) for key, (v, low, high, n) in scores.items()}
+        return Entry(content["policy"], content["commit"], content["date"], metrics)
+    except (json.JSONDecodeError, KeyError, TypeError, ValueError) as error:
+        if isinstance(error, ConfigError):
+            raise
+        raise ConfigError(f"{path} is no entry of the benchmark ({error!r}).") from error
+
+
+def write_entry(path: Path, entry: Entry) -> None:
+    """Write an entry, whole or not at all."""
+    kept = {name: m for name, m in entry.scores.items() if name.rsplit(".", 1)[1] in PER}
+    scores = {name: [*map(_shorten, (m.value, m.low, m.high)), m.n] for name, m in kept.items()}
+    content: dict[str, Any] = {"version": VERSION, "name": path.stem, **asdict(entry)}
+    lines = json.dumps({**content, "scores": scores}, indent=1)
+    write_whole(path, lines.replace("\n   ", " ").replace("\n  ]", "]") + "\n")
+
+
+def enter(path: Path, policy: str, results: Path) -> None:
+    """Write the entry of a policy from the results.json of its run."""
+    content = json.loads(results.read_text())
+    scores = {key: Metric(**value) for key, value in content["metrics"].items()}
+    git, day = str(provenance()["git"]), datetime.date.today().isoformat()
+    write_entry(path, Entry(policy, git, day, scores))
+
+
+def _shorten(value: float) -> float:
+    return float(f"{value:.5g}")

@@ -1,0 +1,341 @@
+"""Studies of whole episodes: a question, the rows that answer it, and what is counted in them.
+
+    SHIELD = Study(
+        name="shielded", title="What the shield keeps", about="...", depends=("env", "shield"),
+        first_seed=8_000_000,
+        rows={
+            "bare": Row("four cameras, no shield", 2000),
+            "four": Row("four cameras", 2000, env={"shield": "qp"}, baseline="bare"),
+        },
+        columns=(share_of_baseline("goals_reached", "throughput [%]", scale=100), mean("cost")),
+    )
+    run(SHIELD, Path("out/shielded"))
+
+Everything that can be known to be wrong is said when a study is declared: an unknown agent,
+estimator, shield, environment or argument; a baseline that is no row; a column of no statistic.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, is_dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hrc_env.agents import policies
+from hrc_env.agents.env_info import Agent, EnvInfo
+from hrc_env.agents.registry import AGENTS, make_agent
+from hrc_env.config import settle
+from hrc_env.core.errors import ConfigError, check_names, unknown
+from hrc_env.core.results import Metric
+from hrc_env.core.typing import Ints
+from hrc_env.evaluation.episodes import play_episodes
+from hrc_env.experiments.cache import PartCache, PartProgress
+from hrc_env.experiments.columns import Column
+from hrc_env.experiments.report import Metrics, Report, Table
+from hrc_env.experiments.setups import PerceptionSetup
+from hrc_env.experiments.versions import check_subsystems, digest_of, key_of, source_digest
+from hrc_env.pipeline.levels import LEVELS
+from hrc_env.safety.shield import SHIELDS
+from hrc_env.scene.rigs import RIGS
+from hrc_env.tracking.estimators import ESTIMATORS
+
+Played = Mapping[str, list[dict[str, float]]]
+"""Statistics of episodes by row, in the order of their seeds."""
+FOUR = PerceptionSetup()
+"""Four cameras, on time, by the emulator."""
+GIVEN_BY_SETUP = ("perception", "estimator")
+"""Arguments of the environment that `Row.setup` says."""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """Who acts, beside whom, with which perception, under which shield."""
+
+    words: str | tuple[str, ...]
+    """Cells before the numbers of its line."""
+    n_episodes: int
+    """Its episodes are the first so many of the study's seeds."""
+    agent: str | Callable[[EnvInfo], Agent] = "scripted"
+    """As `hrc_env.agents.registry.make_agent` takes it; or a function that makes one."""
+    setup: PerceptionSetup = FOUR
+    """What the robot sees with; episodes take turns in the cameras that are left."""
+    env: Mapping[str, Any] = field(default_factory=dict)
+    """Other arguments of the environment, as of `gymnasium.make`."""
+    baseline: str | None = None
+    """The row whose episodes on the same seeds `is_paired` columns compare it with."""
+    n_together: int = 250
+    """So many episodes are one part, played side by side."""
+    is_shown: bool = True
+    """Whether it is a line of the table."""
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """The cells before the numbers."""
+        return (self.words,) if isinstance(self.words, str) else self.words
+
+    def keywords(self) -> list[dict[str, Any]]:
+        """Return the arguments of environments, in which episodes take turns."""
+        setup, known = self.setup, dict(self.env)
+        known["perception"] = setup.level
+        if setup.level in ("keypoints", "pixels"):
+            known["estimator"] = setup.estimator
+        if setup.is_plain:
+            return [known]
+        scene = settle(**{name: known[name] for name in ("task", "scene") if name in known}).scene
+        faults = list(known.pop("faults", ()))
+        return [
+            {**known, "cameras": list(turn.cameras), "faults": [*turn.faults, *faults]}
+            for turn in setup.turns_of(RIGS[scene])
+        ]
+
+    def settings(self) -> dict[str, Any]:
+        """Return all that its episodes depend on besides seeds, as JSON can hold it."""
+        found = {
+            "agent": _describe_agent(self.agent),
+            "setup": asdict(self.setup),
+            "env": describe(self.env),
+        }
+        if source := source_digest(ESTIMATORS[self.setup.estimator].make):
+            found["estimator_source"] = source
+        shield = self.env.get("shield")
+        if isinstance(shield, str) and (source := source_digest(SHIELDS[shield])):
+            found["shield_source"] = source
+        return found
+
+    def check(self) -> None:
+        """Raise `ConfigError` for what cannot be played."""
+        for name in GIVEN_BY_SETUP:
+            if name in self.env:
+                raise ConfigError(f"env must leave out {name}, which the row's setup says.")
+        if self.n_episodes < 1 or self.n_together < 1:
+            raise ConfigError(
+                "n_episodes and n_together must be at least 1, got "
+                f"{self.n_episodes} and {self.n_together}."
+            )
+        check_names("perception", [self.setup.level], LEVELS)
+        _check_agent(self.agent)
+        for keywords in self.keywords():
+            keywords.pop("max_episode_steps", None)  # Gymnasium's own
+            settle(**keywords)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Study:
+    """A declaration of what is played, counted and shown."""
+
+    name: str
+    """As its folder and its results are called."""
+    title: str
+    about: str
+    """The question, and how it is answered."""
+    depends: tuple[str, ...]
+    """Subsystems that its numbers depend on (`behaviour.toml`)."""
+    first_seed: int
+    """Of the episodes of every row; the others count up."""
+    rows: Mapping[str, Row]
+    """By name, in the order in which they are played and shown; those of policies that have not
+    learnt yet may be left out, where `tables` says what is shown."""
+    columns: tuple[Column, ...]
+    heads: tuple[str, ...] = ("",)
+    """Headings of the rows' words."""
+    note: str = ""
+    """What stands below the table, as `Table.note`."""
+    tables: tuple[Table, ...] = ()
+    """What is shown in place of one table of all rows and columns."""
+    derive: Callable[[Metrics], Metrics] | None = None
+    """Returns further metrics from those of the columns."""
+    n_quick: int = 4
+    """Episodes of each row in the short form."""
+    threads: int | None = None
+    """Threads that environments share; None: as many as there are cores."""
+
+    def __post_init__(self) -> None:
+        """Raise `ConfigError` for a row, a column or a table that names nothing."""
+        check_subsystems(self.depends)
+        if not self.columns or not (self.rows or self.tables):
+            raise ConfigError(f"Study {self.name!r} must have rows and columns.")
+        for name, row in self.rows.items():
+            try:
+                row.check()
+            except ConfigError as error:
+                raise ConfigError(f"Row {name!r} of {self.name!r}: {error}") from error
+            self._check_baseline(name, row)
+        known = self._metric_names()
+        if len(set(known)) < len(known):
+            twice = next(each for each in known if known.count(each) > 1)
+            raise ConfigError(f"Study {self.name!r} measures {twice!r} twice.")
+        for each in self.shown_tables():
+            if self.derive is None:
+                each.check(known)
+
+    def _check_baseline(self, name: str, row: Row) -> None:
+        """Raise `ConfigError` unless the row's baseline is there and long enough."""
+        paired = [column.metric.format(name) for column in self.columns if column.is_paired]
+        if row.baseline is None:
+            if paired:
+                raise ConfigError(
+                    f"Row {name!r} of {self.name!r} names no baseline, and {paired[0]!r} compares "
+                    "it with one; it can be the row itself."
+                )
+            return
+        check_names(f"baseline of row {name!r}, a row,", [row.baseline], self.rows)
+        if self.rows[row.baseline].n_episodes < row.n_episodes:
+            raise ConfigError(
+                f"Row {name!r} has {row.n_episodes} episodes, and its baseline {row.baseline!r} "
+                f"must have as many; it has {self.rows[row.baseline].n_episodes}."
+            )
+
+    def _metric_names(self) -> list[str]:
+        return [c.metric.format(row) for row in self.rows for c in self.columns if c.measure]
+
+    @property
+    def seeds(self) -> Sequence[int]:
+        """Of the longest row."""
+        n_episodes = max((row.n_episodes for row in self.rows.values()), default=0)
+        return range(self.first_seed, self.first_seed + n_episodes)
+
+    @property
+    def n_parts(self) -> int:
+        """The number of parts of all rows."""
+        return sum(len(shards_of(row, self.first_seed)) for row in self.rows.values())
+
+    def settings(self) -> dict[str, Any]:
+        """Return all that its numbers depend on, as JSON can hold it."""
+        rows = {name: {"n_episodes": row.n_episodes, **row.settings()}
+                for name, row in self.rows.items()}  # fmt: skip
+        return {"first_seed": self.first_seed, "rows": rows}
+
+    def select(self, beginnings: Sequence[str]) -> "Study":
+        """Return the study of the rows whose names begin so, and of their baselines.
+
+        Raises:
+            ConfigError: no row begins like one of them.
+        """
+        for each in beginnings:
+            if not any(name.startswith(each) for name in self.rows):
+                raise unknown(f"row of {self.name!r}", each, self.rows)
+        kept = {name for name in self.rows if name.startswith(tuple(beginnings))}
+        kept |= {baseline for name in kept if (baseline := self.rows[name].baseline) is not None}
+        return replace(self, rows={name: row for name, row in self.rows.items() if name in kept})
+
+    def quick(self) -> "Study":
+        """Return the short form: few episodes of each row; of rendered images one, cut short."""
+
+        def shorten(row: Row) -> Row:
+            if row.setup.level == "pixels":
+                return replace(row, n_episodes=1, env={**row.env, "max_episode_steps": 10})
+            return replace(row, n_episodes=min(row.n_episodes, self.n_quick))
+
+        return replace(self, rows={name: shorten(row) for name, row in self.rows.items()})
+
+    def play(self, cache: PartCache) -> Played:
+        """Return the episodes of every row, each part of them from the cache or anew."""
+        return {name: self._play_row(name, cache) for name in self.rows}
+
+    def _play_row(self, name: str, cache: PartCache) -> list[dict[str, float]]:
+        row, found = self.rows[name], list[dict[str, float]]()
+        for first_seed, n_episodes in shards_of(row, self.first_seed):
+            made_of = {"row": row.settings(), "first_seed": first_seed, "n": n_episodes}
+            make = partial(play_shard, row, first_seed, n_episodes, self.threads)
+            label = f"{name.replace('/', '.')}.{first_seed}"
+            found += cache.part(label, make, key_of(made_of, self.depends))["episodes"]
+        return found
+
+    def metrics(self, played: Played) -> dict[str, Metric]:
+        """Return every number, as "ROW.NAME"."""
+        found: dict[str, Metric] = {}
+        for name, row in self.rows.items():
+            own, theirs = played[name], played[row.baseline or name]
+            for column in self.columns:
+                if column.measure is not None:
+                    beside = theirs[: len(own)]
+                    found[column.metric.format(name)] = column.measure(own, beside)
+        return found if self.derive is None else {**found, **self.derive(found)}
+
+    def shown_tables(self) -> tuple[Table, ...]:
+        """Return the tables of the report and of the documentation."""
+        if self.tables:
+            return self.tables
+        rows = {name: row.cells for name, row in self.rows.items() if row.is_shown}
+        columns = [column for column in self.columns if column.heading]
+        return (Table(self.name, self.title, rows, columns, self.heads, self.note),)
+
+    def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
+        """Return what is to be read; there are no figures."""
+        parts = [each.markdown(metrics) for each in self.shown_tables()]
+        return Report(self.title, self.about, parts)
+
+
+def shards_of(row: Row, first_seed: int) -> list[tuple[int, int]]:
+    """Return the parts of a row: their first seeds, and how many episodes they have."""
+    return [
+        (first_seed + k, min(row.n_together, row.n_episodes - k))
+        for k in range(0, row.n_episodes, row.n_together)
+    ]
+
+
+def play_shard(
+    row: Row, first_seed: int, n_episodes: int, threads: int | None, tick: PartProgress
+) -> dict[str, Any]:
+    """Return the episodes of a part, of which each turn of the row's cameras has a block.
+
+    Args:
+        row: who is played.
+        first_seed: of the first episode.
+        n_episodes: how many.
+        threads: that environments share; None: as many as there are cores.
+        tick: is told by how much the share that is done grew.
+    """
+    make, found = _agent_maker(row.agent), list[dict[str, float]]()
+    turns = row.keywords()
+    blocks: list[Ints] = np.array_split(np.arange(n_episodes), len(turns))
+    for ids, keywords in zip(blocks, turns, strict=True):
+        if not len(ids):
+            continue
+        if row.setup.level != "pixels":
+            keywords["num_threads"] = threads
+        share = partial(lambda of, done: tick(done * of), len(ids) / n_episodes)
+        found += play_episodes(make, len(ids), first_seed + int(ids[0]), tick=share, **keywords)
+    return {"episodes": found}
+
+
+def describe(value: Any) -> Any:
+    """Return a value as JSON can hold it: of a function its name and the digest of its file."""
+    if isinstance(value, Mapping):
+        return {str(name): describe(each) for name, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [describe(each) for each in value]
+    if is_dataclass(value) and not isinstance(value, type):
+        return describe(asdict(value))
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, Path):
+        return str(value)
+    if callable(value):
+        name = getattr(value, "__qualname__", type(value).__qualname__)
+        return {"function": name, "source": source_digest(value)}
+    return value
+
+
+def _agent_maker(agent: str | Callable[[EnvInfo], Agent]) -> Callable[[EnvInfo], Agent]:
+    return partial(make_agent, agent) if isinstance(agent, str) else agent
+
+
+def _describe_agent(agent: str | Callable[[EnvInfo], Agent]) -> Any:
+    """Return an agent's name; of a trained policy the digest of its file."""
+    if not isinstance(agent, str):
+        return describe(agent)
+    if agent.startswith(policies.PREFIX):
+        return {"policy": agent, "sha256": policies.read(policies.path_of(agent))[0].sha256}
+    return {"policy": digest_of(Path(agent))[:12]} if Path(agent).is_file() else agent
+
+
+def _check_agent(agent: str | Callable[[EnvInfo], Agent]) -> None:
+    """Raise `ConfigError` for an agent that is no name, file or function."""
+    if not isinstance(agent, str) or agent in AGENTS or ":" in agent or Path(agent).exists():
+        if isinstance(agent, str) and agent.startswith(policies.PREFIX):
+            policies.path_of(agent)
+        return
+    raise ConfigError(f"{unknown('agent', agent, AGENTS)} Or a policy's file or MODULE:FUNCTION.")

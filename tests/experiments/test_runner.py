@@ -1,0 +1,272 @@
+"""What the experiments share: folders, parts, intervals and the page."""
+
+import json
+import os
+from dataclasses import asdict, dataclass
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from hrc_env.core.errors import ConfigError, HRCError
+from hrc_env.core.results import Metric, write_results, write_whole
+from hrc_env.evaluation import intervals
+from hrc_env.evaluation.counts import ERRORS_M
+from hrc_env.experiments import report, runner
+from hrc_env.experiments.cache import PartCache, own_folder, owner_of
+from hrc_env.experiments.columns import Column
+
+PLAYED = []
+"""What was played of `Counting`."""
+
+
+@dataclass(frozen=True)
+class Counting:
+    """An experiment of one part."""
+
+    n: int
+    name = "count"
+    depends = ("env",)
+    seeds = (0,)
+    n_parts = 1
+
+    def settings(self):
+        return asdict(self)
+
+    def play(self, cache):
+        return cache.part("one", lambda tick: PLAYED.append(self.n) or {"x": self.n})
+
+    def metrics(self, played):
+        return {"x": Metric(played["x"], played["x"], played["x"], "1", 1)}
+
+    def report(self, played, metrics, figures):
+        return report.Report("Counted", "How many?", ())
+
+
+def silent(share, label):
+    """Say nothing."""
+
+
+def test_a_folder_belongs_to_one_experiment(tmp_path):
+    own_folder(tmp_path, "site")
+    own_folder(tmp_path, "site")
+    with pytest.raises(ConfigError, match=r"holds the results of 'site'.*--overwrite"):
+        own_folder(tmp_path, "lab")
+    own_folder(tmp_path, "lab", overwrite=True)
+    assert owner_of(tmp_path) == "lab"
+
+
+def test_a_benchmarks_results_are_not_overwritten(tmp_path):
+    write_results(tmp_path / "results.json", {}, [0], {})
+    with pytest.raises(ConfigError, match="another benchmark"):
+        own_folder(tmp_path, "site")
+
+
+def test_a_half_written_result_is_said_and_kept(tmp_path):
+    (tmp_path / "results.json").write_text('{"config": ')
+    with pytest.raises(ConfigError, match="unreadable"):
+        own_folder(tmp_path, "site")
+    assert (tmp_path / "results.json").exists()
+
+
+def test_a_half_written_part_is_made_anew(tmp_path):
+    cache = PartCache(tmp_path, "code", 2, silent)
+    cache.part("one", lambda tick: {"x": 1})
+    (tmp_path / "one.json").write_text('{"ke')
+    assert cache.part("one", lambda tick: {"x": 2}) == {"x": 2}
+    assert cache.part("one", lambda tick: {"x": 3}) == {"x": 2}
+
+
+def test_parts_of_another_key_do_not_count(tmp_path):
+    PartCache(tmp_path, "old", 1, silent).part("one", lambda tick: {"x": 1})
+    cache = PartCache(tmp_path, "new", 1, silent)
+    assert cache.part("one", lambda tick: {"x": 2}) == {"x": 2}
+    assert cache.part("one", lambda tick: {"x": 3}, key="other") == {"x": 3}
+
+
+def test_the_progress_of_parts_sums_to_one(tmp_path):
+    shares: list[float] = []
+    cache = PartCache(tmp_path, "code", 3, lambda share, label: shares.append(share))
+    cache.part("quiet", lambda tick: {})
+    cache.part("ticking", lambda tick: [tick(0.25) for _ in range(3)] and {})
+    cache.part("quiet", lambda tick: {})
+    assert sum(shares) == pytest.approx(1.0)
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is always full")
+def test_a_full_disk_is_said_and_loses_nothing(tmp_path, monkeypatch):
+    path = tmp_path / "results.json"
+    write_whole(path, "before")
+    (tmp_path / "results.json.draft").symlink_to("/dev/full")
+    with pytest.raises(HRCError, match=r"No space left.*start the same command again"):
+        write_whole(path, "after" * 100_000)
+    assert path.read_text() == "before"
+
+
+def test_a_rate_of_what_never_happened_says_how_often_it_may():
+    none, some = (intervals.rate_of([k] * 50, 0.05, "per 1000") for k in (0, 1))
+    assert (none.value, none.low) == (0.0, 0.0)
+    assert none.high == pytest.approx(-np.log(0.025) / 0.05)
+    assert (some.value, some.n) == (1000.0, 50)
+    assert (some.low, some.high) == pytest.approx((742.2, 1318.4), abs=0.1)  # tables: 37.11, 65.92
+
+
+@pytest.mark.parametrize(
+    ("count", "low", "high"),  # Garwood's table
+    [(0, 0.0, 3.6889), (1, 0.0253, 5.5716), (2, 0.2422, 7.2247), (10, 4.7954, 18.3904)],
+)
+def test_a_rate_has_the_exact_interval_of_a_poisson_count(count, low, high):
+    found = intervals.rate_of([0, count], [1.0, 1.0], "1/h")
+    assert (2 * found.value, 2 * found.low, 2 * found.high) == pytest.approx(
+        (count, low, high), abs=1e-4
+    )
+
+
+def test_a_rate_in_no_time_is_not_known():
+    assert np.isnan(intervals.rate_of([0.0], 0.0, "1/h").value)
+
+
+@pytest.mark.parametrize(("k", "n"), [(0, 1), (0, 64), (3, 10), (64, 64)])
+def test_a_share_has_the_exact_interval_of_a_binomial_count(k, n):
+    found = intervals.share_of([True] * k + [False] * (n - k))
+    exact = stats.binomtest(k, n).proportion_ci(0.95, method="exact")
+    assert (found.value, found.low, found.high, found.n) == (k / n, exact.low, exact.high, n)
+
+
+def test_what_always_succeeded_may_fail_as_often_as_seeds_allow():
+    found = intervals.success_over([3.0] * 64, [3.0] * 64)
+    assert (found.value, found.high, found.n) == (1.0, 1.0, 64)
+    assert found.low == pytest.approx(0.025 ** (1 / 64))
+    mixed = intervals.success_over([3.0, 1.0], [3.0, 3.0])
+    assert (mixed.value, mixed.low) == (2 / 3, 1 / 3)
+
+
+def test_goals_that_were_never_reached_have_a_bound():
+    none, some = (intervals.goals_over([k] * 30, [1.0] * 30) for k in (0.0, 5.0))
+    assert none.high == pytest.approx(3.6889 / 30, abs=1e-4)
+    assert (some.low, some.high) == (5.0, 5.0)
+
+
+def test_one_rate_less_another_has_a_width_also_where_both_are_zero():
+    zero, five = (intervals.rate_of([k], 15.0, "1/min") for k in (0, 5))
+    same, more = intervals.excess_of(zero, zero), intervals.excess_of(five, zero)
+    assert (same.value, -same.low) == (0.0, same.high)
+    assert same.high == pytest.approx(3.6889 / 15, abs=1e-4)
+    assert more.low < 0.0 < more.value  # five against none is no difference yet: p = 1/16
+    assert more.high == pytest.approx(five.high)
+
+
+@pytest.mark.parametrize("exposure", [1.0, 0.64])
+def test_a_zero_of_a_count_is_shown_with_its_bound(exposure):
+    zero = intervals.rate_of([0] * 64, exposure, "1/h")
+    assert report.said(zero) == f"0.0 (0.0-{3.6889 / exposure:.1f})"
+    assert not report.said(intervals.excess_of(zero, zero), signed=True).endswith("+0.0")
+
+
+def test_an_interval_without_a_visible_width_is_not_shown():
+    assert report.with_interval([1.0, 0.999, 1.001], 2) == "1.00"
+    assert report.with_interval([-1e-9, -1.0, 1.0], 1, "+", " to ") == "+0.0 (-1.0 to +1.0)"
+
+
+def test_intervals_hold_the_truth_as_often_as_they_say():
+    rng = np.random.default_rng(0)
+    held = [
+        interval.low <= 2.0 <= interval.high
+        for interval in (intervals.mean_over(rng.normal(2, 1, 30), "m") for _ in range(60))
+    ]
+    assert 0.85 <= np.mean(held) <= 1.0
+
+
+def test_one_seed_has_no_interval_and_says_so():
+    one = intervals.rmse_over([4.0], [1.0], "m")
+    assert (one.value, one.low, one.high, one.n) == (2.0, 2.0, 2.0, 1)
+
+
+def test_ratios_of_paired_rows_are_narrower_than_of_strangers():
+    rng = np.random.default_rng(1)
+    hard = rng.uniform(1, 9, 40)
+    paired = intervals.rmse_over(4 * hard, hard, "ratio")
+    strangers = intervals.rmse_over(4 * hard, rng.permutation(hard), "ratio")
+    assert paired.value == pytest.approx(2.0)
+    assert paired.high - paired.low < 1e-9 < strangers.high - strangers.low
+
+
+def test_a_ratio_to_nothing_in_some_draws_still_has_an_interval():
+    found = intervals.ratio_over([1.0, 0.0, 2.0], [2.0, 0.0, 4.0], "share")
+    assert (found.value, found.low, found.high) == (0.5, 0.5, 0.5)
+
+
+def test_a_quantile_draws_whole_seeds():
+    same = [[1.0, 2.0, 3.0]] * 5
+    found = intervals.quantile_over(same, 0.5, "m")
+    assert (found.value, found.low, found.high) == (2.0, 2.0, 2.0)
+
+
+def test_pairs_tell_a_difference_that_strangers_do_not():
+    rng = np.random.default_rng(1)
+    walks = rng.uniform(1, 9, 20)
+    ours, theirs = walks, walks + rng.uniform(0.0, 0.4, 20)
+    mean = intervals.ratio_of([*ours, *theirs], np.ones(40))
+    found = intervals.paired("head", mean, 20, "m")
+    assert found["difference.head"].value == pytest.approx((ours - theirs).mean())
+    assert found["difference.head"].high < 0
+    assert found["p.head"].value < 0.001
+    assert intervals.mean_over(ours, "m").low < intervals.mean_over(theirs, "m").value
+
+
+def test_the_test_of_pairs_is_wrong_as_often_as_it_says():
+    rng = np.random.default_rng(2)
+    p = []
+    for _ in range(200):
+        squares = rng.exponential(1.0, 24)
+        rmse = intervals.rmse_of(squares, np.ones(24))
+        p.append(intervals.paired("x", rmse, 12, "m", 400)["p.x"].value)
+    assert 0.02 <= np.mean(np.array(p) <= 0.05) <= 0.09
+    assert 0.4 <= np.mean(np.array(p) <= 0.5) <= 0.6
+
+
+@pytest.mark.parametrize("of", ["ratio", "rmse", "quantile", "counted"])
+def test_a_row_does_not_differ_from_itself(of):
+    values = np.random.default_rng(3).uniform(0.1, 2.0, (8, 5))
+    both = [*values, *values]
+    statistic = {
+        "ratio": lambda: intervals.ratio_of(np.sum(both, 1), np.full(16, 5)),
+        "rmse": lambda: intervals.rmse_of(np.sum(both, 1), np.full(16, 5)),
+        "quantile": lambda: intervals.quantile_of(both, 0.5),
+        "counted": lambda: intervals.counted_quantile_of(ERRORS_M, ERRORS_M.count(np.array(both)),
+                                                         0.5),
+    }[of]()  # fmt: skip
+    found = intervals.paired("x", statistic, 8, "m", 200)
+    off = found["difference.x"]
+    assert (off.value, off.low, off.high) == (0.0, 0.0, 0.0)
+    assert found["p.x"].value == 1.0
+
+
+def test_a_report_holds_its_pictures_its_origin_and_all_numbers(tmp_path):
+    figure = tmp_path / "figures" / "one.png"
+    figure.parent.mkdir()
+    figure.write_bytes(b"not really a picture")
+    metrics = {"m.a": Metric(0.1234, 0.1, 0.2, "m", 3), "d.a": Metric(-0.5, -0.7, -0.1, "m", 3)}
+    columns = (Column("m.{}", "cm", scale=100), Column("d.{}", "less", signed=True),
+               Column("x.{}", "not measured"))  # fmt: skip
+    table = report.table_of("who", {"a": "a < b"}, columns, metrics)
+    asked = "run `make`"
+    page = report.Report("Title", asked, ("## Found", table, report.picture(figure, "seen")))
+    page.write(tmp_path, {"n": 1}, [3, 4], metrics)
+    html, text = ((tmp_path / f"report.{kind}").read_text() for kind in ("html", "md"))
+    assert 'src="data:image/png;base64,' in html
+    assert "a &lt; b" in html
+    assert "<code>make</code>" in html
+    assert "| a < b | 12.3 (10.0-20.0) | -0.5 (-0.7 to -0.1) ● | - |" in text
+    assert "seeds 3 to 4" in text
+    assert set(json.loads((tmp_path / "results.json").read_text())["metrics"]) == set(metrics)
+
+
+def test_an_experiment_plays_each_part_once_and_again_with_other_settings(tmp_path):
+    for n in (1, 1, 2):
+        found = runner.run(Counting(n), tmp_path)
+        assert found["x"].value == n
+    assert PLAYED == [1, 2]
+    assert runner.changed(Counting(1), n=None) == Counting(1)
+    with pytest.raises(ConfigError, match="n must be at least 1, got 0"):
+        runner.at_least_one(Counting(0), "n")
