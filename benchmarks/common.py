@@ -1,16 +1,12 @@
 """What the benches share: normalised errors, cells of tables, a way to show results."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
-from typing import Any
+from collections.abc import Iterable
 
 import numpy as np
-from rich.console import Console
-from rich.markdown import Markdown
 
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Covariances3, Floats, Points3
-from hrc_env.experiments.report import Metrics, Report, with_interval
+from hrc_env.experiments.report import with_interval
 from hrc_env.tasks import BUILT_IN
 
 TASKS = tuple(dict.fromkeys((
@@ -43,15 +39,3 @@ def cell(metric: Metric | None, scale: float = 1.0, digits: int = 1, interval: b
         return ""
     ends = (metric.low, metric.high) if interval else (metric.value, metric.value)
     return with_interval([scale * each for each in (metric.value, *ends)], digits)
-
-
-def publish(
-    out: Path,
-    report: Report,
-    config: Mapping[str, Any],
-    seeds: Sequence[int],
-    metrics: Metrics,
-) -> None:
-    """Write results.json, report.html and report.md into a folder; show the report."""
-    report.write(out, {**config, "out": str(out)}, seeds, metrics)
-    Console().print(Markdown((out / "report.md").read_text()))

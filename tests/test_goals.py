@@ -12,7 +12,6 @@ from stable_baselines3 import SAC, HerReplayBuffer
 from stable_baselines3.common.env_checker import check_env as check_env_for_sb3
 
 import hrc_env  # noqa: F401  registers the ids
-from benchmarks import identity
 from hrc_env.agents.registry import make_agent
 from hrc_env.core.errors import ConfigError, NoGoalError
 from hrc_env.env import HRCEnv
@@ -22,6 +21,7 @@ from hrc_env.tasks.reach_goal import ReachGoalConfig
 from hrc_env.tasks.task import find_task
 from hrc_env.vector.env import HRCVectorEnv
 from tests.tasks.variants import vary
+from tests.vector import identity
 
 REACH, PICK = IDS = ("HRCReachGoal-v0", "HRCPickPlaceGoal-v0")
 SIZES = {REACH: 3, PICK: 9}

@@ -32,7 +32,7 @@ Leave-one-camera-out reprojection [px]; `renamed`: where it fits better, the hel
 taken to have exchanged left and right. Coverage: share of held-out detections within the 95 %
 region of belief and detector. Bones and jerk with all cameras. The smoother is offline: it sees the
 whole recording at once."""
-_COLUMNS = [
+COLUMNS = [
     *(
         Column(f"real_{kind}_px.{{}}.{part}", f"{words}{part}")
         for kind, words in (("reprojection", ""), ("reprojection_either", "renamed, "))
@@ -103,6 +103,6 @@ def _of_estimator(
 def report(metrics: Metrics) -> Report:
     """The table, a row an estimator, and what it says."""
     rows = {name: name for name in NAMES}
-    parts = [table_of("", rows, _COLUMNS, metrics)]
+    parts = [table_of("", rows, COLUMNS, metrics)]
     spread = "95 % intervals over blocks of frames, those of bones and jerk with least and largest"
     return Report("Tracking on recorded films", _LEAD, parts, spread)

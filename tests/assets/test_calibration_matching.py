@@ -74,7 +74,7 @@ def test_ratios_of_errors_have_intervals_over_clips(played, monkeypatch):
     seen = Compared(CLIPS, played, twice, families)
     monkeypatch.setattr(validate, "compared", lambda *_: seen)
     metrics = error_ratios()
-    asked = tables.asked(tables.read("emulator"))
+    asked = tables.asked("emulator")
     assert {name for name in asked if name.split(".")[1] in families} <= metrics.keys()
     for family in families:
         for name in (f"emulator_error_ratio.{family}", f"emulator_error_ratio.{family}.p95"):

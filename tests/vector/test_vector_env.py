@@ -1,8 +1,6 @@
 """The vector environment: the single ones, many at once, by gymnasium's conventions."""
 
-import importlib.util
 from importlib.metadata import version
-from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -13,18 +11,7 @@ from gymnasium.wrappers.vector import DictInfoToList, NormalizeObservation, Reco
 
 import hrc_env  # noqa: F401  registers the ids
 from hrc_env.vector.env import HRCVectorEnv
-
-BENCHMARK = Path(__file__).parents[2] / "benchmarks" / "identity.py"
-
-
-def load_benchmark():
-    spec = importlib.util.spec_from_file_location("identity", BENCHMARK)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-identity = load_benchmark()
+from tests.vector import identity
 
 
 def make(num_envs: int = 3, **kwargs) -> HRCVectorEnv:
@@ -44,9 +31,17 @@ def same(a, b) -> bool:
 @pytest.mark.filterwarnings("ignore:num_threads")
 @pytest.mark.parametrize("mode", list(AutoresetMode))
 def test_it_is_the_single_environments_bit_for_bit_at_1_2_and_3_threads(mode):
-    """Also their infos' layout; `python benchmarks/identity.py` does it for 64 x 500 steps."""
+    """Also their infos' layout."""
     envs = identity.vectors(5, (1, 2, 3), mode, perception="keypoints", max_episode_steps=25)
     assert identity.compare(envs, 60, seed=3) == [0, 0, 0]
+
+
+@pytest.mark.long
+@pytest.mark.filterwarnings("ignore:num_threads")
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+def test_many_of_them_for_long_are_too(mode):
+    envs = identity.vectors(64, (1, 2, 3), mode, perception="keypoints")
+    assert identity.compare(envs, 500, seed=0) == [0, 0, 0]
 
 
 @pytest.mark.filterwarnings("ignore:num_threads")

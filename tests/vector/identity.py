@@ -1,4 +1,4 @@
-"""The batch against as many single environments, bit for bit: python benchmarks/identity.py
+"""The batch against as many single environments, bit for bit.
 
 Gymnasium's `SyncVectorEnv` of `gymnasium.make` environments and `HRCVectorEnv` with 1, 2 and 3
 threads take the same seeded actions; episodes end and begin inside, and now and then a few
@@ -7,39 +7,17 @@ terminations, truncations and infos are compared number by number, their types a
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import gymnasium
 import numpy as np
-import tyro
 from gymnasium.vector import AutoresetMode, VectorEnv
-from rich.console import Console
 
 import hrc_env  # noqa: F401  registers the ids
-from hrc_env.cli.progress import track
 from hrc_env.tasks import DEFAULT
 
 RESET_SHARE = 0.01
 """Chance that an environment is reset after a step."""
-
-
-@dataclass(frozen=True)
-class Arguments:
-    """Compare the batch with single environments."""
-
-    task: str = DEFAULT
-    """Which environment, by its id."""
-    num_envs: int = 64
-    """Environments."""
-    steps: int = 500
-    """Steps of each, for each mode."""
-    threads: tuple[int, ...] = (1, 2, 3)
-    """Numbers of threads of the batch."""
-    perception: tuple[str, ...] = ("keypoints", "truth", "none")
-    """Perception levels."""
-    seed: int = 0
-    """Of environments and actions."""
 
 
 def vectors(
@@ -63,7 +41,7 @@ def compare(envs: list[VectorEnv], n_steps: int, seed: int) -> list[int]:
     rng = np.random.default_rng(seed)
     said = [env.reset(seed=seed) for env in envs]
     counts = [differences(said[0], other) for other in said[1:]]
-    for _ in track(range(n_steps), description="comparing"):
+    for _ in range(n_steps):
         actions = rng.uniform(-1, 1, envs[0].action_space.shape).astype(np.float32)
         chosen = rng.random(envs[0].num_envs) < RESET_SHARE
         said = [step(env, actions, chosen) for env in envs]
@@ -99,23 +77,3 @@ def differences(a: Any, b: Any) -> int:
         return sum(differences(x, y) for x, y in zip(a, b, strict=True))
     same = a.view(np.uint8) == b.view(np.uint8)  # bits: -0.0 is not 0.0
     return int((~same.reshape(a.size, -1).all(1)).sum())
-
-
-def main(arguments: Arguments) -> None:
-    """Compare, print."""
-    n_envs, console = arguments.num_envs, Console()
-    for level in arguments.perception:
-        for mode in AutoresetMode:
-            envs = vectors(n_envs, arguments.threads, mode, arguments.task, perception=level)
-            counts = compare(envs, arguments.steps, arguments.seed)
-            for threads, count in zip(arguments.threads, counts, strict=True):
-                console.print(
-                    f"{level}, {mode.value}, {n_envs} environments, {arguments.steps} steps, "
-                    f"{threads} threads: {count} differences"
-                )
-            for env in envs:
-                env.close()
-
-
-if __name__ == "__main__":
-    main(tyro.cli(Arguments, description=__doc__))
