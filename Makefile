@@ -67,7 +67,6 @@ check: $(DEV)
 bench: $(DEV)
 	$(RUN) -m benchmarks speed
 	$(RUN) -m benchmarks perception
-	$(RUN) benchmarks/soak.py
 
 train-quick: $(TRAIN)
 	$(RUN) train.py
