@@ -97,6 +97,7 @@ def _filled_table(command: str, table: Table) -> dict[str, Any]:
         [*cells, *(_number_of(metrics.get(column.metric.format(row)), column)
                    for column in table.columns)]
         for row, cells in table.rows.items()
+        if any(column.metric.format(row) in metrics for column in table.columns)
     ]  # fmt: skip
     return {
         "title": table.title,

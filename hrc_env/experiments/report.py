@@ -65,12 +65,15 @@ class Table:
         return self.note.format(n=defaultdict(int, {k: each.n for k, each in metrics.items()}))
 
     def markdown(self, metrics: Metrics) -> str:
-        """Return the table with its title and note, without rows of which there is no number."""
+        """Return the table with its title and note, without rows of which there is no number; "" if
+        there are none."""
         lines = [
             (*cells, *(cell(each, metrics, row) for each in self.columns))
             for row, cells in self.rows.items()
             if any(each.metric.format(row) in metrics for each in self.columns)
         ]
+        if not lines:
+            return ""
         heads = (*self.heads, *(each.heading for each in self.columns))
         parts = (f"**{self.title}**", table(heads, lines), self.note_of(metrics))
         return "\n\n".join(filter(None, parts))

@@ -11,10 +11,10 @@ from hrc_env.core.errors import ConfigError, HRCError, check_names
 from hrc_env.core.results import Metric
 from hrc_env.experiments.cache import PartCache
 from hrc_env.experiments.impact.episodes import PEOPLE, Stage
-from hrc_env.experiments.impact.metrics import Table, metrics_of
+from hrc_env.experiments.impact.metrics import Played, metrics_of
 from hrc_env.experiments.impact.policies import POLICIES, PPO, SLOWED, Policy, maker, trained
-from hrc_env.experiments.impact.report import report
-from hrc_env.experiments.report import Metrics, Report
+from hrc_env.experiments.impact.report import LATENESS, report
+from hrc_env.experiments.report import Metrics, Report, Table
 from hrc_env.experiments.rigs import DT_S
 from hrc_env.experiments.runner import at_least_one, changed
 from hrc_env.experiments.setups import (
@@ -118,7 +118,7 @@ class Impact:
         """Return what all numbers depend on."""
         return {"people": PEOPLE, **asdict(self)}
 
-    def play(self, cache: PartCache) -> Table:
+    def play(self, cache: PartCache) -> Played:
         """Return every row; `HRCError` if workers walked otherwise in some."""
         table: dict[tuple[str, str], dict[str, list[Any]]] = {}
         checkpoint, ppo = cache.folder / "ppo.zip", ""
@@ -149,11 +149,15 @@ class Impact:
         check_walks(table)
         return table
 
-    def metrics(self, played: Table) -> dict[str, Metric]:
+    def metrics(self, played: Played) -> dict[str, Metric]:
         """Return every number."""
         return metrics_of(played, self.margins_m)
 
-    def report(self, played: Table, metrics: Metrics, figures: Path) -> Report:
+    def shown_tables(self) -> tuple[Table, ...]:
+        """Return the tables that the documentation shows as they are."""
+        return (LATENESS,)
+
+    def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
         """Draw the figure; return the tables beside it."""
         return report(figures, played, metrics, self.warning)
 

@@ -25,7 +25,7 @@ from hrc_env.experiments.report import Metrics
 from hrc_env.experiments.setups import LATE, REFERENCE, PerceptionSetup, setup_called
 
 Row = Mapping[str, list[Any]]
-Table = Mapping[tuple[str, str], Row]
+Played = Mapping[tuple[str, str], Row]
 """Rows by policy and setup."""
 NOMINAL_MPS = 1.6
 """A worker's approach where it is not measured (ISO 13855, as in Marvel and Norcross 2017,
@@ -55,7 +55,7 @@ COMPARED = (
 """What is compared with the reference, episode by episode; and Z_d."""
 
 
-def metrics_of(table: Table, margins_m: Sequence[float]) -> dict[str, Metric]:
+def metrics_of(table: Played, margins_m: Sequence[float]) -> dict[str, Metric]:
     """By `<policy>.<setup>.<what>`, `difference.<policy>.<setup>.<what>`, `p.` the same (see
     `intervals.paired`) and `lateness.<setup>.<how>`."""
     metrics: dict[str, Metric] = {}
@@ -131,7 +131,7 @@ def _tax(latency_s: float, z_d: Metric, v_r: Metric) -> Metric:
 
 
 def _lateness(
-    setup: PerceptionSetup, table: Table, metrics: Metrics, margins_m: Sequence[float]
+    setup: PerceptionSetup, table: Played, metrics: Metrics, margins_m: Sequence[float]
 ) -> dict[str, Metric]:
     """Extra metres of a late setup: predicted in three ways, measured in two."""
     key, reference = f"{SLOWED}.{setup.name}", f"{SLOWED}.{REFERENCE}"

@@ -25,10 +25,10 @@ from hrc_env.experiments.price.eyes import (
     usual_eyes,
 )
 from hrc_env.experiments.price.metrics import PER, Played, Row, metrics_of, supposed_m
-from hrc_env.experiments.price.report import report
+from hrc_env.experiments.price.report import WORTH, report
 from hrc_env.experiments.price.search import searched
 from hrc_env.experiments.price.shield import SHIELD
-from hrc_env.experiments.report import Metrics, Report
+from hrc_env.experiments.report import Metrics, Report, Table
 from hrc_env.experiments.runner import at_least_one, changed
 from hrc_env.experiments.versions import key_of, source_digest
 from hrc_env.tasks import BUILT_IN, DEFAULT
@@ -131,6 +131,10 @@ class Price:
     def metrics(self, played: Played) -> dict[str, Metric]:
         """Return every number."""
         return metrics_of(played.table, played.alone, played.pixels, self.level)
+
+    def shown_tables(self) -> tuple[Table, ...]:
+        """Return the tables that the documentation shows as they are."""
+        return (WORTH,)
 
     def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
         """Draw the figure; return the tables beside it."""

@@ -10,7 +10,7 @@ from hrc_env.experiments.columns import Column
 from hrc_env.experiments.plots import ends, label, new_figure, save
 from hrc_env.experiments.price.eyes import ELSEWHERE, FOUR, GROUPS, QUICK, Eyes, all_eyes
 from hrc_env.experiments.price.metrics import PER, Played, Row
-from hrc_env.experiments.report import Metrics, Report, picture, table_of
+from hrc_env.experiments.report import Metrics, Report, Table, picture, table_of
 
 COLUMNS = {
     "margin_m": ("margin [m]", 3, 1.0),
@@ -42,6 +42,15 @@ QUESTIONS = {
     "(triangulation less cameras turned by 1 degree)",
 }  # fmt: skip
 """What each of `CONTRASTS` is worth, in words."""
+WORTH = Table(
+    "worth",
+    "What it is worth",
+    {question: (words,) for question, words in QUESTIONS.items()},
+    (Column("worth.{}", "worth [%]", 1, 100.0, signed=True),),
+    ("what",),
+    "Throughput at that rate of contacts and under this shield, of an unshielded robot's, that is "
+    "lost without it; the same seeds. Intervals are not corrected for the number of rows.",
+)
 COLOURS = {
     "truth": "0.25", "estimator": "#2f6db3", "cameras": "#3a9a8f", "latency": "#d1793b",
     "calibration": "#b23a48", "covariance": "#8a6bb8", "fault": "#8c7a4f",
@@ -70,7 +79,8 @@ def report(figures: Path, config: Any, played: Played, metrics: Metrics) -> Repo
     parts = [
         picture(figures / "price.png", "Goals that are left at that rate of contacts, in per cent "
                 "of those of a robot without a shield; whiskers are 95 % intervals."),
-        _table(task, eyes, metrics), _open_ended(task, table[task], metrics), _worth(metrics),
+        _table(task, eyes, metrics), _open_ended(task, table[task], metrics),
+        WORTH.markdown(metrics),
     ]  # fmt: skip
     if config.others:
         parts.append("## Other tasks")
@@ -113,18 +123,6 @@ def _open_ended(task: str, rows: Mapping[str, Row], metrics: Metrics) -> str:
     return (
         f"The level lies beyond the margins that were tried for {', '.join(beyond)}: theirs is "
         "the last one tried, and their price a bound."
-    )
-
-
-def _worth(metrics: Metrics) -> str:
-    asked = {key: words for key, words in QUESTIONS.items() if f"worth.{key}" in metrics}
-    if not asked:
-        return ""
-    column = Column("worth.{}", "of unshielded throughput [%]", 1, 100.0, signed=True)
-    return (
-        "## What it is worth\n\nThroughput at that rate of contacts that is lost without it, on "
-        "the same seeds; a dot where the interval leaves out zero, which is not corrected for the "
-        "number of rows.\n\n" + table_of("", asked, [column], metrics)
     )
 
 
