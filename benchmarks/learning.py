@@ -15,7 +15,7 @@ class Training:
     """A run of `train`."""
 
     folder: Path
-    """Of its own, whose name says what it was learnt with."""
+    """The folder of this run alone, named after its options."""
     options: Mapping[str, Any]
     """Of the command, without `--`."""
 

@@ -1,9 +1,9 @@
 """Learning with a limit, or fast and then under a shield: python -m benchmarks.limited
 
-For each seed PPO-Lagrangian learns with a limit of cost, and PPO without any care. Of the first it
-is told when it reached its limit and how well it stayed there: the cost of its noisy actions, on
-the truth, over windows of 250,000 steps, which are 1,000 episodes. Both are judged on the same
-fixed seeds, the second also under a shield.
+For each seed PPO-Lagrangian learns with a limit of cost, and PPO without any care. Of the first
+the table shows when it reached its limit and how well it stayed there: the cost of its noisy
+actions, on the truth, over windows of 250,000 steps, which are 1,000 episodes. Both are judged on
+the same fixed seeds, the second also under a shield.
 """
 
 import json

@@ -86,8 +86,8 @@ def main(arguments: Arguments) -> int:
     for k, name in enumerate(todo):
         mine = COMMANDS[name].minutes
         all_left = sum(COMMANDS[each].minutes for each in todo[k:])
-        console.print(f"{k + 1} of {len(todo)}: {name}, about {spoken(mine)}; {spoken(all_left)} "
-                      "for all that is left", style="bold")  # fmt: skip
+        console.print(f"{k + 1} of {len(todo)}: {name}, about {spell_time(mine)}; "
+                      f"{spell_time(all_left)} for all that is left", style="bold")  # fmt: skip
         is_begun = time.monotonic() + (0 if COMMANDS[name].goes_on else 60 * mine) < until_s
         if is_begun and run(name, until_s):
             publish(name)
@@ -105,17 +105,19 @@ def plan(stale: Mapping[str, str]) -> Table:
     for name, why in stale.items():
         command, took = COMMANDS[name], whole(name).get("minutes")
         made = ", ".join((*command.tables, *command.pictures))
-        table.add_row(study_of[name], name, made, spoken(command.minutes),
-                      "" if took is None else spoken(took),
+        table.add_row(study_of[name], name, made, spell_time(command.minutes),
+                      "" if took is None else spell_time(took),
                       f"stale: {why}" if why else "fresh")  # fmt: skip
     minutes = sum(COMMANDS[name].minutes for name, why in stale.items() if why)
     all_minutes = sum(COMMANDS[name].minutes for name in stale)
-    table.caption = f"{spoken(minutes)} for what is stale, {spoken(all_minutes)} from nothing"
+    table.caption = (
+        f"{spell_time(minutes)} for what is stale, {spell_time(all_minutes)} from nothing"
+    )
     return table
 
 
-def spoken(minutes: float) -> str:
-    """As people say it."""
+def spell_time(minutes: float) -> str:
+    """Return a time in minutes, or in hours if it is long."""
     return f"{minutes:.0f} min" if minutes < 100 else f"{minutes / 60:.1f} h"
 
 

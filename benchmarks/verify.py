@@ -300,27 +300,27 @@ def found_share(n_parts: int, n_drawn: int) -> float | None:
 
 
 def describe(outcome: Outcome) -> list[str]:
-    """Return sentences about an outcome."""
-    said = []
+    """Return lines about an outcome."""
+    lines = []
     for name, labels in outcome.lacking.items():
-        said.append(f"{name}: {', '.join(labels)} not replayed, as this machine lacks something "
+        lines.append(f"{name}: {', '.join(labels)} not replayed, as this machine lacks something "
                     "(a policy that was learnt, a download, or what draws images).")  # fmt: skip
     for name, labels in outcome.too_long.items():
-        said.append(f"{name}: {', '.join(labels)} left out, as they take longer than --longest.")
+        lines.append(f"{name}: {', '.join(labels)} left out, as they take longer than --longest.")
     for name, spoiled in outcome.spoiled.items():
-        said.append(f"{name} is stale: {len(spoiled)} of its parts differ. "
+        lines.append(f"{name} is stale: {len(spoiled)} of its parts differ. "
                     "`python -m benchmarks.results` makes it again.")  # fmt: skip
     n_drawn = sum(map(len, outcome.drawn.values()))
     n_spoiled = sum(map(len, outcome.spoiled.values()))
-    said.append(f"{n_drawn} parts were drawn, and {n_spoiled} differ, in {outcome.seconds:.0f} s.")
+    lines.append(f"{n_drawn} parts were drawn, and {n_spoiled} differ, in {outcome.seconds:.0f} s.")
     if outcome.finds_share is not None and outcome.finds_scattered_share is not None:
-        said.append(
+        lines.append(
             "Such a draw finds a spoiled part with 95 % if at least "
             f"{100 * outcome.finds_share:.1f} % of the parts are spoiled, wherever they are; "
             f"{100 * outcome.finds_scattered_share:.1f} % suffice if they are scattered at random; "
             "and always if all parts of a row are."
         )
-    return said
+    return lines
 
 
 if __name__ == "__main__":

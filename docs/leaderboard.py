@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from docs.tables import RESULTS
 from hrc_env.experiments.leaderboard import CONDITIONS, MAIN, PER, SEED, VERSION, Entry, read_entry
-from hrc_env.experiments.report import said, table
+from hrc_env.experiments.report import format_metric, table
 from hrc_env.tasks import BUILT_IN
 
 HEAD = f"""\
@@ -53,7 +53,8 @@ def _section(task: str, everybody: Mapping[str, Entry]) -> str:
     rows = [
         (name if k == 0 else "", CONDITIONS[MAIN[k]].shield or "none",
          str(scores[f"{key}.goals_per_minute"].n),
-         *(said(scores[f"{key}.{what}"], digits=2 if what == "success" else 1) for what in PER))
+         *(format_metric(scores[f"{key}.{what}"], digits=2 if what == "success" else 1)
+           for what in PER))
         for name, scores in here for k, key in enumerate(keys)
     ]  # fmt: skip
     return f"## {task}\n\n{table(('policy', 'shield', 'episodes', *PER.values()), rows)}\n"

@@ -3,7 +3,7 @@
 from benchmarks.motion.targets import ANY, Target, targets_of
 from hrc_env.core.results import Metric
 from hrc_env.experiments.columns import Column
-from hrc_env.experiments.report import Metrics, Report, said, table, table_of
+from hrc_env.experiments.report import Metrics, Report, format_metric, table, table_of
 
 COLUMNS = (
     Column("{}.seconds", "s"),
@@ -48,6 +48,6 @@ def _targets(scenes: list[str], metrics: Metrics) -> str:
             if target.scene != ANY or not inside(target, metric):
                 verdict = "" if inside(target, metric) else "**outside**"
                 band = f"{target.low:.3g}-{target.high:.3g}"
-                measured = said(metric, 1, 3)
+                measured = format_metric(metric, 1, 3)
                 lines.append([scene, target.statistic, measured, band, verdict, target.source])
     return table(["scene", "statistic", "measured", "target", "", "source"], lines)

@@ -101,7 +101,7 @@ def _of_estimator(
 
 
 def report(metrics: Metrics) -> Report:
-    """The table, a row an estimator, and what it says."""
+    """Return the table, a row for each estimator."""
     rows = {name: name for name in NAMES}
     parts = [table_of("", rows, COLUMNS, metrics)]
     spread = "95 % intervals over blocks of frames, those of bones and jerk with least and largest"

@@ -94,8 +94,8 @@ def make_study(
     Args:
         policy: as `hrc_env.agents.registry.make_agent` takes it.
         ids: which environments; a learnt policy is for one.
-        control: what its actions are; None: as the policy's file says, or else velocities of the
-            joints.
+        control: what its actions are; None: those of the policy's file, or else velocities of
+            the joints.
         n_seeds: episodes of every row.
 
     Raises:

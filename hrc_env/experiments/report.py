@@ -116,7 +116,7 @@ def picture(path: Path, caption: str) -> str:
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Words and numbers in rows; the first column says what the row is."""
+    """Return a table in Markdown, whose first column names the rows."""
     lines = [header, ("---", *("---:" for _ in header[1:])), *rows]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
@@ -142,11 +142,11 @@ def cell(column: Column, metrics: Metrics, row: str) -> str:
         metric = replace(metric, low=metric.value, high=metric.value)
     is_told_apart = column.signed and (metric.low > 0 or metric.high < 0)
     dot = " ●" if column.marked and is_told_apart else ""
-    return said(metric, column.scale, column.digits, column.signed) + dot
+    return format_metric(metric, column.scale, column.digits, column.signed) + dot
 
 
-def said(metric: Metric, scale: float = 1.0, digits: int = 1, signed: bool = False) -> str:
-    """A number with its interval, as tables show it."""
+def format_metric(metric: Metric, scale: float = 1.0, digits: int = 1, signed: bool = False) -> str:
+    """Return a number with its interval, as tables show it; a dash where it is not known."""
     if metric.value != metric.value:
         return "-"
     three = [scale * each for each in (metric.value, metric.low, metric.high)]

@@ -81,7 +81,7 @@ def run(
         experiment: what is played and counted.
         out: folder of the results, and of parts: those that an earlier run with the same settings
             and versions finished there are not played again.
-        progress: is told by how much the share that is done grew, and what is being done.
+        progress: called with the growth of the share that is done, and its part.
         overwrite: delete the results of something else in the folder.
 
     Returns:

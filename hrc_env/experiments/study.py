@@ -11,7 +11,7 @@
     )
     run(SHIELD, Path("out/shielded"))
 
-Everything that can be known to be wrong is said when a study is declared: an unknown agent,
+A declaration that cannot work raises a `ConfigError` at once: an unknown agent,
 estimator, shield, environment or argument; a baseline that is no row; a column of no statistic.
 """
 
@@ -46,7 +46,7 @@ Played = Mapping[str, list[dict[str, float]]]
 FOUR = PerceptionSetup()
 """Four cameras, on time, by the emulator."""
 GIVEN_BY_SETUP = ("perception", "estimator")
-"""Arguments of the environment that `Row.setup` says."""
+"""Arguments of the environment that come from `Row.setup`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +108,7 @@ class Row:
         """Raise `ConfigError` for what cannot be played."""
         for name in GIVEN_BY_SETUP:
             if name in self.env:
-                raise ConfigError(f"env must leave out {name}, which the row's setup says.")
+                raise ConfigError(f"env must leave out {name}, which comes from the row's setup.")
         if self.n_episodes < 1 or self.n_together < 1:
             raise ConfigError(
                 "n_episodes and n_together must be at least 1, got "
@@ -136,7 +136,7 @@ class Study:
     """Of the episodes of every row; the others count up."""
     rows: Mapping[str, Row]
     """By name, in the order in which they are played and shown; those of policies that have not
-    learnt yet may be left out, where `tables` says what is shown."""
+    learnt yet may be left out, where `tables` are given."""
     columns: tuple[Column, ...]
     heads: tuple[str, ...] = ("",)
     """Headings of the rows' words."""
@@ -286,7 +286,7 @@ def play_shard(
         first_seed: of the first episode.
         n_episodes: how many.
         threads: that environments share; None: as many as there are cores.
-        tick: is told by how much the share that is done grew.
+        tick: called with the growth of the share that is done.
     """
     make, found = _agent_maker(row.agent), list[dict[str, float]]()
     turns = row.keywords()

@@ -159,8 +159,8 @@ def test_one_rate_less_another_has_a_width_also_where_both_are_zero():
 @pytest.mark.parametrize("exposure", [1.0, 0.64])
 def test_a_zero_of_a_count_is_shown_with_its_bound(exposure):
     zero = intervals.rate_of([0] * 64, exposure, "1/h")
-    assert report.said(zero) == f"0.0 (0.0-{3.6889 / exposure:.1f})"
-    assert not report.said(intervals.excess_of(zero, zero), signed=True).endswith("+0.0")
+    assert report.format_metric(zero) == f"0.0 (0.0-{3.6889 / exposure:.1f})"
+    assert not report.format_metric(intervals.excess_of(zero, zero), signed=True).endswith("+0.0")
 
 
 def test_an_interval_without_a_visible_width_is_not_shown():
