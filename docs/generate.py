@@ -3,9 +3,10 @@
 The reference (`docs/reference/`) comes from the code, tables of measurements in README.md and
 `docs/*.md` from `docs/results/*.json`. After a run of a benchmark
 
-    python -m docs.generate --renew baselines out/baselines/results.json
+    python -m docs.generate --renew site out/site/results.json
 
-puts its numbers into the table of that name first.
+puts its numbers into the table of that name first. Tables that experiments declare have no file;
+their numbers are those of `docs/results/whole/`.
 """
 
 import sys
@@ -41,8 +42,11 @@ def main(words: Sequence[str]) -> None:
         option, name, path = words
         if option != "--renew":
             sys.exit(__doc__)
-        table = tables.renewed(tables.read(name), Path(path))
-        (tables.RESULTS / f"{name}.json").write_text(tables.written(table))
+        file = tables.RESULTS / f"{name}.json"
+        if not file.exists():
+            sys.exit(f"There is no docs/results/{name}.json to renew: it is unknown, or its "
+                     "experiment declares it, and `make results` renews it.")  # fmt: skip
+        file.write_text(tables.written(tables.renewed(tables.read(name), Path(path))))
     for path in PAGES:
         _write(path, tables.filled(path.read_text()))
     for path, page in REFERENCE.items():

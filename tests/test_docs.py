@@ -127,6 +127,8 @@ def test_a_table_that_an_experiment_declares_has_the_numbers_of_its_last_run():
     assert "four.share" in tables.asked("shielded")
     with pytest.raises(KeyError, match="no experiment declares 'shields'"):
         tables.read("shields")
+    with pytest.raises(SystemExit, match=r"no docs/results/shielded.json to renew"):
+        generate.main(["--renew", "shielded", "out/shielded/results.json"])
 
 
 def test_cells_are_intervals_counts_and_pairs():

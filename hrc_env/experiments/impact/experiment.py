@@ -40,9 +40,7 @@ class Impact:
     """The experiment, and how much is played."""
 
     name = "impact"
-    depends = (
-        "env", "tracker", "emulator", "detector", "motion", "shield", "agents",
-    )  # fmt: skip
+    depends = ("env", "tracker", "emulator", "detector", "motion", "shield", "agents")
     task: str = DEFAULT
     """What the robots do."""
     shield: str | None = None

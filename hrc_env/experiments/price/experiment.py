@@ -47,9 +47,7 @@ class Price:
     as much time."""
 
     name = "price"
-    depends = (
-        "env", "tracker", "emulator", "detector", "motion", "shield", "agents",
-    )  # fmt: skip
+    depends = ("env", "tracker", "emulator", "detector", "motion", "shield", "agents")
     task: str = DEFAULT
     """What the robot does."""
     others: tuple[str, ...] = ()
