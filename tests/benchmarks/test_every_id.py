@@ -1,14 +1,17 @@
 """Benches and experiments take every id."""
 
+from contextlib import closing
+
 import pytest
 
 from benchmarks.speed.bench import SpeedBench
 from benchmarks.speed.contenders import Starts
 from hrc_env.core.errors import ConfigError
-from hrc_env.experiments.impact.episodes import Stage
+from hrc_env.experiments.impact.episodes import play
 from hrc_env.experiments.impact.experiment import Impact, make_experiment
 from hrc_env.experiments.impact.policies import Policy, maker
 from hrc_env.experiments.setups import REFERENCE, setup_called
+from hrc_env.experiments.stage import Stage
 from hrc_env.tasks.task import find_task
 
 pytestmark = pytest.mark.slow  # studies are played
@@ -18,9 +21,9 @@ IDS = ("HRCPickPlace-v0", "HRCReachGoal-v0")
 
 @pytest.mark.parametrize("task", IDS)
 def test_impact_plays_it(task, tmp_path):
-    stage = Stage(setup_called(REFERENCE), [5, 6], 8, task)
-    rows = stage.play(maker(Policy("scripted_slowed"), tmp_path / "none"), 0.0, lambda share: None)
-    stage.close()
+    setup, make = setup_called(REFERENCE), maker(Policy("scripted_slowed"), tmp_path / "none")
+    with closing(Stage(setup, setup.turns, {"task": task})) as stage:
+        rows = play(stage, [5, 6], 8, make, 0.0, lambda share: None)
     assert [len(values) for values in rows.values()] == [2] * len(rows)
     assert rows["goals"] == [0.0, 0.0]
 

@@ -14,7 +14,7 @@ from hrc_env.evaluation.counts import GAPS_M, Bins
 from hrc_env.evaluation.intervals import counted_quantile_over
 from hrc_env.experiments.cache import PartCache
 from hrc_env.experiments.impact import policies
-from hrc_env.experiments.impact.episodes import STEP, Stage, sums_of
+from hrc_env.experiments.impact.episodes import STEP, play, sums_of
 from hrc_env.experiments.impact.experiment import Impact, check_walks, make_experiment
 from hrc_env.experiments.impact.metrics import COMPARED, margin_needed, metrics_of
 from hrc_env.experiments.impact.policies import Policy, maker, trained
@@ -26,6 +26,7 @@ from hrc_env.experiments.setups import (
     all_setups,
     setup_called,
 )
+from hrc_env.experiments.stage import Stage
 from hrc_env.safety.incidents import KINDS
 
 LATE = PerceptionSetup(latency_s=0.12).name
@@ -203,9 +204,10 @@ def test_workers_who_walk_otherwise_are_noticed():
 
 
 def test_an_environment_that_is_used_again_starts_afresh():
-    stage = Stage(setup_called(LATE), [5, 6], 10)
+    setup = setup_called(LATE)
+    stage = Stage(setup, setup.turns, {})
     make = maker(Policy("scripted_slowed"), None)
-    first, again = (stage.play(make, 0.0, lambda share: None) for _ in range(2))
+    first, again = (play(stage, [5, 6], 10, make, 0.0, lambda share: None) for _ in range(2))
     stage.close()
     assert first == again
 

@@ -13,7 +13,7 @@ from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats
 from hrc_env.experiments.cache import PartCache
 from hrc_env.experiments.price import experiment
-from hrc_env.experiments.price.episodes import STEP, Stage, sums_of
+from hrc_env.experiments.price.episodes import STEP, Watched, sums_of
 from hrc_env.experiments.price.experiment import (
     Price,
     check_walks,
@@ -186,14 +186,14 @@ def test_what_the_command_asks_for():
 
 
 def test_a_wider_shield_intervenes_more_and_covariances_are_told():
-    stage = Stage(replace(all_eyes()["truth"]), "HRCReach-v0", 60)
+    stage = Watched(replace(all_eyes()["truth"]), "HRCReach-v0", 60)
     seeds = [3_000_000 + k for k in range(8)]
     narrow, wide, again = (stage.play(seeds, m, lambda share: None) for m in (-2.0, 1.0, -2.0))
     stage.close()
     assert narrow == again
     assert sum(wide["achieved"]) < sum(narrow["achieved"])
     assert narrow["walk"] == wide["walk"]
-    alone = Stage(all_eyes()["truth"], "HRCReach-v0", 60, is_shielded=False)
+    alone = Watched(all_eyes()["truth"], "HRCReach-v0", 60, is_shielded=False)
     assert alone.play(seeds, 0.0, lambda share: None) == narrow
     alone.close()
 
@@ -288,7 +288,7 @@ def test_a_search_goes_on_where_fresh_seeds_say_so(tmp_path, monkeypatch):
         one = {"minutes": 1.0, "achieved": 1.0, "towards": touched, "walk": 0}
         return {name: [value] * len(seeds) for name, value in one.items()}
 
-    monkeypatch.setattr(Stage, "play", play)
+    monkeypatch.setattr(Watched, "play", play)
     cache = PartCache(tmp_path, "", 1, silent)
     row = experiment.search_margin(TINY, cache, "HRCReach-v0", all_eyes()["truth"])
     assert sorted(row.searched) == pytest.approx([-0.8, -0.4, 0.0, 0.4, 0.45, 0.55, 0.75])

@@ -5,44 +5,32 @@ Distances are between true capsules, as in the cost; directed speeds and contact
 """
 
 import hashlib
-import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
-from gymnasium.utils import seeding
 from numpy.typing import NDArray
 
-from hrc_env.config import settle
-from hrc_env.control import checked_action
 from hrc_env.core.infos import Info
-from hrc_env.core.machine import n_cores
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Bools, Floats, Ints
+from hrc_env.core.typing import Ints
 from hrc_env.evaluation.counts import ERRORS_M, GAPS_M, SPEEDS_MPS
 from hrc_env.evaluation.rollout import rollout
 from hrc_env.experiments.cache import PartProgress
-from hrc_env.experiments.rigs import Turn
-from hrc_env.experiments.setups import PerceptionSetup
+from hrc_env.experiments.stage import Endless, Rows, Stage
 from hrc_env.geometry import chains
 from hrc_env.geometry.distances import least_separation
 from hrc_env.motion import generator
 from hrc_env.safety.incidents import KINDS, MOVING_M_S
 from hrc_env.simulation import Simulation
-from hrc_env.step_result import Observation
-from hrc_env.tasks import DEFAULT
 from hrc_env.vector.shards import Shards
 from hrc_env.worker.body import worker_truth
 
-PEOPLE = "unaware"
-"""Workers who take no notice of the robot: their walk is then the same whatever it does."""
 STOP_M, SLOW_M = 0.10, 0.60
 """Separations that call for standing still and for slowing down [m]: `agents.scripted.Yielding`."""
 MakeAgent = Callable[[Simulation], Any]
 """The agent for a simulation's robot (`agents.env_info.Agent`)."""
-Rows = dict[str, list[Any]]
-"""Sums by name, one an episode."""
 STEP = np.dtype([
     ("true_separation_m", float), ("believed_separation_m", float),
     ("robot_mps", float), ("worker_mps", float),
@@ -53,82 +41,30 @@ where it knows of nobody), speeds towards the other, errors of the estimated joi
 Steps = NDArray[np.void]
 
 
-class Stage:
-    """The environments of one setup, built when they are needed, used by every policy: an episode
-    a seed, of which the k-th has turn k modulo the number of turns."""
+def play(
+    stage: Stage,
+    seeds: Sequence[int],
+    n_steps: int,
+    make_agent: MakeAgent,
+    margin_m: float,
+    tick: PartProgress,
+) -> Rows:
+    """Return sums of every episode of a policy, in the order of the seeds.
 
-    def __init__(
-        self,
-        setup: PerceptionSetup,
-        seeds: Sequence[int],
-        n_steps: int,
-        task: str = DEFAULT,
-        shield: str | None = None,
-    ) -> None:
-        self.setup, self.seeds, self.n_steps = setup, seeds, n_steps
-        self.made_with = {"task": task, "shield": shield}
-        self._envs: list[Shards] = []
+    Args:
+        stage: the environments.
+        seeds: one an episode.
+        n_steps: control steps of each.
+        make_agent: makes the policy, which gets observations only.
+        margin_m: what it adds to the distances that it keeps [m].
+        tick: called with the growth of the share that is done.
+    """
 
-    def play(self, make_agent: MakeAgent, margin_m: float, tick: PartProgress) -> Rows:
-        """Sums of every episode, in the order of the seeds; the policy, which gets observations
-        only, adds `margin_m` to the distances that it keeps."""
-        rows, n = Rows(), len(self.seeds)
-        turns = self.setup.turns[:n]
-        in_turns = [slice(k, None, len(turns)) for k in range(len(turns))]
-        self._envs = self._envs or [
-            build(self.setup, turn, len(self.seeds[mine]), self.made_with)
-            for turn, mine in zip(turns, in_turns, strict=True)
-        ]
-        for env, mine in zip(self._envs, in_turns, strict=True):
-            seeds = self.seeds[mine]
-            stepped = partial(tick, len(seeds) / n / self.n_steps)
-            steps, infos = run(env, make_agent, seeds, self.n_steps, stepped)
-            sums = sums_of(
-                steps, infos, margin_m, env.first.config.ctrl_dt, env.first.task.achieved
-            )
-            for name, values in sums.items():
-                rows.setdefault(name, [None] * n)[mine] = values
-        return rows
+    def play_block(env: Shards, seeds: list[int], tick: PartProgress) -> Rows:
+        steps, infos = run(env, make_agent, seeds, n_steps, partial(tick, 1 / n_steps))
+        return sums_of(steps, infos, margin_m, env.first.config.ctrl_dt, env.first.task.achieved)
 
-    def close(self) -> None:
-        """Release threads and graphics contexts."""
-        for env in self._envs:
-            env.close()
-
-
-def build(
-    setup: PerceptionSetup, turn: Turn, n_episodes: int, made_with: Mapping[str, Any]
-) -> Shards:
-    """Environments with such a setup, through these cameras, with these other arguments."""
-    settings = settle(
-        perception=setup.level, estimator=setup.estimator, people=PEOPLE,
-        faults=list(turn.faults), cameras=list(turn.cameras), **made_with,
-    )  # fmt: skip
-    threads = 1 if setup.level == "pixels" else min(n_cores(), n_episodes)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # that one camera is a poor rig is what we ask about
-        return Shards(n_episodes, threads, partial(Simulation, settings=settings))
-
-
-class Endless:
-    """Environments whose episodes go on after their end, for studies of a fixed length."""
-
-    def __init__(self, env: Shards) -> None:
-        self.env = env
-        self.terminated: Bools = np.zeros(env.bounds[-1], np.bool_)
-        """(B,) whether an episode ended with the last step."""
-
-    def reset(self, seeds: Sequence[int]) -> Observation:
-        """Begin an episode of every seed; return the observation."""
-        rngs = [seeding.np_random(seed)[0] for seed in seeds]
-        return self.env.reset(np.arange(len(seeds)), rngs).observation
-
-    def step(self, action: Any) -> tuple[Observation, Floats, Bools, Bools, Info]:
-        """Step every environment; no episode is over."""
-        shape = len(self.terminated), self.env.first.n_actions
-        result = self.env.step(checked_action(action, shape))
-        self.terminated, never = result.terminated, np.zeros_like(result.terminated)
-        return result.observation, result.reward, never, never, result.info
+    return stage.play(seeds, play_block, tick)
 
 
 def run(

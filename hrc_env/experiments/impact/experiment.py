@@ -10,7 +10,7 @@ from typing import Any
 from hrc_env.core.errors import ConfigError, HRCError, check_names
 from hrc_env.core.results import Metric
 from hrc_env.experiments.cache import PartCache
-from hrc_env.experiments.impact.episodes import PEOPLE, Stage
+from hrc_env.experiments.impact.episodes import play
 from hrc_env.experiments.impact.metrics import Played, metrics_of
 from hrc_env.experiments.impact.policies import POLICIES, PPO, SLOWED, Policy, maker, trained
 from hrc_env.experiments.impact.report import LATENESS, report
@@ -25,6 +25,7 @@ from hrc_env.experiments.setups import (
     setup_called,
     usual_setups,
 )
+from hrc_env.experiments.stage import PEOPLE, Stage
 from hrc_env.experiments.versions import key_of, source_digest
 from hrc_env.safety.shield import shield_called
 from hrc_env.tasks import DEFAULT
@@ -135,13 +136,20 @@ class Impact:
                 "setup": asdict(setup),
                 "estimator": source_digest(estimator_called(setup.estimator).make),
             }
-            stage = Stage(setup, made_of["seeds"], self.n_steps, self.task, self.shield)
-            with closing(stage):
+            made_with = {"task": self.task, "shield": self.shield}
+            with closing(Stage(setup, setup.turns, made_with)) as stage:
                 for policy in policies:
                     who = {"policy": asdict(policy), "ppo": ppo if policy.name == PPO else ""}
                     table[policy.label, setup.name] = cache.part(
                         f"{policy.label}.{setup.name}",
-                        partial(stage.play, maker(policy, checkpoint), policy.margin_m),
+                        partial(
+                            play,
+                            stage,
+                            made_of["seeds"],
+                            self.n_steps,
+                            maker(policy, checkpoint),
+                            policy.margin_m,
+                        ),
                         key_of(made_of | who, self.depends),
                     )
         check_walks(table)

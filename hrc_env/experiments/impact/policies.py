@@ -13,7 +13,8 @@ from hrc_env.agents.registry import make_agent
 from hrc_env.agents.scripted import Yielding
 from hrc_env.core.machine import n_cores
 from hrc_env.experiments.cache import PartCache, PartProgress
-from hrc_env.experiments.impact.episodes import PEOPLE, SLOW_M, STOP_M, MakeAgent
+from hrc_env.experiments.impact.episodes import SLOW_M, STOP_M, MakeAgent
+from hrc_env.experiments.stage import PEOPLE
 from hrc_env.simulation import Simulation
 from hrc_env.tasks import DEFAULT
 

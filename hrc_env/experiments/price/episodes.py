@@ -17,18 +17,15 @@ from hrc_env.agents.registry import make_agent
 from hrc_env.core.typing import Points3
 from hrc_env.evaluation.rollout import rollout
 from hrc_env.experiments.cache import PartProgress
-from hrc_env.experiments.impact.episodes import Endless, MakeAgent, Rows, build
 from hrc_env.experiments.price.eyes import Eyes
 from hrc_env.experiments.price.shield import Widened
-from hrc_env.experiments.rigs import Turn
+from hrc_env.experiments.stage import Endless, Rows, Stage
 from hrc_env.motion import generator
 from hrc_env.simulation import Simulation
 from hrc_env.tasks.task import find_task
 from hrc_env.vector.shards import Shards
 from hrc_env.worker.body import worker_truth
 
-TOGETHER = 300
-"""So many episodes are played side by side."""
 CONTACTS = {
     "towards": "safety/contacts_towards", "standing": "safety/contacts_standing",
     "away": "safety/contacts_fleeing",
@@ -40,42 +37,23 @@ STEP = np.dtype([
 """What the episode has come to after a step, the step's cost, and whether that was the end."""
 
 
-class Stage:
+class Watched:
     """A task's episodes with one pair of eyes."""
 
     def __init__(self, eyes: Eyes, task: str, n_steps: int, is_shielded: bool = True) -> None:
         self.eyes, self.task, self.n_steps = eyes, task, n_steps
         self.is_shielded, self._shield = is_shielded, Widened(eyes.covariance)
-        self._envs: dict[tuple[int, int], Shards] = {}
+        made_with = {"task": task, "shield": self._shield if is_shielded else None}
+        self._stage = Stage(eyes.setup, eyes.turns(find_task(task).scene), made_with)
 
     def play(self, seeds: Sequence[int], margin_m: float, tick: PartProgress) -> Rows:
-        """Sums of every episode, in the order of the seeds, of which the k-th has turn k modulo
-        their number; the shield keeps `margin_m` more than it does by itself."""
+        """Return sums of every episode; the shield keeps `margin_m` more than by itself."""
         self._shield.margin_m = margin_m
-        rows, turns = Rows(), self.eyes.turns(find_task(self.task).scene)
-        for k, turn in enumerate(turns[: len(seeds)]):
-            mine = np.arange(k, len(seeds), len(turns))
-            for ids in np.array_split(mine, -(-len(mine) // TOGETHER)):
-                env = self._env(k, turn, len(ids))
-                stepped = partial(tick, len(ids) / len(seeds) / self.n_steps)
-                played = run(env, scripted, [seeds[i] for i in ids], self.n_steps, stepped)
-                for name, values in played.items():
-                    row = rows.setdefault(name, [None] * len(seeds))
-                    for i, value in zip(ids.tolist(), values, strict=True):
-                        row[i] = value
-        return rows
+        return self._stage.play(seeds, partial(run, n_steps=self.n_steps), tick)
 
     def close(self) -> None:
         """Release threads and graphics contexts."""
-        for env in self._envs.values():
-            env.close()
-
-    def _env(self, k: int, turn: Turn, batch: int) -> Shards:
-        if (k, batch) not in self._envs:
-            shield = self._shield if self.is_shielded else None
-            made_with = {"task": self.task, "shield": shield}
-            self._envs[k, batch] = build(self.eyes.setup, turn, batch, made_with)
-        return self._envs[k, batch]
+        self._stage.close()
 
 
 def scripted(part: Simulation) -> Any:
@@ -83,11 +61,9 @@ def scripted(part: Simulation) -> Any:
     return make_agent("scripted", env_info(part))
 
 
-def run(
-    env: Shards, make_agent: MakeAgent, seeds: Sequence[int], n_steps: int, stepped: Any
-) -> Rows:
-    """One episode of every seed, side by side."""
-    agent, endless, task = make_agent(env.first), Endless(env), env.first.task
+def run(env: Shards, seeds: Sequence[int], tick: PartProgress, n_steps: int) -> Rows:
+    """Return what one episode of every seed came to, played side by side."""
+    agent, endless, task = scripted(env.first), Endless(env), env.first.task
     steps, walks = np.zeros((n_steps, len(seeds)), STEP), [0] * len(seeds)
     so_far = {**CONTACTS, "achieved": task.achieved}
     played = rollout(endless, agent, endless.reset(seeds), n_steps)
@@ -97,7 +73,7 @@ def run(
         step["cost"], step["over"] = made.info["cost"], endless.terminated
         joints = np.concatenate(list(map(true_joints, env.parts)))
         walks = [zlib.crc32(of_one, walk) for of_one, walk in zip(joints, walks, strict=True)]
-        stepped()
+        tick(1 / n_steps)
     return {**sums_of(steps, env.first.config.ctrl_dt), "walk": walks}
 
 

@@ -13,8 +13,7 @@ from hrc_env.agents.experts import EXPERTS
 from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.core.results import Metric
 from hrc_env.experiments.cache import PartCache
-from hrc_env.experiments.impact.episodes import PEOPLE, Rows
-from hrc_env.experiments.price.episodes import Stage
+from hrc_env.experiments.price.episodes import Watched
 from hrc_env.experiments.price.eyes import (
     ELSEWHERE,
     FOUR,
@@ -30,6 +29,7 @@ from hrc_env.experiments.price.search import searched
 from hrc_env.experiments.price.shield import SHIELD
 from hrc_env.experiments.report import Metrics, Report, Table
 from hrc_env.experiments.runner import at_least_one, changed
+from hrc_env.experiments.stage import PEOPLE, Rows
 from hrc_env.experiments.versions import key_of, source_digest
 from hrc_env.tasks import BUILT_IN, DEFAULT
 from hrc_env.tasks.task import Task, find_task
@@ -171,7 +171,7 @@ def make_experiment(
 def search_margin(config: Price, cache: PartCache, task: str, eyes: Eyes) -> Row:
     """Search the margin of one pair of eyes, play on with it."""
     tried: dict[float, Rows] = {}
-    with closing(Stage(eyes, task, config.steps_of(task))) as stage:
+    with closing(Watched(eyes, task, config.steps_of(task))) as stage:
         part = partial(_part, config, cache, stage)
 
         def rate(margin_m: float) -> float:
@@ -197,7 +197,7 @@ def search_margin(config: Price, cache: PartCache, task: str, eyes: Eyes) -> Row
 def _unshielded(config: Price, cache: PartCache, task: str) -> Rows:
     (eyes,) = eyes_called([TRUTH])
     seeds = config.seeds_of(task, config.n_fresh, FIRST_FRESH)
-    with closing(Stage(eyes, task, config.steps_of(task), is_shielded=False)) as stage:
+    with closing(Watched(eyes, task, config.steps_of(task), is_shielded=False)) as stage:
         return _part(config, cache, stage, seeds, 0.0)
 
 
@@ -209,7 +209,7 @@ def _pixels(config: Price, cache: PartCache, table: Any) -> dict[str, Rows]:
     (eyes,) = eyes_called([FOUR])
     for level in ("keypoints", "pixels"):
         of_level = _at_level(eyes, level)
-        with closing(Stage(of_level, config.task, config.steps_of(config.task))) as stage:
+        with closing(Watched(of_level, config.task, config.steps_of(config.task))) as stage:
             seeds = [FIRST_PIXELS + k for k in range(config.n_pixels)]
             found[level] = _part(config, cache, stage, seeds, margin_m)
     return found
@@ -221,7 +221,9 @@ def _at_level(eyes: Eyes, level: str) -> Eyes:
     return changed(eyes, name=f"{FOUR}_{level}", setup=setup)
 
 
-def _part(config: Price, cache: PartCache, stage: Stage, seeds: list[int], margin_m: float) -> Rows:
+def _part(
+    config: Price, cache: PartCache, stage: Watched, seeds: list[int], margin_m: float
+) -> Rows:
     """Episodes with one margin, from the cache or anew."""
     eyes = stage.eyes
     sight = {name: each for name, each in asdict(eyes).items() if name not in ("words", "group")}
@@ -259,7 +261,7 @@ def replay(config: Price, cache: PartCache, margins_m: Mapping[str, float]) -> N
         if level is not None:
             eyes = _at_level(eyes, level)
         is_shielded = kept != "unshielded"
-        with closing(Stage(eyes, task, config.steps_of(task), is_shielded=is_shielded)) as stage:
+        with closing(Watched(eyes, task, config.steps_of(task), is_shielded=is_shielded)) as stage:
             _part(config, cache, stage, seeds, margin_m)
 
 

@@ -12,11 +12,11 @@ import numpy as np
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats
 from hrc_env.evaluation.intervals import crossing, goals_over, rate_of, ratio_over
-from hrc_env.experiments.impact.episodes import Rows
 from hrc_env.experiments.price.episodes import CONTACTS
 from hrc_env.experiments.price.eyes import ELSEWHERE, FOUR, ONE, TRUTH
 from hrc_env.experiments.price.search import Tried, draws, falling
 from hrc_env.experiments.report import Metrics
+from hrc_env.experiments.stage import Rows
 
 N_DRAWS = 1000
 EPISODE_MIN = 10.0 / 60.0
