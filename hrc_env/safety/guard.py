@@ -16,6 +16,7 @@ other parts of theirs, nor how near other links come of themselves but for `stil
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,7 +24,7 @@ import numpy as np
 from hrc_env.belief import Belief
 from hrc_env.core.errors import needed
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Floats, Ints, JointVelocities
+from hrc_env.core.typing import Bools, Floats, Ints, JointVelocities, Transforms
 from hrc_env.core.vacancy import WALKING_M_S
 from hrc_env.geometry import chains
 from hrc_env.geometry.chains import lever
@@ -33,12 +34,23 @@ from hrc_env.safety.config import ShieldConfig
 from hrc_env.safety.contact import SEGMENT_REGIONS, permitted_contact_speed
 from hrc_env.safety.rows import ABSENT_M, MOST_ROWS, floor_rows, tightest_rows
 from hrc_env.safety.solver import exceeded, solve
-from hrc_env.safety.unseen import HAND_M, limit_m_s, unseen
+from hrc_env.safety.unseen import HAND_M, find_undetected
 
 NO_NEARER, AWAY = 1e4, 30.0
 """Weights of a row's excess [m/s], against changes of joint velocities [rad/s]."""
 HOLDS_M_S = 1e-6
 """A row that is exceeded by less holds."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Arm:
+    """How the robots stand that a shield commands."""
+
+    model: RobotModel
+    frames: Transforms
+    """(B, N, 4, 4) world_from_link of every joint's link."""
+    links: Ints
+    """(K,) the link of every capsule."""
 
 
 class Constraints(NamedTuple):
@@ -70,26 +82,37 @@ def guarded(
     Raises:
         ConfigError: the belief has no `RobotModel` or no command in force.
     """
-    model = _model(now)
-    robot = chains.forward(model.chain, now.robot.q), model.chain.slides, _links(model, now)
-    found = constraints(now, wanted, dt_s, config)
+    arm, undetected = describe_arm(now), find_undetected(now, config)
+    found = constraints(now, arm, undetected.lost, wanted, dt_s, config)
     allowed, slack = np.empty_like(wanted), np.empty(len(wanted))
     choose = _scaled if config.kind == "ssm" else _nearest
     choose(tuple(found), wanted, allowed)
-    _capped((*robot, now.robot.capsules_world), limit_m_s(now, config), allowed)
+    moving = arm.frames, arm.model.chain.slides, arm.links, now.robot.capsules_world
+    _capped(moving, undetected.limit_m_s, allowed)
     _slack(found.J, found.b, found.n_rows, allowed, slack)
     least_m = np.where(np.isinf(found.least_m), np.nan, found.least_m)
-    unknown = now.estimate.unknown | unseen(now.estimate, config.unseen_s)
+    unknown = now.estimate.unknown | undetected.lost
     said = {"least_m": least_m, "slack": slack, "unknown": unknown.any(1).astype(float)}
     return allowed, said
 
 
 def constraints(
-    now: Belief, wanted: JointVelocities, dt_s: float, config: ShieldConfig
+    now: Belief, arm: Arm, lost: Bools, wanted: JointVelocities, dt_s: float, config: ShieldConfig
 ) -> Constraints:
-    """The tightest rows of every robot. Of "ssm" only what is between rest and what is wanted
-    (B, N) [rad/s] is within reach; of others what the slew reaches until the next command."""
-    model, batch = _model(now), len(wanted)
+    """Return the tightest rows of every robot.
+
+    Of "ssm" only velocities between rest and `wanted` are within reach; of others those that the
+    slew reaches until the next command.
+
+    Args:
+        now: what the robots believe.
+        arm: their frames.
+        lost: (B, W) the workers that were detected once, but not lately.
+        wanted: (B, N) the velocities that are asked for [rad/s].
+        dt_s: time until the next command [s].
+        config: margins and gains.
+    """
+    model, batch = arm.model, len(wanted)
     low, high = np.minimum(wanted, 0.0), np.maximum(wanted, 0.0)
     if config.kind != "ssm":
         in_force = needed(now.command, "The command in force, which a built-in shield needs,")
@@ -97,21 +120,26 @@ def constraints(
     J, b = np.empty((batch, MOST_ROWS, model.chain.n_joints)), np.empty((batch, MOST_ROWS))
     found = Constraints(J, b, np.empty(batch, np.int64), low, high, np.empty(batch))
     robot, rows = now.robot, (J, b, found.n_rows, found.least_m)
-    arm = (
-        chains.forward(model.chain, robot.q), model.chain.slides, _links(model, now),
-        robot.capsules_world, robot.capsule_radius_m, low, high, model.slew_rad_s2,
+    moving = (
+        arm.frames, model.chain.slides, arm.links, robot.capsules_world, robot.capsule_radius_m,
+        low, high, model.slew_rad_s2,
     )  # fmt: skip
-    tightest_rows(arm, _bodies(now, model, config), config.record(), rows)
-    floor = now.unseen
+    people, settings, floor = _bodies(now, arm, lost, config), config.record(), now.unseen
+    tightest_rows(moving, people, settings, rows)
     if floor is not None and np.isfinite(floor.possible_m).any():
         come_m = WALKING_M_S * (floor.age_s + config.reaction_s + config.latency_s)
         where = floor.floor_world, floor.level, floor.piece_m + HAND_M + come_m
-        floor_rows(arm, where, config.record(), rows)
+        floor_rows(moving, where, settings, rows)
     return found
 
 
-def _model(now: Belief) -> RobotModel:
-    return needed(now.model, "A robot's model (RobotModel), which a built-in shield needs,")
+def describe_arm(now: Belief) -> Arm:
+    """Return how the robots stand; of loads the links are the last ones, as they move so."""
+    model = needed(now.model, "A robot's model (RobotModel), which a built-in shield needs,")
+    n_loads = len(now.robot.capsule_radius_m) - len(model.chain.capsule_link)
+    carried = np.full(n_loads, model.chain.n_joints - 1)
+    links = np.append(model.chain.capsule_link, carried)
+    return Arm(model, chains.forward(model.chain, now.robot.q), links)
 
 
 def _within_reach(
@@ -124,17 +152,11 @@ def _within_reach(
     return low, high
 
 
-def _links(model: RobotModel, now: Belief) -> Ints:
-    """(K,) the link of every capsule; what is carried moves as the last one does."""
-    n_loads = len(now.robot.capsule_radius_m) - len(model.chain.capsule_link)
-    return np.append(model.chain.capsule_link, np.full(n_loads, model.chain.n_joints - 1))
-
-
-def _bodies(now: Belief, model: RobotModel, config: ShieldConfig) -> tuple[Any, ...]:
-    """What `rows` wants to know of the workers."""
-    estimate, lost = now.estimate, unseen(now.estimate, config.unseen_s)
+def _bodies(now: Belief, arm: Arm, lost: Bools, config: ShieldConfig) -> tuple[Any, ...]:
+    """What `rows` wants to know of the workers, of whom some are `lost` (B, W)."""
+    estimate = now.estimate
     mean, velocity, cov = estimate.mean_world, estimate.velocity_world, estimate.cov_world
-    touch_m_s, most_m_s = _touches(now, model, config)
+    touch_m_s, most_m_s = _touches(now, arm, config)
     if lost.any():
         gone = lost[..., None, None]
         mean, velocity = np.where(gone, estimate.seen_world, mean), np.where(gone, 0.0, velocity)
@@ -147,10 +169,10 @@ def _bodies(now: Belief, model: RobotModel, config: ShieldConfig) -> tuple[Any, 
     )  # fmt: skip
 
 
-def _touches(now: Belief, model: RobotModel, config: ShieldConfig) -> tuple[Floats, Floats]:
+def _touches(now: Belief, arm: Arm, config: ShieldConfig) -> tuple[Floats, Floats]:
     """Relative speeds of touches that are allowed (B, W, S), and each capsule's share (K,) [m/s]:
     of "pfl" all there is; else the last link's touches of who is welcome."""
-    link, shape = _links(model, now), (*now.estimate.tracked.shape, len(SEGMENT_REGIONS))
+    model, link, shape = arm.model, arm.links, (*now.estimate.tracked.shape, len(SEGMENT_REGIONS))
     if config.kind == "pfl":
         welcome, most_m_s = np.ones(shape, bool), np.full(len(link), np.inf)
     elif now.allowed_contact is None:

@@ -1,6 +1,6 @@
 """Speed limits for undetected people: lost workers, hidden hands, and floor not seen empty."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,23 +29,28 @@ WRISTS, SHOULDERS = (
 )
 
 
-def unseen(estimate: PoseEstimate, unseen_s: float) -> Bools:
-    """Return (B, W) the workers that were detected once, but not in the last `unseen_s` [s]."""
-    lately = estimate.tracked & (estimate.blind_s <= unseen_s)
-    return ~lately & np.isfinite(estimate.seen_world[..., 0, 0])
+@dataclass(frozen=True, slots=True, eq=False)
+class Undetected:
+    """What follows from people that are not detected at present."""
+
+    lost: Bools
+    """(B, W) the workers that were detected once, but not lately."""
+    limit_m_s: Floats
+    """(B,) the speed limit of every point of a robot [m/s]; infinite without a reason."""
 
 
-def limit_m_s(now: Belief, config: ShieldConfig) -> Floats:
-    """Return (B,) the speed limit of every point of a robot [m/s]; infinite without a reason."""
+def find_undetected(now: Belief, config: ShieldConfig) -> Undetected:
+    """Return the workers that are lost, and the speed limit for people that are not detected."""
     estimate = now.estimate
-    lost = unseen(estimate, config.unseen_s)
+    lately = estimate.tracked & (estimate.blind_s <= config.unseen_s)
+    lost = ~lately & np.isfinite(estimate.seen_world[..., 0, 0])
     never_seen = estimate.unknown & ~lost
     limit = _of_hands(now, config)
     if lost.any():
         limit = np.minimum(limit, _of_lost(now, lost, config))
     if never_seen.any():
         limit = np.minimum(limit, _of_floor(now, never_seen, config))
-    return limit
+    return Undetected(lost, limit)
 
 
 def _of_lost(now: Belief, lost: Bools, config: ShieldConfig) -> Floats:

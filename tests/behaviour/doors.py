@@ -95,8 +95,9 @@ from hrc_env.pipeline.bystanders import Bystanders
 from hrc_env.pipeline.pose_tracker import PoseTracker
 from hrc_env.safety import contact, incidents, separation, solver
 from hrc_env.safety.config import PRESETS, ShieldConfig
-from hrc_env.safety.guard import constraints
+from hrc_env.safety.guard import constraints, describe_arm
 from hrc_env.safety.shield import shield_called, shielded
+from hrc_env.safety.unseen import find_undetected
 from hrc_env.scene import domain_randomization as looks
 from hrc_env.scene import rigs
 from hrc_env.scene.build import SceneConfig, drawing_model, visuals
@@ -2414,7 +2415,8 @@ class Guarded:
     ) -> dict[str, NDArray[Any]]:
         """Return the rows that a shield keeps, as sums over them."""
         config = ShieldConfig(**{SHIELD_SETTINGS[name]: each for name, each in settings.items()})
-        found = constraints(self._now, wanted, step_s, config)
+        arm, lost = describe_arm(self._now), find_undetected(self._now, config).lost
+        found = constraints(self._now, arm, lost, wanted, step_s, config)
         is_row = np.arange(found.b.shape[1]) < found.n_rows[:, None]
         J, b = np.where(is_row[..., None], found.J, 0.0), np.where(is_row, found.b, 0.0)
         return {

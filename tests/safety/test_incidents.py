@@ -194,13 +194,13 @@ def test_a_batch_counts_what_its_environments_do_and_states_keep_it():
         for name, value in alone.items():
             if name.startswith("safety/"):
                 assert told[name][1] == value
-    watched = single.simulation.watch.known
+    watched = single.simulation.monitor.known
     watched["contacts"], watched["since_s"] = 7, 0.1
     state = single.get_state()
     single.reset(seed=1)
-    assert not single.simulation.watch.known["contacts"].any()
+    assert not single.simulation.monitor.known["contacts"].any()
     single.set_state(state)
-    assert single.simulation.watch.known["contacts"].sum() == 21
+    assert single.simulation.monitor.known["contacts"].sum() == 21
 
 
 def test_what_is_carried_hits_harder():

@@ -24,7 +24,7 @@ from hrc_env.render.overlay import SHIELD
 from hrc_env.safety.config import PRESETS, ShieldConfig
 from hrc_env.safety.guard import guarded
 from hrc_env.safety.incidents import MOVING_M_S
-from hrc_env.safety.unseen import limit_m_s
+from hrc_env.safety.unseen import find_undetected
 
 VELOCITIES = ("velocity_world", "angular_velocity_world")
 NO_DOUBT = {"sigmas": 0.0, "least_sigmas_m": 0.0, "human_m_s": 0.0}
@@ -125,7 +125,7 @@ def test_a_vector_is_single_environments_where_somebody_takes_a_tool():
         seen, *_ = many.step(actions)
         alone, _, over, *_ = one.step(actions[1])
         np.testing.assert_array_equal(seen[1], alone)
-        welcome += part.belief.welcome(part.belief)[1].any()
+        welcome += part.belief.allowed_contact[1].any()
     assert welcome > 20
 
 
@@ -257,7 +257,7 @@ def test_where_shoulders_are_hardly_known_hands_are_not_either(depth_m, slow):
     mean[...] += now.robot.tool_world[:, None] + np.array([0.9, 0.0, 0.2]) - mean[:, :, 1:2]
     cov[..., JOINT["left_shoulder"], :, :] = np.diag(np.square((0.04, 0.05, depth_m)))
     vague = replace(now.estimate, mean_world=mean, cov_world=cov)
-    limit = limit_m_s(replace(now, estimate=vague), ShieldConfig())
+    limit = find_undetected(replace(now, estimate=vague), ShieldConfig()).limit_m_s
     assert np.isfinite(limit[0]) == slow
 
 
@@ -277,7 +277,7 @@ def test_hands_that_no_camera_shows_may_be_anywhere_within_an_arm_of_their_shoul
     mean[..., JOINT["right_wrist"], :] += (3.0, 0.0, 0.0)
     cov[..., JOINT["right_wrist"], :, :] = np.diag(np.square(wide_m))
     far = replace(estimate, mean_world=mean, cov_world=cov)
-    limit = limit_m_s(replace(now, estimate=far), ShieldConfig())
+    limit = find_undetected(replace(now, estimate=far), ShieldConfig()).limit_m_s
     assert np.isfinite(limit[0]) == slow
     if slow:
         allowed, _ = guarded(replace(now, estimate=far), wanted, 0.04, ShieldConfig())
@@ -319,7 +319,7 @@ def test_whom_another_environment_has_lost_slows_nobody():
     envs.reset(seed=0)
     lost = unseen(envs.unwrapped.shards.first.belief, 0.9)
     lost.estimate.blind_s[1] = 0.0
-    limits = limit_m_s(lost, ShieldConfig())
+    limits = find_undetected(lost, ShieldConfig()).limit_m_s
     assert np.isfinite(limits).tolist() == [True, False]
 
 
@@ -383,7 +383,7 @@ def comes_m_s(beside, welcome, shield):
     mean[0, 0, JOINT["right_wrist"]] = middle + (tip_m + 0.18) * aside
     mean[0, 0, JOINT["right_elbow"]] = middle + (tip_m + 0.5) * aside
     still = {"mean_world": mean, "velocity_world": np.zeros_like(mean)}
-    now = replace(now, estimate=replace(now.estimate, **still), welcome=lambda now: welcome)
+    now = replace(now, estimate=replace(now.estimate, **still), allowed_contact=welcome)
     turns = part.physics.q + 1e-6 * np.eye(6)
     moved = chains.capsules(part.chain, turns)[:, c].mean(1)
     towards = (moved - chains.capsules(part.chain, part.physics.q)[0, c].mean(0)) @ aside / 1e-6

@@ -100,7 +100,6 @@ CODE: dict[str, CodeRoom] = {
         "hrc_env/tracking/metrics.py", ("env",),
         ("tests/test_metrics.py", "tests/test_several_workers.py"),
     ),
-    "infos": CodeRoom("hrc_env/infos.py", ("env",), ("tests/test_infos.py",)),
     "agents": CodeRoom(
         "agents", ("agents", "learning"),
         (
