@@ -4,8 +4,8 @@ import ast
 import dataclasses
 import inspect
 import json
-import pkgutil
 import os
+import pkgutil
 import re
 import subprocess
 import sys
