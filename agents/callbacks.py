@@ -15,8 +15,8 @@ from matplotlib.ticker import EngFormatter
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 
-from hrc_env.cli.progress import Meter
 from hrc_env.core.errors import ConfigError
+from hrc_env.core.progress import Meter
 from hrc_env.core.results import write_whole
 from hrc_env.evaluation.episodes import summarize
 from hrc_env.experiments.plots import label, new_figure, save

@@ -13,12 +13,12 @@ from rich.console import Console
 from hrc_env import __version__
 from hrc_env.cli.environment import read_word
 from hrc_env.cli.export import Export
-from hrc_env.cli.progress import progress_bar
-from hrc_env.cli.ready import make_ready
 from hrc_env.cli.train import Train
 from hrc_env.core.errors import CheckpointError, learner
+from hrc_env.core.progress import progress_bar
 from hrc_env.core.results import write_whole
 from hrc_env.evaluation.episodes import EVALUATION_SEED, measure, play_episodes
+from hrc_env.pipeline.ready import make_ready
 from hrc_env.sb3 import HRCVecEnv
 
 from . import checkpoints, policies

@@ -20,12 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 
-from hrc_env.cli.progress import progress_bar
-from hrc_env.cli.ready import make_ready
 from hrc_env.cli.record import Record
 from hrc_env.core.errors import ConfigError, MissingExtraError
+from hrc_env.core.progress import progress_bar
 from hrc_env.core.results import write_whole
 from hrc_env.evaluation.rollout import Transition, rollout
+from hrc_env.pipeline.ready import make_ready
 from hrc_env.vector.env import HRCVectorEnv
 
 from .env_info import Agent, Observation, env_info

@@ -12,15 +12,15 @@ from typing import Any, get_type_hints
 import numpy as np
 from rich.console import Console
 
-from hrc_env.cli.progress import Meter, progress_bar
-from hrc_env.cli.ready import make_ready
 from hrc_env.cli.train import Train
-from hrc_env.config import settle
 from hrc_env.core.errors import CheckpointError, RenderingError, learner
 from hrc_env.core.mapping import restored
+from hrc_env.core.progress import Meter, progress_bar
 from hrc_env.core.results import provenance, write_whole
 from hrc_env.evaluation.episodes import Score, evaluate
+from hrc_env.pipeline.ready import make_ready
 from hrc_env.sb3 import HRCVecEnv
+from hrc_env.settings import settle
 
 from . import checkpoints, ppo, sac
 from .callbacks import (
@@ -215,7 +215,7 @@ def _clone(learner: Any, arguments: Run, env: HRCVecEnv, console: Console) -> No
 
 def film(folder: Path, arguments: Train, console: Console) -> bool:
     """Film the policy's closest encounter with the worker; whether this machine can draw."""
-    from hrc_env.cli.film import film_episode, nearest_seed
+    from hrc_env.evaluation.film import film_episode, nearest_seed
 
     def make(env_info: EnvInfo) -> checkpoints.TrainedAgent:
         return checkpoints.load(folder / "policy.zip", env_info)

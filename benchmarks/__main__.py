@@ -12,9 +12,10 @@ from rich.console import Console
 
 from hrc_env.cli.checks import at_least, writable_folder
 from hrc_env.cli.entry import import_first, run_command, show_errors
-from hrc_env.cli.progress import progress_bar, show
+from hrc_env.cli.show import show
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.machine import n_cores
+from hrc_env.core.progress import progress_bar
 from hrc_env.experiments.runner import Experiment, changed, run
 
 PROGRAM = "python -m benchmarks"

@@ -9,7 +9,7 @@ import tyro
 
 from hrc_env.cli.checks import at_least
 from hrc_env.cli.entry import show_errors
-from hrc_env.cli.progress import show
+from hrc_env.cli.show import show
 from hrc_env.experiments.runner import run
 from hrc_env.experiments.study import Study
 

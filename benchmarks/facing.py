@@ -24,7 +24,7 @@ import tyro
 from benchmarks.command import Arguments
 from benchmarks.tracking.matched import heading
 from hrc_env.cli.entry import show_errors
-from hrc_env.cli.progress import show
+from hrc_env.cli.show import show
 from hrc_env.config import HRCConfig
 from hrc_env.core.batching import rows
 from hrc_env.core.records import PoseEstimate

@@ -5,19 +5,22 @@
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any, get_type_hints
-
-import numpy as np
+from typing import Any
 
 from hrc_env.control import ControlConfig
 from hrc_env.core.errors import ConfigError, check_names
-from hrc_env.core.mapping import PRESETS, from_mapping, plain, read_toml, restored, to_toml
+from hrc_env.core.mapping import (
+    PRESETS,
+    answer_unknown_fields,
+    from_mapping,
+    plain,
+    read_toml,
+    to_toml,
+)
 from hrc_env.core.results import write_whole
-from hrc_env.env_config import EnvConfig, answer_unknown_fields
-from hrc_env.geometry.camera_config import CameraConfig, camera_of, read_rig
 from hrc_env.motion.generator import PEOPLE, MotionConfig, PeopleConfig
 from hrc_env.motion.schedule import WORK, Job
 from hrc_env.observations import UNCERTAINTY
@@ -26,16 +29,12 @@ from hrc_env.perception.emulator import EmulatorConfig
 from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.rewards import RewardConfig
 from hrc_env.safety.cost import CostConfig
-from hrc_env.safety.shield import Shield, shield_called
-from hrc_env.scene.build import Scene, SceneConfig
+from hrc_env.scene.build import SceneConfig
 from hrc_env.scene.domain_randomization import APPEARANCES, AppearanceConfig
 from hrc_env.scene.handling import ObjectsConfig
-from hrc_env.scene.rigs import RIGS
-from hrc_env.scene.robot import DEFAULT as DEFAULT_ROBOT
-from hrc_env.scene.robot import ROBOTS, Robot, robot_called
-from hrc_env.tasks.task import Task, TaskType, find_task
+from hrc_env.tasks.task import TaskType
 from hrc_env.tracking.config import ParticleConfig, TrackerConfig, of_kind
-from hrc_env.tracking.estimators import EstimatorSpec, estimator_called
+from hrc_env.tracking.estimators import EstimatorSpec
 from hrc_env.tracking.forecast import LONGEST_S
 from hrc_env.tracking.people.association import AssociationConfig
 from hrc_env.worker.body import pool
@@ -114,87 +113,7 @@ class HRCConfig:
 
 
 ConfigChoice = HRCConfig | Mapping[str, Any] | str | Path | None
-PARTS = {
-    "people": "motion.people",
-    "motions": "motion.motions",
-    "faults": "faults",
-    "appearance": "appearance",
-}
-"""Arguments of an environment that are parts of the config: chosen often."""
 PRESETS.update({AppearanceConfig: APPEARANCES, PeopleConfig: PEOPLE, tuple[Job, ...]: WORK})
-
-
-@dataclass(frozen=True, slots=True)
-class Settings:
-    """Everything that a simulation is made from, whole and checked."""
-
-    asked: EnvConfig
-    """The arguments, as they were given."""
-    task: Task[Any, Any]
-    estimator: EstimatorSpec
-    cameras: Any
-    """Names and indices of the scene's cameras that are used; None: all."""
-    scene: str
-    robot: Robot
-    n_workers: tuple[int, int]
-    """The fewest and the most of an episode."""
-    shield: Shield | None
-    config: HRCConfig
-
-    def recorded(self, batch: int, scene: Scene) -> dict[str, Any]:
-        """What a state must have been taken with to be set."""
-        fewest, most = self.n_workers
-        return {
-            "batch": batch, "task": self.task.id, "perception": self.asked.perception,
-            "estimator": self.estimator.name, "scene": self.scene, "robot": self.robot.name,
-            "cameras": tuple(camera.name for camera in scene.cameras),
-            "n_workers": (fewest, most) if fewest < most else most, "control": self.asked.control,
-            "config": self.config,
-        }  # fmt: skip
-
-
-def settle(**arguments: Any) -> Settings:
-    """Return settings from keyword arguments of an environment; see `make_settings`."""
-    return make_settings(EnvConfig(**arguments))
-
-
-def make_settings(asked: EnvConfig) -> Settings:
-    """Return everything that a simulation is made from, given an environment's arguments.
-
-    Raises:
-        ConfigError: a value that cannot be, with those that can.
-    """
-    task, estimator = find_task(asked.task), estimator_called(asked.estimator)
-    config, cameras = resolve(asked.config, task, estimator), asked.cameras
-    if isinstance(cameras, np.ndarray):
-        cameras = cameras.tolist()
-    if (rig := rig_of(cameras)) is not None:
-        config, cameras = replace(config, scene=replace(config.scene, cameras=rig)), None
-    for name, path in PARTS.items():
-        if (part := getattr(asked, name)) is not None:
-            config = _with_part(config, path, part, name)
-    named = task.robot if asked.robot is None else asked.robot
-    robot = robot_called(DEFAULT_ROBOT if named is None else named)
-    if task.needs_gripper and not robot.grips:
-        able = [name for name, each in ROBOTS.items() if each.grips]
-        raise ConfigError(
-            f"{task.id} needs a robot with a hand, and {robot.name!r} has none; there are "
-            f"{', '.join(map(repr, able))}."
-        )
-    if task.needs_mobile_base != robot.drives:
-        able = [name for name, each in ROBOTS.items() if each.drives == task.needs_mobile_base]
-        kind = "a robot that drives" if task.needs_mobile_base else "an arm on the pedestal"
-        raise ConfigError(
-            f"{task.id} needs {kind}, and {robot.name!r} is none; there are "
-            f"{', '.join(map(repr, able))}."
-        )
-    scene = task.scene if asked.scene is None else asked.scene
-    n_workers = task.n_workers if asked.n_workers is None else asked.n_workers
-    return Settings(
-        asked, task(config.task), estimator, cameras, scene,
-        robot, _worker_counts(n_workers),
-        shield_called(asked.shield), config,
-    )  # fmt: skip
 
 
 def resolve(config: ConfigChoice, task: TaskType, estimator: EstimatorSpec) -> HRCConfig:
@@ -240,57 +159,3 @@ def save_config(config: HRCConfig, path: str | Path) -> None:
         if not isinstance(motion, str):
             raise ConfigError(f"The clip {motion.source!r} cannot be written: give its file.")
     write_whole(Path(path), to_toml(plain(asdict(config))))
-
-
-def rig_of(cameras: Any) -> tuple[CameraConfig, ...] | None:
-    """The rig that `cameras=` says (`HRCEnv`); None if it chooses among the scene's cameras."""
-    if isinstance(cameras, str | Path):
-        if str(cameras).endswith(".toml"):
-            return read_rig(cameras)
-        if cameras in RIGS:
-            return RIGS[str(cameras)]
-        raise ConfigError(
-            f"cameras={cameras!r} is no rig: valid are {', '.join(map(repr, RIGS))}, a path that "
-            "ends in .toml, or a list of names, indices, places or cameras."
-        )
-    several = isinstance(cameras, Sequence)
-    if not several or all(isinstance(each, str | int | float | np.number) for each in cameras):
-        return None
-    return tuple(_camera(camera, k) for k, camera in enumerate(cameras))
-
-
-def _camera(given: Any, index: int) -> CameraConfig:
-    if isinstance(given, CameraConfig):
-        return given
-    if isinstance(given, Mapping):
-        return camera_of(given, f"cameras[{index}]")
-    place = np.asarray(given) if isinstance(given, Sequence | np.ndarray) else np.zeros(0)
-    if place.shape != (3,) or not np.issubdtype(place.dtype, np.number):
-        raise ConfigError(
-            "cameras must be names and indices of the scene's cameras, or else places (x, y, z) "
-            f"[m] and CameraConfigs of a rig of your own; got {given!r} among them."
-        )
-    x, y, z = (float(value) for value in place)
-    return CameraConfig(f"camera_{index + 1}", (x, y, z))
-
-
-def _worker_counts(n_workers: int | tuple[int, int]) -> tuple[int, int]:
-    """The fewest and the most workers of an episode, from one number or from both."""
-    pair = tuple(n_workers) if isinstance(n_workers, Sequence) else (n_workers, n_workers)
-    whole = all(isinstance(k, int | np.integer) and not isinstance(k, bool) for k in pair)
-    if not whole or len(pair) != 2 or not 0 <= pair[0] <= pair[1]:
-        raise ConfigError(
-            "n_workers must be a whole number, 0 or more, or (fewest, most), from which each "
-            f"episode's number is drawn, got {n_workers!r}."
-        )
-    return int(pair[0]), int(pair[1])
-
-
-def _with_part(record: Any, path: str, value: Any, where: str) -> Any:
-    """A record with another value of a field "a.b"; `where` is what the user calls it."""
-    name, _, rest = path.partition(".")
-    if rest:
-        new = _with_part(getattr(record, name), rest, value, where)
-    else:
-        new = restored(get_type_hints(type(record))[name], value, where)
-    return replace(record, **{name: new})

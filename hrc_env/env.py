@@ -15,7 +15,6 @@ from gymnasium.spaces import Box, Dict
 from numpy.typing import NDArray
 
 from hrc_env import observations, rewards
-from hrc_env.config import Settings, settle
 from hrc_env.control import checked_action
 from hrc_env.core.batching import Stateful, one
 from hrc_env.core.errors import ConfigError, NoAttributeError, unknown, whole
@@ -27,6 +26,7 @@ from hrc_env.infos import words_of
 from hrc_env.registration import HasSpec
 from hrc_env.render.views import Views, picture_size
 from hrc_env.rewards import RewardConfig
+from hrc_env.settings import Settings, settle
 from hrc_env.simulation import Simulation
 from hrc_env.step_result import Observation
 from hrc_env.tasks import DEFAULT, goal

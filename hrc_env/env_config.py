@@ -6,13 +6,12 @@ as keyword arguments; the command line and the reference derive from them.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from functools import wraps
 from inspect import Parameter, Signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
-from hrc_env.core.errors import ConfigError, unknown
-from hrc_env.core.mapping import for_json, read_toml, to_toml
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.mapping import answer_unknown_fields, for_json, read_toml, to_toml
 from hrc_env.core.results import write_whole
 from hrc_env.tasks import DEFAULT
 
@@ -27,29 +26,12 @@ if TYPE_CHECKING:  # at run time they would import the simulator, which `--help`
     from hrc_env.tasks.task import TaskType
     from hrc_env.tracking.estimators import EstimatorChoice
 
-RecordT = TypeVar("RecordT")
 PICTURE_SIZE = (960, 720)
 """Width and height of a picture by default [px]."""
 MANY = {"many": True}
 """Metadata of a field for which the command line takes several words."""
 NO_WORD = {"words": False}
 """Metadata of a field that the command line has not: films have a form of their own."""
-
-
-def answer_unknown_fields(record: type[RecordT]) -> type[RecordT]:
-    """Let a dataclass answer a keyword that it has not with a `ConfigError` that names the nearest
-    field, instead of a `TypeError`."""
-    init, names = record.__init__, [each.name for each in fields(record)]  # type: ignore[arg-type]
-
-    @wraps(init)
-    def checked(self: RecordT, *args: Any, **values: Any) -> None:
-        for name in values:
-            if name not in names:
-                raise unknown(f"field of {record.__name__}", name, names)
-        init(self, *args, **values)
-
-    record.__init__ = checked  # type: ignore[method-assign]
-    return record
 
 
 @answer_unknown_fields

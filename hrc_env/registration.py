@@ -54,7 +54,7 @@ def _play_briefly(task: "TaskType") -> None:
     """Play two steps of a task without cameras, so that what is wrong is said at registration."""
     import numpy as np
 
-    from hrc_env.config import settle
+    from hrc_env.settings import settle
     from hrc_env.simulation import Simulation
 
     simulation = Simulation(2, settle(task=task, perception="none"))

@@ -1,4 +1,7 @@
-"""What the robot is rewarded for: one declaration per term. Terms read the estimate only."""
+"""What the robot is rewarded for: one declaration per term.
+
+Of people terms read the estimate only; what a step brought for the task is judged in the world.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

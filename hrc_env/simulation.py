@@ -14,7 +14,6 @@ import numpy as np
 
 from hrc_env import infos, observations, rewards
 from hrc_env.belief import Belief, estimated_separation, of_concern, unseen_floor
-from hrc_env.config import Settings
 from hrc_env.control import fastest, joint_command, n_actions
 from hrc_env.core.batching import State, Stateful, picked, rows, write_rows
 from hrc_env.core.errors import ConfigError, check_shape, needed
@@ -38,6 +37,7 @@ from hrc_env.scene.build import Scene, all_grounds, build
 from hrc_env.scene.limits import object_targets, robot_model
 from hrc_env.scene.physics import Physics
 from hrc_env.scene.rigs import findings
+from hrc_env.settings import Settings
 from hrc_env.step_result import Observation, StepResult, agreed
 from hrc_env.tasks import goal
 from hrc_env.tracking import metrics, oracle

@@ -4,6 +4,7 @@ import ast
 import re
 import subprocess
 import sys
+import tomllib
 from functools import cache
 from pathlib import Path
 
@@ -73,6 +74,17 @@ def test_imports_point_downward():
     assert done.returncode == 0, done.stdout
 
 
+def test_every_layer_is_one_room_or_rooms_that_do_not_know_each_other():
+    """Siblings that may import each other would be several layers in one."""
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]
+    (layers,) = [each["layers"] for each in contracts["contracts"] if each["type"] == "layers"]
+    assert not [layer for layer in layers if ":" in layer]
+    rooms = {room.strip() for layer in layers for room in layer.split("|")}
+    there = {path.stem for path in PACKAGE.glob("*.py")} - {"__init__"}
+    there |= {path.parent.name for path in PACKAGE.glob("*/__init__.py")}
+    assert there - rooms == {"agents", "registration"}
+
+
 def test_the_package_knows_nothing_that_only_a_checkout_has():
     """Neither by an import nor by a string; `MOVED` tells people how commands are called there."""
     beside = ("agents", "assets", "benchmarks", "docs", "examples", "tests")
@@ -90,7 +102,11 @@ def test_only_these_files_know_the_truth():
     assert knowing >= {"hrc_env/simulation.py", "hrc_env/tracking/oracle.py"}
 
 
-@pytest.mark.parametrize("name", ["belief", "observations", "rewards", "control", "tasks/reach"])
+READERS = ["belief", "observations", "rewards", "control"]
+READERS += [f"tasks/{path.stem}" for path in sorted((PACKAGE / "tasks").glob("*.py"))]
+
+
+@pytest.mark.parametrize("name", READERS)
 def test_what_the_robot_reads_knows_no_truth(name):
     """Terms take `Belief`, which has no truth in it; nothing in these files names it."""
     path = PACKAGE / f"{name}.py"

@@ -8,7 +8,7 @@ import gymnasium
 import pytest
 
 from hrc_env.__main__ import main
-from hrc_env.config import HRCConfig, save_config, settle
+from hrc_env.config import HRCConfig, save_config
 from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCEnv
 from hrc_env.env_config import EnvConfig
@@ -17,6 +17,7 @@ from hrc_env.motion.config import PEOPLE
 from hrc_env.motion.schedule import WORK
 from hrc_env.scene.domain_randomization import APPEARANCES
 from hrc_env.scene.rigs import RIGS
+from hrc_env.settings import settle
 from hrc_env.vector.env import HRCVectorEnv
 
 ODD = {

@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 
 import hrc_env
-from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError
 from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.safety.config import ShieldConfig
+from hrc_env.settings import settle
 from hrc_env.tracking.estimators import ESTIMATORS
 
 TRIED = (-np.inf, -1.0, 0.0, 1e-9, 0.5, 1.0, 1.0 + 1e-9, 2.0, 3.0, 10.0, 1e9, np.inf)

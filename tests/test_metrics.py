@@ -1,4 +1,4 @@
-"""Cost and errors are counted on the truth, at every substep."""
+"""Cost of given separations, and errors of given bodies; that these are true: test_truth.py."""
 
 import numpy as np
 import pytest

@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hrc_env.config import settle
 from hrc_env.control import checked_action, n_actions
 from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCEnv
@@ -24,6 +23,7 @@ from hrc_env.safety.shield import SHIELDS, shield_called, shielded
 from hrc_env.scene.build import build
 from hrc_env.scene.domain_randomization import AppearanceConfig
 from hrc_env.scene.robot import ROBOTS, chain_of
+from hrc_env.settings import settle
 
 ARM, BASE = (chain_of(ROBOTS[name], (0.0, 0.0, 0.0)) for name in ("ur10e_like", "mobile_base"))
 

@@ -130,6 +130,18 @@ def test_the_hand_that_a_tool_is_brought_to_is_the_estimated_one():
     np.testing.assert_array_equal(welcome[:n_calls], welcome[n_calls:])
 
 
+def onto_the_robot(points):
+    return 0.0 * points + np.array([-0.75, 0.0, 1.0])
+
+
+@pytest.mark.parametrize("level", LEVELS[1:])
+def test_cost_follows_the_truth_and_not_the_belief(level):
+    """Bodies that truly stand in the robot, unseen, cost in every part; nothing else moves."""
+    moved = differences(partial(single, level), displaced(onto_the_robot), n_steps=8)
+    assert leaks(moved) == {}
+    assert {"info/cost/", "info/cost_proximity/", "info/cost_contact/"} <= moved.keys()
+
+
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
 @pytest.mark.parametrize("level", LEVELS[1:])
 def test_nor_is_anything_else_in_a_vector_through_resets(level, mode):

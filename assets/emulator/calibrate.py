@@ -9,7 +9,7 @@ from rich.table import Table
 
 from hrc_env.cli.checks import at_least, writable_file
 from hrc_env.cli.entry import run_command, show_errors
-from hrc_env.cli.progress import progress_bar
+from hrc_env.core.progress import progress_bar
 
 
 @dataclass(frozen=True)

@@ -37,8 +37,8 @@ from assets.emulator.validate import (
     ratios_of,
 )
 from assets.emulator.writing import write_calibration
-from hrc_env.cli.progress import progress_bar
 from hrc_env.config import HRCConfig
+from hrc_env.core.progress import progress_bar
 from hrc_env.core.results import Metric, write_results
 from hrc_env.experiments.cache import PartCache, PartProgress
 from hrc_env.experiments.versions import key_of

@@ -11,13 +11,14 @@ from functools import lru_cache
 import numpy as np
 
 from benchmarks.tracking.rigs import Rig
-from hrc_env.config import HRCConfig, settle
+from hrc_env.config import HRCConfig
 from hrc_env.core.records import Keypoints, WorkerTruth
 from hrc_env.core.typing import Bools, Points3
 from hrc_env.geometry.cameras import projections
 from hrc_env.geometry.sight import Surroundings, nothing
 from hrc_env.motion import generator
 from hrc_env.perception import emulator
+from hrc_env.settings import settle
 from hrc_env.simulation import Simulation
 from hrc_env.tracking.config import ParticleConfig, of_kind
 from hrc_env.worker.body import worker_truth

@@ -6,7 +6,7 @@ from importlib import import_module
 from pathlib import Path
 
 from hrc_env.cli.checks import at_least, writable_file
-from hrc_env.cli.progress import show
+from hrc_env.cli.show import show
 from hrc_env.tasks import BUILT_IN
 
 

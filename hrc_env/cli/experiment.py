@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 import tyro
 
 from hrc_env.cli.checks import at_least
-from hrc_env.cli.progress import show
+from hrc_env.cli.show import show
 from hrc_env.tasks import DEFAULT
 
 

@@ -11,8 +11,8 @@ from rich.console import Console
 from rich.table import Table
 
 from hrc_env.cli.checks import writable_file
-from hrc_env.cli.progress import progress_bar
 from hrc_env.core.errors import ConfigError
+from hrc_env.core.progress import progress_bar
 from hrc_env.core.skeleton import JOINTS
 
 if TYPE_CHECKING:  # --help imports no simulator

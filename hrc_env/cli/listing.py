@@ -48,8 +48,8 @@ class List(EnvironmentArguments):
         return 0
 
     def _show_config(self) -> int:
-        from hrc_env.config import settle
         from hrc_env.core.mapping import plain, to_toml
+        from hrc_env.settings import settle
 
         print(to_toml(plain(asdict(settle(**self.keywords()).config))), end="")
         return 0

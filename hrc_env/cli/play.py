@@ -9,13 +9,14 @@ from typing import Annotated, Any
 
 import tyro
 from rich.console import Console
+from rich.table import Table
 
 import hrc_env
 from hrc_env.cli.checks import at_least, writable_file
 from hrc_env.cli.environment import EnvironmentArguments
-from hrc_env.cli.progress import track
-from hrc_env.cli.ready import make_ready
 from hrc_env.core.errors import check_names
+from hrc_env.core.progress import track
+from hrc_env.pipeline.ready import make_ready
 from hrc_env.tasks import DEFAULT
 
 
@@ -58,7 +59,7 @@ class Play(EnvironmentArguments):
         return 0
 
     def _play(self, env: Any, seed: int) -> None:
-        from hrc_env.cli import film
+        from hrc_env.evaluation import film
         from hrc_env.scene.viewer import Viewer
 
         inner = env.unwrapped
@@ -97,7 +98,7 @@ class Demo(EnvironmentArguments):
         at_least("--seed", self.seed, 0)
         writable_file(self.out, ".mp4")
         Console().print("Loading the simulator ...")
-        from hrc_env.config import settle  # here: --help imports no simulator
+        from hrc_env.settings import settle  # here: --help imports no simulator
 
         ctrl_dt = settle(**self.keywords()).config.ctrl_dt
         at_least("--seconds", self.seconds, ctrl_dt)
@@ -112,11 +113,11 @@ def filmed(
     asked: Play | Demo, agent: str, path: Path, n_steps: int | None = None, title: str = ""
 ) -> None:
     """Film an episode of an agent by its name, up to its end; show what came of it."""
-    from hrc_env.cli import film
+    from hrc_env.evaluation import film
 
     make, keywords = named(agent, asked.seed), asked.keywords()
     totals = film.film_episode(make, path, asked.seed, n_steps=n_steps, **keywords)
-    Console().print(film.table(totals, title))
+    Console().print(table(totals, title))
 
 
 def named(agent: str, seed: int) -> Callable[[Any], Any]:
@@ -124,3 +125,13 @@ def named(agent: str, seed: int) -> Callable[[Any], Any]:
     from hrc_env.agents.registry import make_agent
 
     return lambda env_info: make_agent(agent, env_info, seed)
+
+
+def table(totals: dict[str, float], title: str = "") -> Table:
+    """Return what `film_episode` has measured as a table, each value with its unit."""
+    rows = Table("", "", "unit", title=title or None)
+    rows.columns[1].justify = "right"
+    for name, value in totals.items():
+        what, _, unit = name.removesuffix("]").partition(" [")
+        rows.add_row(what, f"{value:.{({'count': 0, 'm': 2}).get(unit, 1)}f}", unit)
+    return rows

@@ -5,7 +5,7 @@ from typing import Literal
 
 from rich.console import Console
 
-from hrc_env.cli.ready import compile_kernels, fetch_networks, find_opengl
+from hrc_env.pipeline.ready import compile_kernels, fetch_networks, find_opengl
 
 
 @dataclass(frozen=True)

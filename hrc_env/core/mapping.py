@@ -9,6 +9,7 @@ import tomllib
 import types
 import typing
 from collections.abc import Mapping
+from functools import wraps
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -20,6 +21,22 @@ RecordT = TypeVar("RecordT")
 PRESETS: dict[Any, Mapping[str, Any]] = {}
 """Values that have names, by the type hint of their field: a name stands for the value."""
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
+
+
+def answer_unknown_fields(record: type[RecordT]) -> type[RecordT]:
+    """Let a dataclass answer a keyword that it has not with a `ConfigError` that names the nearest
+    field, instead of a `TypeError`."""
+    init, names = record.__init__, [each.name for each in dataclasses.fields(record)]  # type: ignore[arg-type]
+
+    @wraps(init)
+    def checked(self: RecordT, *args: Any, **values: Any) -> None:
+        for name in values:
+            if name not in names:
+                raise unknown(f"field of {record.__name__}", name, names)
+        init(self, *args, **values)
+
+    record.__init__ = checked  # type: ignore[method-assign]
+    return record
 
 
 def from_mapping(

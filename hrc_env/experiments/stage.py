@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from gymnasium.utils import seeding
 
-from hrc_env.config import settle
 from hrc_env.control import checked_action
 from hrc_env.core.infos import Info
 from hrc_env.core.machine import n_cores
@@ -20,6 +19,7 @@ from hrc_env.core.typing import Bools, Floats
 from hrc_env.experiments.cache import PartProgress
 from hrc_env.experiments.rigs import Turn
 from hrc_env.experiments.setups import PerceptionSetup
+from hrc_env.settings import settle
 from hrc_env.simulation import Simulation
 from hrc_env.step_result import Observation
 from hrc_env.vector.shards import Shards

@@ -26,7 +26,6 @@ import numpy as np
 from hrc_env.agents import policies
 from hrc_env.agents.env_info import Agent, EnvInfo
 from hrc_env.agents.registry import AGENTS, make_agent
-from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError, check_names, unknown
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Ints
@@ -39,6 +38,7 @@ from hrc_env.experiments.versions import check_subsystems, digest_of, key_of, so
 from hrc_env.pipeline.levels import LEVELS
 from hrc_env.safety.shield import SHIELDS
 from hrc_env.scene.rigs import RIGS
+from hrc_env.settings import settle
 from hrc_env.tracking.estimators import ESTIMATORS
 
 Played = Mapping[str, list[dict[str, float]]]

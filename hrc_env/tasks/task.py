@@ -28,8 +28,8 @@ class Task(Generic[ConfigT, StateT]):
     """What a robot is to achieve: derive from it, and register the class (`register_task`).
 
     The first paragraph of a subclass's docstring describes the task. A subclass must define `id`,
-    `config_type`, `observations`, `rewards`, `achieved`, `failed`, and the methods `make_state`,
-    `reset`, `advance`, `view` and `info`; the other attributes and methods have defaults.
+    `config_type`, `achieved`, `failed`, and the methods `make_state`, `reset`, `advance`, `view`
+    and `info`; the other attributes and methods have defaults.
 
     All methods work on a batch of environments. `state` is a structured array, or a dataclass of
     arrays, with a row for every environment; `ids` are the rows in question, all rows where a

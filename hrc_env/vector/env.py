@@ -18,13 +18,13 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from hrc_env.config import settle
 from hrc_env.control import checked_action
 from hrc_env.core.batching import copied, mapped, one, write_rows
 from hrc_env.core.errors import ConfigError, check_shape, whole
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.env import RENDER_MODES, EnvBase, spaces
 from hrc_env.rewards import RewardConfig
+from hrc_env.settings import settle
 from hrc_env.simulation import Simulation
 from hrc_env.step_result import Observation, StepResult
 from hrc_env.tasks.task import Task

@@ -36,7 +36,6 @@ from hrc_env.belief import (
     standard_deviation_m,
     unseen_floor,
 )
-from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.infos import ENTRIES
 from hrc_env.core.records import (
@@ -107,6 +106,7 @@ from hrc_env.scene.render import CropRenderer
 from hrc_env.scene.rig import make_cameras
 from hrc_env.scene.rigs import floor as floor_points
 from hrc_env.scene.robot import ROBOTS, chain_of
+from hrc_env.settings import settle
 from hrc_env.simulation import Simulation
 from hrc_env.tasks.task import find_task
 from hrc_env.tracking import metrics, oracle, presence

@@ -34,7 +34,7 @@ import tyro
 from rich.console import Console
 from scipy.stats import binomtest
 
-from hrc_env.cli.progress import Meter
+from hrc_env.core.progress import Meter
 from tests.behaviour.mutants import CODE, ROOT, Mutant, MutantError, draw, read_list
 from tests.behaviour.mutants.child import ELSEWHERE, MARK, NOTICED, SAME
 from tests.behaviour.playing import BOUNDED, bounds_checked

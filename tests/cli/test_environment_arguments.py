@@ -12,10 +12,10 @@ from hrc_env.__main__ import main
 from hrc_env.cli.environment import EnvironmentArguments, cameras_named, read_config
 from hrc_env.cli.play import Demo, Play
 from hrc_env.cli.train import Train
-from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCEnv
 from hrc_env.safety.config import ShieldConfig
+from hrc_env.settings import settle
 
 OF_RENDER = {"render_mode", "width", "height"}
 """What only `render` reads, which no command calls: films have a form of their own."""
@@ -134,7 +134,7 @@ def test_a_film_is_told_with_its_units(tmp_path: Path, monkeypatch, capsys):
         asked.append({"path": path, "seed": seed, **kwargs})
         return {"median tracking error [mm]": 21.3}
 
-    monkeypatch.setattr("hrc_env.cli.film.film_episode", film_episode)
+    monkeypatch.setattr("hrc_env.evaluation.film.film_episode", film_episode)
     video = tmp_path / "site.mp4"
     words = ["play", "--perception", "none", "--scene", "site", "--control", "tool"]
     assert main([*words, "--config", "ctrl_dt=0.08", "--video", str(video)]) == 0

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
-from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.mapping import from_mapping, plain
+from hrc_env.settings import settle
 
 EYE = [2.0, 2.0, 2.0]
 

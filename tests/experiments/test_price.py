@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats
@@ -27,6 +26,7 @@ from hrc_env.experiments.price.shield import Widened
 from hrc_env.experiments.runner import run
 from hrc_env.experiments.setups import PerceptionSetup
 from hrc_env.safety.shield import SHIELDS
+from hrc_env.settings import settle
 from hrc_env.simulation import Simulation
 
 TINY = Price(

@@ -4,12 +4,12 @@ import cv2
 import numpy as np
 import pytest
 
-from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError
 from hrc_env.geometry.camera_config import CameraConfig, read_rig, write_rig
 from hrc_env.geometry.cameras import image_from_pinhole, project
 from hrc_env.geometry.rotations import about_axis, from_rotation_vector, look_at
 from hrc_env.scene.rig import make_cameras
+from hrc_env.settings import settle
 
 K = np.array([[905.0, 0.0, 948.0], [0.0, 912.0, 551.0], [0.0, 0.0, 1.0]])
 BROWN = (-0.21, 0.06, 0.001, -0.002, -0.004)

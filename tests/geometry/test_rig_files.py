@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCEnv
 from hrc_env.geometry.camera_config import CameraConfig, read_rig, write_rig
 from hrc_env.scene.build import SceneConfig, build
 from hrc_env.scene.rigs import RIGS, findings, sees, workspace
+from hrc_env.settings import settle
 
 ODD = replace(
     CameraConfig.from_make("gopro_hero8_wide", 'the "left" one\\', (1.0, -2.0, 2.25)),

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from assets.workers.poses import rest_motion
-from hrc_env.config import settle
 from hrc_env.core.batching import mapped, one
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.infos import ABSENT, ACTIVITY, BODY
@@ -17,6 +16,7 @@ from hrc_env.motion import generator
 from hrc_env.scene.build import build
 from hrc_env.scene.physics import Physics
 from hrc_env.scene.render import CropRenderer
+from hrc_env.settings import settle
 from hrc_env.vector.env import HRCVectorEnv
 from hrc_env.worker.body import SEGMENT, load_body, worker_names
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from recorded import begin, joined, started, walk_straight, watched
 
-from hrc_env.config import settle
 from hrc_env.core.batching import one
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import WorkerMotion
@@ -26,6 +25,7 @@ from hrc_env.motion.paths import lay_path
 from hrc_env.motion.state import N_ROOTS
 from hrc_env.motion.traffic import meets
 from hrc_env.motion.walk import plan_walk
+from hrc_env.settings import settle
 from hrc_env.worker.body import SEGMENT, load_body, worker_truth
 
 BODY = load_body()

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from gymnasium.utils import seeding
 
-from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError
 from hrc_env.geometry import chains
 from hrc_env.geometry.distances import least_separation
 from hrc_env.motion import generator, starts
+from hrc_env.settings import settle
 from hrc_env.simulation import Simulation
 from hrc_env.worker.body import worker_truth
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from assets.emulator.writing import write_calibration
-from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError
 from hrc_env.perception.calibration import (
     PACKAGED,
@@ -15,6 +14,7 @@ from hrc_env.perception.calibration import (
     VERSION,
     read_calibration,
 )
+from hrc_env.settings import settle
 
 
 def changed(tmp_path, **changes):

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from hrc_env.agents.env_info import env_info
 from hrc_env.agents.registry import make_agent
-from hrc_env.config import settle
 from hrc_env.core.results import Metric
 from hrc_env.evaluation.intervals import ratio_over
 from hrc_env.geometry import chains
@@ -21,6 +20,7 @@ from hrc_env.geometry.distances import least_separation
 from hrc_env.motion import generator
 from hrc_env.perception.calibration import POSTURES
 from hrc_env.perception.outline import posture_of
+from hrc_env.settings import settle
 from hrc_env.simulation import Simulation
 from hrc_env.tasks import EPISODE_STEPS
 from hrc_env.worker.body import worker_truth

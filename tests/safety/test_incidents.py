@@ -5,7 +5,6 @@ import pytest
 
 from hrc_env.agents.env_info import env_info
 from hrc_env.agents.registry import make_agent
-from hrc_env.config import settle
 from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCEnv
 from hrc_env.motion.starts import gap_m
@@ -13,6 +12,7 @@ from hrc_env.safety import incidents
 from hrc_env.safety.contact import contact_force
 from hrc_env.safety.cost import COMPONENTS, CostConfig
 from hrc_env.safety.incidents import KINDS, noted, nothing_yet
+from hrc_env.settings import settle
 from hrc_env.simulation import Simulation
 from hrc_env.vector.env import HRCVectorEnv
 from hrc_env.worker.body import load_body

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from hrc_env.cli.frame import LEGEND_HEIGHT, MOMENT, RIGHT_X, TITLE_Y, compose, legend, strip
 from hrc_env.env import HRCEnv
 from hrc_env.render import overlay
+from hrc_env.render.frame import LEGEND_HEIGHT, MOMENT, RIGHT_X, TITLE_Y, compose, legend, strip
 
 
 def colours(image: np.ndarray) -> set[tuple[int, ...]]:
@@ -41,7 +41,7 @@ def test_a_frame_is_full_at_levels_without_crops(level):
     env = HRCEnv(perception=level)
     env.reset(seed=7)
     env.step(np.zeros(6))
-    frame = compose(env, a_diary(1), {})
+    frame = compose(env.views, a_diary(1), {})
     env.close()
     assert frame.shape == (900, 1600, 3)
     for x in (RIGHT_X, RIGHT_X + 404):

@@ -6,10 +6,10 @@ import pytest
 from rich.console import Console
 
 from hrc_env.__main__ import main
-from hrc_env.cli import ready
 from hrc_env.core.errors import RenderingError
 from hrc_env.core.kernels import ahead
 from hrc_env.perception import weights
+from hrc_env.pipeline import ready
 from hrc_env.scene import gl
 
 

@@ -1,17 +1,13 @@
-"""How far a long command is: a bar in a terminal, a line every ten seconds anywhere else."""
+"""How far a long computation is: a bar in a terminal, a line every ten seconds elsewhere."""
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import contextmanager
 from datetime import timedelta
-from pathlib import Path
 from typing import Self, TypeVar
 
 from rich.console import Console
-from rich.markdown import Markdown
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-
-from hrc_env.cli.checks import writable_folder
 
 EVERY_S = 10.0
 """Between two lines in a log file [s]."""
@@ -78,17 +74,6 @@ def progress_bar(console: Console, name: str) -> Iterator[Say]:
     """Tell it by how much the share that is done grew, and what is being done."""
     with Meter(console, name) as meter:
         yield lambda share, label: meter.show(meter.done + share, label)
-
-
-def show(run: Callable[[Path, Say], object], out: Path, name: str) -> int:
-    """Run a bench or an experiment under a progress bar, then show its report.md."""
-    writable_folder(out)
-    console = Console()
-    with progress_bar(console, name) as say:
-        run(out, say)
-    console.print(Markdown((out / "report.md").read_text()))
-    console.print(f"In [bold]{out}[/]: report.html, results.json, figures/")
-    return 0
 
 
 def track(

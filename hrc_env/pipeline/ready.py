@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 from rich.console import Console
 
-from hrc_env.cli.progress import progress_bar
 from hrc_env.core.errors import RenderingError
+from hrc_env.core.progress import progress_bar
 
 
 def make_ready(console: Console, level: str, draws: bool = False, installs: bool = False) -> None:

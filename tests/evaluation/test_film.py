@@ -6,8 +6,9 @@ import pytest
 from rich.console import Console
 
 from hrc_env.agents.registry import make_agent
-from hrc_env.cli import film
+from hrc_env.cli.play import table
 from hrc_env.core.errors import RenderingError
+from hrc_env.evaluation import film
 
 
 def scripted(env_info):
@@ -42,7 +43,7 @@ def test_every_value_of_the_table_has_its_unit():
     console = Console(width=80)
     with console.capture() as capture:
         console.print(
-            film.table(
+            table(
                 {
                     "median tracking error [mm]": 15.851,
                     "lost steps [%]": 0.4,

@@ -7,10 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.core.typing import Image
-from hrc_env.env import HRCEnv
 from hrc_env.pipeline.levels import CAMERA_LEVELS
 from hrc_env.render import overlay
-from hrc_env.render.views import Glance
+from hrc_env.render.views import Glance, Views
 
 WIDTH, HEIGHT = 1600, 900
 ROOM = (792, 716)
@@ -38,15 +37,18 @@ Diary = NDArray[np.void]
 
 
 def compose(
-    env: HRCEnv, diary: Diary, counts: Mapping[str, float], seen: Glance | None = None
+    views: Views, diary: Diary, counts: Mapping[str, float], seen: Glance | None = None
 ) -> Image:
-    """One frame (900, 1600, 3): room, cameras, crops or belief, strip.
+    """Return a frame (900, 1600, 3): room, cameras, crops or belief, strip.
 
-    Of the moment `seen` (None: now), with which the diary ends; the environment may have gone on.
-    `counts` are what was achieved and what failed so far.
+    Args:
+        views: of the simulation, which may have gone on.
+        diary: the moments so far.
+        counts: attempts that succeeded and that failed so far.
+        seen: the moment with which the diary ends; None: now.
     """
-    seen = seen or env.views.glance()
-    level, views = env.simulation.perception, env.views
+    seen = seen or views.glance()
+    level, config = views.simulation.perception, views.simulation.config
     frame = _panel(HEIGHT, WIDTH)
     if level == "pixels":
         title = "what the pose network is given: crops round the predicted worker"
@@ -64,7 +66,7 @@ def compose(
         _paste(frame, view, (RIGHT_X + k % 2 * (TILE[0] + 4), k // 2 * (TILE[1] + 4)))
     for k, picture in enumerate(pictures):
         _paste(frame, picture, (RIGHT_X + k * (picture.shape[1] + 4), TITLE_Y + 30))
-    _paste(frame, strip(diary, counts, env.config.ctrl_dt, env.config.cost.proximity_m), (0, 720))
+    _paste(frame, strip(diary, counts, config.ctrl_dt, config.cost.proximity_m), (0, 720))
     return frame
 
 

@@ -12,15 +12,14 @@ from typing import Any
 import imageio.v2 as imageio
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from hrc_env.agents.env_info import env_info
-from hrc_env.cli.frame import MOMENT, Diary, compose
-from hrc_env.cli.progress import track
-from hrc_env.cli.ready import make_ready
+from hrc_env.core.progress import track
 from hrc_env.core.typing import Image
 from hrc_env.env import HRCEnv
 from hrc_env.evaluation.rollout import Transition, rollout
+from hrc_env.pipeline.ready import make_ready
+from hrc_env.render.frame import MOMENT, Diary, compose
 
 STEPS_PER_FRAME = 2
 """A film shows every second step, in real time."""
@@ -83,16 +82,6 @@ def begin(env: Any, make: Make, seed: int, n_steps: int) -> Iterator[Transition]
     return rollout(env, agent, env.reset(seed=seed)[0], n_steps)
 
 
-def table(totals: dict[str, float], title: str = "") -> Table:
-    """What `film_episode` has returned, each value with its unit."""
-    rows = Table("", "", "unit", title=title or None)
-    rows.columns[1].justify = "right"
-    for name, value in totals.items():
-        what, _, unit = name.removesuffix("]").partition(" [")
-        rows.add_row(what, f"{value:.{({'count': 0, 'm': 2}).get(unit, 1)}f}", unit)
-    return rows
-
-
 def _limit(env: HRCEnv) -> int:
     return env.simulation.task.max_episode_steps
 
@@ -113,7 +102,7 @@ def _filmed(
     )  # fmt: skip
 
     def draw(*moment: Any) -> Image:
-        frame = compose(env, *moment)
+        frame = compose(env.views, *moment)
         writer.append_data(frame)
         return frame
 

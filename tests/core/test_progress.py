@@ -4,7 +4,7 @@ import io
 
 from rich.console import Console
 
-from hrc_env.cli.progress import Meter, progress_bar, track
+from hrc_env.core.progress import Meter, progress_bar, track
 
 
 class Clock:
