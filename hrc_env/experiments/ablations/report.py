@@ -21,7 +21,8 @@ Every joint of every frame after the first second counts, also where the track i
 word, or the prior, is then the answer. *Coverage*: the share of joints within the reported 95 %
 region; *lost*: the share of time without a track; *switches*: of a worker from one track to
 another, a minute, and *IDF1*: how well workers keep theirs (`hrc_env/tracking/metrics.py`);
-*less*: less the setting that was changed, walk by walk; a dot where the interval leaves out zero."""
+*less*: less the setting that was changed, walk by walk; a dot where the interval leaves out
+zero."""
 
 
 def report(figures: Path, ablations: Sequence[Ablation], metrics: Metrics) -> Report:
