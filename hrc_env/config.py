@@ -16,6 +16,7 @@ from hrc_env.core.mapping import (
     PRESETS,
     answer_unknown_fields,
     from_mapping,
+    merge,
     plain,
     read_toml,
     to_toml,
@@ -122,7 +123,7 @@ def resolve(config: ConfigChoice, task: TaskType, estimator: EstimatorSpec) -> H
     if isinstance(config, str | Path):
         config = read_toml(config)
     if config is None or isinstance(config, Mapping):
-        said = _merged(task.defaults, config or {})
+        said = merge(task.defaults, config or {})
         said = {name: value for name, value in said.items() if (name, value) != ("task", None)}
         kinds = {"task": task.config_type, "tracker": estimator.config}
         config = from_mapping(HRCConfig, said, kinds=kinds)
@@ -140,13 +141,6 @@ def resolve(config: ConfigChoice, task: TaskType, estimator: EstimatorSpec) -> H
             f"got {type(config.task).__name__}."
         )
     return config
-
-
-def _merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
-    """Nested mappings as one; what both say is as `above` has it."""
-    both = {k: v for k, v in below.items() if k in above and isinstance(v, Mapping)}
-    deeper = {k: _merged(v, above[k]) for k, v in both.items() if isinstance(above[k], Mapping)}
-    return {**below, **above, **deeper}
 
 
 def save_config(config: HRCConfig, path: str | Path) -> None:

@@ -350,7 +350,7 @@ class Simulation(Stateful):
         still = np.zeros((len(ids), self.chain.n_joints))
         info = agreed(self.keys, {
             **infos.reset_info(world.robot, truth.workers, present, terms, self.config.cost),
-            **infos.tracking_info(self._estimate_of(ids), truth.workers, present, identities),
+            **infos.tracking_info(rows(self.estimate, ids), truth.workers, present, identities),
             **shielded(self.shield, belief, still, self.config.ctrl_dt)[1],
             **self._episode_info(ids, generator.activity(self.motion), None),
         })  # fmt: skip
@@ -399,9 +399,6 @@ class Simulation(Stateful):
         """Return the world in which loads are parts of robots."""
         arm, qpos = world.robot.capsules_world[:, None], self.physics.qpos[:, None]
         return handling.loaded(self.scene, world, arm, qpos, self.task.is_load(self.task_state))[0]
-
-    def _estimate_of(self, ids: Ints) -> PoseEstimate:
-        return rows(self.estimate, ids)
 
     def _observe(self, belief: Belief) -> Observation:
         """Return what robots see, and their goals if the task sets them apart."""

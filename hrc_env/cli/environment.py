@@ -1,7 +1,7 @@
 """The arguments of an environment, as the commands take them that make one."""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import Field, field, fields, make_dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -9,7 +9,7 @@ import tyro
 
 from hrc_env.core.docstrings import field_docs
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.mapping import read_toml
+from hrc_env.core.mapping import merge, read_toml
 from hrc_env.env_config import EnvConfig
 
 FAULT = """'{"kind": "late", "cameras": ["camera_1"], "amount": 0.2}'"""
@@ -33,17 +33,8 @@ def read_config(words: Sequence[str]) -> dict[str, Any]:
             raise ConfigError(
                 f"--config takes FIELD=VALUE, as reward.proximity=0, or a .toml file, got {word!r}."
             )
-        config = merged(config, _assigned(word) if "=" in word else read_toml(word))
+        config = merge(config, _assigned(word) if "=" in word else read_toml(word))
     return config
-
-
-def merged(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
-    """Both nested mappings; where both say something, the other."""
-    both = {**one, **other}
-    for name in one.keys() & other.keys():
-        if isinstance(one[name], Mapping) and isinstance(other[name], Mapping):
-            both[name] = merged(one[name], other[name])
-    return both
 
 
 def _assigned(word: str) -> dict[str, Any]:

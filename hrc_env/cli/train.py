@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from hrc_env.cli.checks import at_least, writable_folder
-from hrc_env.cli.environment import EnvironmentArguments, merged
+from hrc_env.cli.environment import EnvironmentArguments
 from hrc_env.core.errors import ConfigError, check_names
+from hrc_env.core.mapping import merge
 
 ALGORITHMS = ("ppo", "ppo_lagrangian", "sac")
 
@@ -89,7 +90,7 @@ class Train(EnvironmentArguments):
         """Keyword arguments of the environment that a run learns and is judged in."""
         given = super().keywords()
         safety = {} if self.proximity is None else {"reward": {"proximity": self.proximity}}
-        config = merged(safety, given.get("config", {}))
+        config = merge(safety, given.get("config", {}))
         return {**given, "config": config, "num_threads": self.threads}
 
 

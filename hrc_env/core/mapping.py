@@ -136,6 +136,15 @@ def _tuple(hint: Any, value: Any, where: str) -> tuple[Any, ...]:
     )
 
 
+def merge(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    """Return nested mappings as one; where both hold a value it is that of `above`."""
+    both = {**below, **above}
+    for name in below.keys() & above.keys():
+        if isinstance(below[name], Mapping) and isinstance(above[name], Mapping):
+            both[name] = merge(below[name], above[name])
+    return both
+
+
 def plain(value: Any) -> Any:
     """A value as JSON has it: paths are text, NumPy's numbers and enumerations what they hold. What
     has no such form (a recorded clip, a function) stays; `for_json` refuses it."""
