@@ -309,7 +309,11 @@ def observe(now: Belief, where: ObservationLayout, terms: tuple[ObservationTerm,
     `FloatingPointError` for one that is no number, a fault of the code, never of a camera."""
     batch = len(now.action)
     present = [terms[k] for k in where.terms]
-    parts = [term.function(now).reshape(batch, -1) for term in present]
+    values = [term.function(now) for term in present]
+    for term, value in zip(present, values, strict=True):
+        name, rows = f"rows of observation term {term.name!r}", np.shape(value)[:1]
+        check_shape(name, rows, (batch,), "one an environment")
+    parts = [value.reshape(batch, -1) for value in values]
     physical = np.concatenate(parts, axis=1)
     if physical.shape[1] != len(where.scale):
         for term, part in zip(present, parts, strict=True):

@@ -9,6 +9,7 @@ import pytest
 from hrc_env.core.errors import ConfigError, NoGoalError
 from hrc_env.geometry.ways import value_at
 from hrc_env.observations import SHARED_TERMS
+from hrc_env.registration import register_task
 from hrc_env.rewards import SHARED_TERMS as SHARED_REWARDS
 from hrc_env.scene.build import build
 from hrc_env.tasks import delivery
@@ -18,7 +19,7 @@ from hrc_env.tasks.drywall import DrywallConfig
 from hrc_env.tasks.goal import judged
 from hrc_env.tasks.pick_place_goal import PickPlaceGoalConfig
 from hrc_env.tasks.reach import ReachConfig
-from hrc_env.tasks.task import TaskType, find_task, goal_of
+from hrc_env.tasks.task import TASKS, Task, TaskType, find_task, goal_of
 from tests.tasks.variants import vary
 
 REACH, WITH_GOAL = find_task("HRCReach-v0"), find_task("HRCReachGoal-v0")
@@ -71,6 +72,11 @@ REFUSED = {
         f"no {name}": (vary(REACH, **{name: None}), f"{name} must be a method")
         for name in (*REQUIRED, "markers", "is_terminal")
     },
+    "a former name": (vary(REACH, over=lambda self, step: True), "over is called is_terminal now"),
+    "nearly a hook": (vary(REACH, is_terminl=lambda self, step: True), "Is is_terminal meant"),
+    "other arguments": (vary(REACH, view=lambda self, state: None), "view must be a method of"),
+    "an object of a task": (REACH(), "register the class Reach itself"),
+    "terms in a list": (vary(REACH, rewards=[]), "rewards must be a tuple of RewardTerm"),
     "settings that are an object": (vary(REACH, config_type=ReachConfig()), "must be a dataclass"),
     "settings of another kind": (vary(REACH, config_type=dict), "must be a dataclass"),
     "settings without a default": (
@@ -106,6 +112,43 @@ def test_a_task_in_which_one_thing_is_wrong_is_refused(name):
     task, said = REFUSED[name]
     with pytest.raises(ConfigError, match=said):
         check_task(task)
+
+
+def test_a_task_without_a_hook_is_refused():
+    class Bare(Task):
+        id = "Bare-v0"
+
+    with pytest.raises(ConfigError, match=r"Bare-v0: the method \w+ is missing"):
+        check_task(Bare)
+
+
+def test_the_base_class_is_no_task():
+    with pytest.raises(ConfigError, match="Task is a base class"):
+        Task("HRCTend-v0", "Go to and fro.")
+
+
+SHAPES = {
+    "a view of another shape": (
+        {"view": lambda self, state, ids: SimpleNamespace(
+            goal_world=np.zeros((1, 3)), time_left_s=np.zeros(7))},
+        "rows of observation term 'goal_time_left'"),
+    "ends of other environments": (
+        {"is_terminal": lambda self, step: np.zeros(3, bool)}, "is_terminal must have shape"),
+    "starts of another robot": (
+        {"draw_start": lambda self, rngs, place, home_q, spread_rad: np.zeros((len(rngs), 5))},
+        "draw_start must have shape"),
+    "poses of objects that there are not": (
+        {"object_poses": lambda self, state, ids: np.zeros((len(ids), 2, 7))},
+        "object_poses must have shape"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_wrong_shapes_are_said_at_registration(name):
+    changes, said = SHAPES[name]
+    with pytest.raises(ConfigError, match=said):
+        register_task(vary(REACH, id="HRCShapes-v0", **changes))
+    assert "HRCShapes-v0" not in TASKS
 
 
 @pytest.mark.parametrize("name", ["HRCReech-v0", "", "HRCReach"])
