@@ -55,7 +55,7 @@ class Crowded(RenderedCameras):
         )
         generator.reset(state, np.arange(1), [np.random.default_rng(seed)])
         self.other = generator.current(state)
-        pipeline.cameras = pipeline.sensor = self
+        pipeline.cameras = pipeline.image_sensor = pipeline.sensor = self
 
     @property
     def other_xy_m(self) -> np.ndarray:

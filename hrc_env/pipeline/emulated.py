@@ -15,7 +15,7 @@ from hrc_env.perception.dimness import Quality, quality_of
 from hrc_env.perception.faults.fault import IMAGE
 from hrc_env.perception.faults.schedule import Recent, Schedule
 from hrc_env.pipeline.sensor_input import Generators, TrueSensorInput, TrueState, with_truth
-from hrc_env.pipeline.tracking import PoseTracking, no_keypoints
+from hrc_env.pipeline.tracking import PoseTracking, no_keypoints, setup_in
 from hrc_env.scene.build import Scene
 from hrc_env.scene.domain_randomization import AS_BUILT, draw_look
 from hrc_env.tracking.estimators import Estimator
@@ -126,7 +126,7 @@ class EmulatorPipeline(PoseTracking):
         self, scene: Scene, batch: int, tracker: Estimator, config: HRCConfig, schedule: Schedule
     ) -> None:
         self.cameras = EmulatedCameras(scene, batch, config, schedule)
-        super().__init__(batch, scene, tracker, config, self.cameras)
+        super().__init__(batch, setup_in(scene, config), tracker, self.cameras)
 
     def looked(self, ids: Ints, age_s: Floats) -> Bools:
         """Return (B, C) the cameras whose images have come and are not blank."""

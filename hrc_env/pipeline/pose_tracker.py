@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.core.batching import one
 from hrc_env.core.brought import (
     check_kind,
     check_kinds,
@@ -22,46 +21,55 @@ from hrc_env.core.brought import (
 )
 from hrc_env.core.errors import needed, whole
 from hrc_env.core.records import PoseEstimate, Roi
-from hrc_env.core.typing import Bools, Capsules, Image, Points3
+from hrc_env.core.typing import Bools, Capsules, Floats, Image, Ints, Points3
 from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.geometry.cameras import PinholeCamera, projections
 from hrc_env.geometry.shapes import WIDTH
 from hrc_env.perception.detector import DetectorConfig
 from hrc_env.perception.frames import Frames
-from hrc_env.perception.lensed import pinhole_keypoints
-from hrc_env.perception.noise import our_joints
 from hrc_env.perception.searching import ImageSource, image_crop
+from hrc_env.pipeline.image_tracking import ImageSensor, ImageTracking
 from hrc_env.pipeline.looking import Looking
-from hrc_env.pipeline.tracking import no_keypoints
+from hrc_env.pipeline.tracking import TrackingSetup
 from hrc_env.scene.rig import make_cameras
 from hrc_env.scene.rigs import common_views, coverage_of
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.contradiction import find_unexplained
 from hrc_env.tracking.estimators import EstimatorChoice, make_estimator
-from hrc_env.tracking.people.association import AssociationConfig, associate
-from hrc_env.tracking.presence import SEARCHES, Looks, Presence
 
 MOST_WORKERS = 16
 """The most people that one tracker follows."""
 MOST_SUMS = 1000
 """Number of checksums that are kept: windows move with people."""
+_ALONE = np.arange(1)
+"""The one row of a batch of one."""
 
 
-class _Watched:
-    """An image source, and the cameras whose images repeat bit for bit: they are stuck."""
+class _Films(ImageSensor):
+    """The images that somebody shows; a camera whose images repeat bit for bit is stuck."""
 
-    def __init__(self) -> None:
+    CHANGES = ("sums", "repeats")
+    tells_times = False
+
+    def __init__(self, n_cameras: int) -> None:
+        self.n_cameras = n_cameras
+        self.images = self
         self.source: ImageSource | None = None
+        self.robot_world: Capsules | None = None
+        """(K, 2, 3) the robot's capsules [m]; None: unknown."""
         self.sums: dict[tuple[int, Roi], int] = {}
         """Checksums of the crops of each camera and window."""
         self.repeats: dict[int, bool] = {}
         """Of the cameras that gave a crop of a former window again, whether it is the same."""
 
-    def show(self, source: ImageSource) -> None:
-        """Begin with the next images."""
-        self.source, self.repeats = source, {}
+    def take(self, source: ImageSource, robot_world: Capsules | None) -> None:
+        """Take the next images in."""
+        self.source, self.robot_world, self.repeats = source, robot_world, {}
         if len(self.sums) > MOST_SUMS:
             self.sums.clear()
+
+    def show(self, b: int) -> Floats:
+        """Return when the images were taken: all of them now."""
+        return np.zeros(self.n_cameras)
 
     def crop(self, camera_index: int, window: Roi) -> Image:
         """Return a crop of the source."""
@@ -73,9 +81,13 @@ class _Watched:
         self.sums[key] = new
         return crop
 
-    def stuck(self, n_cameras: int) -> Bools:
-        """Return (C,) the cameras all of whose crops are the same as before."""
-        return np.array([self.repeats.get(c, False) for c in range(n_cameras)])
+    def stuck(self, ids: Ints) -> Bools:
+        """Return (1, C) the cameras all of whose crops are the same as before."""
+        return np.array([[self.repeats.get(c, False) for c in range(self.n_cameras)]])
+
+    def robots_world(self) -> Capsules | None:
+        """Return (1, K, 2, 3) the robot's capsules [m]; None: unknown."""
+        return None if self.robot_world is None else self.robot_world[None]
 
 
 class PoseTracker:
@@ -113,22 +125,22 @@ class PoseTracker:
         dt_s = positive("dt_s", dt_s, "s")
         if floor_world is not None:
             floor_world = points_of("floor_world [m]", floor_world)
-        self.n_workers, self.dt_s = n_workers, dt_s
-        self.cameras = tuple(
+        rig = tuple(
             make_cameras([each])[0] if isinstance(each, CameraConfig) else each for each in cameras
         )
-        self.P = projections(self.cameras)
-        self.focal_px = np.array([camera.K[0, 0] for camera in self.cameras])
-        self.estimator = make_estimator(estimator, self.P, dt_s, tracker)
-        settings = detector or DetectorConfig()
-        self.looking = Looking(1, self.cameras, n_workers, settings, floor_world)
         if floor_world is None:
-            seen = common_views(self.cameras)
+            seen = common_views(rig)
         else:
-            seen = coverage_of(self.cameras, np.zeros((0, WIDTH)), floor_world)
-        self.state = self.estimator.init(1, n_workers)
-        self.presence = Presence(1, n_workers, seen)
-        self._watched = _Watched()
+            seen = coverage_of(rig, np.zeros((0, WIDTH)), floor_world)
+        settings = detector or DetectorConfig()
+        self._films = _Films(len(rig))
+        self._tracking = ImageTracking(
+            1,
+            TrackingSetup(rig, n_workers, seen, dt_s),
+            make_estimator(estimator, projections(rig), dt_s, tracker),
+            self._films,
+            Looking(1, rig, n_workers, settings, floor_world),
+        )
 
     def update(
         self,
@@ -153,45 +165,26 @@ class PoseTracker:
         if isinstance(rngs, tuple | list) and not rngs:
             rngs = [np.random.default_rng(0)]
         check_kinds("rngs", rngs, np.random.Generator)
-        drawn = list(rngs)
-        dt_s = self.dt_s if dt_s is None else positive("dt_s", dt_s, "s")
+        setup, drawn = self._tracking.setup, list(rngs)
+        dt_s = setup.dt_s if dt_s is None else positive("dt_s", dt_s, "s")
         if robot_world is not None:
             shape = (count_of(robot_world), 2, 3)
             robot_world = numbers_of("robot_world [m]", robot_world, shape, "K capsules, ends, xyz")
         given: Any = source
-        shown = given if hasattr(given, "crop") else Frames(self.cameras, given)
-        self.estimator.predict(self.state, dt_s, drawn)
-        everyone = np.arange(1)
-        expected = self.looking.followed(everyone, self.estimator.estimate(self.state))
-        seen = no_keypoints(1, len(self.cameras), self.n_workers)
-        has_image = [True] * len(self.cameras)
-        self._watched.show(shown)
-        self.looking.look(self._watched, one(expected, 0), 0, has_image, one(seen, 0), robot_world)
-        found = keypoints = pinhole_keypoints(seen, self.cameras)
-        if self.n_workers > 1:
-            keypoints = associate(self.P, found, expected, AssociationConfig()).keypoints
-        self.estimator.update(self.state, keypoints, drawn)
-        now, searched = self.estimator.estimate(self.state), self.looking.looked(everyone)
-        searched &= ~self._watched.stuck(len(self.cameras))
-        fresh_s = np.zeros(searched.shape)
-        poses = find_unexplained(keypoints, fresh_s, now, self.P, self.focal_px)
-        poses.unexplained[:] |= searched & self.looking.unexplained
-        others = self.looking.bystanders.others(everyone, self.dt_s)
-        looks = Looks(searched, fresh_s, SEARCHES, poses, others)
-        ours, config = our_joints(now), self.estimator.config
-        return self.presence.update(everyone, ours, found, keypoints, looks, dt_s, config)
+        shown = given if hasattr(given, "crop") else Frames(setup.cameras, given)
+        self._films.take(shown, robot_world)
+        return self._tracking.follow(_ALONE, dt_s, drawn, drawn)
 
     @property
     def more_people(self) -> bool:
         """Whether cameras detect more people than `n_workers`; all are then `unknown` as well."""
-        return bool(self.presence.vacancy(np.arange(1)).others.any[0])
+        return bool(self._tracking.vacancy(_ALONE).others.any[0])
 
     def forget(self) -> None:
         """Forget everybody, as at the beginning."""
-        self.estimator.reset(self.state, np.arange(1), [np.random.default_rng(0)])
-        self.presence.forget(np.arange(1))
-        self.looking.forget(0)
+        rngs = [np.random.default_rng(0)]
+        self._tracking.reset(_ALONE, rngs, rngs)
 
     def close(self) -> None:
         """Stop the detector's thread."""
-        self.looking.detector.close()
+        self._tracking.close()

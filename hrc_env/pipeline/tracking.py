@@ -1,6 +1,6 @@
-"""What the levels with cameras share: predict, get keypoints, update."""
+"""The loop of all who follow people with cameras: predict, look, update, say who is there."""
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -10,8 +10,9 @@ from hrc_env.core.batching import Stateful, rows, write_rows
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Floats, Image, Ints
-from hrc_env.core.vacancy import Others, Vacancy, no_others
-from hrc_env.geometry.cameras import projections
+from hrc_env.core.vacancy import Coverage, Others, Vacancy, no_others
+from hrc_env.geometry.cameras import PinholeCamera, projections
+from hrc_env.perception.calibration import Calibration, read_calibration
 from hrc_env.perception.lensed import pinhole_keypoints
 from hrc_env.perception.noise import our_joints
 from hrc_env.pipeline.sensor_input import Generators, Sensor, Windows
@@ -27,7 +28,7 @@ from hrc_env.tracking.frozen_frames import (
     leave_out_frozen,
     make_frozen,
 )
-from hrc_env.tracking.people.association import associate
+from hrc_env.tracking.people.association import AssociationConfig, associate
 from hrc_env.tracking.presence import IMAGES, Looks, Presence
 
 
@@ -75,26 +76,56 @@ class PerceptionPipeline(Stateful):
         """Release threads and graphics contexts."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackingSetup:
+    """Where people are followed, how many and how often."""
+
+    cameras: tuple[PinholeCamera, ...]
+    """The rig, as it is said to be."""
+    n_workers: int
+    """People who are followed at most."""
+    coverage: Coverage
+    """Which cameras would see a person on each piece of the floor."""
+    dt_s: float
+    """The usual time between two updates [s]."""
+    association: AssociationConfig = field(default_factory=AssociationConfig)
+    calibration: Calibration = field(default_factory=read_calibration)
+    """Where the network means joints to be."""
+
+
+def setup_in(scene: Scene, config: HRCConfig) -> TrackingSetup:
+    """Return how the workers of a scene are followed."""
+    calibration = config.emulator.calibrated()
+    followed = scene.cameras, scene.n_workers, coverage(scene)
+    return TrackingSetup(*followed, config.ctrl_dt, config.association, calibration)
+
+
 class PoseTracking(PerceptionPipeline):
-    """What the levels with cameras share: predict, get keypoints, update."""
+    """Follows people with cameras: predict, look where they should be, update, say who is there.
+
+    Args:
+        batch: number of environments.
+        setup: where people are followed.
+        tracker: the estimator.
+        sensor: what keypoints are found in.
+    """
 
     CHANGES = ("state", "keypoints", "sensor", "steps", "frozen", "monitored", "presence")
     LOOKS = IMAGES
     """So many say that nobody is there (`looked`)."""
 
     def __init__(
-        self, batch: int, scene: Scene, tracker: Estimator, config: HRCConfig, sensor: Sensor
+        self, batch: int, setup: TrackingSetup, tracker: Estimator, sensor: Sensor
     ) -> None:
-        self.scene, self.tracker, self.dt_s = scene, tracker, config.ctrl_dt
-        self.sensor, self.steps = sensor, np.zeros(batch, int)
-        self.association, self.calibration = config.association, config.emulator.calibrated()
-        self.P = projections(scene.cameras)
-        self.state: Any = tracker.init(batch, scene.n_workers)
-        self.keypoints = no_keypoints(batch, len(scene.cameras), scene.n_workers)
-        self.frozen = make_frozen(batch, len(scene.cameras))
-        self.monitored = make_monitor(batch, len(scene.cameras))
-        self.presence = Presence(batch, scene.n_workers, coverage(scene))
-        self.axes = np.array([(*camera.K[:2, 2], camera.K[0, 0]) for camera in scene.cameras])
+        self.setup, self.tracker, self.sensor = setup, tracker, sensor
+        n_cameras, n_workers = len(setup.cameras), setup.n_workers
+        self.P, self.steps = projections(setup.cameras), np.zeros(batch, int)
+        self.state: Any = tracker.init(batch, n_workers)
+        self.keypoints = no_keypoints(batch, n_cameras, n_workers)
+        self.frozen = make_frozen(batch, n_cameras)
+        self.monitored = make_monitor(batch, n_cameras)
+        self.presence = Presence(batch, n_workers, setup.coverage)
+        self.axes = np.array([(*camera.K[:2, 2], camera.K[0, 0]) for camera in setup.cameras])
         """(C, 3) principal point and focal length [px]."""
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
@@ -109,12 +140,27 @@ class PoseTracking(PerceptionPipeline):
     def perceive(
         self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators
     ) -> PoseEstimate:
-        """Predict the workers, look at them where they should be, and update."""
+        """Take in what the sensor measures after the usual time."""
+        return self.follow(ids, self.setup.dt_s, sensor_rngs, tracker_rngs)
+
+    def follow(
+        self, ids: Ints, dt_s: float, sensor_rngs: Generators, tracker_rngs: Generators
+    ) -> PoseEstimate:
+        """Predict the workers, look at them where they should be, and update.
+
+        Args:
+            ids: (B,) environments.
+            dt_s: time since their last update [s].
+            sensor_rngs, tracker_rngs: a generator for each environment of the batch.
+
+        Returns:
+            What is believed of the workers (B, W, ...), and who is there or unknown.
+        """
         whole = len(ids) == len(self.keypoints.px)
         state = self.state if whole else rows(self.state, ids)
-        self.tracker.predict(state, self.dt_s, tracker_rngs)
+        self.tracker.predict(state, dt_s, tracker_rngs)
         expected = self.followed(ids, self.tracker.estimate(state))
-        found = pinhole_keypoints(self.detect(ids, expected, sensor_rngs), self.scene.cameras)
+        found = pinhole_keypoints(self.detect(ids, expected, sensor_rngs), self.setup.cameras)
         self.steps[ids] += 1
         if found.time_s is not None:
             leave_out_frozen(self.frozen, ids, found)
@@ -132,14 +178,13 @@ class PoseTracking(PerceptionPipeline):
         shown = find_unexplained(keypoints, age_s, estimate, self.P, self.axes[:, 2])
         shown.unexplained[:] |= whole_images & self.strangers(ids)
         looks = Looks(whole_images, age_s, self.LOOKS, shown, self.others(ids))
-        ours = our_joints(estimate, self.calibration)
-        dt_s, config = self.dt_s, self.tracker.config
+        ours, config = our_joints(estimate, self.setup.calibration), self.tracker.config
         return self.presence.update(ids, ours, found, keypoints, looks, dt_s, config)
 
     def strangers(self, ids: Ints) -> Bools:
         """Return (B, C) the cameras whose last search found people beside the workers; here the
         keypoints hold all people."""
-        return np.zeros((len(ids), len(self.scene.cameras)), np.bool_)
+        return np.zeros((len(ids), len(self.setup.cameras)), np.bool_)
 
     def followed(self, ids: Ints, expected: PoseEstimate) -> PoseEstimate:
         """Return what is expected of the workers who are to be followed; here, of all."""
@@ -161,7 +206,7 @@ class PoseTracking(PerceptionPipeline):
         """What the estimator expects."""
         whole = len(ids) == len(self.keypoints.px)
         state = self.state if whole else rows(self.state, ids)
-        later = our_joints(self.tracker.forecast(state, horizon_s), self.calibration)
+        later = our_joints(self.tracker.forecast(state, horizon_s), self.setup.calibration)
         kept = {name: getattr(now, name) for name in ("unknown", "blind_s", "seen_world")}
         return replace(later, **kept)
 
@@ -172,9 +217,9 @@ class PoseTracking(PerceptionPipeline):
 
     def _sorted(self, keypoints: Keypoints, expected: PoseEstimate) -> Keypoints:
         """Keypoints by worker; where there is one worker, whatever was found is theirs."""
-        if self.scene.n_workers < 2:
+        if self.setup.n_workers < 2:
             return keypoints
-        return associate(self.P, keypoints, expected, self.association).keypoints
+        return associate(self.P, keypoints, expected, self.setup.association).keypoints
 
     def suspected(self, ids: Ints) -> Bools:
         """(B, C) which cameras of environments `ids` are thought to be miscalibrated."""
@@ -184,7 +229,7 @@ class PoseTracking(PerceptionPipeline):
         """(B, C) how old the images of this update are, as they say [s]; NaN: none."""
         if keypoints.time_s is None:
             return np.zeros(keypoints.px.shape[:2])
-        return self.steps[ids, None] * self.dt_s - keypoints.time_s
+        return self.steps[ids, None] * self.setup.dt_s - keypoints.time_s
 
     def last_detections(self, b: int) -> tuple[Keypoints | None, Windows]:
         """The keypoints of environment `b`."""
