@@ -6,12 +6,15 @@ is left of the joints' freedom pulled towards a rest posture. The damping keeps 
 near singular postures, where the tool then lags behind the command.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hrc_env.core.batching import flat
 from hrc_env.core.errors import ConfigError, check_fields, check_shape, unknown
+from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats, JointAngles, JointVelocities, Velocities3
 from hrc_env.geometry.chains import SerialChain, jacobian, turning
 
@@ -98,14 +101,13 @@ def resolved_rate(
     config: ControlConfig,
 ) -> JointVelocities:
     """Joint velocities (..., N) for a tool velocity (..., 3), scaled together to their limits."""
-    J = jacobian(chain, q)
-    pull = config.posture_gain_hz * (q_rest - q)
+    pull = np.asarray(config.posture_gain_hz * (q_rest - q), float)
     pull[..., 0] = 0.0  # the first joint points the arm at its goal: leave it free
-    wanted = tool_velocity_world - (J @ pull[..., None])[..., 0]
-    gram = J @ J.swapaxes(-1, -2) + config.damping**2 * np.eye(3)
-    solved = np.linalg.solve(gram, wanted[..., None])
-    qd = pull + (J.swapaxes(-1, -2) @ solved)[..., 0]
-    return _within(qd, chain)
+    J, qd = flat(jacobian(chain, q), 2), flat(pull, 1)
+    _resolve(
+        J, flat(np.asarray(tool_velocity_world, float), 1), np.full(len(J), config.damping**2), qd
+    )
+    return _within(qd.reshape(pull.shape), chain)
 
 
 def resolved_twist(
@@ -113,12 +115,82 @@ def resolved_twist(
 ) -> JointVelocities:
     """Joint velocities (..., N) for a velocity and a turn rate of the tool, (..., 6), scaled
     together to their limits; damped only near singular postures, where the tool lags behind."""
-    J = np.concatenate([jacobian(chain, q), turning(chain, q)], axis=-2)
-    gram = J @ J.swapaxes(-1, -2)
-    near = 1.0 - np.sqrt(np.maximum(np.linalg.det(gram), 0.0)) / SINGULAR_M3
-    damping = np.square(config.damping * np.clip(near, 0.0, 1.0)) + 1e-9
-    solved = np.linalg.solve(gram + damping[..., None, None] * np.eye(6), twist_world[..., None])
-    return _within((J.swapaxes(-1, -2) @ solved)[..., 0], chain)
+    J = flat(np.concatenate([jacobian(chain, q), turning(chain, q)], axis=-2), 2)
+    manipulability, qd = np.empty(len(J)), np.zeros((len(J), chain.n_joints))
+    _measure_manipulability(J, manipulability)
+    near = np.clip(1.0 - manipulability / SINGULAR_M3, 0.0, 1.0)
+    _resolve(
+        J, flat(np.asarray(twist_world, float), 1), np.square(config.damping * near) + 1e-9, qd
+    )
+    return _within(qd.reshape(np.shape(q)), chain)
+
+
+@kernel(makes_arrays=True)
+def _resolve(J, wanted, squared_damping, qd):
+    """Add to `qd` (B, N) what brings J qd (B, M) to what is wanted, by damped least squares.
+
+    Sums are of a fixed order, as those of a linear algebra library are not: stiff contacts enlarge
+    the last bit.
+    """
+    n_rows, n_joints = J.shape[1:]
+    gram, missing = np.empty((n_rows, n_rows)), np.empty(n_rows)
+    for b in range(len(J)):
+        _square(J[b], squared_damping[b], gram)
+        for i in range(n_rows):
+            missing[i] = wanted[b, i]
+            for k in range(n_joints):
+                missing[i] -= J[b, i, k] * qd[b, k]
+        _factorise(gram)
+        for i in range(n_rows):
+            for j in range(i):
+                missing[i] -= gram[i, j] * missing[j]
+        for i in range(n_rows - 1, -1, -1):
+            missing[i] /= gram[i, i]
+            for j in range(i + 1, n_rows):
+                missing[i] -= gram[j, i] * missing[j]
+        for k in range(n_joints):
+            for i in range(n_rows):
+                qd[b, k] += J[b, i, k] * missing[i]
+
+
+@kernel(makes_arrays=True)
+def _measure_manipulability(J, out):
+    """Write the square root of the determinant of J J^T (B,), 0 of singular postures."""
+    gram = np.empty((J.shape[1], J.shape[1]))
+    for b in range(len(J)):
+        _square(J[b], 0.0, gram)
+        _factorise(gram)
+        determinant = 1.0
+        for i in range(len(gram)):
+            determinant *= max(gram[i, i], 0.0)
+        out[b] = math.sqrt(determinant)
+
+
+@kernel
+def _square(J, squared_damping, gram):
+    """Write J J^T + squared_damping I."""
+    for i in range(len(gram)):
+        for j in range(i + 1):
+            total = squared_damping if i == j else 0.0
+            for k in range(J.shape[1]):
+                total += J[i, k] * J[j, k]
+            gram[i, j] = gram[j, i] = total
+
+
+@kernel
+def _factorise(gram):
+    """Write L (below the diagonal, of ones) and D (on it) of gram = L D L^T; a
+    pivot that is not positive ends its column."""
+    for j in range(len(gram)):
+        pivot = gram[j, j]
+        for k in range(j):
+            pivot -= gram[j, k] ** 2 * gram[k, k]
+        gram[j, j] = pivot
+        for i in range(j + 1, len(gram)):
+            total = gram[i, j]
+            for k in range(j):
+                total -= gram[i, k] * gram[j, k] * gram[k, k]
+            gram[i, j] = total / pivot if pivot > 0.0 else 0.0
 
 
 def _within(qd: JointVelocities, chain: SerialChain) -> JointVelocities:

@@ -3,9 +3,16 @@
 import numpy as np
 import pytest
 
-from hrc_env.control import ControlConfig, joint_command, n_actions, resolved_rate
+from hrc_env.control import (
+    SINGULAR_M3,
+    ControlConfig,
+    joint_command,
+    n_actions,
+    resolved_rate,
+    resolved_twist,
+)
 from hrc_env.core.errors import ConfigError
-from hrc_env.geometry.chains import jacobian
+from hrc_env.geometry.chains import jacobian, turning
 from hrc_env.scene.build import build
 
 SCENE = build(n_workers=0)
@@ -50,3 +57,18 @@ def test_joint_limits_of_speed_hold_and_keep_the_direction():
 def test_an_unknown_control_names_the_valid_ones():
     with pytest.raises(ConfigError, match="'joint', 'tool'"):
         n_actions("torque", CHAIN)
+
+
+def test_a_twist_is_the_damped_least_squares_solution_also_at_singular_postures():
+    config, rng = ControlConfig(), np.random.default_rng(5)
+    q = np.concatenate([near_home(), np.zeros((1, CHAIN.n_joints))])  # the last: a straight arm
+    twist = 0.01 * rng.normal(size=(len(q), 6))
+    J = np.concatenate([jacobian(CHAIN, q), turning(CHAIN, q)], axis=1)
+    gram = J @ J.swapaxes(1, 2)
+    near = 1.0 - np.sqrt(np.maximum(np.linalg.det(gram), 0.0)) / SINGULAR_M3
+    damping = np.square(config.damping * np.clip(near, 0.0, 1.0)) + 1e-9
+    solved = np.linalg.solve(gram + damping[:, None, None] * np.eye(6), twist[..., None])
+    expected = (J.swapaxes(1, 2) @ solved)[..., 0]
+    assert near[-1] == 1.0
+    assert near[0] < 1.0
+    np.testing.assert_allclose(resolved_twist(CHAIN, q, twist, config), expected, atol=1e-9)
