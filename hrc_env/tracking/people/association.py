@@ -22,7 +22,7 @@ from hrc_env.geometry.assignment import assign_rows
 from hrc_env.geometry.lines_of_sight import cameras_of
 from hrc_env.tracking.measurements import arrays_of, is_measurement
 from hrc_env.tracking.people.affinity import LEAST_JOINTS, POSE, affinity, expect
-from hrc_env.tracking.people.track_initiation import (
+from hrc_env.tracking.people.new_people import (
     fit_cameras,
     look_along,
     meeting,
@@ -112,7 +112,7 @@ def _associate_all(cameras, poses, measured, belief, s, pose, sorted_into):
     for b in range(len(pose)):
         _read(found_px[b], found_confidence[b], found_sigma[b], poses)
         _follow(cameras, poses, (mean[b], cov[b], tracked[b]), s, pose[b])
-        _welcome(cameras, poses, mean[b], tracked[b], s, pose[b])
+        _assign_new_people(cameras, poses, mean[b], tracked[b], s, pose[b])
         for c in range(len(cameras)):
             for w in range(pose.shape[2]):
                 d = pose[b, c, w]
@@ -161,7 +161,7 @@ def _follow(cameras, poses, belief, s, chosen):
 
 
 @kernel(makes_arrays=True)
-def _welcome(cameras, poses, mean, tracked, s, chosen):
+def _assign_new_people(cameras, poses, mean, tracked, s, chosen):
     """Give poses that several cameras have of one body to whom it can be."""
     (n_cameras, n_poses), n_workers = poses.shape, len(tracked)
     vacant, unseen = np.empty(n_workers, np.bool_), np.empty(n_workers, np.bool_)
