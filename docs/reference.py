@@ -333,6 +333,18 @@ With `config={{"observe_shield": True}}` the observation ends with `shield_chang
 gave in the last step, less what was asked for. What it does is in `info` ([keys](infos.md)) and in
 pictures (a red frame). One of your own: [bring your own](../bring_your_own.md#a-shield).
 
+## What it keeps
+As far as people are where they are believed to be and move no faster than the settings below say:
+
+- the robot does not come towards a person nearer than the margin ("qp" of truth: never nearer than
+  `margin_m`, beside people who walk into the robot). People may come nearer themselves: then "qp"
+  gets away, "ssm" stands;
+- to people whom no camera sees, and to floor that none has seen empty, it comes no nearer;
+- what a task lets people touch is touched no faster than the region of the body bears.
+
+`tests/safety/test_shields.py` holds each of these; how far beliefs are right is measured
+([experiments](../experiments.md)).
+
 ## How it decides
 {rows}
 

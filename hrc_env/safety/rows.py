@@ -5,9 +5,11 @@ Of every pair, n is the unit vector from the robot's nearest point to the body's
     D = gap - margin - Z_d - v_h T_h,   Z_d = max(least, predicted + k seen + k' max(seen - s', 0))
 
 with v_h the estimated speed of the body's point along -n, and sigma_n = sqrt(n' Sigma n) the root
-of predicted^2 + seen^2: of what was not seen for a while, as in late images, much of the deviation
-is the prediction's, which is wide; one that is large all the same is of a part that one camera
-carries, whose errors are larger than it says. Where D >= 0 the robot may be as fast as
+of predicted^2 + seen^2. Of `ShieldConfig` are k `sigmas`, k' `doubtful_sigmas`, s' `doubtful_m`,
+least `least_sigmas_m`, T_h `human_s`; the margin is `margin_m` or `hand_margin_m`. Of what was not
+seen for a while, as in late images, much of the deviation is the prediction's, which is wide; one
+that is large all the same is of a part that one camera carries, whose errors are larger than it
+says. Where D >= 0 the robot may be as fast as
 it can brake within D (the robot's share of `separation.protective_distance`); else it has to get
 away. A row that no command within reach exceeds is left out.
 

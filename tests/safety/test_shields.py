@@ -1,7 +1,7 @@
 """The built-in shields in the environment: what they keep, leave alone, say and refuse."""
 
 import pickle
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import gymnasium
 import numpy as np
@@ -70,6 +70,34 @@ def test_to_a_worker_who_stands_still_the_robot_comes_no_nearer_than_the_margin(
     apart = kept[0] > 0.13
     assert (free[:, apart].min(0) < 0.05).any()
     assert kept[:, apart].min() > 0.12 - 0.002
+
+
+def test_beside_people_who_walk_into_it_the_robot_never_comes_nearer_than_the_margin():
+    """In the true scene, in closed loop; without a shield it hits them."""
+    bare, kept = (play_beside_headlong_people(shield) for shield in (None, "qp"))
+    assert bare.contacts_towards > 0
+    assert bare.nearest_while_coming_m < ShieldConfig().margin_m
+    assert kept.contacts_towards == 0
+    assert kept.nearest_while_coming_m >= ShieldConfig().margin_m
+    assert kept.n_steps_coming > 0.7 * bare.n_steps_coming, "it works on"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Of some episodes, in the true scene."""
+
+    contacts_towards: float
+    nearest_while_coming_m: float
+    n_steps_coming: int
+
+
+def play_beside_headlong_people(shield: str | None) -> Outcome:
+    separations_m, contacts = [], 0.0
+    for infos, _ in steps(vector(8, shield, people="headlong"), 240, seed=71000):
+        is_coming = infos["safety/robot_towards_m_s"] > MOVING_M_S
+        separations_m += infos["safety/min_separation_m"][is_coming].tolist()
+        contacts = infos["safety/contacts_towards"].sum()
+    return Outcome(contacts, min(separations_m), len(separations_m))
 
 
 def test_where_no_row_is_tight_what_is_wanted_is_applied():
