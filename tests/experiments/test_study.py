@@ -183,9 +183,17 @@ def test_a_row_that_names_nothing_is_refused_when_it_is_declared(changes, words)
         study(**changes)
 
 
-def test_an_unknown_statistic_or_unit_is_refused_when_a_column_is_declared():
+@pytest.mark.parametrize(
+    "declare",
+    [mean, per_minute, rate, share_of_episodes, share_of_baseline, less_baseline],
+    ids=lambda declare: declare.__name__,
+)
+def test_an_unknown_statistic_is_refused_when_a_column_is_declared(declare):
     with pytest.raises(ConfigError, match=r"Unknown statistic 'costs'\. Did you mean 'cost'"):
-        mean("costs")
+        declare("costs")
+
+
+def test_an_unknown_unit_is_refused_when_a_column_is_declared():
     with pytest.raises(ConfigError, match="Unknown exposure '100 episodes'"):
         rate("contacts", per="100 episodes")
 
