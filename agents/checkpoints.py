@@ -16,6 +16,7 @@ from hrc_env.observations import FLAT
 from hrc_env.sb3 import HRCVecEnv
 from hrc_env.tasks.goal import ACHIEVED, DESIRED
 
+from . import sb3_files
 from .env_info import EnvInfo, Observation
 from .ppo_lagrangian import PPOLagrangian
 from .sac import first_steps
@@ -76,6 +77,30 @@ def describe(path: Path) -> dict[str, Any]:
         ) from error
 
 
+def meta_of(path: Path) -> dict[str, Any]:
+    """Return the description that a checkpoint holds; nothing of one that Stable-Baselines3 wrote.
+
+    Raises:
+        CheckpointError: no file, or neither of them.
+    """
+    try:
+        return describe(path)
+    except CheckpointError:
+        sb3_files.check_is_one(path)
+        return {}
+
+
+def load_to_act(path: Path, env_info: EnvInfo, trust: bool = False) -> sb3_files.SB3Agent:
+    """Return the policy of a checkpoint, of ours or of Stable-Baselines3, by its weights alone.
+
+    Raises:
+        CheckpointError: as of `load` and of `sb3_files.load`.
+    """
+    if meta := meta_of(path):
+        _check_made_for(path, meta, env_info)
+    return sb3_files.load(path, env_info, trust)
+
+
 def resume(path: Path, env: HRCVecEnv, tensorboard: Path | None = None) -> Learner:
     """Go on from a checkpoint: PPO with its scale of rewards; SAC fills its buffer anew first.
 
@@ -101,15 +126,13 @@ def resume(path: Path, env: HRCVecEnv, tensorboard: Path | None = None) -> Learn
 
 
 def load(path: Path, env_info: EnvInfo) -> "TrainedAgent":
-    """A trained policy for acting.
+    """A trained policy for acting, with its learner, which is unpickled: for runs of one's own.
 
     Raises:
         CheckpointError: it was made for another version or another environment.
     """
-    meta, size = describe(path), len(env_info.layout.low)
-    goals = dict.fromkeys((ACHIEVED, DESIRED), env_info.goal_size)
-    parts: Size = {**goals, FLAT: size} if env_info.goal_size else size
-    _check_fits(path, meta, parts, env_info.n_actions)
+    meta = describe(path)
+    _check_made_for(path, meta, env_info)
     kind = KINDS[meta.get("algorithm", "ppo")]
     return TrainedAgent(kind.load(path, device="cpu", custom_objects=NO_BUFFER))
 
@@ -129,6 +152,13 @@ def _size(space: spaces.Space[Any]) -> Size:
     if isinstance(space, spaces.Dict):
         return {name: int(np.prod(part.shape or ())) for name, part in space.items()}
     return int(np.prod(space.shape or ()))
+
+
+def _check_made_for(path: Path, meta: dict[str, Any], env_info: EnvInfo) -> None:
+    size = len(env_info.layout.low)
+    goals = dict.fromkeys((ACHIEVED, DESIRED), env_info.goal_size)
+    parts: Size = {**goals, FLAT: size} if env_info.goal_size else size
+    _check_fits(path, meta, parts, env_info.n_actions)
 
 
 def _check_fits(path: Path, meta: dict[str, Any], observation: Size, action: Size) -> None:

@@ -22,7 +22,7 @@ from benchmarks.tracking.sequences import MATCHED, Sequences, make_sequences
 from benchmarks.tracking.timing import BATCH, time_estimator
 from hrc_env.core.results import Metric
 from hrc_env.experiments.cache import PartCache, PartProgress
-from hrc_env.experiments.report import Metrics, Report
+from hrc_env.experiments.report import Metrics, Report, quick_words
 from hrc_env.experiments.runner import at_least_one
 from hrc_env.tracking.estimators import ESTIMATORS
 
@@ -60,6 +60,12 @@ class TrackingBench:
     def n_parts(self) -> int:
         """Estimators on every condition, and their times."""
         return sum(len(names_of(each)) for _, each in conditions()) + len(ESTIMATORS)
+
+    @property
+    def quick_note(self) -> str:
+        """What tables and figures of a short run say of themselves; "" of others."""
+        is_short = self.n_seeds <= QUICK.n_seeds
+        return quick_words(self.n_seeds) if is_short else ""
 
     def settings(self) -> dict[str, Any]:
         """Return what all numbers depend on."""
