@@ -77,6 +77,13 @@ class ImpactExperiment(AnyExperiment):
     """Episodes of every row, instead of 90 (8 if quick)."""
     estimator: tuple[str, ...] = ()
     """Compare these only, with the default one, the truth and nothing; all setups if not given."""
+    robots: tuple[str, ...] = ()
+    """Who acts, instead of scripted, scripted_slowed and ppo, which is trained here first: some of
+    these, random, hrc://ID/NAME, files (.zip, .safetensors) or MODULE:FUNCTION, as of play."""
+    control: str | None = None
+    """What actions are of robots that do not say it: joint, if not given, tool or twist."""
+    trust: bool = False
+    """Read pickles in their checkpoints, which run code of whoever made them; see play."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +99,13 @@ class PriceExperiment(AnyExperiment):
     instead of 1000 (600 if quick)."""
     eyes: tuple[str, ...] = ()
     """Compare these only, by name, as truth particle one_camera; quick: twelve."""
+    robots: tuple[str, ...] = ()
+    """Who acts, instead of scripted: one of random, scripted_slowed, hrc://ID/NAME, a file (.zip,
+    .safetensors) or MODULE:FUNCTION, as of play. Other tasks are then left out."""
+    control: str | None = None
+    """What its actions are if it does not say it: joint, if not given, tool or twist."""
+    trust: bool = False
+    """Read pickles in its checkpoint, which run code of whoever made it; see play."""
 
 
 @dataclass(frozen=True)

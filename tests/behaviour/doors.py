@@ -639,6 +639,10 @@ def _put(config: dict[str, Any], path: str, value: Any) -> None:
 # --- Learning (learning.py) ----------------------------------------------------------------------
 
 
+NOT_RECORDED = ("is_success", "proximity")
+"""What curves and scores hold since the recordings were made."""
+
+
 def learn(
     algorithm: str, env_id: str, ends: tuple[int, ...], folder: Path, **options: Any
 ) -> dict[str, NDArray[np.float64]]:
@@ -662,10 +666,11 @@ def learn(
         resumed = folder if k else None
         run = dataclasses.replace(asked, timesteps=end, out=folder, resume=resumed)
         for name, value in _columns(training.train(run, folder, console)[0]).items():
-            if not name.endswith("_s"):  # but for the clock's
+            if not name.endswith("_s") and name not in NOT_RECORDED:  # but for the clock's
                 values[f"run_{k}/{name}"] = value
     score = dataclasses.asdict(training.judge(asked, folder, console))
-    values |= {f"score/{name}": np.array([float(value)]) for name, value in score.items()}
+    recorded = {name: value for name, value in score.items() if name not in NOT_RECORDED}
+    values |= {f"score/{name}": np.array([float(value)]) for name, value in recorded.items()}
     with contextlib.redirect_stdout(io.StringIO()):
         export.run(Export(run_folder=folder, name="probe", out=folder, episodes=4))
     (folder / env_id / "probe.safetensors").rename(folder / EXPORTED)
