@@ -1,12 +1,10 @@
 """Agents by name, from the policies that come with the package, from a file, or by a function."""
 
-import os
-import sys
 from collections.abc import Callable
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from hrc_env.core.brought import function_called
 from hrc_env.core.errors import ConfigError, unknown
 
 from . import experts, policies, random
@@ -99,21 +97,13 @@ def control_of(name: str) -> str | None:
 
 
 def function_of(name: str) -> Callable[..., Any]:
-    """Return the function that "module:function" names; modules in the working folder are found.
+    """Return the function that "module:function" names.
 
     Raises:
         ConfigError: there is none.
     """
-    module, _, function = name.partition(":")
-    if os.getcwd() not in sys.path:  # as python -m has it
-        sys.path.append(os.getcwd())
-    try:
-        made = getattr(import_module(module), function)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise ConfigError(
-            f"There is no agent {name!r} ({error}). It must be MODULE:FUNCTION: a module that "
-            "can be imported from here, a function that is given an EnvInfo and returns an agent."
-        ) from error
+    meaning = "a function that is given an EnvInfo and returns an agent"
+    made = function_called("agent", name, meaning)
     if not callable(made):
         raise ConfigError(f"{name} must be a function of an EnvInfo, got {type(made).__name__}.")
     return made

@@ -9,6 +9,7 @@ from typing import Annotated, ClassVar
 import tyro
 
 from hrc_env.cli.checks import at_least
+from hrc_env.cli.estimators import estimators_named
 from hrc_env.cli.show import show
 from hrc_env.tasks import DEFAULT
 
@@ -34,6 +35,8 @@ class AnyExperiment:
         runner = import_module("hrc_env.experiments.runner")
         asked = {each.name: getattr(self, each.name) for each in fields(self)}
         out, overwrite = asked.pop("out"), asked.pop("overwrite")
+        if "estimator" in asked:
+            asked["estimator"] = estimators_named(asked["estimator"])
         made = experiment.make_experiment(**asked)
         return show(partial(runner.run, made, overwrite=overwrite), out, "experiment")
 
@@ -76,7 +79,8 @@ class ImpactExperiment(AnyExperiment):
     seeds: int | None = None
     """Episodes of every row, instead of 90 (8 if quick)."""
     estimator: tuple[str, ...] = ()
-    """Compare these only, with the default one, the truth and nothing; all setups if not given."""
+    """Compare these only, with the default one, the truth and nothing; all setups if not given.
+    Names, or MODULE:FUNCTION, which makes one of (P, ctrl_dt, config)."""
     robots: tuple[str, ...] = ()
     """Who acts, instead of scripted, scripted_slowed and ppo, which is trained here first: some of
     these, random, hrc://ID/NAME, files (.zip, .safetensors) or MODULE:FUNCTION, as of play."""

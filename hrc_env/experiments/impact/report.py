@@ -103,7 +103,7 @@ def report(
     if not policies:
         return Report(title, "\n\n".join(asked), ())
     setups = {name: setup_called(name).words for _, name in table}
-    draw_tradeoff(figures / "tradeoff.png", metrics, policies, list(setups), bool(warning))
+    draw_tradeoff(figures / "tradeoff.png", metrics, policies, list(setups))
     caption = (
         "A point for each setup, placed by its paired difference from the reference, whose 95 % "
         "interval are the bars: up is more goals, left is safer. Below: approaches instead of "
@@ -152,7 +152,6 @@ def draw_tradeoff(
     metrics: Metrics,
     policies: Sequence[str],
     setups: Sequence[str],
-    is_quick: bool = False,
 ) -> None:
     """Draw goals a minute against true cost while the robot moves towards the worker, and below
     against approaches, without setups that track nobody and without the policy that does not look.
@@ -162,7 +161,6 @@ def draw_tradeoff(
         metrics: of the study.
         policies: names, each has a column.
         setups: names, each has a point.
-        is_quick: whether the picture says that these are too few episodes to compare.
     """
     looking = [name for name in policies if name != SCRIPTED]
     n_rows = 2 if looking else 1
@@ -176,8 +174,6 @@ def draw_tradeoff(
             _panel(below, metrics, policy, seeing, "approaches")
         else:
             below.remove()
-    if is_quick:
-        figure.suptitle("A quick run: too few episodes to compare anything", fontsize=15)
     handles, labels = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=12)
     save(figure, path)
