@@ -1,5 +1,6 @@
 """What perception is worth in safety: every policy with every setup, on the same workers."""
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass, field
@@ -82,8 +83,11 @@ class Impact:
         shield_called(self.shield)
         at_least_one(self, "n_seeds", "n_pixels", "n_steps", "learning_steps")
         for name in self.policies:
-            if name not in POLICIES:
-                check_choice(name)
+            if name in POLICIES:
+                continue
+            if re.fullmatch(r"\w+", name) and not Path(name).exists():
+                check_names("policy", [name], (*POLICIES, "random"))
+            check_choice(name)
         labels_of(self.policies, WORDS)
         check_names("perception setup", self.setups, all_setups())
         if REFERENCE not in self.setups or not self.policies:
