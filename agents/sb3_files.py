@@ -23,6 +23,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from hrc_env.core.brought import described
 from hrc_env.core.errors import CheckpointError, learner
 from hrc_env.observations import FLAT
 from hrc_env.tasks.goal import ACHIEVED, DESIRED
@@ -46,7 +47,6 @@ POLICIES = {
 }  # fmt: skip
 """Policies that are built without a pickle, by module: those of PPO and A2C, of SAC, of TD3 and
 DDPG."""
-DISCRETE = "stable_baselines3.dqn.policies"
 EXTRACTORS = {
     f"{module}.{name}"
     for module, names in {
@@ -153,7 +153,9 @@ def _read(path: Path) -> tuple[Mapping[str, Any], Mapping[str, torch.Tensor]]:
             f"policy.pth in {path} holds no weights, or more than weights ({first}), and is not "
             "read: Stable-Baselines3 writes tensors by name."
         ) from error
-    if not (isinstance(weights, dict) and all(isinstance(w, torch.Tensor) for w in weights.values())):
+    if not (
+        isinstance(weights, dict) and all(isinstance(w, torch.Tensor) for w in weights.values())
+    ):
         raise CheckpointError(f"policy.pth in {path} must hold tensors by name.")
     return data, weights
 
@@ -240,11 +242,6 @@ def _architecture(
     kind, said = data.get("policy_class"), data.get("policy_kwargs", {})
     if not isinstance(kind, dict) or not isinstance(said, dict):
         raise CheckpointError(f"{path} does not say which policy it holds.")
-    if kind.get("__module__") == DISCRETE:
-        raise CheckpointError(
-            f"{path} holds a policy of DQN, which chooses one of a few actions; actions here are "
-            "numbers in [-1, 1]. PPO, A2C, SAC, TD3 and DDPG have such policies."
-        )
     make, unread = _known_policy(kind), list[str]()
     if make is None:
         unread.append(f"its policy ({kind.get('__module__', 'unknown')})")
@@ -256,9 +253,9 @@ def _architecture(
             f"Stable-Baselines3. A pickle runs code of whoever made the file. {TRUST}"
         )
     if make is None:
-        make = _unpickled(path, "policy_class", kind)
+        make = _unpickled(path, "policy_class", kind, type)
     if strange:
-        whole = _unpickled(path, "policy_kwargs", said)
+        whole = _unpickled(path, "policy_kwargs", said, dict)
         keywords = {name: each for name, each in whole.items() if name not in NOT_FOR_ACTING}
     if data.get("use_sde") is True:
         keywords = {"use_sde": True, **keywords}
@@ -293,16 +290,21 @@ def _plain_keywords(said: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, 
     return plain, strange
 
 
-def _unpickled(path: Path, name: str, said: Mapping[str, Any]) -> Any:
+def _unpickled(path: Path, name: str, said: Mapping[str, Any], expected: type) -> Any:
     import cloudpickle
 
     try:
-        return cloudpickle.loads(base64.b64decode(said[PICKLED]))
+        found = cloudpickle.loads(base64.b64decode(said[PICKLED]))
     except Exception as error:  # whatever objects of others raise
         raise CheckpointError(
             f"The {name} of {path} cannot be unpickled here ({type(error).__name__}: {error}). "
             "What it is made of must be importable from here."
         ) from error
+    if not isinstance(found, expected):
+        raise CheckpointError(
+            f"The {name} of {path} must be a {expected.__name__}, got {described(found)}."
+        )
+    return found
 
 
 def _built(

@@ -50,6 +50,8 @@ DEMONSTRATION_SEED = 2_000_000
 """First seed of what is shown, far from those of learning and of evaluations."""
 ONLY_OF_A_RUN = ("out", "timesteps", "threads", "episodes", "film", "resume")
 """Arguments that a resumed run does not take from the run that it goes on with."""
+SHARES = {"success_rate": ", of attempts", "is_success": ", of episodes"}
+"""What two numbers of a score are shares of."""
 FILM_SEEDS = 8
 """Number of episodes of which the film shows the one that comes closest to the worker."""
 STOPPED = 130
@@ -103,7 +105,7 @@ def judge(arguments: Train, folder: Path, console: Console) -> Score:
         **arguments.keywords(),
     )
     for name, value in asdict(score).items():
-        console.print(f"  {name:28s} {value:.3f}", highlight=False)
+        console.print(f"  {name + SHARES.get(name, ''):28s} {value:.3f}", highlight=False)
     if said := contradiction(score):
         console.print(said, highlight=False, soft_wrap=True)
     return score

@@ -86,7 +86,10 @@ class TrackingArguments(BenchArguments):
         names = estimators_named(self.estimators)
         return self.show(
             changed(
-                config, n_seeds=self.seeds, processes=processes, estimators=names,
+                config,
+                n_seeds=self.seeds,
+                processes=processes,
+                estimators=names,
                 sequences=tuple(dict.fromkeys(self.sequences)),
             )  # fmt: skip
         )

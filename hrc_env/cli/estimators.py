@@ -18,7 +18,9 @@ def _registered(word: str) -> str:
     from hrc_env.registration import register_estimator
     from hrc_env.tracking.estimators import ESTIMATORS, estimator_called
 
-    made = function_called("estimator", word, "a function of (P, ctrl_dt, config) or an EstimatorSpec")
+    made = function_called(
+        "estimator", word, "a function of (P, ctrl_dt, config) or an EstimatorSpec"
+    )
     spec = estimator_called(made)
     if spec.name not in ESTIMATORS or ESTIMATORS[spec.name].make is not spec.make:
         register_estimator(spec)

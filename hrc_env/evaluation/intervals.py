@@ -83,9 +83,7 @@ def compare_rates(
     Raises:
         ConfigError: counts that are no whole numbers, or an exposure below 0.
     """
-    difference = excess_of(
-        rate_of(ours, our_exposure, unit), rate_of(theirs, their_exposure, unit)
-    )
+    difference = excess_of(rate_of(ours, our_exposure, unit), rate_of(theirs, their_exposure, unit))
     x, y = int(np.sum(ours)), int(np.sum(theirs))
     over, under = float(np.sum(our_exposure)), float(np.sum(their_exposure))
     if not over or not under:

@@ -255,7 +255,7 @@ def test_a_report_is_made_without_the_policy_that_yields(end_to_end, tmp_path):
     _, metrics = end_to_end
     config = replace(TINY, policies=("scripted",), setups=("truth", REFERENCE))
     table = config.play(PartCache(tmp_path / "parts", "", 1, silent))
-    found = report(tmp_path / "figures", table, metrics)
+    found = report(tmp_path / "figures", table, metrics, {"scripted": "scripted"})
     assert (tmp_path / "figures" / "tradeoff.png").exists()
     assert "scripted_slowed" not in str(found.parts[1])
 

@@ -237,6 +237,7 @@ def test_a_run_that_is_killed_goes_on_to_the_same_numbers(end_to_end, process, t
     _, metrics = end_to_end
     script = (
         "import os, sys; from pathlib import Path; "
+        "from hrc_env.experiments.price.episodes import Driver\n"
         "from hrc_env.experiments.price.experiment import Price\n"
         "from hrc_env.experiments.runner import run\n"
         f"config = {TINY!r}\n"
