@@ -14,9 +14,9 @@ from .scripted import Yielding
 AGENTS = ("random", "scripted", "scripted_slowed")
 """Names of the agents that need no checkpoint."""
 OTHERS = (
-    f"{policies.PREFIX}ID/NAME, the path of what python -m hrc_env train or Stable-Baselines3 wrote "
-    "(.zip) or python -m hrc_env export (.safetensors), or MODULE:FUNCTION, which is given an "
-    "EnvInfo and returns what has act(observation)"
+    f"{policies.PREFIX}ID/NAME, the path of what python -m hrc_env train or Stable-Baselines3 "
+    "wrote (.zip) or python -m hrc_env export (.safetensors), or MODULE:FUNCTION, which is given "
+    "an EnvInfo and returns what has act(observation)"
 )
 """What else is an agent, in words."""
 
@@ -48,9 +48,9 @@ def make_agent(name: str, env_info: EnvInfo, seed: int = 0, trust: bool = False)
     if is_policy(name):
         return policies.load(policies.path_of(name), env_info)
     if _is_checkpoint(name):
-        from . import checkpoints  # here: torch takes seconds to import, and need not be there
+        from . import acting  # here: torch takes seconds to import, and need not be there
 
-        return checkpoints.load_to_act(Path(name), env_info, trust)
+        return acting.load(Path(name), env_info, trust)
     return _made_by(name, env_info)
 
 
@@ -80,7 +80,7 @@ def check_agent(name: str) -> None:
 
 
 def is_policy(name: str) -> bool:
-    """Return whether a name is that of a policy that executes nothing: hrc://... or .safetensors."""
+    """Return whether a name is that of a policy that executes nothing: hrc://, .safetensors."""
     return name.startswith(policies.PREFIX) or Path(name).suffix == policies.SUFFIX
 
 
@@ -91,9 +91,9 @@ def control_of(name: str) -> str | None:
         return policies.read(policies.path_of(name))[0].control
     if not _is_checkpoint(name):
         return None
-    from . import checkpoints
+    from . import acting
 
-    return checkpoints.meta_of(Path(name)).get("environment", {}).get("control")
+    return acting.meta_of(Path(name)).get("environment", {}).get("control")
 
 
 def function_of(name: str) -> Callable[..., Any]:

@@ -177,21 +177,20 @@ def _check_spaces(
         "(MODULE:FUNCTION)."
     )
     for what, space in (("observation", seen), ("action", actions)):
-        said = data.get(f"{what}_space")
+        said: Any = data.get(f"{what}_space")
         kind = CLASS.search(str(said.get(":type:"))) if isinstance(said, dict) else None
         if kind is None:
             raise CheckpointError(f"{path} does not say for which {what}s its policy was made.")
         expected, found = _shapes_of(space), _shapes_said(said)
         if found is None:
-            name = kind[1].rpartition(".")[2]
-            raise CheckpointError(
-                f"{path} is for {what}s of {name}, this environment has {_words(expected)}. {advice}"
-            )
-        if found != expected:
-            raise CheckpointError(
-                f"{path} is for {what}s of {_words(found)}, this environment has "
-                f"{_words(expected)}. {advice}"
-            )
+            was = kind[1].rpartition(".")[2]
+        elif found != expected:
+            was = _words(found)
+        else:
+            continue
+        raise CheckpointError(
+            f"{path} is for {what}s of {was}, this environment has {_words(expected)}. {advice}"
+        )
     for end, bound in (("low", -1.0), ("high", 1.0)):
         values = _numbers(data["action_space"].get(end))
         if values.size and not np.allclose(values, bound):
@@ -342,8 +341,9 @@ def _statistics(path: Path, trust: bool) -> Statistics | None:
         return None
     if not trust:
         raise CheckpointError(
-            f"Beside {path.name} lies {file}: by its statistics VecNormalize scaled what the policy "
-            "saw or earned. It is a pickle, which runs code of whoever made it when it is read. "
+            f"Beside {path.name} lies {file}: by its statistics VecNormalize scaled what the "
+            "policy saw or earned. It is a pickle, which runs code of whoever made it when it is "
+            "read. "
             f"{TRUST} If the policy saw observations as they are, move that file away."
         )
     try:

@@ -84,15 +84,9 @@ class TrackingArguments(BenchArguments):
         config = QUICK if self.quick else TrackingBench()
         processes = self.processes or n_cores()
         names = estimators_named(self.estimators)
-        return self.show(
-            changed(
-                config,
-                n_seeds=self.seeds,
-                processes=processes,
-                estimators=names,
-                sequences=tuple(dict.fromkeys(self.sequences)),
-            )  # fmt: skip
-        )
+        sequences = tuple(dict.fromkeys(self.sequences))
+        config = changed(config, n_seeds=self.seeds, processes=processes)
+        return self.show(changed(config, estimators=names, sequences=sequences))
 
     def _beside(self, ending: str) -> BenchArguments:
         """The same in a folder of its own, unless one was given."""

@@ -12,18 +12,18 @@ from types import ModuleType, SimpleNamespace
 import pytest
 
 from hrc_env import __version__
-from hrc_env.agents import checkpoints, policies
+from hrc_env.agents import acting, policies
 from hrc_env.agents.callbacks import Ramp
 from hrc_env.agents.env_info import EnvInfo, env_info
 from hrc_env.agents.experts import expert
 from hrc_env.agents.recording import _same_as_before
 from hrc_env.agents.registry import control_of, make_agent
-from hrc_env.evaluation.episodes import evaluate
 from hrc_env.agents.training import as_before, asked_of
 from hrc_env.cli.record import Record
 from hrc_env.cli.train import Train
 from hrc_env.core.errors import CheckpointError, ConfigError
 from hrc_env.env import HRCEnv
+from hrc_env.evaluation.episodes import evaluate
 from hrc_env.tasks.goal import ACHIEVED
 
 MAJOR, MINOR, *_ = __version__.split(".")
@@ -78,20 +78,20 @@ def meta_of(**changes: object) -> dict[str, object]:
 def test_a_checkpoint_fits_what_it_was_made_for(changes, size, said):
     meta = meta_of(**changes)
     if not said:
-        checkpoints._check_fits(Path("it.zip"), meta, size, 3)
+        acting.check_fits(Path("it.zip"), meta, size, 3)
         return
     with pytest.raises(CheckpointError, match=rf"it\.zip {said}"):
-        checkpoints._check_fits(Path("it.zip"), meta, size, 3)
+        acting.check_fits(Path("it.zip"), meta, size, 3)
 
 
 def test_what_is_no_checkpoint_says_so(tmp_path):
-    assert checkpoints.describe(made(meta_of(), tmp_path / "good.zip")) == meta_of()
+    assert acting.describe(made(meta_of(), tmp_path / "good.zip")) == meta_of()
     with pytest.raises(CheckpointError, match=r"none\.zip\. Train one"):
-        checkpoints.describe(tmp_path / "none.zip")
+        acting.describe(tmp_path / "none.zip")
     (tmp_path / "junk.zip").write_text("junk")
     for path in (tmp_path / "junk.zip", made(None, tmp_path / "other.zip")):
         with pytest.raises(CheckpointError, match=f"{path.name} is not a checkpoint of hrc_env"):
-            checkpoints.describe(path)
+            acting.describe(path)
 
 
 def test_a_run_goes_on_where_there_is_more_to_learn(tmp_path):

@@ -4,13 +4,13 @@ from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
+from importlib import import_module
 from typing import Any
 
 import gymnasium
 import numpy as np
 
 from hrc_env.agents.env_info import Agent, env_info
-from hrc_env.agents.registry import check_agent, make_agent
 from hrc_env.core.errors import ConfigError, whole
 from hrc_env.core.results import Metric
 from hrc_env.env import HRCEnv
@@ -69,8 +69,9 @@ def evaluate(
     """
     whole("n_episodes", n_episodes, 1, 10**9)
     if isinstance(make, str):
-        check_agent(make)
-        make = partial(make_agent, make)
+        registry = import_module("hrc_env.agents.registry")  # here: it reads learners' files
+        registry.check_agent(make)
+        make = partial(registry.make_agent, make)
     if not callable(make):
         raise ConfigError(
             "evaluate wants a function that makes an agent for an EnvInfo, or an agent as "

@@ -71,7 +71,7 @@ def labels_of(agents: Sequence[str], taken: Mapping[str, str]) -> dict[str, str]
 
 
 def label_of(agent: str, taken: Mapping[str, str]) -> str:
-    """Return a name for an agent of somebody's own: letters, digits and _ of its own, joined by -."""
+    """Return a name for an agent of the user's own: its letters, digits and _, joined by -."""
     stem = agent.removesuffix(".zip").removesuffix(policies.SUFFIX)
     label = re.sub(r"\W+", "-", stem).strip("-")
     return f"own-{label}" if label in taken else label

@@ -334,5 +334,6 @@ def describe(value: Any) -> Any:
     if isinstance(value, Path):
         return str(value)
     if callable(value):
-        return described(value)
+        name = getattr(value, "__qualname__", type(value).__qualname__)
+        return {"function": name, "source": source_digest(value)}
     return value

@@ -1,4 +1,4 @@
-"""Options of commands: unknown ones are answered with the nearest, switches are given either way."""
+"""Options of commands: unknown ones are answered with the nearest, switches come in two ways."""
 
 import pytest
 

@@ -23,7 +23,8 @@ from hrc_env.tasks import DEFAULT
 SCRIPTED, SLOWED, PPO = "scripted", "scripted_slowed", "ppo"
 WORDS = {
     SCRIPTED: "drives to its goals whoever is near",
-    SLOWED: f"slows down from {SLOW_M:g} m of estimated separation and stands still at {STOP_M:g} m",
+    SLOWED: f"slows down from {SLOW_M:g} m of estimated separation and stands still at "
+    f"{STOP_M:g} m",
     PPO: "was trained here on the reference",
 }
 POLICIES = tuple(WORDS)

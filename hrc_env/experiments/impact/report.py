@@ -8,7 +8,8 @@ from matplotlib.axes import Axes
 from hrc_env.experiments.columns import Column
 from hrc_env.experiments.impact.episodes import SLOW_M, STOP_M
 from hrc_env.experiments.impact.metrics import COMPARED, NOMINAL_MPS, Played
-from hrc_env.experiments.impact.policies import PPO, SCRIPTED, WORDS as ROBOTS
+from hrc_env.experiments.impact.policies import PPO, SCRIPTED
+from hrc_env.experiments.impact.policies import WORDS as ROBOTS
 from hrc_env.experiments.plots import ends, label, new_figure, save
 from hrc_env.experiments.report import Metrics, Report, Table, picture, table_of
 from hrc_env.experiments.setups import LATE, LATE_S, REFERENCE, setup_called

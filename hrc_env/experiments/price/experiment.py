@@ -70,7 +70,7 @@ class Price:
     """Episodes with rendered images and a network, and as many with the emulator; 0: none."""
     n_steps: int | None = None
     """Control steps of an episode; None: the task's."""
-    driver: Driver = Driver()
+    driver: Driver = field(default_factory=Driver)
     """Who drives the robot."""
 
     def __post_init__(self) -> None:
