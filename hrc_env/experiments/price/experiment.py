@@ -178,15 +178,15 @@ def make_experiment(
             f"The price is that of one robot, got --robots {' '.join(robots)}. Call it once for "
             "each, with a folder of its own (--out)."
         )
-    usual = Price(eyes=QUICK, n_fresh=600, n_pixels=0) if quick else Price(
-        others=tuple(each for each in BUILT_IN if each != DEFAULT)
-    )  # fmt: skip
-    if task != DEFAULT:
-        usual = changed(usual, task=task, others=(), eyes=ELSEWHERE, n_pixels=0)
-    if robots:
-        usual = changed(usual, others=())
     driver = Driver(*robots or (SCRIPTED,), control=control, trust=trust)
-    usual = changed(usual, driver=driver)
+    others = () if robots else tuple(each for each in BUILT_IN if each != DEFAULT)
+    if task != DEFAULT:
+        usual = Price(task=task, eyes=ELSEWHERE, n_pixels=0, driver=driver)
+        usual = changed(usual, n_fresh=600 if quick else None)
+    elif quick:
+        usual = Price(eyes=QUICK, n_fresh=600, n_pixels=0, driver=driver)
+    else:
+        usual = Price(others=others, driver=driver)
     config = changed(usual, n_seeds=seeds, eyes=tuple(dict.fromkeys(eyes)) or None)
     if seeds is not None:
         config = changed(config, n_fresh=-(-10 * seeds // 3), n_pixels=min(seeds, config.n_pixels))
