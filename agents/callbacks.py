@@ -57,10 +57,16 @@ class Curriculum(BaseCallback):
         super().__init__()
         self.ramp, self.env = ramp, env
         self.whole = env.env.config.reward
+        self.share = ramp.at(0)
+
+    @property
+    def weight(self) -> float:
+        """The proximity term's weight in the last rollout."""
+        return self.share * self.whole.proximity
 
     def _on_rollout_start(self) -> None:
-        share = self.ramp.at(self.num_timesteps)
-        self.env.set_reward(replace(self.whole, proximity=share * self.whole.proximity))
+        self.share = share = self.ramp.at(self.num_timesteps)
+        self.env.set_reward(replace(self.whole, proximity=self.weight))
         if isinstance(self.model, PPOLagrangian):
             self.model.share = share
 
@@ -111,12 +117,12 @@ class TrainingMonitor(BaseCallback):
         folder: Path,
         facts: dict[str, Any],
         curve: Curve,
-        ramp: Ramp,
+        care: Curriculum,
         interrupt: Interrupt,
         meter: Meter,
     ) -> None:
         super().__init__()
-        self.folder, self.facts, self.curve, self.ramp = folder, facts, curve, ramp
+        self.folder, self.facts, self.curve, self.care = folder, facts, curve, care
         self.interrupt, self.meter = interrupt, meter
         self.recent: deque[dict[str, float]] = deque(maxlen=RECENT_EPISODES)
         self.before_s = curve[-1]["wall_s"] if curve else 0.0
@@ -147,8 +153,9 @@ class TrainingMonitor(BaseCallback):
         if self.recent:
             score = asdict(summarize(list(self.recent)))
             wall_s = self.before_s + time.monotonic() - self.started_s
-            share = self.ramp.at(self.num_timesteps)
+            share = self.care.ramp.at(self.num_timesteps)
             point = {"steps": float(self.num_timesteps), "wall_s": wall_s, "safety_share": share}
+            point["proximity"] = self.care.weight
             if isinstance(self.model, PPOLagrangian):
                 held = self.model.multiplier
                 point |= {"cost": held.cost, "limit": held.limit, "multiplier": held.value}
@@ -156,7 +163,8 @@ class TrainingMonitor(BaseCallback):
             for name, value in score.items():
                 self.logger.record(f"episode/{name}", value)
             contacts = score["contacts_per_episode"]
-            note = f"goals {score['success_rate']:.0%}, contacts {contacts:.2f}"
+            note = f"attempts {score['success_rate']:.0%}, is_success {score['is_success']:.0%}"
+            note += f", contacts {contacts:.2f}"
         self.meter.show(self.num_timesteps, note=note)
 
     def _save(self) -> None:
@@ -166,7 +174,7 @@ class TrainingMonitor(BaseCallback):
 
 
 PANELS = {
-    "success_rate": ("goals reached (share)", "tab:green"),
+    "success_rate": ("attempts achieved (dashed: episodes with is_success)", "tab:green"),
     "goals_per_minute": ("goals per minute", "tab:blue"),
     "contacts_per_episode": ("true contacts per episode", "tab:red"),
     "close_steps_per_episode": ("steps < 15 cm per episode", "tab:orange"),
@@ -189,6 +197,9 @@ def plot_curve(curve: Curve, path: Path, title: str) -> None:
     axes = figure.subplots(len(panels) // 2, 2, sharex=True)
     for axis, (name, (words, colour)) in zip(axes.ravel(), panels.items(), strict=True):
         axis.plot(steps, [point[name] for point in curve], color=colour)
+        if name == "success_rate" and all("is_success" in point for point in curve):
+            succeeded = [point["is_success"] for point in curve]
+            axis.plot(steps, succeeded, color=colour, linestyle="--")
         if name == "cost":
             axis.axhline(curve[-1]["limit"], color="grey", linestyle="--")
         label(axis, "environment steps", words)

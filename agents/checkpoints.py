@@ -11,11 +11,10 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from hrc_env import __version__
-from hrc_env.core.errors import CheckpointError, learner
-from hrc_env.observations import FLAT
+from hrc_env.core.errors import learner
 from hrc_env.sb3 import HRCVecEnv
-from hrc_env.tasks.goal import ACHIEVED, DESIRED
 
+from .acting import Size, check_fits, check_made_for, describe
 from .env_info import EnvInfo, Observation
 from .ppo_lagrangian import PPOLagrangian
 from .sac import first_steps
@@ -24,14 +23,11 @@ with learner():
     from stable_baselines3 import PPO, SAC
     from stable_baselines3.common.vec_env import VecNormalize
 
-TRAIN = "python -m hrc_env train"
 KINDS = {"ppo": PPO, "ppo_lagrangian": PPOLagrangian, "sac": SAC}
 """By algorithm."""
 NO_BUFFER = {"buffer_size": 1, "replay_buffer_class": None, "replay_buffer_kwargs": {}}
 """What acts needs none, and hindsight wants an environment."""
 Learner = PPO | SAC
-Size = int | dict[str, int]
-"""Entries of an observation, by name where goals stand apart."""
 
 
 def save(learner: Learner, path: Path, facts: dict[str, Any]) -> None:
@@ -59,23 +55,6 @@ def save(learner: Learner, path: Path, facts: dict[str, Any]) -> None:
     os.replace(draft, path)
 
 
-def describe(path: Path) -> dict[str, Any]:
-    """Return the description that a checkpoint holds.
-
-    Raises:
-        CheckpointError: no file, or not one of ours.
-    """
-    if not path.exists():
-        raise CheckpointError(f"No checkpoint at {path}. Train one with: {TRAIN}")
-    try:
-        with zipfile.ZipFile(path) as archive:
-            return json.loads(archive.read("hrc_env.json"))
-    except (zipfile.BadZipFile, KeyError) as error:
-        raise CheckpointError(
-            f"{path} is not a checkpoint of hrc_env ({error}). Train one with: {TRAIN}"
-        ) from error
-
-
 def resume(path: Path, env: HRCVecEnv, tensorboard: Path | None = None) -> Learner:
     """Go on from a checkpoint: PPO with its scale of rewards; SAC fills its buffer anew first.
 
@@ -83,7 +62,7 @@ def resume(path: Path, env: HRCVecEnv, tensorboard: Path | None = None) -> Learn
         CheckpointError: it was made for another version or another environment.
     """
     meta = describe(path)
-    _check_fits(path, meta, _size(env.observation_space), _size(env.action_space))
+    check_fits(path, meta, _size(env.observation_space), _size(env.action_space))
     log = None if tensorboard is None else str(tensorboard)
     kind = KINDS[meta.get("algorithm", "ppo")]
     if kind is SAC:
@@ -101,15 +80,13 @@ def resume(path: Path, env: HRCVecEnv, tensorboard: Path | None = None) -> Learn
 
 
 def load(path: Path, env_info: EnvInfo) -> "TrainedAgent":
-    """A trained policy for acting.
+    """A trained policy for acting, with its learner, which is unpickled: for runs of one's own.
 
     Raises:
         CheckpointError: it was made for another version or another environment.
     """
-    meta, size = describe(path), len(env_info.layout.low)
-    goals = dict.fromkeys((ACHIEVED, DESIRED), env_info.goal_size)
-    parts: Size = {**goals, FLAT: size} if env_info.goal_size else size
-    _check_fits(path, meta, parts, env_info.n_actions)
+    meta = describe(path)
+    check_made_for(path, meta, env_info)
     kind = KINDS[meta.get("algorithm", "ppo")]
     return TrainedAgent(kind.load(path, device="cpu", custom_objects=NO_BUFFER))
 
@@ -129,19 +106,3 @@ def _size(space: spaces.Space[Any]) -> Size:
     if isinstance(space, spaces.Dict):
         return {name: int(np.prod(part.shape or ())) for name, part in space.items()}
     return int(np.prod(space.shape or ()))
-
-
-def _check_fits(path: Path, meta: dict[str, Any], observation: Size, action: Size) -> None:
-    made_with = meta["hrc_env"]
-    if made_with.split(".")[:2] != __version__.split(".")[:2]:
-        raise CheckpointError(
-            f"{path} was made with hrc_env {made_with}, this is {__version__}; checkpoints fit the "
-            f"same minor version. Install hrc_env {made_with} or train anew: {TRAIN}"
-        )
-    sizes = meta["observation_size"], meta["action_size"]
-    if sizes != (observation, action):
-        raise CheckpointError(
-            f"{path} expects observations {sizes[0]} and actions {sizes[1]}, this environment has "
-            f"{observation} and {action}: make it with the same task, n_workers and control "
-            f"({meta.get('environment')})."
-        )

@@ -115,7 +115,7 @@ def _played(asked: Record, first: int, n: int) -> list[Episode]:
     """Episodes `first` to `first + n - 1`, side by side."""
     env = HRCVectorEnv(n, **asked.keywords())
     try:
-        agent = make_agent(asked.agent, env_info(env.shards.first), asked.seed + first)
+        agent = make_agent(asked.agent, env_info(env.shards.first), asked.seed + first, asked.trust)
         begun = env.reset(seed=asked.seed + first)
         steps = list(rollout(env, _Clipped(agent), begun[0]))
         lengths = np.sum([step.is_playing for step in steps], axis=0)

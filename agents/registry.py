@@ -1,8 +1,10 @@
-"""Agents by name, from the policies that come with the package, or from a file."""
+"""Agents by name, from the policies that come with the package, from a file, or by a function."""
 
-from importlib import import_module
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+from hrc_env.core.brought import function_called
 from hrc_env.core.errors import ConfigError, unknown
 
 from . import experts, policies, random
@@ -11,64 +13,113 @@ from .scripted import Yielding
 
 AGENTS = ("random", "scripted", "scripted_slowed")
 """Names of the agents that need no checkpoint."""
+OTHERS = (
+    f"{policies.PREFIX}ID/NAME, the path of what python -m hrc_env train or Stable-Baselines3 "
+    "wrote (.zip) or python -m hrc_env export (.safetensors), or MODULE:FUNCTION, which is given "
+    "an EnvInfo and returns what has act(observation)"
+)
+"""What else is an agent, in words."""
 
 
-def make_agent(name: str, env_info: EnvInfo, seed: int = 0) -> Agent:
+def make_agent(name: str, env_info: EnvInfo, seed: int = 0, trust: bool = False) -> Agent:
     """Return an agent by name, from a file, or as a function makes it.
 
     Args:
         name: "random", "scripted", "scripted_slowed"; a policy that comes with the package,
-            "hrc://HRCReach-v0/NAME"; the path of a policy (.safetensors) or checkpoint (.zip); or
-            "module:function", which is given the `EnvInfo`.
+            "hrc://HRCReach-v0/NAME"; the path of a policy (.safetensors), or of a checkpoint of
+            `train` or of Stable-Baselines3 (.zip); or "module:function", which is given the
+            `EnvInfo`.
         env_info: of the environment that it acts in, as of `hrc_env.env_info`.
         seed: of an agent that draws.
+        trust: whether pickles in a checkpoint may be read, which run code of whoever made it.
+            Only checkpoints with a policy or network class of somebody's own need that, and
+            statistics of `VecNormalize`.
 
     Raises:
         ConfigError: neither an agent nor a file.
-        CheckpointError: a file that does not fit the environment.
+        CheckpointError: a file that does not fit the environment, or that needs `trust`.
         MissingExtraError: a checkpoint, where the learner that reads it is not installed.
     """
+    check_agent(name)
     if name == "random":
         return random.RandomAgent(env_info, seed)
     if name in AGENTS:
         return experts.expert(env_info, Yielding() if name != "scripted" else None)
-    if name.startswith(policies.PREFIX) or Path(name).suffix == policies.SUFFIX:
+    if is_policy(name):
         return policies.load(policies.path_of(name), env_info)
-    if Path(name).suffix == ".zip" or Path(name).exists():
-        from . import checkpoints  # here: torch takes seconds to import, and need not be there
+    if _is_checkpoint(name):
+        from . import acting  # here: torch takes seconds to import, and need not be there
 
-        return checkpoints.load(Path(name), env_info)
+        return acting.load(Path(name), env_info, trust)
+    return _made_by(name, env_info)
+
+
+def check_agent(name: str) -> None:
+    """Raise `ConfigError` for what cannot be an agent, before an environment is made.
+
+    Files are looked for, and functions are imported; whether they fit is found when they are
+    given an `EnvInfo`.
+    """
+    if not isinstance(name, str):
+        raise ConfigError(f"An agent must be a name, got {type(name).__name__}. {_valid()}")
+    if name in AGENTS:
+        return
+    if is_policy(name):
+        policies.path_of(name)
+        return
+    if name and Path(name).is_dir():
+        inside = Path(name) / "policy.zip"
+        hint = f" Did you mean {str(inside)!r}?" if inside.is_file() else ""
+        raise ConfigError(f"The agent {name!r} is a folder.{hint} {_valid()}")
+    if _is_checkpoint(name):
+        return
     if ":" in name:
-        return _made_by(name, env_info)
-    error = unknown("agent", name, AGENTS)
-    raise ConfigError(
-        f"{error} Or {policies.PREFIX}ID/NAME, the path of what python -m hrc_env train wrote "
-        "(.zip) or export (.safetensors), or MODULE:FUNCTION."
-    )
+        function_of(name)
+        return
+    raise ConfigError(f"{unknown('agent', name, AGENTS)} Or {OTHERS}.")
+
+
+def is_policy(name: str) -> bool:
+    """Return whether a name is that of a policy that executes nothing: hrc://, .safetensors."""
+    return name.startswith(policies.PREFIX) or Path(name).suffix == policies.SUFFIX
 
 
 def control_of(name: str) -> str | None:
     """Return the `control` that a trained policy was made for; None if it names none."""
-    if name.startswith(policies.PREFIX) or Path(name).suffix == policies.SUFFIX:
+    check_agent(name)
+    if is_policy(name):
         return policies.read(policies.path_of(name))[0].control
-    if Path(name).suffix != ".zip":
+    if not _is_checkpoint(name):
         return None
-    from . import checkpoints
+    from . import acting
 
-    return checkpoints.describe(Path(name)).get("environment", {}).get("control")
+    return acting.meta_of(Path(name)).get("environment", {}).get("control")
+
+
+def function_of(name: str) -> Callable[..., Any]:
+    """Return the function that "module:function" names.
+
+    Raises:
+        ConfigError: there is none.
+    """
+    meaning = "a function that is given an EnvInfo and returns an agent"
+    made = function_called("agent", name, meaning)
+    if not callable(made):
+        raise ConfigError(f"{name} must be a function of an EnvInfo, got {type(made).__name__}.")
+    return made
+
+
+def _valid() -> str:
+    return f"Valid: {', '.join(map(repr, AGENTS))}. Or {OTHERS}."
+
+
+def _is_checkpoint(name: str) -> bool:
+    return bool(name) and (Path(name).suffix == ".zip" or Path(name).is_file())
 
 
 def _made_by(name: str, env_info: EnvInfo) -> Agent:
     """What a function makes, by its module's dotted name and its own."""
-    module, _, function = name.partition(":")
-    try:
-        make = getattr(import_module(module), function)
-    except (ImportError, AttributeError) as error:
-        raise ConfigError(
-            f"There is no agent {name!r} ({error}). It must be MODULE:FUNCTION: a module that "
-            "can be imported from here, a function that is given an EnvInfo and returns an agent."
-        ) from error
-    agent = make(env_info)
+    agent = function_of(name)(env_info)
     if not callable(getattr(agent, "act", None)):
         raise ConfigError(
             f"{name} made {type(agent).__name__}, which has no act(observation) -> actions."

@@ -17,7 +17,7 @@ from hrc_env.core.errors import CheckpointError, RenderingError, learner
 from hrc_env.core.mapping import restored
 from hrc_env.core.progress import Meter, progress_bar
 from hrc_env.core.results import provenance, write_whole
-from hrc_env.evaluation.episodes import Score, evaluate
+from hrc_env.evaluation.episodes import Score, contradiction, evaluate
 from hrc_env.pipeline.ready import make_ready
 from hrc_env.sb3 import HRCVecEnv
 from hrc_env.settings import settle
@@ -50,6 +50,8 @@ DEMONSTRATION_SEED = 2_000_000
 """First seed of what is shown, far from those of learning and of evaluations."""
 ONLY_OF_A_RUN = ("out", "timesteps", "threads", "episodes", "film", "resume")
 """Arguments that a resumed run does not take from the run that it goes on with."""
+SHARES = {"success_rate": ", of attempts", "is_success": ", of episodes"}
+"""What two numbers of a score are shares of."""
 FILM_SEEDS = 8
 """Number of episodes of which the film shows the one that comes closest to the worker."""
 STOPPED = 130
@@ -77,7 +79,7 @@ def run(arguments: Train) -> int:
     _write(folder / "score.json", {**asdict(score), **took})
     config = settle(task=mine.task, config=mine.keywords()["config"]).config
     title = f"{mine.algorithm.upper()}, {mine.perception}"
-    title += f", proximity weight {config.reward.proximity:g}"
+    title += f", {weight_reached(curve, config.reward.proximity)}"
     title += f", shield {mine.shield}" if mine.shield else ""
     written = ["policy.zip", "score.json"]
     if curve:
@@ -103,8 +105,18 @@ def judge(arguments: Train, folder: Path, console: Console) -> Score:
         **arguments.keywords(),
     )
     for name, value in asdict(score).items():
-        console.print(f"  {name:28s} {value:.3f}", highlight=False)
+        console.print(f"  {name + SHARES.get(name, ''):28s} {value:.3f}", highlight=False)
+    if said := contradiction(score):
+        console.print(said, highlight=False, soft_wrap=True)
     return score
+
+
+def weight_reached(curve: Curve, whole: float) -> str:
+    """Return the proximity term's weight in words: that of the last rollout, and the whole one
+    where the ramp was not over."""
+    reached = curve[-1].get("proximity", whole) if curve else whole
+    of_whole = "" if reached == whole else f" of {whole:g}: the ramp was not over"
+    return f"proximity weight {reached:g}{of_whole}"
 
 
 def unused(folder: Path) -> Path:
@@ -171,10 +183,11 @@ def train(arguments: Run, folder: Path, console: Console) -> tuple[Curve, dict[s
         facts = {"environment": kwargs, "settings": asdict(settings)}
         ramp, total = Ramp(arguments.ramp), arguments.timesteps
         with Meter(console, "training", total, "steps", learner.num_timesteps) as meter:
-            monitor = TrainingMonitor(folder, facts, curve, ramp, interrupt, meter)
+            care = Curriculum(ramp, env)
+            monitor = TrainingMonitor(folder, facts, curve, care, interrupt, meter)
             learner.learn(
                 total - learner.num_timesteps,
-                callback=[Curriculum(ramp, env), monitor],
+                callback=[care, monitor],
                 reset_num_timesteps=arguments.resume is None,
                 tb_log_name=arguments.algorithm,
             )

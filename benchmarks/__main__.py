@@ -12,6 +12,7 @@ from rich.console import Console
 
 from hrc_env.cli.checks import at_least, writable_folder
 from hrc_env.cli.entry import import_first, run_command, show_errors
+from hrc_env.cli.estimators import estimators_named
 from hrc_env.cli.show import show
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.machine import n_cores
@@ -48,6 +49,12 @@ class TrackingArguments(BenchArguments):
     alone, at the end."""
     real: bool = False
     """On recorded films instead, which are fetched once (51 MB): four calibrated cameras."""
+    estimators: tuple[str, ...] = ()
+    """Run these only, beside particle: names (those of --import too, dlt, smoother), or
+    MODULE:FUNCTION, which makes one of (P, ctrl_dt, config)."""
+    sequences: tuple[str, ...] = ()
+    """On these only: a rig (lab, site, env), a condition (clean, occluded, hard, ...) or one of a
+    rig, as lab.hard."""
     baselines: bool = False
     """Other people's code instead, on the same sequences (5 per rig and condition, 1 if quick),
     as far as it is installed."""
@@ -58,6 +65,11 @@ class TrackingArguments(BenchArguments):
         at_least("--processes", self.processes, 1)
         if self.real and self.baselines:
             raise ConfigError("--real and --baselines are two parts of the bench; choose one.")
+        if (self.real or self.baselines) and (self.estimators or self.sequences):
+            raise ConfigError(
+                "--estimators and --sequences choose of the simulated sequences, which --real and "
+                "--baselines do not run: leave one of them out."
+            )
         if self.baselines:
             from benchmarks.tracking.baselines.bench import BaselinesBench
 
@@ -71,7 +83,10 @@ class TrackingArguments(BenchArguments):
 
         config = QUICK if self.quick else TrackingBench()
         processes = self.processes or n_cores()
-        return self.show(changed(config, n_seeds=self.seeds, processes=processes))
+        names = estimators_named(self.estimators)
+        sequences = tuple(dict.fromkeys(self.sequences))
+        config = changed(config, n_seeds=self.seeds, processes=processes)
+        return self.show(changed(config, estimators=names, sequences=sequences))
 
     def _beside(self, ending: str) -> BenchArguments:
         """The same in a folder of its own, unless one was given."""

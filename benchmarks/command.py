@@ -1,5 +1,6 @@
 """How the studies of this folder are called: python -m benchmarks.NAME [--quick] [--out DIR]."""
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -9,6 +10,7 @@ import tyro
 
 from hrc_env.cli.checks import at_least
 from hrc_env.cli.entry import show_errors
+from hrc_env.cli.options import understood
 from hrc_env.cli.show import show
 from hrc_env.experiments.runner import run
 from hrc_env.experiments.study import Study
@@ -56,6 +58,9 @@ def main(make: Callable[[], Study], about: str | None) -> int:
     def run_asked() -> int:
         study = make()
         default = StudyArguments(Path("out") / study.name)
-        return run_study(study, tyro.cli(StudyArguments, default=default, description=about))
+        words = understood(StudyArguments, sys.argv[1:], f"python -m benchmarks.{study.name}")
+        return run_study(
+            study, tyro.cli(StudyArguments, args=words, default=default, description=about)
+        )
 
     return show_errors(run_asked)

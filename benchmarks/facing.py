@@ -37,7 +37,7 @@ from hrc_env.experiments.ablations.play import BODIES, Walks, walks_of
 from hrc_env.experiments.cache import PartCache, PartProgress
 from hrc_env.experiments.columns import Column
 from hrc_env.experiments.lab.sides import MISSED_CONFIDENCE, MISSED_SHARE
-from hrc_env.experiments.report import Metrics, Report, Table
+from hrc_env.experiments.report import Metrics, Report, Table, quick_words
 from hrc_env.experiments.rigs import ALL, DT_S, N_WARM_UP, SINGLE, Rig, left_with
 from hrc_env.experiments.runner import run
 from hrc_env.experiments.versions import key_of
@@ -79,6 +79,12 @@ class Facing:
     def n_parts(self) -> int:
         """Levels."""
         return len(ESTIMATORS)
+
+    @property
+    def quick_note(self) -> str:
+        """What tables and figures of a short run say of themselves; "" of others."""
+        is_short = max(self.episodes) < max(Facing().episodes)
+        return quick_words(max(self.episodes), self.seconds) if is_short else ""
 
     def settings(self) -> dict[str, Any]:
         """Return what all numbers depend on."""

@@ -395,7 +395,8 @@ def command_line() -> str:
         "# Command line",
         NOTICE,
         f"`{__main__.PROGRAM} COMMAND --help` says the same. Every command also takes "
-        "`--import FILE`, a Python file that registers something of your own.",
+        "`--import FILE`, a Python file that registers something of your own. Switches are given "
+        "alone or with a value: `--film`, `--no-film`, `--film True`, `--film False`.",
         "## Arguments of an environment",
         "Of `play`, whose first word is the task, and `train`.",
         _options(EnvironmentArguments),

@@ -35,6 +35,9 @@ if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
     from hrc_env.env_config import EnvConfig as EnvConfig
     from hrc_env.evaluation.episodes import Score as Score
     from hrc_env.evaluation.episodes import evaluate as evaluate
+    from hrc_env.evaluation.intervals import Comparison as Comparison
+    from hrc_env.evaluation.intervals import compare_means as compare_means
+    from hrc_env.evaluation.intervals import compare_rates as compare_rates
     from hrc_env.evaluation.intervals import mean_over as mean_over
     from hrc_env.evaluation.intervals import paired as paired
     from hrc_env.evaluation.intervals import rate_of as rate_of
@@ -171,10 +174,13 @@ PUBLIC = {
     "save_clip": "hrc_env.motion.clip",
     # agents and what their episodes come to
     "Agent": "hrc_env.agents.env_info",
+    "Comparison": "hrc_env.evaluation.intervals",
     "EnvInfo": "hrc_env.agents.env_info",
     "Metric": "hrc_env.core.results",
     "Score": "hrc_env.evaluation.episodes",
     "Transition": "hrc_env.evaluation.rollout",
+    "compare_means": "hrc_env.evaluation.intervals",
+    "compare_rates": "hrc_env.evaluation.intervals",
     "env_info": "hrc_env.agents.env_info",
     "evaluate": "hrc_env.evaluation.episodes",
     "make_agent": "hrc_env.agents.registry",

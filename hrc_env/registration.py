@@ -56,12 +56,14 @@ def _play_briefly(task: "TaskType") -> None:
 
     from hrc_env.settings import settle
     from hrc_env.simulation import Simulation
+    from hrc_env.tasks.check import check_counts
 
     simulation = Simulation(2, settle(task=task, perception="none"))
     try:
         simulation.reset(np.arange(2), [np.random.default_rng(seed) for seed in range(2)])
         for _ in range(2):
-            simulation.step(np.zeros((2, simulation.n_actions)))
+            result = simulation.step(np.zeros((2, simulation.n_actions)))
+            check_counts(simulation.task, result.info)
         simulation.markers(0)
     finally:
         simulation.close()

@@ -86,6 +86,12 @@ def test_what_nobody_wrote_an_expert_for_says_so():
     assert "no scripted agent for HRCTend-v0" in " ".join(done.stderr.split())
 
 
+def counting(visits: float = 0.0, missing: float = 0.0, success: float = 0.0):
+    """Return an `info` that always says this."""
+    said = {"task/visits": visits, "task/missing_visits": missing, "is_success": success}
+    return lambda self, state: {name: np.full(len(state), each) for name, each in said.items()}
+
+
 BAD = {
     "markers that are no function": (
         {"id": "HRCTend-v1", "markers": None},
@@ -105,6 +111,18 @@ BAD = {
     "an info that lacks a count": (
         {"id": "HRCTend-v1", "achieved": "task/screws"},
         "info must hold 'task/screws'",
+    ),
+    "attempts below zero": (
+        {"id": "HRCTend-v1", "info": counting(visits=-1.0)},
+        r"info\['task/visits'\] must count attempts",
+    ),
+    "attempts that are no numbers": (
+        {"id": "HRCTend-v1", "info": counting(missing=np.nan)},
+        r"info\['task/missing_visits'\] must count attempts",
+    ),
+    "half a success": (
+        {"id": "HRCTend-v1", "info": counting(success=0.5)},
+        r"info\['is_success'\] must be 0 or 1",
     ),
     "a state of other rows": (
         {

@@ -23,8 +23,8 @@ sys.meta_path = [Without if finder is PathFinder else finder for finder in sys.m
 
 
 DOORS = {
-    "checkpoints", "cloning", "export", "features", "ppo", "ppo_lagrangian", "sac",
-    "sb3", "training",
+    "acting", "checkpoints", "cloning", "export", "features", "ppo", "ppo_lagrangian", "sac",
+    "sb3", "sb3_files", "training",
 }  # fmt: skip
 """The modules that cannot be imported without the learner: `hrc_env.sb3`, the rest agents."""
 

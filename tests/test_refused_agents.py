@@ -12,7 +12,7 @@ from types import ModuleType, SimpleNamespace
 import pytest
 
 from hrc_env import __version__
-from hrc_env.agents import checkpoints, policies
+from hrc_env.agents import acting, policies
 from hrc_env.agents.callbacks import Ramp
 from hrc_env.agents.env_info import EnvInfo, env_info
 from hrc_env.agents.experts import expert
@@ -23,6 +23,7 @@ from hrc_env.cli.record import Record
 from hrc_env.cli.train import Train
 from hrc_env.core.errors import CheckpointError, ConfigError
 from hrc_env.env import HRCEnv
+from hrc_env.evaluation.episodes import evaluate
 from hrc_env.tasks.goal import ACHIEVED
 
 MAJOR, MINOR, *_ = __version__.split(".")
@@ -77,20 +78,20 @@ def meta_of(**changes: object) -> dict[str, object]:
 def test_a_checkpoint_fits_what_it_was_made_for(changes, size, said):
     meta = meta_of(**changes)
     if not said:
-        checkpoints._check_fits(Path("it.zip"), meta, size, 3)
+        acting.check_fits(Path("it.zip"), meta, size, 3)
         return
     with pytest.raises(CheckpointError, match=rf"it\.zip {said}"):
-        checkpoints._check_fits(Path("it.zip"), meta, size, 3)
+        acting.check_fits(Path("it.zip"), meta, size, 3)
 
 
 def test_what_is_no_checkpoint_says_so(tmp_path):
-    assert checkpoints.describe(made(meta_of(), tmp_path / "good.zip")) == meta_of()
+    assert acting.describe(made(meta_of(), tmp_path / "good.zip")) == meta_of()
     with pytest.raises(CheckpointError, match=r"none\.zip\. Train one"):
-        checkpoints.describe(tmp_path / "none.zip")
+        acting.describe(tmp_path / "none.zip")
     (tmp_path / "junk.zip").write_text("junk")
     for path in (tmp_path / "junk.zip", made(None, tmp_path / "other.zip")):
         with pytest.raises(CheckpointError, match=f"{path.name} is not a checkpoint of hrc_env"):
-            checkpoints.describe(path)
+            acting.describe(path)
 
 
 def test_a_run_goes_on_where_there_is_more_to_learn(tmp_path):
@@ -166,6 +167,51 @@ def test_an_agent_is_called_by_what_makes_it(here, agents_of_mine):
 def test_an_agent_that_there_is_not_is_refused(here, agents_of_mine, name, said):
     with pytest.raises(ConfigError, match=said):
         make_agent(name, here)
+
+
+@pytest.mark.parametrize("name", ["", " ", None, 3])
+def test_an_agent_without_a_name_is_refused(here, name):
+    with pytest.raises(ConfigError, match="'scripted_slowed'"):
+        make_agent(name, here)
+
+
+def test_a_folder_is_no_agent_and_that_of_a_run_says_what_is_meant(here, tmp_path):
+    with pytest.raises(ConfigError, match=r"is a folder\. Valid: 'random'"):
+        make_agent(str(tmp_path), here)
+    made(meta_of(), tmp_path / "policy.zip")
+    with pytest.raises(ConfigError, match=r"is a folder\. Did you mean '.*policy\.zip'\?"):
+        make_agent(str(tmp_path), here)
+
+
+def test_what_is_called_must_be_a_function(here, agents_of_mine):
+    sys.modules[agents_of_mine].number = 3
+    with pytest.raises(ConfigError, match="agents_of_mine:number must be a function of an EnvInfo"):
+        make_agent(f"{agents_of_mine}:number", here)
+
+
+def test_a_module_in_the_working_folder_is_found(here, tmp_path, monkeypatch):
+    """Also where the command is a script, whose own folder is the first of the path."""
+    (tmp_path / "agents_of_the_folder.py").write_text(
+        "class Still:\n    def act(self, observation):\n        return 0\n"
+        "def make(info):\n    return Still()\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [each for each in sys.path if each])
+    assert make_agent("agents_of_the_folder:make", here).act(None) == 0
+
+
+@pytest.mark.parametrize(
+    ("agent", "said"),
+    [("scriptd", "Did you mean 'scripted'"), ("none_of_mine:make", "There is no agent")],
+)
+def test_an_evaluation_takes_names_and_refuses_those_that_there_are_not(agent, said):
+    with pytest.raises(ConfigError, match=said):
+        evaluate(agent, 1, perception="none")
+    with pytest.raises(ConfigError, match="evaluate wants a function"):
+        evaluate(None, 1)
+    with pytest.raises(ConfigError, match="n_episodes must be a whole number"):
+        evaluate("random", 0)
+    assert evaluate("random", 1, perception="none").episodes == 1
 
 
 @pytest.mark.parametrize("name", ["none.zip", "none.safetensors"])

@@ -12,7 +12,7 @@ from benchmarks.motion.statistics import gait_of, statistics_of
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric, over
 from hrc_env.experiments.cache import PartCache
-from hrc_env.experiments.report import Metrics, Report
+from hrc_env.experiments.report import Metrics, Report, quick_words
 from hrc_env.experiments.runner import at_least_one
 from hrc_env.motion import state as st
 from hrc_env.motion.repertoire import SCENES, Film, alone, perform
@@ -44,6 +44,12 @@ class MotionBench:
     def seeds(self) -> list[int]:
         """One a film of each worker."""
         return list(range(self.n_seeds))
+
+    @property
+    def quick_note(self) -> str:
+        """What tables and figures of a short run say of themselves; "" of others."""
+        is_short = self.n_seeds <= QUICK.n_seeds
+        return quick_words(self.n_seeds) if is_short else ""
 
     def settings(self) -> dict[str, Any]:
         """Return what all numbers depend on."""

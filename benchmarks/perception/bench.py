@@ -22,7 +22,8 @@ from benchmarks.perception.views import PLAIN, View, in_turns
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric
 from hrc_env.experiments.cache import PartCache, PartProgress
-from hrc_env.experiments.report import Metrics, Report
+from hrc_env.experiments.report import Metrics, Report, quick_words
+from hrc_env.experiments.rigs import DT_S
 from hrc_env.experiments.runner import at_least_one
 from hrc_env.perception import vino
 from hrc_env.perception.faults.fault import IMAGE, KINDS, FaultConfig
@@ -95,6 +96,12 @@ class PerceptionBench:
     def n_parts(self) -> int:
         """Tasks."""
         return len(list(tasks_of(self)))
+
+    @property
+    def quick_note(self) -> str:
+        """What tables and figures of a short run say of themselves; "" of others."""
+        is_short = self.n_emulated <= QUICK.n_emulated or self.n_steps <= QUICK.n_steps
+        return quick_words(self.n_emulated, self.n_steps * DT_S) if is_short else ""
 
     def settings(self) -> dict[str, Any]:
         """Return what all numbers depend on."""

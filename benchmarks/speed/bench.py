@@ -77,6 +77,12 @@ class SpeedBench:
         if WATCHED not in self.levels:
             raise ConfigError(f"levels must have {WATCHED!r} in them, got {self.levels}.")
 
+    @property
+    def quick_note(self) -> str:
+        """What tables and figures of a short run say of themselves; "" of others."""
+        is_short = self.n_rounds <= QUICK.n_rounds
+        return f"Quick run, {self.n_rounds} round: too few to compare anything." if is_short else ""
+
     def settings(self) -> dict[str, Any]:
         """Return what all numbers depend on."""
         return {"bench": asdict(self)}

@@ -4,6 +4,7 @@ Each (rig, condition, estimator) is written to DIR/parts as soon as it is done, 
 that was stopped goes on where it was; parts made at other versions or settings are made anew.
 """
 
+import hashlib
 import multiprocessing
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, replace
@@ -15,15 +16,16 @@ from benchmarks.tracking.cells import run_cell
 from benchmarks.tracking.detections import CONDITIONS
 from benchmarks.tracking.env_sequences import ENV, make_env_rig
 from benchmarks.tracking.metrics import TIMING, Parts, metrics_of
-from benchmarks.tracking.names import DEFAULT, SMOOTHER, conditions, names_of
+from benchmarks.tracking.names import DEFAULT, SMOOTHER, Selection
 from benchmarks.tracking.report import report
 from benchmarks.tracking.rigs import RIGS, SIGMA_PX, Rig, make_rig
 from benchmarks.tracking.sequences import MATCHED, Sequences, make_sequences
 from benchmarks.tracking.timing import BATCH, time_estimator
 from hrc_env.core.results import Metric
 from hrc_env.experiments.cache import PartCache, PartProgress
-from hrc_env.experiments.report import Metrics, Report
+from hrc_env.experiments.report import Metrics, Report, quick_words
 from hrc_env.experiments.runner import at_least_one
+from hrc_env.experiments.versions import key_of, source_digest
 from hrc_env.tracking.estimators import ESTIMATORS
 
 
@@ -46,10 +48,20 @@ class TrackingBench:
     """How often the time per update is taken."""
     processes: int = 1
     """How many conditions are run at once; times are taken alone, at the end."""
+    estimators: tuple[str, ...] = ()
+    """Who is run beside the default, as of `Selection`."""
+    sequences: tuple[str, ...] = ()
+    """On what, as of `Selection`."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for numbers that cannot work."""
         at_least_one(self, "n_seeds", "n_matched", "n_smoothed", "timing_repeats", "processes")
+        self.selection.check()
+
+    @property
+    def selection(self) -> Selection:
+        """What of the bench is run."""
+        return Selection(self.estimators, self.sequences)
 
     @property
     def seeds(self) -> list[int]:
@@ -59,11 +71,21 @@ class TrackingBench:
     @property
     def n_parts(self) -> int:
         """Estimators on every condition, and their times."""
-        return sum(len(names_of(each)) for _, each in conditions()) + len(ESTIMATORS)
+        run = self.selection
+        return sum(len(run.names_of(each)) for _, each in run.conditions()) + len(run.timed())
+
+    @property
+    def quick_note(self) -> str:
+        """What tables and figures of a short run say of themselves; "" of others."""
+        is_short = self.n_seeds <= QUICK.n_seeds
+        return quick_words(self.n_seeds) if is_short else ""
 
     def settings(self) -> dict[str, Any]:
         """Return what all numbers depend on."""
         bench = {name: value for name, value in asdict(self).items() if name != "processes"}
+        for name in ("estimators", "sequences"):
+            if not bench[name]:
+                del bench[name]
         return {
             "bench": bench,
             "default": DEFAULT,
@@ -73,30 +95,34 @@ class TrackingBench:
         }
 
     def play(self, cache: PartCache) -> Parts:
-        """Return every estimator on everything; several processes first fill the cache."""
-        quiet = replace(cache, progress=_silent)
+        """Return every estimator on everything; several processes first fill the cache. Parts are
+        the same whatever else is run."""
+        whole = {"experiment": self.name, **replace(self, estimators=(), sequences=()).settings()}
+        cache = replace(cache, key=key_of(whole, self.depends))
+        quiet, run = replace(cache, progress=_silent), self.selection
         if self.processes > 1:
             context = multiprocessing.get_context("spawn")
             with ProcessPoolExecutor(self.processes, mp_context=context) as pool:
                 running = {
-                    pool.submit(play_condition, self, quiet, *each): each for each in conditions()
+                    pool.submit(play_condition, self, quiet, *each): each
+                    for each in run.conditions()
                 }
                 for done in as_completed(running):
                     done.result()
-                    share = len(names_of(running[done][1])) / cache.n_parts
+                    share = len(run.names_of(running[done][1])) / cache.n_parts
                     cache.progress(share, ".".join(running[done]))
         played: Parts = {}
-        for each in conditions():
+        for each in run.conditions():
             played |= play_condition(self, quiet if self.processes > 1 else cache, *each)
         return played | _timing(self, cache)
 
     def metrics(self, played: Parts) -> dict[str, Metric]:
         """Return every number."""
-        return metrics_of(played)
+        return metrics_of(played, self.selection)
 
     def report(self, played: Parts, metrics: Metrics, figures: Path) -> Report:
         """Return the tables."""
-        return report(metrics)
+        return report(metrics, self.selection)
 
 
 QUICK = TrackingBench(n_seeds=8, n_matched=30, n_smoothed=2, timing_repeats=2)
@@ -119,10 +145,16 @@ def play_condition(config: TrackingBench, parts: PartCache, rig_name: str, condi
 
     return {
         (rig_name, condition, name): parts.part(
-            f"{rig_name}.{condition}.{name}", partial(make, name)
+            f"{rig_name}.{condition}.{name}", partial(make, name), own_key(name, parts.key)
         )
-        for name in names_of(condition)
+        for name in config.selection.names_of(condition)
     }
+
+
+def own_key(name: str, key: str) -> str:
+    """Return the key of an estimator's parts: of one of the user's own also its file counts."""
+    source = source_digest(ESTIMATORS[name].make) if name in ESTIMATORS else ""
+    return hashlib.sha256(f"{key} {source}".encode()).hexdigest()[:16] if source else key
 
 
 def seeds_of(config: TrackingBench, condition: str = "clean") -> list[int]:
@@ -149,6 +181,8 @@ def _timing(config: TrackingBench, parts: PartCache) -> Parts:
         return time_estimator(name, rig, frames("clean"), frames("hard"), repeats, tick)
 
     return {
-        ("lab", TIMING, name): parts.part(f"{TIMING}.{name}", partial(make, name))
-        for name in ESTIMATORS
+        ("lab", TIMING, name): parts.part(
+            f"{TIMING}.{name}", partial(make, name), own_key(name, parts.key)
+        )
+        for name in config.selection.timed()
     }

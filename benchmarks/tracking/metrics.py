@@ -1,12 +1,11 @@
 """From sums per sequence to numbers with intervals, bootstrapped over sequences."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
 
-from benchmarks.tracking.names import DEFAULT, RIVALS, names_of, rows
-from benchmarks.tracking.rigs import RIGS
+from benchmarks.tracking.names import DEFAULT, EVERYTHING, Selection
 from benchmarks.tracking.sequences import MATCHED
 from hrc_env.core.results import Metric, over
 from hrc_env.core.typing import Floats
@@ -19,23 +18,25 @@ N_RESAMPLED = 1000
 _Sums: TypeAlias = Mapping[str, Floats]
 
 
-def metrics_of(parts: Parts) -> dict[str, Metric]:
+def metrics_of(parts: Parts, selection: Selection = EVERYTHING) -> dict[str, Metric]:
     """All metrics of the bench by their dotted names."""
     metrics = _times(parts)
-    for rig, condition, window in rows():
+    for rig, condition, window in selection.rows():
         drawn = {
-            name: drawn_sums(parts[rig, condition, name][window]) for name in names_of(condition)
+            name: drawn_sums(parts[rig, condition, name][window])
+            for name in selection.names_of(condition)
         }
         for name, sums in drawn.items():
             for kind, (unit, statistic) in STATISTICS.items():
                 if _NEEDS.get(kind, "n") in sums:
                     metrics[f"{kind}.{rig}.{window}.{name}"] = metric(statistic(sums), unit, sums)
         default = _rmse(drawn[DEFAULT])
-        for name in RIVALS:
+        for name in selection.rivals():
             ratio = default / _rmse(drawn[name])
             metrics[f"default_over.{rig}.{window}.{name}"] = metric(ratio, "-", drawn[name])
-    for name in names_of(MATCHED):
-        metrics |= _bounds(parts, name)
+    if rigs := selection.rigs_of(MATCHED):
+        for name in selection.names_of(MATCHED):
+            metrics |= _bounds(parts, name, rigs)
     return dict(sorted(metrics.items()))
 
 
@@ -93,9 +94,9 @@ def _times(parts: Parts) -> dict[str, Metric]:
     }
 
 
-def _bounds(parts: Parts, name: str) -> dict[str, Metric]:
+def _bounds(parts: Parts, name: str, rigs: Sequence[str]) -> dict[str, Metric]:
     """RMSE over its bound: root of the mean of the squared ratios over rigs, and of each."""
-    drawn = {rig: drawn_sums(parts[rig, MATCHED, name][MATCHED]) for rig in RIGS}
+    drawn = {rig: drawn_sums(parts[rig, MATCHED, name][MATCHED]) for rig in rigs}
     squared = {rig: sums["squared"] / sums["bound"] for rig, sums in drawn.items()}
     both = np.sqrt(np.mean(list(squared.values()), axis=0))
     return {
@@ -103,5 +104,5 @@ def _bounds(parts: Parts, name: str) -> dict[str, Metric]:
             f"ratio_to_bound_in.{rig}.{name}": metric(np.sqrt(values), "-", drawn[rig])
             for rig, values in squared.items()
         },
-        f"ratio_to_bound.{name}": metric(both, "-", drawn[RIGS[0]], len(RIGS)),
+        f"ratio_to_bound.{name}": metric(both, "-", drawn[rigs[0]], len(rigs)),
     }

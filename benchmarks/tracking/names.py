@@ -1,8 +1,11 @@
 """Who takes part in the tracking bench, and in which rows."""
 
+from dataclasses import dataclass
+
 from benchmarks.tracking.env_sequences import ENV, ENV_CONDITIONS
 from benchmarks.tracking.rigs import RIGS
 from benchmarks.tracking.sequences import ENV_WINDOWS, MATCHED, SIMULATED, WINDOWS
+from hrc_env.core.errors import check_names
 from hrc_env.tracking.estimators import ESTIMATORS
 
 DEFAULT = "particle"
@@ -11,25 +14,70 @@ DLT = "dlt"
 """Plain per-frame triangulation; where cameras do not know names, it is told them."""
 SMOOTHER = "smoother"
 """What could have been known in view of the whole clip; not where the bound is a filter's."""
-RIVALS = (*(name for name in ESTIMATORS if name != DEFAULT), DLT)
-"""Who else there is, of those that know no more than the frames so far."""
 
 
-def conditions() -> list[tuple[str, str]]:
-    """(rig, condition) of everything that is run."""
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """What of the bench is run."""
+
+    estimators: tuple[str, ...] = ()
+    """Who beside the default; everybody if none are named."""
+    sequences: tuple[str, ...] = ()
+    """On which rigs and conditions: "lab", "hard" or "lab.hard"; on all if none are named."""
+
+    def check(self) -> None:
+        """Raise `ConfigError` for names that there are not, with those that there are."""
+        check_names("estimator", self.estimators, [*ESTIMATORS, DLT, SMOOTHER])
+        pairs = _all_conditions()
+        known = [*RIGS, ENV, *dict.fromkeys(name for _, name in pairs), *map(".".join, pairs)]
+        check_names("sequences", self.sequences, known)
+
+    def conditions(self) -> list[tuple[str, str]]:
+        """Return (rig, condition) of everything that is run."""
+        return [
+            (rig, condition)
+            for rig, condition in _all_conditions()
+            if not self.sequences
+            or {rig, condition, f"{rig}.{condition}"} & {*self.sequences}
+        ]  # fmt: skip
+
+    def rivals(self) -> list[str]:
+        """Return who else there is, of those that know no more than the frames so far."""
+        others = [*(name for name in ESTIMATORS if name != DEFAULT), DLT]
+        return [name for name in others if not self.estimators or name in self.estimators]
+
+    def names_of(self, condition: str) -> list[str]:
+        """Return who runs on a condition, the default first."""
+        smooths = not self.estimators or SMOOTHER in self.estimators
+        last = [SMOOTHER] if smooths and condition != MATCHED else []
+        return [DEFAULT, *self.rivals(), *last]
+
+    def timed(self) -> list[str]:
+        """Return whose time is taken."""
+        return [name for name in ESTIMATORS if name in (DEFAULT, *self.rivals())]
+
+    def rows(self) -> list[tuple[str, str, str]]:
+        """Return (rig, condition, window) of every row of the tables."""
+        return [
+            (rig, condition, window)
+            for rig, condition in self.conditions()
+            for window in (ENV_WINDOWS if rig == ENV else WINDOWS)[condition]
+        ]
+
+    def rigs_of(self, condition: str) -> list[str]:
+        """Return the simulated rigs on which a condition is run."""
+        return [rig for rig in RIGS if (rig, condition) in self.conditions()]
+
+
+def _all_conditions() -> list[tuple[str, str]]:
     simulated = [(rig, condition) for rig in RIGS for condition in SIMULATED]
     return [*simulated, *((ENV, condition) for condition in ENV_CONDITIONS)]
 
 
-def names_of(condition: str) -> list[str]:
-    """Who runs on a condition, the default first."""
-    return [DEFAULT, *RIVALS, *([] if condition == MATCHED else [SMOOTHER])]
+EVERYTHING = Selection()
+"""The whole bench."""
 
 
 def rows() -> list[tuple[str, str, str]]:
-    """(rig, condition, window) of every row of the tables."""
-    return [
-        (rig, condition, window)
-        for rig, condition in conditions()
-        for window in (ENV_WINDOWS if rig == ENV else WINDOWS)[condition]
-    ]
+    """Return (rig, condition, window) of every row of the whole bench."""
+    return EVERYTHING.rows()

@@ -5,11 +5,9 @@ from itertools import product
 
 from benchmarks.common import cell
 from benchmarks.tracking.env_sequences import ENV
-from benchmarks.tracking.names import DEFAULT, DLT, RIVALS, SMOOTHER, names_of, rows
-from benchmarks.tracking.rigs import RIGS
+from benchmarks.tracking.names import DEFAULT, DLT, EVERYTHING, SMOOTHER, Selection
 from benchmarks.tracking.sequences import MATCHED, TWO_WORKERS
 from hrc_env.experiments.report import Metrics, Report, table
-from hrc_env.tracking.estimators import ESTIMATORS
 
 _LEAD = f"""\
 Numbers in brackets are 95 % bootstrap intervals over sequences. `lab` and `site` are the bench's
@@ -35,76 +33,94 @@ _TABLES: dict[str, tuple[str, int]] = {
 _BATCHES = {"1": "batch 1", "64": "batch 64", "hard_64": "batch 64, mean over hard"}
 
 
-def report(metrics: Metrics) -> Report:
-    """What is to be read."""
-    rivals = [DEFAULT, *RIVALS]
+def report(metrics: Metrics, selection: Selection = EVERYTHING) -> Report:
+    """What is to be read; sections of which nothing was run are left out."""
+    rivals = [DEFAULT, *selection.rivals()]
+    with_names = [name for name in rivals if name != DLT]
     swaps = {"": f"identity_swaps.{{rig}}.{TWO_WORKERS}.{{name}}"}
-    return Report("Tracking bench", _LEAD, (
-        f"## {DEFAULT}, the default, and the best of the others", _lead(metrics),
-        "## RMSE / posterior Cramer-Rao bound", _bound(metrics), _ABOUT_THE_BOUND,
-        "## Microseconds per worker and update, one core", _cost(metrics),
-        *(part for kind, (title, scale) in _TABLES.items()
-          for part in (f"## {title}", _by_row(metrics, kind, scale))),
-        "## Two workers: changes of identity per 100 sequences",
-        _by_rig(metrics, [name for name in rivals if name != DLT], swaps),
-    ), "95 % intervals over seeds, times with the smallest and the largest")  # fmt: skip
+    sections = [(f"{DEFAULT}, the default, and the best of the others", _lead(metrics, selection))]
+    if rigs := selection.rigs_of(MATCHED):
+        bound = f"{_bound(metrics, selection, rigs)}\n\n{_ABOUT_THE_BOUND}"
+        sections.append(("RMSE / posterior Cramer-Rao bound", bound))
+    sections.append(("Microseconds per worker and update, one core", _cost(metrics, selection)))
+    sections += [
+        (title, _by_row(metrics, selection, kind, scale))
+        for kind, (title, scale) in _TABLES.items()
+    ]
+    if rigs := selection.rigs_of(TWO_WORKERS):
+        title = "Two workers: changes of identity per 100 sequences"
+        sections.append((title, _by_rig(metrics, with_names, rigs, swaps)))
+    parts = [part for title, text in sections if text for part in (f"## {title}", text)]
+    spread = "95 % intervals over seeds, times with the smallest and the largest"
+    return Report("Tracking bench", _LEAD, parts, spread)
 
 
-def _lead(metrics: Metrics) -> str:
+def _lead(metrics: Metrics, selection: Selection) -> str:
     """The default, row by row, beside the paper's algorithm and the best of the others."""
-    lines = []
-    for rig, _, window in rows():
+    lines, rivals = list[list[str]](), selection.rivals()
+    header = ["", "RMSE, cm", "coverage", "std/RMSE"]
+    header += ["paper, cm"] if "paper" in rivals else []
+    header += ["best other, cm", "default/best"] if rivals else []
+    for rig, _, window in selection.rows():
         key = f"{rig}.{window}"
-        best = min(RIVALS, key=lambda name: metrics[f"rmse_m.{key}.{name}"].value)
-        lines.append([
+        line = [
             f"{rig} {window}",
             cell(metrics[f"rmse_m.{key}.{DEFAULT}"], 100, 2, True),
             cell(metrics[f"coverage95.{key}.{DEFAULT}"], 1, 3),
             cell(metrics[f"std_over_rmse.{key}.{DEFAULT}"], 1, 2),
-            cell(metrics[f"rmse_m.{key}.paper"], 100, 2),
-            f"{cell(metrics[f'rmse_m.{key}.{best}'], 100, 2)} {best}",
-            cell(metrics[f"default_over.{key}.{best}"], 1, 3, True),
-        ])  # fmt: skip
-    header = ("", "RMSE, cm", "coverage", "std/RMSE", "paper, cm", "best other, cm", "default/best")
+        ]
+        if "paper" in rivals:
+            line.append(cell(metrics[f"rmse_m.{key}.paper"], 100, 2))
+        if rivals:
+            best = min(rivals, key=lambda name: metrics[f"rmse_m.{key}.{name}"].value)
+            line.append(f"{cell(metrics[f'rmse_m.{key}.{best}'], 100, 2)} {best}")
+            line.append(cell(metrics[f"default_over.{key}.{best}"], 1, 3, True))
+        lines.append(line)
     return table(header, lines)
 
 
-def _by_row(metrics: Metrics, kind: str, scale: int) -> str:
+def _by_row(metrics: Metrics, selection: Selection, kind: str, scale: int) -> str:
     """One row per rig and window, one column per estimator; what is not known is left empty."""
-    names, digits = [DEFAULT, *RIVALS, SMOOTHER], 2 if scale == 100 else 3
+    names = list(dict.fromkeys(n for _, c in selection.conditions() for n in selection.names_of(c)))
+    digits = 2 if scale == 100 else 3
     lines = [
         [f"{rig} {window}"]
         + [cell(metrics.get(f"{kind}.{rig}.{window}.{name}"), scale, digits) for name in names]
-        for rig, _, window in rows()
+        for rig, _, window in selection.rows()
     ]
     return table(["", *names], lines)
 
 
 def _by_rig(
-    metrics: Metrics, names: Sequence[str], kinds: Mapping[str, str], *above: list[str]
+    metrics: Metrics,
+    names: Sequence[str],
+    rigs: Sequence[str],
+    kinds: Mapping[str, str],
+    *above: list[str],
 ) -> str:
     """Rows per rig and title, columns per estimator; of each title a pattern of keys."""
     lines = list(above)
-    for rig, (title, key) in product(RIGS, kinds.items()):
+    for rig, (title, key) in product(rigs, kinds.items()):
         scale, digits = (100, 2) if key.startswith("rmse_m") else (1, 3)
         found = (metrics.get(key.format(rig=rig, name=name)) for name in names)
         lines.append([rig + title, *(cell(each, scale, digits, True) for each in found)])
     return table(["", *names], lines)
 
 
-def _bound(metrics: Metrics) -> str:
-    names = names_of(MATCHED)
+def _bound(metrics: Metrics, selection: Selection, rigs: Sequence[str]) -> str:
+    names = selection.names_of(MATCHED)
     both = ["both rigs", *(cell(metrics[f"ratio_to_bound.{name}"], 1, 3, True) for name in names)]
     kinds = {
         "": "ratio_to_bound_in.{rig}.{name}",
         ": coverage": f"coverage95.{{rig}}.{MATCHED}.{{name}}",
     }
-    return _by_rig(metrics, names, kinds, both)
+    return _by_rig(metrics, names, rigs, kinds, *([both] if len(rigs) > 1 else []))
 
 
-def _cost(metrics: Metrics) -> str:
+def _cost(metrics: Metrics, selection: Selection) -> str:
+    names = selection.timed()
     lines = [
-        [title, *(cell(metrics[f"update_us.{name}.{batch}"], 1, 1, True) for name in ESTIMATORS)]
+        [title, *(cell(metrics[f"update_us.{name}.{batch}"], 1, 1, True) for name in names)]
         for batch, title in _BATCHES.items()
     ]
-    return table(["", *ESTIMATORS], lines)
+    return table(["", *names], lines)

@@ -20,8 +20,11 @@ class Benchmark:
     """
 
     policy: str
-    """random, scripted, scripted_slowed, a checkpoint of `train` (.zip), hrc://ID/NAME, or
-    MODULE:FUNCTION, which is given an `agents.env_info.EnvInfo` and returns what has `act`."""
+    """random, scripted, scripted_slowed, hrc://ID/NAME; the path of a checkpoint of `train` or of
+    Stable-Baselines3 (.zip) or of a policy of `export` (.safetensors); or MODULE:FUNCTION, a
+    function that is given an EnvInfo and returns what has act(observation)."""
+    trust: bool = False
+    """Read pickles in a checkpoint, which run code of whoever made it; see play."""
     ids: tuple[str, ...] = tuple(BUILT_IN)
     """Which environments; a learnt policy is for one."""
     control: str | None = None
@@ -43,7 +46,7 @@ class Benchmark:
             writable_file(self.enter, ".json", "--enter")
         leaderboard = import_module("hrc_env.experiments.leaderboard")
         runner = import_module("hrc_env.experiments.runner")
-        study = leaderboard.make_study(self.policy, self.ids, self.control, self.seeds)
+        study = leaderboard.make_study(self.policy, self.ids, self.control, self.seeds, self.trust)
         words = self.policy.removeprefix("hrc://").replace("/", "-").replace(":", "-")
         out = self.out or Path("out/benchmark") / words
         status = show(partial(runner.run, study, overwrite=self.overwrite), out, "benchmark")

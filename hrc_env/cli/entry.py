@@ -49,10 +49,12 @@ def run_command(command: type[Any], words: Sequence[str], program: str) -> int:
     """Make a command's record of words and run it; return the exit status."""
     import tyro
 
+    from hrc_env.cli.options import understood
+
     filled = tyro.cli(
         command,
         prog=program,
-        args=list(words),
+        args=understood(command, words, program),
         config=(tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
     )
     return int(filled.run() or 0)

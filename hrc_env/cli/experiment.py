@@ -9,6 +9,7 @@ from typing import Annotated, ClassVar
 import tyro
 
 from hrc_env.cli.checks import at_least
+from hrc_env.cli.estimators import estimators_named
 from hrc_env.cli.show import show
 from hrc_env.tasks import DEFAULT
 
@@ -34,6 +35,8 @@ class AnyExperiment:
         runner = import_module("hrc_env.experiments.runner")
         asked = {each.name: getattr(self, each.name) for each in fields(self)}
         out, overwrite = asked.pop("out"), asked.pop("overwrite")
+        if "estimator" in asked:
+            asked["estimator"] = estimators_named(asked["estimator"])
         made = experiment.make_experiment(**asked)
         return show(partial(runner.run, made, overwrite=overwrite), out, "experiment")
 
@@ -76,7 +79,15 @@ class ImpactExperiment(AnyExperiment):
     seeds: int | None = None
     """Episodes of every row, instead of 90 (8 if quick)."""
     estimator: tuple[str, ...] = ()
-    """Compare these only, with the default one, the truth and nothing; all setups if not given."""
+    """Compare these only, with the default one, the truth and nothing; all setups if not given.
+    Names, or MODULE:FUNCTION, which makes one of (P, ctrl_dt, config)."""
+    robots: tuple[str, ...] = ()
+    """Who acts, instead of scripted, scripted_slowed and ppo, which is trained here first: some of
+    these, random, hrc://ID/NAME, files (.zip, .safetensors) or MODULE:FUNCTION, as of play."""
+    control: str | None = None
+    """What actions are of robots that do not say it: joint, if not given, tool or twist."""
+    trust: bool = False
+    """Read pickles in their checkpoints, which run code of whoever made them; see play."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +103,13 @@ class PriceExperiment(AnyExperiment):
     instead of 1000 (600 if quick)."""
     eyes: tuple[str, ...] = ()
     """Compare these only, by name, as truth particle one_camera; quick: twelve."""
+    robots: tuple[str, ...] = ()
+    """Who acts, instead of scripted: one of random, scripted_slowed, hrc://ID/NAME, a file (.zip,
+    .safetensors) or MODULE:FUNCTION, as of play. Other tasks are then left out."""
+    control: str | None = None
+    """What its actions are if it does not say it: joint, if not given, tool or twist."""
+    trust: bool = False
+    """Read pickles in its checkpoint, which run code of whoever made it; see play."""
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ class List(EnvironmentArguments):
             "control": CONTROLS,
             "agent": (
                 *AGENTS, *policies.names(), "a checkpoint: PATH.zip",
-                "a policy: PATH.safetensors",
+                "a policy: PATH.safetensors", "a function: MODULE:FUNCTION",
             ),
         }  # fmt: skip
         for argument, names in known.items():

@@ -27,8 +27,13 @@ class Play(EnvironmentArguments):
     task: Annotated[str, tyro.conf.Positional] = DEFAULT
     """Which environment, by its id."""
     agent: str = "scripted_slowed"
-    """random, scripted, scripted_slowed, hrc://ID/NAME (python -m hrc_env list), or the path of a
-    checkpoint of `train` (.zip) or a policy of `export` (.safetensors); those know --control."""
+    """random, scripted, scripted_slowed, hrc://ID/NAME (python -m hrc_env list); the path of a
+    checkpoint of `train` or of Stable-Baselines3 (.zip) or of a policy of `export` (.safetensors);
+    or MODULE:FUNCTION, a function that is given an EnvInfo and returns what has act(observation).
+    Files of this package know --control."""
+    trust: bool = False
+    """Read pickles in a checkpoint of Stable-Baselines3, which run code of whoever made it: for
+    policy or network classes of its author's own, and for statistics of VecNormalize."""
     episodes: int = 1
     """How many episodes to play."""
     seed: int = 0
@@ -48,7 +53,7 @@ class Play(EnvironmentArguments):
         asked = replace(self, control=self.control or control_of(self.agent))
         if self.video is not None:
             writable_file(self.video, ".mp4", "--video")
-            filmed(asked, self.agent, self.video)
+            filmed(asked, self.agent, self.video, trust=self.trust)
             return 0
         import gymnasium
 
@@ -65,7 +70,7 @@ class Play(EnvironmentArguments):
         inner = env.unwrapped
         window = Viewer(inner.simulation.scene) if self.viewer else None
         limit = env.spec.max_episode_steps
-        played = film.begin(env, named(self.agent, seed), seed, limit)
+        played = film.begin(env, named(self.agent, seed, self.trust), seed, limit)
         started_s, total, step, info = time.monotonic(), 0.0, 0, {}
         for step, made in enumerate(track(played, f"episode {seed}", limit), 1):
             total, info = total + float(made.reward), made.info
@@ -110,21 +115,26 @@ class Demo(EnvironmentArguments):
 
 
 def filmed(
-    asked: Play | Demo, agent: str, path: Path, n_steps: int | None = None, title: str = ""
+    asked: Play | Demo,
+    agent: str,
+    path: Path,
+    n_steps: int | None = None,
+    title: str = "",
+    trust: bool = False,
 ) -> None:
     """Film an episode of an agent by its name, up to its end; show what came of it."""
     from hrc_env.evaluation import film
 
-    make, keywords = named(agent, asked.seed), asked.keywords()
+    make, keywords = named(agent, asked.seed, trust), asked.keywords()
     totals = film.film_episode(make, path, asked.seed, n_steps=n_steps, **keywords)
     Console().print(table(totals, title))
 
 
-def named(agent: str, seed: int) -> Callable[[Any], Any]:
+def named(agent: str, seed: int, trust: bool) -> Callable[[Any], Any]:
     """What makes an agent, by its name, for an `EnvInfo`."""
     from hrc_env.agents.registry import make_agent
 
-    return lambda env_info: make_agent(agent, env_info, seed)
+    return lambda env_info: make_agent(agent, env_info, seed, trust)
 
 
 def table(totals: dict[str, float], title: str = "") -> Table:

@@ -23,8 +23,11 @@ class Record(EnvironmentArguments):
     task: Annotated[str, tyro.conf.Positional] = DEFAULT
     """Which environment, by its id."""
     agent: str = "scripted"
-    """random, scripted, scripted_slowed, hrc://ID/NAME, or the path of a checkpoint of `train`
-    (.zip) or a policy of `export` (.safetensors)."""
+    """random, scripted, scripted_slowed, hrc://ID/NAME; the path of a checkpoint of `train` or of
+    Stable-Baselines3 (.zip) or of a policy of `export` (.safetensors); or MODULE:FUNCTION, a
+    function that is given an EnvInfo and returns what has act(observation)."""
+    trust: bool = False
+    """Read pickles in a checkpoint, which run code of whoever made it; see play."""
     episodes: int = 100
     """How many episodes."""
     seed: int = 0
@@ -47,5 +50,7 @@ class Record(EnvironmentArguments):
                 "--perception pixels is too slow to record: record keypoints, which emulates it."
             )
         from hrc_env.agents import recording  # here: it imports Minari
+        from hrc_env.agents.registry import check_agent
 
+        check_agent(self.agent)
         return recording.run(self)

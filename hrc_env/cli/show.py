@@ -1,6 +1,7 @@
 """Run what writes a report, and show it."""
 
 from collections.abc import Callable
+from itertools import groupby
 from pathlib import Path
 
 from rich.console import Console
@@ -16,6 +17,39 @@ def show(run: Callable[[Path, Say], object], out: Path, name: str) -> int:
     console = Console()
     with progress_bar(console, name) as say:
         run(out, say)
-    console.print(Markdown((out / "report.md").read_text()))
+    print_report(console, (out / "report.md").read_text())
     console.print(f"In [bold]{out}[/]: report.html, results.json, figures/")
     return 0
+
+
+def print_report(console: Console, text: str) -> None:
+    """Print a report in Markdown: rendered in a terminal in which its tables fit, otherwise as it
+    is, with the columns of its tables aligned, so that no number is cut."""
+    text = align_tables(text)
+    widest = max((len(line) for line in text.splitlines() if line.startswith("|")), default=0)
+    if console.is_terminal and widest <= console.width:
+        console.print(Markdown(text))
+    else:
+        console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+
+def align_tables(text: str) -> str:
+    """Return Markdown whose tables have cells of one width in each column."""
+    blocks = groupby(text.splitlines(), key=lambda line: line.startswith("| "))
+    return "\n".join(
+        line for is_table, lines in blocks for line in (_aligned([*lines]) if is_table else lines)
+    )
+
+
+def _aligned(lines: list[str]) -> list[str]:
+    rows = [[cell.strip() for cell in line.strip().strip("|").split("|")] for line in lines]
+    if len({len(row) for row in rows}) > 1:  # a cell with a bar in it
+        return lines
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [f"| {' | '.join(map(_filled, row, widths, range(len(row))))} |" for row in rows]
+
+
+def _filled(cell: str, width: int, k: int) -> str:
+    if set(cell) <= {"-", ":"} and cell:
+        return ("-" * width) if k == 0 else "-" * (width - 1) + ":"
+    return cell.ljust(width) if k == 0 else cell.rjust(width)

@@ -1,7 +1,10 @@
 """Checks of what users bring: functions by their arguments, results by kind, shape and values."""
 
 import inspect
+import os
+import sys
 from collections.abc import Callable
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -43,6 +46,30 @@ def check_arguments(what: str, function: Callable[..., Any], *names: str) -> Non
         raise ConfigError(
             f"{what} must be a function of ({', '.join(names)}), got one of {signature}: {error}."
         ) from error
+
+
+def function_called(what: str, name: str, meaning: str) -> Any:
+    """Return what "module:function" names; modules in the working folder are found, too.
+
+    Args:
+        what: it is to be, as an agent.
+        name: the module's dotted name and, behind a colon, its own.
+        meaning: what it must be, for the error.
+
+    Raises:
+        ConfigError: there is none.
+    """
+    module, _, function = name.partition(":")
+    if os.getcwd() not in sys.path:  # as `python -m` has it
+        sys.path.append(os.getcwd())
+    try:
+        found = getattr(import_module(module), function)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise ConfigError(
+            f"There is no {what} {name!r} ({error}). It must be MODULE:FUNCTION: a module that can "
+            f"be imported from here, and in it {meaning}."
+        ) from error
+    return found
 
 
 def numbers_of(

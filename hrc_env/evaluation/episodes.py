@@ -3,12 +3,15 @@
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
+from functools import partial
+from importlib import import_module
 from typing import Any
 
 import gymnasium
 import numpy as np
 
 from hrc_env.agents.env_info import Agent, env_info
+from hrc_env.core.errors import ConfigError, whole
 from hrc_env.core.results import Metric
 from hrc_env.env import HRCEnv
 from hrc_env.evaluation.intervals import goals_over, mean_over, rate_of
@@ -29,7 +32,9 @@ class Score:
     episodes: int
     """How many were played."""
     success_rate: float
-    """Of all attempts (`Task.achieved` and `Task.failed`)."""
+    """Share of all attempts that were achieved (`Task.achieved` and `Task.failed`)."""
+    is_success: float
+    """Share of episodes whose last `info["is_success"]` was 1."""
     goals_per_minute: float
     """Goals reached in a minute of all episodes together [1/min]."""
     contacts_per_episode: float
@@ -45,16 +50,33 @@ class Score:
 
 
 def evaluate(
-    make: Callable[[Any], Agent], n_episodes: int = 64, seed: int = EVALUATION_SEED, **kwargs: Any
+    make: str | Callable[[Any], Agent],
+    n_episodes: int = 64,
+    seed: int = EVALUATION_SEED,
+    **kwargs: Any,
 ) -> Score:
     """Return the score of an agent over whole episodes with fixed seeds.
 
     Args:
-        make: builds the agent for an `EnvInfo`.
+        make: builds the agent for an `EnvInfo`; or an agent as `make_agent` takes it: a name, a
+            file or "module:function".
         n_episodes: how many episodes; the k-th begins with `reset(seed=seed + k)`.
         seed: of the first.
         kwargs: the environment's, as of `HRCVectorEnv`: task, perception, estimator, ...
+
+    Raises:
+        ConfigError: no such agent, or no episode.
     """
+    whole("n_episodes", n_episodes, 1, 10**9)
+    if isinstance(make, str):
+        registry = import_module("hrc_env.agents.registry")  # here: it reads learners' files
+        registry.check_agent(make)
+        make = partial(registry.make_agent, make)
+    if not callable(make):
+        raise ConfigError(
+            "evaluate wants a function that makes an agent for an EnvInfo, or an agent as "
+            f"make_agent takes it, got {type(make).__name__}."
+        )
     return summarize(play_episodes(make, n_episodes, seed, **kwargs))
 
 
@@ -126,12 +148,24 @@ def summarize(episodes: list[dict[str, float]]) -> Score:
     return Score(
         episodes=len(episodes),
         success_rate=float(reached / max(reached + missed, 1)),
+        is_success=float(column["success"].mean()),
         goals_per_minute=float(reached / minutes),
         contacts_per_episode=float(column["contacts"].mean()),
         cost_per_episode=float(column["cost"].mean()),
         close_steps_per_episode=float(column["cost_steps"].mean()),
         median_min_separation_m=float(np.median(column["min_separation_m"])),
         return_mean=float(column["r"].mean()),
+    )
+
+
+def contradiction(score: Score) -> str:
+    """Return a sentence where most attempts were achieved and no episode succeeded; else ""."""
+    if score.is_success > 0 or score.success_rate < 0.5:
+        return ""
+    return (
+        f"{score.success_rate:.0%} of the attempts were achieved (Task.achieved of it and "
+        "Task.failed), but no episode ended with is_success: these are two questions, and this "
+        "task's info answers them differently."
     )
 
 

@@ -6,21 +6,90 @@ an event that did not happen cannot happen.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from scipy import stats
 
+from hrc_env.core.brought import described
+from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric
-from hrc_env.core.typing import Floats, Ints
+from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.evaluation.counts import Bins
 
 Metrics = dict[str, Metric]
 Numbers = Sequence[float] | Floats
 Statistic = Callable[[Ints], Floats]
 """From how often each seed is drawn (R, n) to a number for each draw (R,)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """How much one row has more than another."""
+
+    difference: Metric
+    """With its 95 % interval."""
+    p: float
+    """Two-sided probability of a difference as large as that if there were none; NaN: not known."""
+
+
+def compare_means(ours: Numbers, theirs: Numbers, unit: str = "1") -> Comparison:
+    """Return the difference of two means over the same seeds, pair by pair.
+
+    Its interval is a bootstrap over pairs, p is by exchanging the two of a pair at random (Fisher
+    1935): below .05 with 6 pairs or more. Pairs of which a number is not finite do not count.
+
+    Args:
+        ours: (n,) a number with each seed.
+        theirs: (n,) those of what it is compared with, with the same seeds in the same order.
+        unit: of both.
+
+    Raises:
+        ConfigError: not two columns of one length.
+    """
+    x, y = _column("ours", ours), _column("theirs", theirs)
+    if len(x) != len(y):
+        raise ConfigError(
+            f"ours and theirs must be of the same seeds, got {len(x)} and {len(y)} numbers."
+        )
+    x, y = _usable(x, y)
+    both = [*x, *y]
+    found = paired("it", ratio_of(both, np.ones(len(both))), len(x), unit)
+    return Comparison(found["difference.it"], found["p.it"].value)
+
+
+def compare_rates(
+    ours: Numbers,
+    theirs: Numbers,
+    our_exposure: Numbers | float,
+    their_exposure: Numbers | float,
+    unit: str = "1",
+) -> Comparison:
+    """Return the difference of how often something rare happened, from exact intervals.
+
+    Its interval follows from those of both rates (`rate_of`; Zou and Donner 2008,
+    doi:10.1002/sim.3095), also where nothing happened at all; p is exact, of how the events are
+    shared out (Przyborowski and Wilenski 1940, doi:10.1093/biomet/31.3-4.313).
+
+    Args:
+        ours: (n,) how often it happened with each seed.
+        theirs: (m,) the same of what it is compared with.
+        our_exposure: in how much it was counted, with each seed or with all together.
+        their_exposure: the same of what it is compared with.
+        unit: of a count over an exposure.
+
+    Raises:
+        ConfigError: counts that are no whole numbers, or an exposure below 0.
+    """
+    difference = excess_of(rate_of(ours, our_exposure, unit), rate_of(theirs, their_exposure, unit))
+    x, y = int(np.sum(ours)), int(np.sum(theirs))
+    over, under = float(np.sum(our_exposure)), float(np.sum(their_exposure))
+    if not over or not under:
+        return Comparison(difference, np.nan)
+    p = stats.binomtest(x, x + y, over / (over + under)).pvalue if x + y else 1.0
+    return Comparison(difference, float(p))
 
 
 def bootstrap(statistic: Statistic, n: int, unit: str, n_draws: int = 4000) -> Metric:
@@ -99,7 +168,7 @@ def ratio_over(above: Numbers, below: Numbers, unit: str) -> Metric:
     return bootstrap(ratio_of(x, y), len(x), unit)
 
 
-def rate_of(counts: Numbers, exposure: Numbers | float, unit: str) -> Metric:
+def rate_of(counts: Numbers, exposure: Numbers | float, unit: str = "1") -> Metric:
     """Return how often something rare happened, with its exact 95 % interval.
 
     That of a Poisson count says how often an event that did not happen still may (Garwood 1936,
@@ -109,7 +178,18 @@ def rate_of(counts: Numbers, exposure: Numbers | float, unit: str) -> Metric:
         counts: (n,) how often it happened with each seed.
         exposure: in how much it was counted, with each seed (n,) or with all together.
         unit: of a count over an exposure.
+
+    Raises:
+        ConfigError: counts that are no whole numbers, or an exposure below 0.
     """
+    events = _column("counts", counts)
+    if not (np.isfinite(events).all() and (events >= 0).all() and (events % 1 == 0).all()):
+        raise ConfigError(
+            "counts must be whole numbers from 0 on, one with each seed: of other numbers take "
+            f"mean_over; got {described(counts)}."
+        )
+    if not np.all(np.asarray(exposure, float) >= 0):
+        raise ConfigError(f"exposure must not be negative, got {described(exposure)}.")
     total, over = float(np.sum(counts)), float(np.sum(exposure))
     if not over:
         return Metric(np.nan, np.nan, np.nan, unit, len(counts))
@@ -120,17 +200,20 @@ def rate_of(counts: Numbers, exposure: Numbers | float, unit: str) -> Metric:
     return Metric(value, low, high, unit, len(counts))
 
 
-def share_of(seen: Sequence[bool]) -> Metric:
+def share_of(seen: Sequence[bool] | Bools) -> Metric:
     """Return the share of trials in which something was seen, with its exact 95 % interval.
 
     The interval is binomial (Clopper and Pearson 1934, doi:10.1093/biomet/26.4.404); NaN of no
-    trials.
+    trials. `ConfigError` for anything but a column of truth values.
     """
-    n = len(seen)
+    column = _column("seen", seen)
+    if not np.isin(column, (0.0, 1.0)).all():
+        raise ConfigError(f"seen must be true or false of each trial, got {described(seen)}.")
+    n, n_seen = len(column), int(column.sum())
     if n == 0:
         return Metric(np.nan, np.nan, np.nan, "share", 0)
-    found = stats.binomtest(sum(seen), n).proportion_ci(0.95, method="exact")
-    return Metric(sum(seen) / n, float(found.low), float(found.high), "share", n)
+    found = stats.binomtest(n_seen, n).proportion_ci(0.95, method="exact")
+    return Metric(n_seen / n, float(found.low), float(found.high), "share", n)
 
 
 def goals_over(goals: Numbers, minutes: Numbers) -> Metric:
@@ -158,8 +241,13 @@ def excess_of(ours: Metric, theirs: Metric) -> Metric:
     return Metric(less, float(low), float(high), ours.unit, ours.n)
 
 
-def mean_over(values: Numbers, unit: str) -> Metric:
-    """Return the mean of one number a seed with its 95 % bootstrap interval."""
+def mean_over(values: Numbers, unit: str = "1") -> Metric:
+    """Return the mean of one number a seed with its 95 % bootstrap interval.
+
+    Seeds without a finite number do not count: `Metric.n` says how many did. `ConfigError` for
+    anything but a column of numbers.
+    """
+    values = _column("values", values)
     return ratio_over(values, np.ones(len(values)), unit)
 
 
@@ -200,6 +288,19 @@ def crossing(x: Floats, y: Floats, level: float) -> float:
         return x[0] if reached.size else x[-1]
     nearest = slice(reached[0] - 1, reached[0] + 1)
     return float(np.interp(-level, -y[nearest], x[nearest]))
+
+
+def _column(what: str, values: Any) -> Floats:
+    """Return (n,) numbers, or raise `ConfigError`."""
+    try:
+        column = np.asarray(values, float)
+    except (TypeError, ValueError) as error:
+        raise ConfigError(f"{what} must be numbers, got {described(values)}: {error}.") from error
+    if column.ndim != 1:
+        raise ConfigError(
+            f"{what} must have shape (n,), a number with each seed, got {column.shape}."
+        )
+    return column
 
 
 def _usable(*samples: Numbers) -> list[Floats]:

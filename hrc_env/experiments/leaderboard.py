@@ -88,6 +88,7 @@ def make_study(
     ids: Sequence[str] = tuple(BUILT_IN),
     control: str | None = None,
     n_seeds: int = 64,
+    trust: bool = False,
 ) -> Study:
     """Return the study of a policy under all conditions.
 
@@ -97,6 +98,7 @@ def make_study(
         control: what its actions are; None: those of the policy's file, or else velocities of
             the joints.
         n_seeds: episodes of every row.
+        trust: whether pickles in the policy's checkpoint are read, as of `make_agent`.
 
     Raises:
         ConfigError: an unknown policy or environment, or no episode.
@@ -106,8 +108,8 @@ def make_study(
     env = {} if control is None else {"control": control}
     rows = {
         f"{task}.{name}": Row(
-            each.words, n_seeds, policy, SETUPS[each.setup][1],
-            {"task": task, "people": each.people, "shield": each.shield, **env},
+            each.words, n_seeds, policy, setup=SETUPS[each.setup][1],
+            env={"task": task, "people": each.people, "shield": each.shield, **env}, trust=trust,
         )
         for task in ids
         for name, each in CONDITIONS.items()

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from PIL import Image, ImageDraw, ImageFont
 
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats
@@ -22,6 +23,19 @@ def save(figure: Figure, path: Path, dpi: int = 110) -> None:
     """Write a PNG; its folder is made."""
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=dpi)
+
+
+def stamp(path: Path, words: str) -> None:
+    """Write words across the top of a picture that is there, in a strip of its own."""
+    with Image.open(path) as picture:
+        drawn = picture.convert("RGB")
+    size = max(12, drawn.width // 60)
+    strip = Image.new("RGB", (drawn.width, drawn.height + 2 * size), "white")
+    strip.paste(drawn, (0, 2 * size))
+    place = (drawn.width // 2, size)
+    font = ImageFont.load_default(size)
+    ImageDraw.Draw(strip).text(place, words, "#b00020", font, anchor="mm")
+    strip.save(path)
 
 
 def ends(metrics: Sequence[Metric], scale: float = 1.0) -> Floats:

@@ -14,6 +14,7 @@ from markdown_it import MarkdownIt
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric, provenance, write_results, write_whole
 from hrc_env.experiments.columns import Column
+from hrc_env.experiments.plots import stamp
 
 Metrics = Mapping[str, Metric]
 _STYLE = """
@@ -90,6 +91,9 @@ class Report:
     """In the order of reading, as Markdown: paragraphs, headings, tables, pictures."""
     spread: str = "95 % intervals over seeds"
     """What the low and high ends of its numbers are."""
+    quick: str = ""
+    """What a run that is too short to compare anything says of itself, below each of its tables and
+    on each of its figures, which mark no difference then; "" of others."""
 
     def write(
         self, out: Path, settings: Mapping[str, Any], seeds: Sequence[int], metrics: Metrics
@@ -98,7 +102,13 @@ class Report:
         write_results(out / "results.json", settings, seeds, metrics)
         origin = f"Version {provenance()['hrc_env']}, seeds {min(seeds)} to {max(seeds)}; "
         origin += f"numbers are given with {self.spread}, all of them in results.json."
-        text = "\n\n".join([f"# {self.title}", self.asked, *self.parts, origin]) + "\n"
+        head, parts = [f"# {self.title}"], [*filter(None, self.parts)]
+        if self.quick:
+            head.append(f"**{self.quick}**")
+            parts = [_as_quick(each, self.quick) for each in parts]
+            for name in _FIGURE.findall("\n".join(parts)):
+                stamp(out / "figures" / name, self.quick)
+        text = "\n\n".join([*head, self.asked, *parts, origin]) + "\n"
         write_whole(out / "report.md", text)
         body = MarkdownIt("commonmark", {"html": False}).enable("table").render(text)
         body = re.sub(r'src="([^"]+)"', lambda found: f'src="{_embedded(out, found[1])}"', body)
@@ -108,6 +118,31 @@ class Report:
             f"<body>{body}</body></html>"
         )
         write_whole(out / "report.html", page)
+
+
+def quick_words(n_seeds: int, seconds: float | None = None) -> str:
+    """Return what the report of a short run says of itself.
+
+    Args:
+        n_seeds: of its rows, at most.
+        seconds: that an episode takes [s]; None: episodes differ.
+    """
+    seeds = f"{n_seeds} seed{'' if n_seeds == 1 else 's'}"
+    lasting = "" if seconds is None else f" of {seconds:g} s"
+    return f"Quick run, {seeds}{lasting}: too few to compare anything."
+
+
+_FIGURE = re.compile(r"\]\(figures/([^)]+)\)")
+_TABLE = re.compile(r"^\| ---", re.M)
+_DOT = " ●"
+"""Behind a difference whose interval leaves out zero."""
+
+
+def _as_quick(part: str, words: str) -> str:
+    """Return a part of a report without marks, and with the words below its table or figure."""
+    part = part.replace(_DOT, "")
+    is_shown = _TABLE.search(part) or _FIGURE.search(part)
+    return f"{part}\n\n*{words}*" if is_shown else part
 
 
 def picture(path: Path, caption: str) -> str:
@@ -124,10 +159,13 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 def table_of(
     name: str, rows: Mapping[str, str], columns: Sequence[Column], metrics: Metrics
 ) -> str:
-    """A table of metrics; `rows` by the part of their keys in place of `{}`, with their words."""
-    lines = (
+    """A table of metrics, "" if there are none; `rows` by the part of their keys in place of `{}`,
+    with their words."""
+    lines = [
         (words, *(cell(each, metrics, row) for each in columns)) for row, words in rows.items()
-    )
+    ]
+    if not any(each.metric.format(row) in metrics for each in columns for row in rows):
+        return ""
     return table((name, *(each.heading for each in columns)), lines)
 
 
@@ -141,7 +179,7 @@ def cell(column: Column, metrics: Metrics, row: str) -> str:
     if column.plain:
         metric = replace(metric, low=metric.value, high=metric.value)
     is_told_apart = column.signed and (metric.low > 0 or metric.high < 0)
-    dot = " ●" if column.marked and is_told_apart else ""
+    dot = _DOT if column.marked and is_told_apart else ""
     return format_metric(metric, column.scale, column.digits, column.signed) + dot
 
 

@@ -54,7 +54,11 @@ class Experiment(Protocol[PlayedT]):
         ...
 
     def report(self, played: PlayedT, metrics: dict[str, Metric], figures: Path) -> Report:
-        """Draw the figures into a folder; return what is to be read."""
+        """Draw the figures into a folder; return what is to be read.
+
+        An experiment that may be too short to compare anything says so by `quick_note`, as of
+        `Report.quick`.
+        """
         ...
 
 
@@ -94,6 +98,7 @@ def run(
     played = experiment.play(cache_of(experiment, out / "parts", progress))
     metrics = experiment.metrics(played)
     report = experiment.report(played, metrics, out / "figures")
+    report = replace(report, quick=getattr(experiment, "quick_note", ""))
     report.write(out, settings_of(experiment), experiment.seeds, metrics)
     return metrics
 

@@ -23,22 +23,23 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.agents import policies
-from hrc_env.agents.env_info import Agent, EnvInfo
-from hrc_env.agents.registry import AGENTS, make_agent
 from hrc_env.core.errors import ConfigError, check_names, unknown
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Ints
 from hrc_env.evaluation.episodes import play_episodes
+from hrc_env.experiments.agents import AgentChoice, check_choice, described, maker_of
 from hrc_env.experiments.cache import PartCache, PartProgress
 from hrc_env.experiments.columns import Column
-from hrc_env.experiments.report import Metrics, Report, Table
+from hrc_env.experiments.report import Metrics, Report, Table, quick_words
+from hrc_env.experiments.rigs import DT_S
 from hrc_env.experiments.setups import PerceptionSetup
-from hrc_env.experiments.versions import check_subsystems, digest_of, key_of, source_digest
+from hrc_env.experiments.versions import check_subsystems, key_of, source_digest
 from hrc_env.pipeline.levels import LEVELS
 from hrc_env.safety.shield import SHIELDS
 from hrc_env.scene.rigs import RIGS
 from hrc_env.settings import settle
+from hrc_env.tasks import DEFAULT
+from hrc_env.tasks.task import find_task
 from hrc_env.tracking.estimators import ESTIMATORS
 
 Played = Mapping[str, list[dict[str, float]]]
@@ -57,7 +58,7 @@ class Row:
     """Cells before the numbers of its line."""
     n_episodes: int
     """Its episodes are the first so many of the study's seeds."""
-    agent: str | Callable[[EnvInfo], Agent] = "scripted"
+    agent: AgentChoice = "scripted"
     """As `hrc_env.agents.registry.make_agent` takes it; or a function that makes one."""
     setup: PerceptionSetup = FOUR
     """What the robot sees with; episodes take turns in the cameras that are left."""
@@ -69,11 +70,19 @@ class Row:
     """So many episodes are one part, played side by side."""
     is_shown: bool = True
     """Whether it is a line of the table."""
+    trust: bool = False
+    """Whether pickles in the agent's checkpoint are read, as of `make_agent`."""
 
     @property
     def cells(self) -> tuple[str, ...]:
         """The cells before the numbers."""
         return (self.words,) if isinstance(self.words, str) else self.words
+
+    @property
+    def n_steps(self) -> int:
+        """Control steps of an episode, at most."""
+        asked = self.env.get("max_episode_steps")
+        return asked or find_task(self.env.get("task", DEFAULT)).max_episode_steps
 
     def keywords(self) -> list[dict[str, Any]]:
         """Return the arguments of environments, in which episodes take turns."""
@@ -93,7 +102,7 @@ class Row:
     def settings(self) -> dict[str, Any]:
         """Return all that its episodes depend on besides seeds, as JSON can hold it."""
         found = {
-            "agent": _describe_agent(self.agent),
+            "agent": described(self.agent),
             "setup": asdict(self.setup),
             "env": describe(self.env),
         }
@@ -115,7 +124,7 @@ class Row:
                 f"{self.n_episodes} and {self.n_together}."
             )
         check_names("perception", [self.setup.level], LEVELS)
-        _check_agent(self.agent)
+        check_choice(self.agent)
         for keywords in self.keywords():
             keywords.pop("max_episode_steps", None)  # Gymnasium's own
             settle(**keywords)
@@ -150,6 +159,8 @@ class Study:
     """Episodes of each row in the short form."""
     threads: int | None = None
     """Threads that environments share; None: as many as there are cores."""
+    is_quick: bool = False
+    """Whether it is the short form."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for a row, a column or a table that names nothing."""
@@ -201,6 +212,14 @@ class Study:
         """The number of parts of all rows."""
         return sum(len(shards_of(row, self.first_seed)) for row in self.rows.values())
 
+    @property
+    def quick_note(self) -> str:
+        """What tables of the short form say of themselves; "" of others."""
+        if not (self.is_quick and self.rows):
+            return ""
+        seconds = DT_S * max(row.n_steps for row in self.rows.values())
+        return quick_words(max(row.n_episodes for row in self.rows.values()), seconds)
+
     def settings(self) -> dict[str, Any]:
         """Return all that its numbers depend on, as JSON can hold it."""
         rows = {name: {"n_episodes": row.n_episodes, **row.settings()}
@@ -228,7 +247,8 @@ class Study:
                 return replace(row, n_episodes=1, env={**row.env, "max_episode_steps": 10})
             return replace(row, n_episodes=min(row.n_episodes, self.n_quick))
 
-        return replace(self, rows={name: shorten(row) for name, row in self.rows.items()})
+        rows = {name: shorten(row) for name, row in self.rows.items()}
+        return replace(self, rows=rows, is_quick=True)
 
     def play(self, cache: PartCache) -> Played:
         """Return the episodes of every row, each part of them from the cache or anew."""
@@ -288,7 +308,7 @@ def play_shard(
         threads: that environments share; None: as many as there are cores.
         tick: called with the growth of the share that is done.
     """
-    make, found = _agent_maker(row.agent), list[dict[str, float]]()
+    make, found = maker_of(row.agent, row.trust), list[dict[str, float]]()
     turns = row.keywords()
     blocks: list[Ints] = np.array_split(np.arange(n_episodes), len(turns))
     for ids, keywords in zip(blocks, turns, strict=True):
@@ -317,25 +337,3 @@ def describe(value: Any) -> Any:
         name = getattr(value, "__qualname__", type(value).__qualname__)
         return {"function": name, "source": source_digest(value)}
     return value
-
-
-def _agent_maker(agent: str | Callable[[EnvInfo], Agent]) -> Callable[[EnvInfo], Agent]:
-    return partial(make_agent, agent) if isinstance(agent, str) else agent
-
-
-def _describe_agent(agent: str | Callable[[EnvInfo], Agent]) -> Any:
-    """Return an agent's name; of a trained policy the digest of its file."""
-    if not isinstance(agent, str):
-        return describe(agent)
-    if agent.startswith(policies.PREFIX):
-        return {"policy": agent, "sha256": policies.read(policies.path_of(agent))[0].sha256}
-    return {"policy": digest_of(Path(agent))[:12]} if Path(agent).is_file() else agent
-
-
-def _check_agent(agent: str | Callable[[EnvInfo], Agent]) -> None:
-    """Raise `ConfigError` for an agent that is no name, file or function."""
-    if not isinstance(agent, str) or agent in AGENTS or ":" in agent or Path(agent).exists():
-        if isinstance(agent, str) and agent.startswith(policies.PREFIX):
-            policies.path_of(agent)
-        return
-    raise ConfigError(f"{unknown('agent', agent, AGENTS)} Or a policy's file or MODULE:FUNCTION.")

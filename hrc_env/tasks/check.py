@@ -3,6 +3,7 @@
 import inspect
 import re
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from difflib import get_close_matches
 from typing import Any
@@ -128,6 +129,18 @@ def _check_state(task: Task[Any, Any]) -> None:
 
 def _check_info(task: Task[Any, Any], info: Any, batch: int) -> None:
     """Raise `ConfigError` for an info of a task that lacks names or has other shapes."""
+    for part, counts in (("achieved", "successful"), ("failed", "failed")):
+        if not isinstance(name := getattr(task, part), str) or not name.startswith("task/"):
+            raise ConfigError(
+                f"{task.id}: {part} must be the name in info that counts {counts} attempts, such "
+                f"as 'task/{'goals_reached' if part == 'achieved' else 'goals_missed'}'; got "
+                f"{name!r}."
+            )
+    if task.achieved == task.failed:
+        raise ConfigError(
+            f"{task.id}: achieved and failed must be two counts, of which success is the share; "
+            f"both are {task.achieved!r}."
+        )
     for name in (task.achieved, task.failed, "is_success"):
         if name not in info:
             raise ConfigError(f"{task.id}: info must hold {name!r}, has {', '.join(info)}.")
@@ -135,3 +148,24 @@ def _check_info(task: Task[Any, Any], info: Any, batch: int) -> None:
         if name != "is_success" and not name.startswith("task/"):
             raise ConfigError(f"{task.id}: names in info must begin with 'task/', got {name!r}.")
         check_shape(f"{task.id}: info[{name!r}]", np.shape(value), (batch,), "one an environment")
+
+
+def check_counts(task: Task[Any, Any], info: Mapping[str, Any]) -> None:
+    """Raise `ConfigError` for attempts or a success that cannot be, in an info of a played step.
+
+    `achieved` and `failed` count attempts, 0 or more; `is_success` is 0 or 1 and says whether the
+    episode would be one if it ended now. They are two questions: tables show both.
+    """
+    for name in (task.achieved, task.failed):
+        values = np.asarray(info[name], float)
+        if not (np.isfinite(values).all() and (values >= 0).all()):
+            raise ConfigError(
+                f"{task.id}: info[{name!r}] must count attempts of the episode so far, finite and "
+                f"0 or more, got {values}."
+            )
+    success = np.asarray(info["is_success"], float)
+    if not np.isin(success, (0.0, 1.0)).all():
+        raise ConfigError(
+            f"{task.id}: info['is_success'] must be 0 or 1, whether the episode would be a success "
+            f"if it ended now, got {success}."
+        )

@@ -51,7 +51,7 @@ class Task(Generic[ConfigT, StateT]):
     rewards: ClassVar[tuple[RewardTerm, ...]] = ()
     """The task's terms of the reward; their functions are given the task's settings as weights."""
     achieved: ClassVar[str] = ""
-    """The name in `info` that counts successful attempts."""
+    """The name in `info` that counts successful attempts; "success" in tables is their share."""
     failed: ClassVar[str] = ""
     """The name in `info` that counts failed attempts."""
     starts: ClassVar[str] = ""
@@ -116,7 +116,8 @@ class Task(Generic[ConfigT, StateT]):
     def info(self, state: StateT) -> Mapping[str, Floats]:
         """Return numbers (B,) about the episode so far, by name.
 
-        Names begin with "task/"; beside them stands "is_success", 0 or 1.
+        Names begin with "task/"; beside them stands "is_success", 0 or 1: whether the episode would
+        be a success if it ended now.
         """
         raise NotImplementedError
 

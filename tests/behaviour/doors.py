@@ -639,6 +639,17 @@ def _put(config: dict[str, Any], path: str, value: Any) -> None:
 # --- Learning (learning.py) ----------------------------------------------------------------------
 
 
+NOT_RECORDED = ("is_success", "proximity")
+"""What curves and scores hold since the recordings were made."""
+
+
+def _score(score: Any) -> dict[str, NDArray[np.float64]]:
+    """Return a score, as it is recorded."""
+    named = dataclasses.asdict(score).items()
+    kept = {name: value for name, value in named if name not in NOT_RECORDED}
+    return {f"score/{name}": np.array([float(value)]) for name, value in kept.items()}
+
+
 def learn(
     algorithm: str, env_id: str, ends: tuple[int, ...], folder: Path, **options: Any
 ) -> dict[str, NDArray[np.float64]]:
@@ -662,10 +673,9 @@ def learn(
         resumed = folder if k else None
         run = dataclasses.replace(asked, timesteps=end, out=folder, resume=resumed)
         for name, value in _columns(training.train(run, folder, console)[0]).items():
-            if not name.endswith("_s"):  # but for the clock's
+            if not name.endswith("_s") and name not in NOT_RECORDED:  # but for the clock's
                 values[f"run_{k}/{name}"] = value
-    score = dataclasses.asdict(training.judge(asked, folder, console))
-    values |= {f"score/{name}": np.array([float(value)]) for name, value in score.items()}
+    values |= _score(training.judge(asked, folder, console))
     with contextlib.redirect_stdout(io.StringIO()):
         export.run(Export(run_folder=folder, name="probe", out=folder, episodes=4))
     (folder / env_id / "probe.safetensors").rename(folder / EXPORTED)
@@ -765,12 +775,11 @@ def judge_agent(
     options = {"task": env_id, "perception": "keypoints", **options}
     shares: list[float] = []
     episodes = play(make, n_episodes, played.EVALUATION_SEED, tick=shares.append, **options)
-    score = dataclasses.asdict(played.summarize(episodes))
     worth = played.measure(episodes)
     return {
         **_columns(episodes),
         "progress": np.cumsum(shares),
-        **{f"score/{name}": np.array([float(value)]) for name, value in score.items()},
+        **_score(played.summarize(episodes)),
         **{f"worth/{k}": np.array([v.value, v.low, v.high], float) for k, v in worth.items()},
     }
 

@@ -9,16 +9,20 @@ import numpy as np
 import pytest
 
 from docs import tables
+from hrc_env.agents import policies as kept
 from hrc_env.core.errors import ConfigError, HRCError
+from hrc_env.core.results import Metric
 from hrc_env.evaluation.counts import GAPS_M, Bins
 from hrc_env.evaluation.intervals import counted_quantile_over
+from hrc_env.experiments.agents import label_of, labels_of
 from hrc_env.experiments.cache import PartCache
 from hrc_env.experiments.impact import policies
 from hrc_env.experiments.impact.episodes import STEP, play, sums_of
 from hrc_env.experiments.impact.experiment import Impact, check_walks, make_experiment
 from hrc_env.experiments.impact.metrics import COMPARED, margin_needed, metrics_of
 from hrc_env.experiments.impact.policies import Policy, maker, trained
-from hrc_env.experiments.impact.report import report
+from hrc_env.experiments.impact.report import has_learnt, report
+from hrc_env.experiments.price.experiment import make_experiment as make_price
 from hrc_env.experiments.runner import run
 from hrc_env.experiments.setups import (
     REFERENCE,
@@ -255,9 +259,140 @@ def test_a_report_is_made_without_the_policy_that_yields(end_to_end, tmp_path):
     _, metrics = end_to_end
     config = replace(TINY, policies=("scripted",), setups=("truth", REFERENCE))
     table = config.play(PartCache(tmp_path / "parts", "", 1, silent))
-    found = report(tmp_path / "figures", table, metrics)
+    found = report(tmp_path / "figures", table, metrics, {"scripted": "scripted"})
     assert (tmp_path / "figures" / "tradeoff.png").exists()
     assert "scripted_slowed" not in str(found.parts[1])
+
+
+def metric(value: float, low: float = 0.0) -> Metric:
+    return Metric(value, low, 2 * value, "1/min", 8)
+
+
+@pytest.mark.parametrize(
+    ("ppo", "others", "expected"),
+    [
+        ((5.0, 3.0), {"scripted": 48.0}, False),
+        ((12.0, 3.0), {"scripted": 48.0}, True),
+        ((12.0, 3.0), {"scripted": 20.0, "mine": 60.0}, False),
+        ((0.1, 0.0), {}, False),
+        ((9.0, 4.0), {}, True),
+        ((0.0, 0.0), {"mine": 0.0}, False),
+    ],
+)
+def test_a_policy_has_learnt_if_it_does_something(ppo, others, expected):
+    found = {"ppo": metric(*ppo), **{name: metric(value) for name, value in others.items()}}
+    metrics = {f"{name}.{REFERENCE}.goals_per_min": each for name, each in found.items()}
+    assert has_learnt(metrics, list(found)) == expected
+
+
+def played(goals: dict[str, float], n: int = 3) -> dict[tuple[str, str], dict[str, list]]:
+    """Episodes of robots that reach so many goals each, with two setups."""
+    table = {}
+    for policy, reached in goals.items():
+        for name in (REFERENCE, "truth"):
+            episode = sums((0.3, 0.3, 0.1, 0.0), (0.2, 0.2, 0.1, 0.0))
+            episode |= {"walk": "", "goals": reached}
+            table[policy, name] = {what: [each] * n for what, each in episode.items()}
+    return table
+
+
+def test_a_policy_that_did_not_learn_is_left_out_and_named(tmp_path):
+    table = played({"scripted": 5.0, "ppo": 0.0})
+    metrics = metrics_of(table, ())
+    robots = {"scripted": "scripted", "ppo": "ppo"}
+    found = report(tmp_path / "figures", table, metrics, robots)
+    assert "`ppo` did not learn its task (0.0 goals a minute" in found.asked
+    assert not any("| ppo" in part for part in found.parts)
+    alone = report(tmp_path / "figures", played({"ppo": 0.0}), metrics, {"ppo": "ppo"})
+    assert alone.parts == ()
+    learnt = report(tmp_path / "figures", played({"scripted": 5.0, "ppo": 4.0}),
+                    metrics_of(played({"scripted": 5.0, "ppo": 4.0}), ()), robots)  # fmt: skip
+    assert "did not learn" not in learnt.asked
+
+
+def test_nothing_empty_is_printed_of_one_setup_and_one_robot(tmp_path):
+    table = {key: row for key, row in played({"scripted": 5.0}).items() if key[1] == REFERENCE}
+    found = report(tmp_path / "figures", table, metrics_of(table, ()), {"scripted": "scripted"})
+    assert len(found.parts) == 2
+    assert "paired" not in "".join(found.parts[1:])
+    assert all(found.parts)
+
+
+OWN = """
+import numpy as np
+
+
+class Still:
+    def __init__(self, info):
+        self.n = info.n_actions
+
+    def act(self, observation):
+        return np.zeros((*observation.shape[:-1], self.n), np.float32)
+
+
+def make(info):
+    return Still(info)
+"""
+
+
+def test_ones_own_robot_is_played_and_nothing_learns(tmp_path, monkeypatch):
+    (tmp_path / "still_robots.py").write_text(OWN)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(policies, "learn_ppo", None)
+    config = replace(
+        make_experiment(quick=True, seeds=2, robots=["still_robots:make", "random"]),
+        n_steps=8, setups=("truth", REFERENCE),
+    )  # fmt: skip
+    assert config.policies == ("still_robots:make", "random")
+    out = tmp_path / "out"
+    metrics = run(config, out, silent)
+    assert metrics[f"still_robots-make.{REFERENCE}.goals_per_min"].value == 0
+    assert len(list((out / "parts").iterdir())) == 4
+    text = (out / "report.md").read_text()
+    assert "`still_robots-make` is the agent `still_robots:make`" in text
+    assert "learnt" not in text
+    before = {path: path.stat().st_mtime_ns for path in (out / "parts").iterdir()}
+    (tmp_path / "still_robots.py").write_text(OWN + "\n# changed\n")
+    run(config, out, silent)
+    anew = {path.name for path, t in before.items() if path.stat().st_mtime_ns != t}
+    assert anew == {path.name for path in before if path.name.startswith("still")}
+
+
+def test_robots_by_their_file_act_as_they_learnt_to(tmp_path):
+    name = next(each for each in kept.names() if each.startswith("hrc://HRCReach-v0/"))
+    config = replace(
+        make_experiment(quick=True, seeds=1, robots=[name], control="twist"),
+        n_steps=4, setups=("none", REFERENCE),
+    )  # fmt: skip
+    metrics = run(config, tmp_path, silent)
+    assert f"{label_of(name, {})}.none.cost" in metrics
+
+
+@pytest.mark.parametrize(
+    ("robots", "said"),
+    [
+        (["scriptde"], "Unknown policy 'scriptde'. Did you mean 'scripted'"),
+        (["nowhere:make"], "There is no agent 'nowhere:make'"),
+        (["none.zip"], "Unknown agent 'none.zip'"),
+        (["."], "is a folder"),
+    ],
+)
+def test_robots_that_there_are_not_are_refused_before_anything_is_played(robots, said):
+    for make in (make_experiment, make_price):
+        if make is make_price and ":" not in robots[0] and "." not in robots[0]:
+            continue
+        with pytest.raises(ConfigError, match=said):
+            make(robots=robots)
+
+
+def test_names_of_robots_are_told_apart():
+    assert label_of("runs/a/policy.zip", {}) == "runs-a-policy"
+    assert label_of("ppo.zip", {"ppo": ""}) == "own-ppo"
+    assert labels_of(["scripted", "m:f", "m:f"], {"scripted": ""}) == {
+        "scripted": "scripted", "m-f": "m:f",
+    }  # fmt: skip
+    with pytest.raises(ConfigError, match="would both be called 'a-b'"):
+        labels_of(["a/b.zip", "a:b"], {})
 
 
 def test_a_quick_run_says_so_and_marks_nothing(tmp_path):
@@ -280,13 +415,15 @@ def test_a_quick_run_says_so_and_marks_nothing(tmp_path):
         table["scripted_slowed", name] = {what: [each] * 3 for what, each in episode.items()}
     metrics = metrics_of(table, ())
     assert metrics["difference.scripted_slowed.truth.goals_per_min"].low > 0
-    config.report(table, metrics, tmp_path / "figures").write(tmp_path, {}, [0], metrics)
+    found = config.report(table, metrics, tmp_path / "figures")
+    replace(found, quick=config.quick_note).write(tmp_path, {}, [0], metrics)
     for page in ("report.md", "report.html"):
         text = (tmp_path / page).read_text()
         assert "This run was quick: 3 episodes of 4 s a row" in text
         assert "not enough to compare estimators" in text
         assert "●" not in text
         assert "a dot" not in text
+        assert text.count("Quick run, 3 seeds of 4 s: too few") == 4  # above, a figure, two tables
     whole = make_experiment().report(table, metrics, tmp_path / "figures")
     assert "quick" not in whole.title + whole.asked
     assert "●" in str(whole.parts)

@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hrc_env.agents import experts
 from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats
 from hrc_env.experiments.cache import PartCache
 from hrc_env.experiments.price import experiment
-from hrc_env.experiments.price.episodes import STEP, Watched, sums_of
+from hrc_env.experiments.price.episodes import STEP, Driver, Watched, sums_of
 from hrc_env.experiments.price.experiment import (
     Price,
     check_walks,
@@ -157,8 +158,6 @@ def test_what_cannot_be_played_is_refused(change, words):
 
 
 def test_a_task_that_nobody_has_scripted_is_refused(monkeypatch):
-    from hrc_env.agents import experts
-
     monkeypatch.delitem(experts.EXPERTS, "HRCHandover-v0")
     with pytest.raises(ConfigError, match="there is none for HRCHandover-v0; there is for HRCR"):
         replace(TINY, task="HRCHandover-v0")
@@ -237,6 +236,7 @@ def test_a_run_that_is_killed_goes_on_to_the_same_numbers(end_to_end, process, t
     _, metrics = end_to_end
     script = (
         "import os, sys; from pathlib import Path; "
+        "from hrc_env.experiments.price.episodes import Driver\n"
         "from hrc_env.experiments.price.experiment import Price\n"
         "from hrc_env.experiments.runner import run\n"
         f"config = {TINY!r}\n"
@@ -312,3 +312,30 @@ def test_the_best_eyes_stand_above():
     eyes = eyes_called(["truth", "particle", "one_camera"])
     shown = choose_bars(metrics, "HRCReach-v0", eyes)
     assert [each.name for each in shown] == ["truth", "one_camera", "particle"]
+
+
+def test_ones_own_robot_has_a_price(tmp_path):
+    """One that does not move needs no margin, and has nothing to lose."""
+    config = replace(TINY, driver=Driver("random"), n_steps=8)
+    metrics = run(config, tmp_path, silent)
+    assert metrics["HRCReach-v0.unshielded.goals_per_min"].value == 0
+    text = (tmp_path / "report.md").read_text()
+    assert "The robot is driven by the agent `random`" in text
+    assert "Quick run, 5 seeds of 0.32 s: too few to compare" in text
+    settings = json.loads((tmp_path / "results.json").read_text())["config"]
+    assert settings["agent"] == "random"
+
+
+def test_one_robot_has_a_price_at_a_time(tmp_path, monkeypatch):
+    with pytest.raises(ConfigError, match="The price is that of one robot, got --robots random s"):
+        make_experiment(robots=["random", "scripted"])
+    alone = make_experiment(robots=["random"], control="tool", task="HRCHandover-v0")
+    assert alone.others == ()
+    assert alone.driver.given == {"control": "tool"}
+    monkeypatch.delitem(experts.EXPERTS, "HRCHandover-v0")
+    make_experiment(robots=["random"], task="HRCHandover-v0")  # nobody has scripted it
+
+
+def test_the_usual_robot_changes_no_key():
+    assert Driver().settings() == {}
+    assert "driver" not in TINY.settings()

@@ -2,17 +2,18 @@
 
 import json
 import os
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 import pytest
+from PIL import Image
 from scipy import stats
 
 from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.core.results import Metric, write_results, write_whole
 from hrc_env.evaluation import intervals
 from hrc_env.evaluation.counts import ERRORS_M
-from hrc_env.experiments import report, runner
+from hrc_env.experiments import plots, report, runner
 from hrc_env.experiments.cache import PartCache, own_folder, owner_of
 from hrc_env.experiments.columns import Column
 
@@ -270,3 +271,33 @@ def test_an_experiment_plays_each_part_once_and_again_with_other_settings(tmp_pa
     assert runner.changed(Counting(1), n=None) == Counting(1)
     with pytest.raises(ConfigError, match="n must be at least 1, got 0"):
         runner.at_least_one(Counting(0), "n")
+
+
+def test_a_quick_report_says_so_at_every_table_and_figure_and_marks_nothing(tmp_path):
+    metrics = {"d.a": Metric(2.0, 1.0, 3.0, "m", 4)}
+    column = Column("d.{}", "less [m]", signed=True)
+    figure = plots.new_figure(3, 2)
+    plots.save(figure, tmp_path / "figures" / "one.png")
+    before = Image.open(tmp_path / "figures" / "one.png").size
+    parts = ["## Heading", report.picture(tmp_path / "figures" / "one.png", "Picture."),
+             report.table_of("row", {"a": "A"}, [column], metrics)]  # fmt: skip
+    whole = report.Report("Title", "Asked.", parts)
+    whole.write(tmp_path, {}, [0], metrics)
+    assert "●" in (tmp_path / "report.md").read_text()
+    quick = replace(whole, quick=report.quick_words(4, 10.0))
+    quick.write(tmp_path, {}, [0], metrics)
+    text = (tmp_path / "report.md").read_text()
+    assert text.count("Quick run, 4 seeds of 10 s: too few to compare anything.") == 3
+    assert "●" not in text
+    after = Image.open(tmp_path / "figures" / "one.png").size
+    assert after[0] == before[0]
+    assert after[1] > before[1]  # a strip with the words
+
+
+def test_seeds_of_a_quick_run_are_counted_in_words():
+    assert report.quick_words(1) == "Quick run, 1 seed: too few to compare anything."
+
+
+def test_a_table_of_nothing_is_not_printed():
+    assert report.table_of("row", {"a": "A"}, [Column("d.{}", "x")], {}) == ""
+    assert report.table_of("row", {}, [Column("d.{}", "x")], {"d.a": Metric(1, 1, 1, "m", 1)}) == ""

@@ -101,6 +101,9 @@ REFUSED = {
         f"no {name} in info": (saying(without=name), f"info must hold {name!r}")
         for name in (REACH.achieved, REACH.failed, "is_success")
     },
+    "no name of a count": (vary(REACH, achieved=""), "achieved must be the name in info"),
+    "a count that is no name": (vary(REACH, failed=None), "failed must be the name in info"),
+    "one count for both": (vary(REACH, failed=REACH.achieved), "achieved and failed must be two"),
     "a name of no task in info": (saying(more=np.zeros(2)), "must begin with 'task/', got 'more'"),
     "one number for two": (saying(task_at_more=0.0), r"info\['task/more'\] must have shape \(2,\)"),
     "one success for two": (saying(is_success=True), r"info\['is_success'\] must have shape"),

@@ -22,7 +22,7 @@ from hrc_env.experiments.ablations.questions.filters import ALGORITHM_1, FILTER,
 from hrc_env.experiments.ablations.questions.rigs import CAMERAS, OCCLUSION, WORKERS
 from hrc_env.experiments.ablations.report import report
 from hrc_env.experiments.cache import PartCache, PartProgress
-from hrc_env.experiments.report import Metrics, Report
+from hrc_env.experiments.report import Metrics, Report, quick_words
 from hrc_env.experiments.rigs import DT_S, WARM_UP_S
 from hrc_env.experiments.runner import at_least_one, changed
 from hrc_env.experiments.versions import key_of
@@ -78,6 +78,12 @@ class Ablations:
     def n_parts(self) -> int:
         """Settings of all questions."""
         return sum(len(ablation.settings) for ablation in self.asked)
+
+    @property
+    def quick_note(self) -> str:
+        """What tables and figures of a short run say of themselves; "" of others."""
+        is_short = self.n_seeds <= QUICK.n_seeds or self.seconds <= QUICK.seconds
+        return quick_words(self.n_seeds, self.seconds) if is_short else ""
 
     def settings(self) -> dict[str, Any]:
         """Return what all numbers depend on; which questions are asked changes none of them."""

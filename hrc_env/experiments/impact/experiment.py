@@ -1,5 +1,6 @@
 """What perception is worth in safety: every policy with every setup, on the same workers."""
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass, field
@@ -9,12 +10,23 @@ from typing import Any
 
 from hrc_env.core.errors import ConfigError, HRCError, check_names
 from hrc_env.core.results import Metric
+from hrc_env.experiments.agents import check_choice, labels_of
 from hrc_env.experiments.cache import PartCache
 from hrc_env.experiments.impact.episodes import play
 from hrc_env.experiments.impact.metrics import Played, metrics_of
-from hrc_env.experiments.impact.policies import POLICIES, PPO, SLOWED, Policy, maker, trained
+from hrc_env.experiments.impact.policies import (
+    POLICIES,
+    PPO,
+    SLOWED,
+    WORDS,
+    Policy,
+    control_for,
+    made_of,
+    maker,
+    trained,
+)
 from hrc_env.experiments.impact.report import LATENESS, report
-from hrc_env.experiments.report import Metrics, Report, Table
+from hrc_env.experiments.report import Metrics, Report, Table, quick_words
 from hrc_env.experiments.rigs import DT_S
 from hrc_env.experiments.runner import at_least_one, changed
 from hrc_env.experiments.setups import (
@@ -55,7 +67,11 @@ class Impact:
     learning_steps: int = 300_000
     """Environment steps in which the trained policy learns."""
     policies: tuple[str, ...] = POLICIES
-    """Whose perception is exchanged."""
+    """Whose perception is exchanged: `POLICIES`, or agents as `hrc_env.make_agent` takes them."""
+    control: str | None = None
+    """What actions are of policies that do not say it themselves; None: the default."""
+    trust: bool = False
+    """Whether pickles in their checkpoints are read, as of `make_agent`."""
     setups: tuple[str, ...] = field(default_factory=usual_setups)
     """Which perception they get; the reference is always among them."""
     margins_m: tuple[float, ...] = (0.05, 0.1, 0.2)
@@ -66,7 +82,13 @@ class Impact:
         find_task(self.task)
         shield_called(self.shield)
         at_least_one(self, "n_seeds", "n_pixels", "n_steps", "learning_steps")
-        check_names("policy", self.policies, POLICIES)
+        for name in self.policies:
+            if name in POLICIES:
+                continue
+            if re.fullmatch(r"\w+", name) and not Path(name).exists():
+                check_names("policy", [name], (*POLICIES, "random"))
+            check_choice(name)
+        labels_of(self.policies, WORDS)
         check_names("perception setup", self.setups, all_setups())
         if REFERENCE not in self.setups or not self.policies:
             raise ConfigError(
@@ -86,7 +108,13 @@ class Impact:
     @property
     def is_quick(self) -> bool:
         """Whether the episodes or the learning are too few to compare anything."""
-        return any(getattr(self, each) <= QUICK[each] for each in ("n_seeds", "learning_steps"))
+        is_short = PPO in self.policies and self.learning_steps <= QUICK["learning_steps"]
+        return self.n_seeds <= QUICK["n_seeds"] or is_short
+
+    @property
+    def quick_note(self) -> str:
+        """What tables and figures of a quick run say of themselves; "" of others."""
+        return quick_words(self.n_seeds, self.n_steps * DT_S) if self.is_quick else ""
 
     @property
     def warning(self) -> str:
@@ -115,7 +143,10 @@ class Impact:
 
     def settings(self) -> dict[str, Any]:
         """Return what all numbers depend on."""
-        return {"people": PEOPLE, **asdict(self)}
+        given = {name: each for name, each in asdict(self).items() if name != "trust"}
+        if self.control is None:
+            del given["control"]
+        return {"people": PEOPLE, **given}
 
     def play(self, cache: PartCache) -> Played:
         """Return every row; `HRCError` if workers walked otherwise in some."""
@@ -127,33 +158,47 @@ class Impact:
             key = key_of(learnt, self.depends)
             ppo = trained(cache, n, checkpoint, key, self.task)
         for setup, policies in self.rows():
-            made_of = {
-                "people": PEOPLE,
-                "task": self.task,
-                **({} if self.shield is None else {"shield": self.shield}),
-                "seeds": self.seeds_at(setup.level),
-                "n_steps": self.n_steps,
-                "setup": asdict(setup),
-                "estimator": source_digest(estimator_called(setup.estimator).make),
-            }
-            made_with = {"task": self.task, "shield": self.shield}
-            with closing(Stage(setup, setup.turns, made_with)) as stage:
-                for policy in policies:
-                    who = {"policy": asdict(policy), "ppo": ppo if policy.name == PPO else ""}
-                    table[policy.label, setup.name] = cache.part(
-                        f"{policy.label}.{setup.name}",
-                        partial(
-                            play,
-                            stage,
-                            made_of["seeds"],
-                            self.n_steps,
-                            maker(policy, checkpoint),
-                            policy.margin_m,
-                        ),
-                        key_of(made_of | who, self.depends),
-                    )
+            for control, those in self._by_control(policies).items():
+                made_with: dict[str, Any] = {"task": self.task, "shield": self.shield}
+                made_with |= {} if control is None else {"control": control}
+                with closing(Stage(setup, setup.turns, made_with)) as stage:
+                    for policy in those:
+                        key = self._key(setup, control, policy, ppo)
+                        table[policy.label, setup.name] = cache.part(
+                            f"{policy.label}.{setup.name}",
+                            partial(
+                                play,
+                                stage,
+                                self.seeds_at(setup.level),
+                                self.n_steps,
+                                maker(policy, checkpoint, self.trust),
+                                policy.margin_m,
+                            ),
+                            key,
+                        )
         check_walks(table)
         return table
+
+    def _by_control(self, policies: Sequence[Policy]) -> dict[str | None, list[Policy]]:
+        """Return policies by what their actions are, which is a matter of the environment."""
+        found: dict[str | None, list[Policy]] = {}
+        for policy in policies:
+            found.setdefault(control_for(policy, self.control), []).append(policy)
+        return found
+
+    def _key(self, setup: PerceptionSetup, control: str | None, policy: Policy, ppo: str) -> str:
+        """Return the key of a row."""
+        shared = {
+            "people": PEOPLE,
+            "task": self.task,
+            **({} if self.shield is None else {"shield": self.shield}),
+            **({} if control is None else {"control": control}),
+            "seeds": self.seeds_at(setup.level),
+            "n_steps": self.n_steps,
+            "setup": asdict(setup),
+            "estimator": source_digest(estimator_called(setup.estimator).make),
+        }
+        return key_of(shared | made_of(policy, ppo), self.depends)
 
     def metrics(self, played: Played) -> dict[str, Metric]:
         """Return every number."""
@@ -165,7 +210,8 @@ class Impact:
 
     def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
         """Draw the figure; return the tables beside it."""
-        return report(figures, played, metrics, self.warning)
+        robots = labels_of(self.policies, WORDS)
+        return report(figures, played, metrics, robots, self.warning)
 
 
 QUICK: dict[str, Any] = {"n_seeds": 8, "n_pixels": 1, "n_steps": 100, "learning_steps": 65_536}
@@ -178,11 +224,17 @@ def make_experiment(
     estimator: Sequence[str] = (),
     task: str = DEFAULT,
     shield: str | None = None,
+    robots: Sequence[str] = (),
+    control: str | None = None,
+    trust: bool = False,
 ) -> Impact:
     """The settings that the command line asks for; if estimators are named, only these, the
-    reference, the truth and nothing are compared."""
+    reference, the truth and nothing are compared; if robots are named, only these act."""
     whole = Impact(n_steps=find_task(task).max_episode_steps)
-    config = changed(Impact(**QUICK) if quick else whole, task=task, shield=shield)
+    config = changed(
+        Impact(**QUICK) if quick else whole, task=task, shield=shield, control=control,
+        policies=tuple(dict.fromkeys(robots)) or None, trust=trust,
+    )  # fmt: skip
     asked = [PerceptionSetup(estimator=estimator_called(name).name).name for name in estimator]
     setups = tuple(dict.fromkeys(("truth", "none", REFERENCE, *asked))) if asked else None
     return changed(config, n_seeds=seeds, setups=setups)

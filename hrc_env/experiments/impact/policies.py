@@ -1,17 +1,19 @@
-"""The policies that are given other perception: two scripted ones, and PPO, which learns here."""
+"""The policies that are given other perception: two scripted ones, PPO, which learns here, and
+those of the user's own."""
 
 import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from hrc_env.agents.env_info import env_info
 from hrc_env.agents.experts import expert
-from hrc_env.agents.registry import make_agent
+from hrc_env.agents.registry import control_of, make_agent
 from hrc_env.agents.scripted import Yielding
 from hrc_env.core.machine import n_cores
+from hrc_env.experiments.agents import described, label_of
 from hrc_env.experiments.cache import PartCache, PartProgress
 from hrc_env.experiments.impact.episodes import SLOW_M, STOP_M, MakeAgent
 from hrc_env.experiments.stage import PEOPLE
@@ -19,8 +21,14 @@ from hrc_env.simulation import Simulation
 from hrc_env.tasks import DEFAULT
 
 SCRIPTED, SLOWED, PPO = "scripted", "scripted_slowed", "ppo"
-POLICIES = (SCRIPTED, SLOWED, PPO)
-"""Full speed whoever is near; slower by the estimated separation; trained."""
+WORDS = {
+    SCRIPTED: "drives to its goals whoever is near",
+    SLOWED: f"slows down from {SLOW_M:g} m of estimated separation and stands still at "
+    f"{STOP_M:g} m",
+    PPO: "was trained here on the reference",
+}
+POLICIES = tuple(WORDS)
+"""Those of the study, with what they do in words; others are the user's own."""
 SEED = 0
 """Of the learner and of the environments that it learns in."""
 N_ENVS = 64
@@ -35,17 +43,40 @@ class Policy:
     """A policy, and what it adds to the distances that it keeps."""
 
     name: str
+    """One of `POLICIES`, or an agent as `hrc_env.make_agent` takes it."""
     margin_m: float = 0.0
 
     @property
     def label(self) -> str:
         """As parts and results are called."""
+        if self.name not in POLICIES:
+            return label_of(self.name, WORDS)
         if self.margin_m == 0:
             return self.name
         return f"{self.name}_plus_{round(1000 * self.margin_m)}mm"
 
 
-def maker(policy: Policy, checkpoint: Path) -> MakeAgent:
+def made_of(policy: Policy, ppo: str) -> dict[str, Any]:
+    """Return what rows of a policy depend on besides people and perception, as JSON can hold it.
+
+    Args:
+        policy: of the rows.
+        ppo: digest of the checkpoint that was trained here.
+    """
+    found = {"policy": asdict(policy), "ppo": ppo if policy.name == PPO else ""}
+    own = {} if policy.name in POLICIES else {"agent": described(policy.name)}
+    return found | own
+
+
+def control_for(policy: Policy, control: str | None) -> str | None:
+    """Return what the actions of a policy are: what its file says, or else the one that is asked
+    for; PPO has learnt with the default one."""
+    if policy.name == PPO:
+        return None
+    return control if policy.name in POLICIES else control_of(policy.name) or control
+
+
+def maker(policy: Policy, checkpoint: Path, trust: bool = False) -> MakeAgent:
     """What makes the agent for a robot."""
 
     def make(part: Simulation) -> Any:
@@ -54,7 +85,7 @@ def maker(policy: Policy, checkpoint: Path) -> MakeAgent:
             limits_m = STOP_M + policy.margin_m, SLOW_M + policy.margin_m
             return expert(known, Yielding(*limits_m))
         name = str(checkpoint) if policy.name == PPO else policy.name
-        return make_agent(name, known)
+        return make_agent(name, known, trust=trust)
 
     return make
 

@@ -1,6 +1,6 @@
 """The report: throughput against true cost, rows, differences, what lateness costs in metres."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from matplotlib.axes import Axes
@@ -8,7 +8,8 @@ from matplotlib.axes import Axes
 from hrc_env.experiments.columns import Column
 from hrc_env.experiments.impact.episodes import SLOW_M, STOP_M
 from hrc_env.experiments.impact.metrics import COMPARED, NOMINAL_MPS, Played
-from hrc_env.experiments.impact.policies import POLICIES, SCRIPTED
+from hrc_env.experiments.impact.policies import PPO, SCRIPTED
+from hrc_env.experiments.impact.policies import WORDS as ROBOTS
 from hrc_env.experiments.plots import ends, label, new_figure, save
 from hrc_env.experiments.report import Metrics, Report, Table, picture, table_of
 from hrc_env.experiments.setups import LATE, LATE_S, REFERENCE, setup_called
@@ -27,8 +28,6 @@ ASKED = f"""\
 A robot keeps away from a worker whom it knows through cameras only. What is a better estimator, one
 more camera or a shorter delay worth, in goals reached and in safety? Only perception is exchanged;
 robots, goals and workers, who take no notice of the robot, are the same in every row, bit for bit.
-`scripted` drives to its goals whoever is near; `scripted_slowed` slows down from {SLOW_M:g} m of
-estimated separation and stands still at {STOP_M:g} m; `ppo` was trained here on the reference.
 
 Counted is the truth. *True cost*: steps nearer than 0.15 m, and steps in touch, an episode; *of it
 moving towards*: while the robot moves towards the worker at more than {MOVING_M_S} m/s. The rest
@@ -63,6 +62,8 @@ LATENESS = Table(
     "belief: growth of the 95th percentile of believed less true gap. In the loop: margin that "
     "`scripted_slowed` must add until it misses no greater share of stops than on time.",
 )
+LEAST_SHARE = 0.25
+"""Of the best robot's goals: a trained policy that reaches fewer has not learnt the task."""
 COLOURS = {
     "particle": "C0", "kalman": "C2", "triangulation": "C4", "paper_restarts": "C6",
     "truth": "black", "none": "0.55", "pixels": "C1",
@@ -77,18 +78,33 @@ ACROSS = {
 }
 
 
-def report(figures: Path, table: Played, metrics: Metrics, warning: str = "") -> Report:
+def report(
+    figures: Path, table: Played, metrics: Metrics, robots: Mapping[str, str], warning: str = ""
+) -> Report:
     """Draw the figure, and put the tables beside it.
 
     Args:
         figures: folder of the figure.
         table: what was played.
         metrics: numbers of it.
+        robots: whose perception was exchanged: agents by their labels in the table.
         warning: what stands above all where too little was played: no difference is marked then.
     """
-    policies = [name for name in POLICIES if (name, REFERENCE) in table]
+    policies = [name for name in robots if (name, REFERENCE) in table]
+    asked = [*filter(None, (warning, ASKED, _acting(robots)))]
+    if PPO in policies and not has_learnt(metrics, policies):
+        policies.remove(PPO)
+        reached = metrics[f"{PPO}.{REFERENCE}.goals_per_min"].value
+        asked.append(
+            f"`{PPO}` did not learn its task ({reached:.1f} goals a minute with the reference), so "
+            "that nothing can be said of its perception: it is left out here, and its numbers are "
+            "in results.json only."
+        )
+    title = f"What perception is worth in safety{', a quick run' if warning else ''}"
+    if not policies:
+        return Report(title, "\n\n".join(asked), ())
     setups = {name: setup_called(name).words for _, name in table}
-    draw_tradeoff(figures / "tradeoff.png", metrics, policies, list(setups), bool(warning))
+    draw_tradeoff(figures / "tradeoff.png", metrics, policies, list(setups))
     caption = (
         "A point for each setup, placed by its paired difference from the reference, whose 95 % "
         "interval are the bars: up is more goals, left is safer. Below: approaches instead of "
@@ -99,9 +115,10 @@ def report(figures: Path, table: Played, metrics: Metrics, warning: str = "") ->
         columns = [Column(f"{policy}.{{}}.{what}", *words) for what, words in WORDS.items()]
         parts.append(table_of(policy, setups, columns, metrics))
     marks = "" if warning else "; a dot where the interval leaves out zero"
-    parts.append(f"Less {setups[REFERENCE]}, paired{marks}.")
     others = {name: words for name, words in setups.items() if name != REFERENCE}
-    for policy in policies:
+    if others:
+        parts.append(f"Less {setups[REFERENCE]}, paired{marks}.")
+    for policy in policies if others else ():
         key = f"difference.{policy}.{{}}."
         columns = [
             Column(key + what, *WORDS[what], signed=True, marked=not warning)
@@ -109,8 +126,26 @@ def report(figures: Path, table: Played, metrics: Metrics, warning: str = "") ->
         ]
         parts.append(table_of(policy, others, columns, metrics))
     parts.append(LATENESS.markdown(metrics))
-    title = f"What perception is worth in safety{', a quick run' if warning else ''}"
-    return Report(title, f"{warning}\n\n{ASKED}".strip(), parts)
+    return Report(title, "\n\n".join(asked), [*filter(None, parts)])
+
+
+def _acting(robots: Mapping[str, str]) -> str:
+    """Return who acts, in words."""
+    said = [
+        f"`{label}` {ROBOTS[label]}" if label in ROBOTS else f"`{label}` is the agent `{agent}`"
+        for label, agent in robots.items()
+    ]
+    return f"Robots: {'; '.join(said)}."
+
+
+def has_learnt(metrics: Metrics, policies: Sequence[str]) -> bool:
+    """Return whether `ppo` reaches at least a quarter of the goals a minute that the best of the
+    others reaches with the reference; beside no others, whether its interval leaves out zero."""
+    found = {name: metrics[f"{name}.{REFERENCE}.goals_per_min"] for name in policies}
+    others = [each.value for name, each in found.items() if name != PPO]
+    if not others or max(others) == 0:
+        return found[PPO].value > 0 and found[PPO].low > 0
+    return found[PPO].value >= LEAST_SHARE * max(others)
 
 
 def draw_tradeoff(
@@ -118,7 +153,6 @@ def draw_tradeoff(
     metrics: Metrics,
     policies: Sequence[str],
     setups: Sequence[str],
-    is_quick: bool = False,
 ) -> None:
     """Draw goals a minute against true cost while the robot moves towards the worker, and below
     against approaches, without setups that track nobody and without the policy that does not look.
@@ -128,19 +162,19 @@ def draw_tradeoff(
         metrics: of the study.
         policies: names, each has a column.
         setups: names, each has a point.
-        is_quick: whether the picture says that these are too few episodes to compare.
     """
-    figure = new_figure(5.4 * len(policies) + 1, 12)
-    axes = figure.subplots(2, len(policies), squeeze=False)
+    looking = [name for name in policies if name != SCRIPTED]
+    n_rows = 2 if looking else 1
+    figure = new_figure(5.4 * len(policies) + 1, 6 * n_rows)
+    axes = figure.subplots(n_rows, len(policies), squeeze=False)
     seeing = [name for name in setups if setup_called(name).level != "none"]
-    for (above, below), policy in zip(axes.T, policies, strict=True):
+    for policy, above in zip(policies, axes[0], strict=True):
         _panel(above, metrics, policy, setups, "cost_towards")
-        if policy == SCRIPTED:
-            below.set_axis_off()
-        else:
+    for policy, below in zip(policies, axes[1] if looking else (), strict=False):
+        if policy in looking:
             _panel(below, metrics, policy, seeing, "approaches")
-    if is_quick:
-        figure.suptitle("A quick run: too few episodes to compare anything", fontsize=15)
+        else:
+            below.remove()
     handles, labels = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=12)
     save(figure, path)

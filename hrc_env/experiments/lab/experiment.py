@@ -18,8 +18,8 @@ from hrc_env.experiments.lab.motions import MOTIONS, play
 from hrc_env.experiments.lab.report import ALL, COLUMNS, ESTIMATORS, WARM_UP, report
 from hrc_env.experiments.lab.sides import MISSED_SHARE, away_from_cameras, missed_by_camera
 from hrc_env.experiments.recording import Recording, record, replay
-from hrc_env.experiments.report import Metrics, Report
-from hrc_env.experiments.rigs import CHOICES, MULTI
+from hrc_env.experiments.report import Metrics, Report, quick_words
+from hrc_env.experiments.rigs import CHOICES, DT_S, MULTI
 from hrc_env.experiments.runner import at_least_one, changed
 from hrc_env.perception.detector import DetectorConfig
 from hrc_env.scene.build import Scene, SceneConfig, build
@@ -64,6 +64,12 @@ class Lab:
     def n_parts(self) -> int:
         """Films."""
         return self.n_seeds * len(MOTIONS)
+
+    @property
+    def quick_note(self) -> str:
+        """What tables and figures of a short run say of themselves; "" of others."""
+        is_short = self.n_seeds <= QUICK.n_seeds or self.max_frames <= QUICK.max_frames
+        return quick_words(self.n_seeds, self.max_frames * DT_S) if is_short else ""
 
     def settings(self) -> dict[str, Any]:
         """Return what all numbers depend on."""

@@ -1,4 +1,4 @@
-"""Episodes of the scripted robot under a shield, seen with some eyes: what came of each.
+"""Episodes of a robot under a shield, seen with some eyes: what came of each.
 
 As in `experiments.impact`: the same seeds and workers for everybody, who take no notice of the
 robot; contacts are those of `safety.incidents`.
@@ -6,16 +6,18 @@ robot; contacts are those of `safety.incidents`.
 
 import zlib
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.agents.env_info import env_info
-from hrc_env.agents.registry import make_agent
+from hrc_env.agents.env_info import Agent, env_info
+from hrc_env.agents.registry import control_of, make_agent
 from hrc_env.core.typing import Points3
 from hrc_env.evaluation.rollout import rollout
+from hrc_env.experiments.agents import described
 from hrc_env.experiments.cache import PartProgress
 from hrc_env.experiments.price.eyes import Eyes
 from hrc_env.experiments.price.shield import Widened
@@ -26,6 +28,8 @@ from hrc_env.tasks.task import find_task
 from hrc_env.vector.shards import Shards
 from hrc_env.worker.body import worker_truth
 
+SCRIPTED = "scripted"
+"""The agent that drives to its goals whoever is near."""
 CONTACTS = {
     "towards": "safety/contacts_towards", "standing": "safety/contacts_standing",
     "away": "safety/contacts_fleeing",
@@ -37,33 +41,66 @@ STEP = np.dtype([
 """What the episode has come to after a step, the step's cost, and whether that was the end."""
 
 
+@dataclass(frozen=True, slots=True)
+class Driver:
+    """Who drives the robot."""
+
+    agent: str = SCRIPTED
+    """As `hrc_env.make_agent` takes it."""
+    control: str | None = None
+    """What its actions are, if its file does not say it; None: the default."""
+    trust: bool = False
+    """Whether pickles in its checkpoint are read, as of `make_agent`."""
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """The argument of the environment that follows from it."""
+        control = control_of(self.agent) or self.control
+        return {} if control is None else {"control": control}
+
+    def settings(self) -> dict[str, Any]:
+        """Return what episodes depend on of it, as JSON can hold it; nothing of the usual one."""
+        found = {} if self.agent == SCRIPTED else {"agent": described(self.agent)}
+        return found | self.given
+
+    def make(self, part: Simulation) -> Agent:
+        """Return the agent for a robot."""
+        return make_agent(self.agent, env_info(part), trust=self.trust)
+
+
 class Watched:
     """A task's episodes with one pair of eyes."""
 
-    def __init__(self, eyes: Eyes, task: str, n_steps: int, is_shielded: bool = True) -> None:
-        self.eyes, self.task, self.n_steps = eyes, task, n_steps
+    def __init__(
+        self,
+        eyes: Eyes,
+        task: str,
+        n_steps: int,
+        is_shielded: bool = True,
+        driver: Driver = Driver(),
+    ) -> None:
+        self.eyes, self.task, self.n_steps, self.driver = eyes, task, n_steps, driver
         self.is_shielded, self._shield = is_shielded, Widened(eyes.covariance)
-        made_with = {"task": task, "shield": self._shield if is_shielded else None}
+        shield = self._shield if is_shielded else None
+        made_with = {"task": task, "shield": shield, **driver.given}
         self._stage = Stage(eyes.setup, eyes.turns(find_task(task).scene), made_with)
 
     def play(self, seeds: Sequence[int], margin_m: float, tick: PartProgress) -> Rows:
         """Return sums of every episode; the shield keeps `margin_m` more than by itself."""
         self._shield.margin_m = margin_m
-        return self._stage.play(seeds, partial(run, n_steps=self.n_steps), tick)
+        play = partial(run, n_steps=self.n_steps, driver=self.driver)
+        return self._stage.play(seeds, play, tick)
 
     def close(self) -> None:
         """Release threads and graphics contexts."""
         self._stage.close()
 
 
-def scripted(part: Simulation) -> Any:
-    """The agent that drives to its goals whoever is near."""
-    return make_agent("scripted", env_info(part))
-
-
-def run(env: Shards, seeds: Sequence[int], tick: PartProgress, n_steps: int) -> Rows:
+def run(
+    env: Shards, seeds: Sequence[int], tick: PartProgress, n_steps: int, driver: Driver
+) -> Rows:
     """Return what one episode of every seed came to, played side by side."""
-    agent, endless, task = scripted(env.first), Endless(env), env.first.task
+    agent, endless, task = driver.make(env.first), Endless(env), env.first.task
     steps, walks = np.zeros((n_steps, len(seeds)), STEP), [0] * len(seeds)
     so_far = {**CONTACTS, "achieved": task.achieved}
     played = rollout(endless, agent, endless.reset(seeds), n_steps)

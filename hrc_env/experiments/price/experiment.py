@@ -12,8 +12,9 @@ import numpy as np
 from hrc_env.agents.experts import EXPERTS
 from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.core.results import Metric
+from hrc_env.experiments.agents import check_choice
 from hrc_env.experiments.cache import PartCache
-from hrc_env.experiments.price.episodes import Watched
+from hrc_env.experiments.price.episodes import SCRIPTED, Driver, Watched
 from hrc_env.experiments.price.eyes import (
     ELSEWHERE,
     FOUR,
@@ -27,7 +28,8 @@ from hrc_env.experiments.price.metrics import PER, Played, Row, metrics_of, supp
 from hrc_env.experiments.price.report import WORTH, report
 from hrc_env.experiments.price.search import searched
 from hrc_env.experiments.price.shield import SHIELD
-from hrc_env.experiments.report import Metrics, Report, Table
+from hrc_env.experiments.report import Metrics, Report, Table, quick_words
+from hrc_env.experiments.rigs import DT_S
 from hrc_env.experiments.runner import at_least_one, changed
 from hrc_env.experiments.stage import PEOPLE, Rows
 from hrc_env.experiments.versions import key_of, source_digest
@@ -68,6 +70,8 @@ class Price:
     """Episodes with rendered images and a network, and as many with the emulator; 0: none."""
     n_steps: int | None = None
     """Control steps of an episode; None: the task's."""
+    driver: Driver = field(default_factory=Driver)
+    """Who drives the robot."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for what cannot work."""
@@ -81,8 +85,9 @@ class Price:
                 "bracket_m must be (least, greatest) and level be positive, "
                 f"got {self.bracket_m} and {self.level}."
             )
+        check_choice(self.driver.agent)
         for task in (self.task, *self.others):
-            _check_task(task)
+            _check_task(task, self.driver.agent)
 
     def pairs(self) -> Iterator[tuple[str, Eyes]]:
         """Every task with every pair of eyes."""
@@ -113,9 +118,16 @@ class Price:
         n_each = self.n_search + 4 + len(BEYOND_M)
         return n_pairs * n_each + 1 + len(self.others) + n_levels
 
+    @property
+    def quick_note(self) -> str:
+        """What tables and figures of a short run say of themselves; "" of others."""
+        is_short = self.n_seeds < 300 or self.n_fresh < 600
+        return quick_words(self.n_seeds, self.steps_of(self.task) * DT_S) if is_short else ""
+
     def settings(self) -> dict[str, Any]:
         """Return what all numbers depend on."""
-        return {"people": PEOPLE, "shield": SHIELD, **asdict(self)}
+        given = {name: each for name, each in asdict(self).items() if name != "driver"}
+        return {"people": PEOPLE, "shield": SHIELD, **given, **self.driver.settings()}
 
     def play(self, cache: PartCache) -> Played:
         """Return what every search came to."""
@@ -139,13 +151,13 @@ class Price:
         return report(figures, self, played, metrics)
 
 
-def _check_task(task: str) -> None:
+def _check_task(task: str, agent: str) -> None:
     """Raise `ConfigError` for a task that the study cannot play."""
     find_task(task)
-    if task not in EXPERTS:
+    if agent == SCRIPTED and task not in EXPERTS:
         raise ConfigError(
             f"The price is that of a scripted robot, and there is none for {task}; there is for "
-            f"{', '.join(EXPERTS)}."
+            f"{', '.join(EXPERTS)}. Or name an agent of your own: --robots MODULE:FUNCTION."
         )
 
 
@@ -154,14 +166,27 @@ def make_experiment(
     seeds: int | None = None,
     task: str = DEFAULT,
     eyes: Sequence[str] = (),
+    robots: Sequence[str] = (),
+    control: str | None = None,
+    trust: bool = False,
 ) -> Price:
     """The settings that the command line asks for. Quick: twelve pairs of eyes, the first task. Of
-    another task than the first three pairs of eyes, if none are named."""
-    usual = Price(eyes=QUICK, n_fresh=600, n_pixels=0) if quick else Price(
-        others=tuple(each for each in BUILT_IN if each != DEFAULT)
-    )  # fmt: skip
+    another task than the first three pairs of eyes, if none are named. With an agent that is named
+    only the one task is played."""
+    if len(robots) > 1:
+        raise ConfigError(
+            f"The price is that of one robot, got --robots {' '.join(robots)}. Call it once for "
+            "each, with a folder of its own (--out)."
+        )
+    driver = Driver(*robots or (SCRIPTED,), control=control, trust=trust)
+    others = () if robots else tuple(each for each in BUILT_IN if each != DEFAULT)
     if task != DEFAULT:
-        usual = changed(usual, task=task, others=(), eyes=ELSEWHERE, n_pixels=0)
+        usual = Price(task=task, eyes=ELSEWHERE, n_pixels=0, driver=driver)
+        usual = changed(usual, n_fresh=600 if quick else None)
+    elif quick:
+        usual = Price(eyes=QUICK, n_fresh=600, n_pixels=0, driver=driver)
+    else:
+        usual = Price(others=others, driver=driver)
     config = changed(usual, n_seeds=seeds, eyes=tuple(dict.fromkeys(eyes)) or None)
     if seeds is not None:
         config = changed(config, n_fresh=-(-10 * seeds // 3), n_pixels=min(seeds, config.n_pixels))
@@ -171,7 +196,7 @@ def make_experiment(
 def search_margin(config: Price, cache: PartCache, task: str, eyes: Eyes) -> Row:
     """Search the margin of one pair of eyes, play on with it."""
     tried: dict[float, Rows] = {}
-    with closing(Watched(eyes, task, config.steps_of(task))) as stage:
+    with closing(_watched(config, eyes, task)) as stage:
         part = partial(_part, config, cache, stage)
 
         def rate(margin_m: float) -> float:
@@ -194,10 +219,15 @@ def search_margin(config: Price, cache: PartCache, task: str, eyes: Eyes) -> Row
         return confirmed(end_m) if row.ends_at(end_m) else row
 
 
+def _watched(config: Price, eyes: Eyes, task: str, is_shielded: bool = True) -> Watched:
+    """Return a task's episodes with one pair of eyes."""
+    return Watched(eyes, task, config.steps_of(task), is_shielded, config.driver)
+
+
 def _unshielded(config: Price, cache: PartCache, task: str) -> Rows:
     (eyes,) = eyes_called([TRUTH])
     seeds = config.seeds_of(task, config.n_fresh, FIRST_FRESH)
-    with closing(Watched(eyes, task, config.steps_of(task), is_shielded=False)) as stage:
+    with closing(_watched(config, eyes, task, is_shielded=False)) as stage:
         return _part(config, cache, stage, seeds, 0.0)
 
 
@@ -209,7 +239,7 @@ def _pixels(config: Price, cache: PartCache, table: Any) -> dict[str, Rows]:
     (eyes,) = eyes_called([FOUR])
     for level in ("keypoints", "pixels"):
         of_level = _at_level(eyes, level)
-        with closing(Watched(of_level, config.task, config.steps_of(config.task))) as stage:
+        with closing(_watched(config, of_level, config.task)) as stage:
             seeds = [FIRST_PIXELS + k for k in range(config.n_pixels)]
             found[level] = _part(config, cache, stage, seeds, margin_m)
     return found
@@ -231,6 +261,7 @@ def _part(
         "people": PEOPLE, "task": stage.task, "seeds": seeds, "n_steps": stage.n_steps,
         "eyes": sight, "margin_m": margin_m, "shield": SHIELD if stage.is_shielded else "",
         "estimator": source_digest(estimator_called(eyes.setup.estimator).make),
+        **config.driver.settings(),
     }  # fmt: skip
     which = {FIRST_SEED: "searched", FIRST_FRESH: "fresh", FIRST_PIXELS: "pixels"}[seeds[0]]
     kept = f"{1e4 * margin_m:+.0f}" if stage.is_shielded else "unshielded"
@@ -261,7 +292,7 @@ def replay(config: Price, cache: PartCache, margins_m: Mapping[str, float]) -> N
         if level is not None:
             eyes = _at_level(eyes, level)
         is_shielded = kept != "unshielded"
-        with closing(Watched(eyes, task, config.steps_of(task), is_shielded=is_shielded)) as stage:
+        with closing(_watched(config, eyes, task, is_shielded)) as stage:
             _part(config, cache, stage, seeds, margin_m)
 
 

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 
 from hrc_env.experiments.columns import Column
 from hrc_env.experiments.plots import ends, label, new_figure, save
+from hrc_env.experiments.price.episodes import SCRIPTED, Driver
 from hrc_env.experiments.price.eyes import ELSEWHERE, FOUR, GROUPS, QUICK, Eyes, all_eyes
 from hrc_env.experiments.price.metrics import PER, Played, Row
 from hrc_env.experiments.report import Metrics, Report, Table, picture, table_of
@@ -62,7 +63,7 @@ episodes of 10 s, {hourly:.1f} times an hour; the goals that are left are compar
 added to all protective distances of the `{shield}` shield and may be negative: the shield as it
 comes is much safer than that. It is found by bisection on {n_seeds} episodes, the same for all
 eyes, and confirmed on {n_fresh} others: the uncertainty of the level and of the margin is in the
-intervals. The robot is the scripted one, the workers take no notice of it; a touch is called by
+intervals. The robot is {robot}, the workers take no notice of it; a touch is called by
 what the robot did in the step before, and touches within half a second of each other are one. In
 tasks with longer episodes there are fewer, and a thousand episodes are as much time.
 
@@ -96,9 +97,15 @@ def report(figures: Path, config: Any, played: Played, metrics: Metrics) -> Repo
         ]
     asked = ASKED.format(
         level=config.level, hourly=an_hour(config.level), shield="qp", n_seeds=config.n_seeds,
-        n_fresh=config.n_fresh,
+        n_fresh=config.n_fresh, robot=_driven(config.driver),
     )  # fmt: skip
     return Report("What sight costs at one rate of contacts", asked, [*filter(None, parts)])
+
+
+def _driven(driver: Driver) -> str:
+    """Return who drives the robot, in words."""
+    usual = driver.agent == SCRIPTED
+    return "the scripted one" if usual else f"driven by the agent `{driver.agent}`"
 
 
 def an_hour(level: float) -> float:

@@ -18,7 +18,7 @@ from hrc_env.core.typing import Floats
 from hrc_env.evaluation.intervals import mean_over, paired, rmse_of, rmse_over
 from hrc_env.experiments.cache import PartCache, PartProgress
 from hrc_env.experiments.recording import Recording, record, replay
-from hrc_env.experiments.report import Metrics, Report
+from hrc_env.experiments.report import Metrics, Report, quick_words
 from hrc_env.experiments.rigs import CHOICES, DT_S, MULTI, N_WARM_UP, left_of
 from hrc_env.experiments.runner import at_least_one, changed
 from hrc_env.experiments.site.report import report, site
@@ -79,6 +79,12 @@ class Site:
         """Films, and own crops."""
         n_closed = len(self.seeds[: self.n_closed])
         return self.n_seeds + len(self.estimators) * len(ROWS) * n_closed
+
+    @property
+    def quick_note(self) -> str:
+        """What tables and figures of a short run say of themselves; "" of others."""
+        is_short = self.n_seeds <= QUICK.n_seeds or self.seconds <= QUICK.seconds
+        return quick_words(self.n_seeds, self.seconds) if is_short else ""
 
     def settings(self) -> dict[str, Any]:
         """Return what all numbers depend on."""

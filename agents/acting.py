@@ -1,0 +1,84 @@
+"""Checkpoints for acting: what they were made for, and their policy; nothing in files is run."""
+
+import json
+import zipfile
+from pathlib import Path
+from typing import Any
+
+from hrc_env import __version__
+from hrc_env.core.errors import CheckpointError
+from hrc_env.observations import FLAT
+from hrc_env.tasks.goal import ACHIEVED, DESIRED
+
+from . import sb3_files
+from .env_info import EnvInfo
+
+TRAIN = "python -m hrc_env train"
+Size = int | dict[str, int]
+"""Entries of an observation, by name where goals stand apart."""
+
+
+def load(path: Path, env_info: EnvInfo, trust: bool = False) -> sb3_files.SB3Agent:
+    """Return the policy of a checkpoint, of ours or of Stable-Baselines3, by its weights alone.
+
+    Raises:
+        CheckpointError: it was made for another version or environment; or as of `sb3_files.load`.
+    """
+    if meta := meta_of(path):
+        check_made_for(path, meta, env_info)
+    return sb3_files.load(path, env_info, trust)
+
+
+def describe(path: Path) -> dict[str, Any]:
+    """Return the description that a checkpoint holds.
+
+    Raises:
+        CheckpointError: no file, or not one of ours.
+    """
+    if not path.exists():
+        raise CheckpointError(f"No checkpoint at {path}. Train one with: {TRAIN}")
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return json.loads(archive.read("hrc_env.json"))
+    except (zipfile.BadZipFile, KeyError) as error:
+        raise CheckpointError(
+            f"{path} is not a checkpoint of hrc_env ({error}). Train one with: {TRAIN}"
+        ) from error
+
+
+def meta_of(path: Path) -> dict[str, Any]:
+    """Return the description that a checkpoint holds; nothing of one that Stable-Baselines3 wrote.
+
+    Raises:
+        CheckpointError: no file, or neither of them.
+    """
+    try:
+        return describe(path)
+    except CheckpointError:
+        sb3_files.check_is_one(path)
+        return {}
+
+
+def check_made_for(path: Path, meta: dict[str, Any], env_info: EnvInfo) -> None:
+    """Raise `CheckpointError` unless a checkpoint of ours is for an environment."""
+    size = len(env_info.layout.low)
+    goals = dict.fromkeys((ACHIEVED, DESIRED), env_info.goal_size)
+    parts: Size = {**goals, FLAT: size} if env_info.goal_size else size
+    check_fits(path, meta, parts, env_info.n_actions)
+
+
+def check_fits(path: Path, meta: dict[str, Any], observation: Size, action: Size) -> None:
+    """Raise `CheckpointError` unless a checkpoint of ours is of this version and these sizes."""
+    made_with = meta["hrc_env"]
+    if made_with.split(".")[:2] != __version__.split(".")[:2]:
+        raise CheckpointError(
+            f"{path} was made with hrc_env {made_with}, this is {__version__}; checkpoints fit the "
+            f"same minor version. Install hrc_env {made_with} or train anew: {TRAIN}"
+        )
+    sizes = meta["observation_size"], meta["action_size"]
+    if sizes != (observation, action):
+        raise CheckpointError(
+            f"{path} expects observations {sizes[0]} and actions {sizes[1]}, this environment has "
+            f"{observation} and {action}: make it with the same task, n_workers and control "
+            f"({meta.get('environment')})."
+        )
