@@ -17,7 +17,7 @@ from hrc_env.cli.show import show
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.machine import n_cores
 from hrc_env.core.progress import progress_bar
-from hrc_env.experiments.runner import Experiment, changed, run
+from hrc_env.experiments.runner import Experiment, changed, run_experiment
 
 PROGRAM = "python -m benchmarks"
 
@@ -33,7 +33,7 @@ class BenchArguments:
 
     def show(self, experiment: Experiment[Any]) -> int:
         """Run an experiment, show its tables."""
-        return show(partial(run, experiment), self.out, "bench")
+        return show(partial(run_experiment, experiment), self.out, "bench")
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from hrc_env.cli.checks import at_least
 from hrc_env.cli.entry import show_errors
 from hrc_env.cli.options import understood
 from hrc_env.cli.show import show
-from hrc_env.experiments.runner import run
+from hrc_env.experiments.runner import run_experiment
 from hrc_env.experiments.study import Study
 
 
@@ -44,7 +44,7 @@ def run_study(study: Study, arguments: StudyArguments) -> int:
     """Run a study as it was asked, and show its report; return the exit status."""
     study = study.select(arguments.only) if arguments.only else study
     study = replace(study.quick() if arguments.quick else study, threads=arguments.threads)
-    return show(partial(run, study), arguments.out, study.name)
+    return show(partial(run_experiment, study), arguments.out, study.name)
 
 
 def main(make: Callable[[], Study], about: str | None) -> int:

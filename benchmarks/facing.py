@@ -39,7 +39,7 @@ from hrc_env.experiments.columns import Column
 from hrc_env.experiments.lab.sides import MISSED_CONFIDENCE, MISSED_SHARE
 from hrc_env.experiments.report import Metrics, Report, Table, quick_words
 from hrc_env.experiments.rigs import ALL, DT_S, N_WARM_UP, SINGLE, Rig, left_with
-from hrc_env.experiments.runner import run
+from hrc_env.experiments.runner import run_experiment
 from hrc_env.experiments.versions import key_of
 from hrc_env.geometry.cameras import project, projections
 from hrc_env.geometry.sight import hidden
@@ -255,7 +255,7 @@ def main() -> int:
     """Follow, sort, write, show."""
     arguments = tyro.cli(Arguments, default=Arguments(Path("out/facing")), description=__doc__)
     facing = Facing(episodes=(12, 4)) if arguments.quick else Facing()
-    return show(partial(run, facing), arguments.out, "facing")
+    return show(partial(run_experiment, facing), arguments.out, "facing")
 
 
 if __name__ == "__main__":

@@ -32,7 +32,7 @@ def doc_of(name: str) -> str:
     """Return the documentation of a public name: its own docstring, or the text after a constant;
     "" if there is none."""
     value = getattr(hrc_env, name)
-    if inspect.isclass(value) or inspect.isfunction(value):
+    if inspect.isclass(value) or inspect.isfunction(value) or inspect.ismodule(value):
         return inspect.cleandoc(value.__doc__ or "")
     module = Path(str(import_module(PUBLIC[name]).__file__))
     for node, after in itertools.pairwise(ast.parse(module.read_text()).body):

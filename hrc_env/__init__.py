@@ -44,6 +44,11 @@ if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
     from hrc_env.evaluation.intervals import share_of as share_of
     from hrc_env.evaluation.rollout import Transition as Transition
     from hrc_env.evaluation.rollout import rollout as rollout
+    from hrc_env.experiments import columns as columns
+    from hrc_env.experiments.runner import run_experiment as run_experiment
+    from hrc_env.experiments.setups import PerceptionSetup as PerceptionSetup
+    from hrc_env.experiments.study import Row as Row
+    from hrc_env.experiments.study import Study as Study
     from hrc_env.geometry.camera_config import CameraConfig as CameraConfig
     from hrc_env.geometry.camera_config import read_rig as read_rig
     from hrc_env.geometry.camera_config import write_rig as write_rig
@@ -189,6 +194,12 @@ PUBLIC = {
     "rate_of": "hrc_env.evaluation.intervals",
     "rollout": "hrc_env.evaluation.rollout",
     "share_of": "hrc_env.evaluation.intervals",
+    # studies
+    "PerceptionSetup": "hrc_env.experiments.setups",
+    "Row": "hrc_env.experiments.study",
+    "Study": "hrc_env.experiments.study",
+    "columns": "hrc_env.experiments",
+    "run_experiment": "hrc_env.experiments.runner",
     # files of your own, and errors
     "ConfigError": "hrc_env.core.errors",
     "HRCError": "hrc_env.core.errors",

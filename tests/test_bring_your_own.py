@@ -2,6 +2,7 @@
 
 import dataclasses
 import re
+import runpy
 import subprocess
 import sys
 
@@ -438,3 +439,12 @@ def test_what_is_wrong_with_a_robot_is_said(changes, said):
 def test_an_unknown_robot_is_refused_with_those_that_there_are():
     with pytest.raises(ConfigError, match="Did you mean 'swing_arm'"):
         gymnasium.make("HRCReach-v0", robot="swing_amr")
+
+
+def test_a_study_is_played_and_reported(tmp_path):
+    study = runpy.run_path(str(EXAMPLES / "study.py"))["STUDY"]
+    short = dataclasses.replace(study, n_quick=2).quick()
+    found = hrc_env.run_experiment(short, tmp_path / "out")
+    assert found["bare.share"].value == 1.0
+    assert found["qp.contacts_towards"].n == 2
+    assert "What the shield costs" in (tmp_path / "out" / "report.md").read_text()

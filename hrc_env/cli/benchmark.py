@@ -49,7 +49,9 @@ class Benchmark:
         study = leaderboard.make_study(self.policy, self.ids, self.control, self.seeds, self.trust)
         words = self.policy.removeprefix("hrc://").replace("/", "-").replace(":", "-")
         out = self.out or Path("out/benchmark") / words
-        status = show(partial(runner.run, study, overwrite=self.overwrite), out, "benchmark")
+        status = show(
+            partial(runner.run_experiment, study, overwrite=self.overwrite), out, "benchmark"
+        )
         if self.enter is not None:
             leaderboard.enter(self.enter, self.policy, out / "results.json")
             print(f"Entered: {self.enter}")

@@ -38,7 +38,7 @@ class AnyExperiment:
         if "estimator" in asked:
             asked["estimator"] = estimators_named(asked["estimator"])
         made = experiment.make_experiment(**asked)
-        return show(partial(runner.run, made, overwrite=overwrite), out, "experiment")
+        return show(partial(runner.run_experiment, made, overwrite=overwrite), out, "experiment")
 
 
 @dataclass(frozen=True)

@@ -73,7 +73,7 @@ def cache_of(experiment: Experiment[Any], parts: Path, progress: Progress) -> Pa
     return PartCache(parts, key, experiment.n_parts, progress)
 
 
-def run(
+def run_experiment(
     experiment: Experiment[Any],
     out: Path,
     progress: Progress = lambda share, label: None,

@@ -24,12 +24,14 @@ RIGS_OF = {4: (ALL,), 3: TRIPLES, 2: (*OPPOSITE, (0, 1), (2, 3)), 1: SINGLE}
 
 @dataclass(frozen=True, slots=True)
 class PerceptionSetup:
-    """How a robot perceives."""
+    """How a robot perceives in a study: level, estimator, cameras that are left, lateness."""
 
     level: str = "keypoints"
+    """As `perception=` of an environment."""
     estimator: str = "particle"
+    """Its name, where the level has cameras."""
     n_cameras: int = 4
-    """That are left after the warm-up."""
+    """That are left after the warm-up, of the scene's four."""
     latency_s: float = 0.0
     """From taking an image to having it [s]."""
     is_told: bool = True
@@ -67,9 +69,9 @@ class PerceptionSetup:
     @property
     def turns(self) -> tuple[Turn, ...]:
         """Cameras and their faults, in which episodes take turns."""
-        return self.turns_of(RIGS["lab"])
+        return self.list_turns(RIGS["lab"])
 
-    def turns_of(self, rig: Sequence[CameraConfig]) -> tuple[Turn, ...]:
+    def list_turns(self, rig: Sequence[CameraConfig]) -> tuple[Turn, ...]:
         """The same with another rig of four."""
         turns = (
             Turn(tuple(rig[c] for c in kept)) if self.is_alone else left_with(rig, kept)

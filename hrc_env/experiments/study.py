@@ -9,7 +9,7 @@
         },
         columns=(share_of_baseline("goals_reached", "throughput [%]", scale=100), mean("cost")),
     )
-    run(SHIELD, Path("out/shielded"))
+    run_experiment(SHIELD, Path("out/shielded"))
 
 A declaration that cannot work raises a `ConfigError` at once: an unknown agent,
 estimator, shield, environment or argument; a baseline that is no row; a column of no statistic.
@@ -96,7 +96,7 @@ class Row:
         faults = list(known.pop("faults", ()))
         return [
             {**known, "cameras": list(turn.cameras), "faults": [*turn.faults, *faults]}
-            for turn in setup.turns_of(RIGS[scene])
+            for turn in setup.list_turns(RIGS[scene])
         ]
 
     def settings(self) -> dict[str, Any]:
@@ -137,6 +137,7 @@ class Study:
     name: str
     """As its folder and its results are called."""
     title: str
+    """Of the report."""
     about: str
     """The question, and how it is answered."""
     depends: tuple[str, ...]
@@ -147,6 +148,7 @@ class Study:
     """By name, in the order in which they are played and shown; those of policies that have not
     learnt yet may be left out, where `tables` are given."""
     columns: tuple[Column, ...]
+    """What is counted, of every row (`hrc_env.columns`)."""
     heads: tuple[str, ...] = ("",)
     """Headings of the rows' words."""
     note: str = ""
@@ -283,7 +285,13 @@ class Study:
         return (Table(self.name, self.title, rows, columns, self.heads, self.note),)
 
     def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
-        """Return what is to be read; there are no figures."""
+        """Return what is to be read.
+
+        Args:
+            played: episodes by row.
+            metrics: every number of them.
+            figures: folder; a study of episodes draws none.
+        """
         parts = [each.markdown(metrics) for each in self.shown_tables()]
         return Report(self.title, self.about, parts)
 

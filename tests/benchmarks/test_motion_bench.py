@@ -9,7 +9,7 @@ from benchmarks.motion import bench
 from benchmarks.motion.report import inside
 from benchmarks.motion.targets import TARGETS, targets_of
 from hrc_env.core.errors import ConfigError
-from hrc_env.experiments.runner import run
+from hrc_env.experiments.runner import run_experiment
 from hrc_env.motion.repertoire import SCENES
 
 PLAYED = ("stand", "walk 1.1 m/s", "saw")
@@ -21,7 +21,7 @@ def done(tmp_path_factory):
     out, said = tmp_path_factory.mktemp("motion"), []
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(bench, "SCENES", {name: SCENES[name] for name in PLAYED})
-        metrics = run(TINY, out, lambda share, label: said.append(share))
+        metrics = run_experiment(TINY, out, lambda share, label: said.append(share))
     return out, metrics, said
 
 

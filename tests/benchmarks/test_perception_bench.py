@@ -14,7 +14,7 @@ from benchmarks.perception.report import report
 from benchmarks.perception.views import FAMILIES, FAMILY_OF, View, rows_of
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric
-from hrc_env.experiments.runner import run
+from hrc_env.experiments.runner import run_experiment
 from hrc_env.motion.generator import activity_names
 
 TINY = PerceptionBench(
@@ -121,12 +121,12 @@ def test_more_faulty_episodes_than_faultless_ones_are_refused():
 
 def test_a_bench_writes_everything_and_goes_on_where_it_was(pixels, tmp_path):
     said = []
-    run(TINY, tmp_path, lambda share, label: said.append(share))
+    run_experiment(TINY, tmp_path, lambda share, label: said.append(share))
     assert sum(said) == pytest.approx(1.0)
     for name in ("report.md", "report.html", "results.json"):
         assert (tmp_path / name).stat().st_size > 0
     content = json.loads((tmp_path / "results.json").read_text())
     assert "error_ratio.lost" in content["metrics"]
     before = {path: path.stat().st_mtime_ns for path in (tmp_path / "parts").glob("*.json")}
-    run(TINY, tmp_path, lambda share, label: None)
+    run_experiment(TINY, tmp_path, lambda share, label: None)
     assert before == {path: path.stat().st_mtime_ns for path in (tmp_path / "parts").glob("*.json")}

@@ -13,7 +13,7 @@ from benchmarks.speed.organs import REST, TOTAL
 from benchmarks.speed.stopwatch import Stopwatch
 from benchmarks.speed.tasks import shares
 from hrc_env.core.errors import ConfigError, HRCError
-from hrc_env.experiments.runner import run
+from hrc_env.experiments.runner import run_experiment
 from hrc_env.tasks import BUILT_IN
 
 TINY = bench.SpeedBench(
@@ -25,7 +25,7 @@ TINY = bench.SpeedBench(
 @pytest.fixture(scope="module")
 def end_to_end(tmp_path_factory):
     out, said = tmp_path_factory.mktemp("speed"), []
-    metrics = run(TINY, out, lambda share, label: said.append(share))
+    metrics = run_experiment(TINY, out, lambda share, label: said.append(share))
     return out, metrics, said
 
 
@@ -57,7 +57,7 @@ def test_of_every_id_nothing_else_is_timed(tmp_path, monkeypatch):
     monkeypatch.setattr(bench.Tasks, "run", lambda self, n: {"HRCReach-v0": 10.0 * n})
     said = []
     config = bench.SpeedBench(task="every", n_rounds=2)
-    metrics = run(config, tmp_path, lambda share, label: said.append(share))
+    metrics = run_experiment(config, tmp_path, lambda share, label: said.append(share))
     assert set(metrics) == {"task_steps_per_s.HRCReach-v0", "task_share.HRCReach-v0"}
     assert sum(said) == pytest.approx(1.0)
 

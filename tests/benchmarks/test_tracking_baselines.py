@@ -9,7 +9,7 @@ from benchmarks.tracking.baselines import bench
 from benchmarks.tracking.baselines.model import F, Q, first_joints, pixels
 from benchmarks.tracking.rigs import make_rig
 from benchmarks.tracking.sequences import make_sequences
-from hrc_env.experiments.runner import run
+from hrc_env.experiments.runner import run_experiment
 from hrc_env.geometry.cameras import project
 
 
@@ -67,7 +67,7 @@ def test_the_bench_writes_what_ran_and_names_what_did_not(tmp_path, monkeypatch)
     monkeypatch.setattr(bench, "OURS", ("dlt",))  # no kernels to compile
     monkeypatch.setattr(bench, "installed", lambda name: False)
     shares, config = [], bench.BaselinesBench(n_seeds=2)
-    metrics = run(config, tmp_path, lambda share, _: shares.append(share))
+    metrics = run_experiment(config, tmp_path, lambda share, _: shares.append(share))
     assert sum(shares) == pytest.approx(1)
     assert "rmse_m.lab.after_return.dlt" in metrics
     assert metrics["rmse_m.lab.one_camera.dlt"].n == 2

@@ -24,7 +24,7 @@ from hrc_env.experiments.ablations.play import matched, pipeline_of, play, walks
 from hrc_env.experiments.ablations.questions.rigs import CORNERS, WALLS, spread_over
 from hrc_env.experiments.report import Report
 from hrc_env.experiments.rigs import DT_S, N_WARM_UP, left_of
-from hrc_env.experiments.runner import run
+from hrc_env.experiments.runner import run_experiment
 from hrc_env.tracking.tree.gaussian import PARENT, ROOT
 
 TINY = Ablations(n_seeds=1, seconds=1.24)
@@ -59,7 +59,7 @@ def state_of(setting):
 def end_to_end(tmp_path_factory):
     """A run of all studies: folder, numbers, told progress."""
     out, shares = tmp_path_factory.mktemp("ablations"), []
-    metrics = run(TINY, out, lambda share, label: shares.append(share))
+    metrics = run_experiment(TINY, out, lambda share, label: shares.append(share))
     return out, metrics, shares
 
 
@@ -124,7 +124,7 @@ def test_what_is_finished_is_used_again(end_to_end, monkeypatch):
     monkeypatch.setattr(experiment, "part", never)
     monkeypatch.setattr(experiment, "report", lambda *args: Report("", "", ()))
     before = (out / "results.json").read_text()
-    run(TINY, out, silent)
+    run_experiment(TINY, out, silent)
     assert (out / "results.json").read_text() == before
 
 
@@ -133,10 +133,10 @@ def test_a_run_that_is_killed_goes_on_to_the_same_numbers(process, tmp_path):
     script = (
         "import os, sys; from pathlib import Path; "
         "from hrc_env.experiments.ablations.experiment import Ablations\n"
-        "from hrc_env.experiments.runner import run\n"
+        "from hrc_env.experiments.runner import run_experiment\n"
         "def say(share, label):\n"
         "    if label == 'workers.lab_3': os.kill(os.getpid(), 9)\n"
-        f"run({config!r}, Path(sys.argv[1]), say)"
+        f"run_experiment({config!r}, Path(sys.argv[1]), say)"
     )
     out, other = tmp_path / "killed", tmp_path / "whole"
     killed = process("-c", script, out)
@@ -144,7 +144,7 @@ def test_a_run_that_is_killed_goes_on_to_the_same_numbers(process, tmp_path):
     kept = {path.name: path.stat().st_mtime_ns for path in (out / "parts").iterdir()}
     assert set(kept) == {"workers.lab_1.json", "workers.lab_2.json"}
     assert not (out / "results.json").exists()
-    resumed, whole = run(config, out, silent), run(config, other, silent)
+    resumed, whole = run_experiment(config, out, silent), run_experiment(config, other, silent)
     assert resumed.keys() == whole.keys()
     for name, metric in whole.items():  # sums of another process may round otherwise
         numbers = (resumed[name].value, resumed[name].low, resumed[name].high)
@@ -165,7 +165,7 @@ def test_what_cannot_work_is_explained(tmp_path):
         Setting("x", "x", estimator="paper", bones="known")
     (tmp_path / "experiment.json").write_text('{"experiment": "lab"}')
     with pytest.raises(ConfigError, match="--overwrite"):
-        run(TINY, tmp_path, silent)
+        run_experiment(TINY, tmp_path, silent)
 
 
 def test_quick_asks_everything():

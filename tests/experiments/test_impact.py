@@ -23,7 +23,7 @@ from hrc_env.experiments.impact.metrics import COMPARED, margin_needed, metrics_
 from hrc_env.experiments.impact.policies import Policy, maker, trained
 from hrc_env.experiments.impact.report import has_learnt, report
 from hrc_env.experiments.price.experiment import make_experiment as make_price
-from hrc_env.experiments.runner import run
+from hrc_env.experiments.runner import run_experiment
 from hrc_env.experiments.setups import (
     REFERENCE,
     PerceptionSetup,
@@ -63,7 +63,7 @@ def sums(*steps, margin_m=0.0):
 def end_to_end(tmp_path_factory):
     """A run from beginning to end: its folder and its numbers."""
     out = tmp_path_factory.mktemp("impact")
-    return out, run(TINY, out, silent)
+    return out, run_experiment(TINY, out, silent)
 
 
 def test_eyes_are_called_what_they_are():
@@ -221,18 +221,18 @@ def test_a_run_that_is_killed_goes_on_to_the_same_numbers(end_to_end, process, t
     script = (
         "import os, sys; from pathlib import Path; "
         "from hrc_env.experiments.impact.experiment import Impact\n"
-        "from hrc_env.experiments.runner import run\n"
+        "from hrc_env.experiments.runner import run_experiment\n"
         f"config = {TINY!r}\n"
         "def say(share, label):\n"
         f"    if label == 'scripted.{REFERENCE}': os.kill(os.getpid(), 9)\n"
-        "run(config, Path(sys.argv[1]), say)"
+        "run_experiment(config, Path(sys.argv[1]), say)"
     )
     killed = process("-c", script, tmp_path)
     assert killed.returncode == -signal.SIGKILL
     kept = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "parts").iterdir()}
     assert len(kept) == 4  # truth and none, two policies each
     assert not (tmp_path / "results.json").exists()
-    assert run(TINY, tmp_path, silent) == metrics
+    assert run_experiment(TINY, tmp_path, silent) == metrics
     for name, time_ns in kept.items():
         assert (tmp_path / "parts" / name).stat().st_mtime_ns == time_ns
 
@@ -345,7 +345,7 @@ def test_ones_own_robot_is_played_and_nothing_learns(tmp_path, monkeypatch):
     )  # fmt: skip
     assert config.policies == ("still_robots:make", "random")
     out = tmp_path / "out"
-    metrics = run(config, out, silent)
+    metrics = run_experiment(config, out, silent)
     assert metrics[f"still_robots-make.{REFERENCE}.goals_per_min"].value == 0
     assert len(list((out / "parts").iterdir())) == 4
     text = (out / "report.md").read_text()
@@ -353,7 +353,7 @@ def test_ones_own_robot_is_played_and_nothing_learns(tmp_path, monkeypatch):
     assert "learnt" not in text
     before = {path: path.stat().st_mtime_ns for path in (out / "parts").iterdir()}
     (tmp_path / "still_robots.py").write_text(OWN + "\n# changed\n")
-    run(config, out, silent)
+    run_experiment(config, out, silent)
     anew = {path.name for path, t in before.items() if path.stat().st_mtime_ns != t}
     assert anew == {path.name for path in before if path.name.startswith("still")}
 
@@ -364,7 +364,7 @@ def test_robots_by_their_file_act_as_they_learnt_to(tmp_path):
         make_experiment(quick=True, seeds=1, robots=[name], control="twist"),
         n_steps=4, setups=("none", REFERENCE),
     )  # fmt: skip
-    metrics = run(config, tmp_path, silent)
+    metrics = run_experiment(config, tmp_path, silent)
     assert f"{label_of(name, {})}.none.cost" in metrics
 
 
@@ -437,6 +437,6 @@ def test_an_estimator_that_a_file_registers_is_compared(tmp_path, process, broug
         policies=("scripted_slowed",),
         margins_m=(),
     )
-    metrics = run(config, tmp_path, silent)
+    metrics = run_experiment(config, tmp_path, silent)
     assert "scripted_slowed.keypoints_alpha_beta_4cam_0ms.cost" in metrics
     assert (tmp_path / "figures").is_dir()

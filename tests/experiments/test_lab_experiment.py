@@ -14,7 +14,7 @@ from hrc_env.experiments.lab.motions import MOTIONS, play
 from hrc_env.experiments.lab.sides import LEFT, RIGHT, turned_away
 from hrc_env.experiments.recording import replay
 from hrc_env.experiments.report import Report
-from hrc_env.experiments.runner import run
+from hrc_env.experiments.runner import run_experiment
 
 TINY = Lab(n_seeds=1, max_frames=26)
 CAMERAS = (*(f"camera_{k}" for k in range(1, 5)), "multi")
@@ -23,7 +23,7 @@ CAMERAS = (*(f"camera_{k}" for k in range(1, 5)), "multi")
 @pytest.fixture(scope="module")
 def end_to_end(weights, tmp_path_factory):
     out = tmp_path_factory.mktemp("lab")
-    return out, run(TINY, out, lambda share, label: None)
+    return out, run_experiment(TINY, out, lambda share, label: None)
 
 
 def test_every_number_is_there(end_to_end):
@@ -60,7 +60,7 @@ def test_what_is_finished_is_used_again(end_to_end, monkeypatch):
     monkeypatch.setattr(experiment, "film", never)
     monkeypatch.setattr(experiment, "report", lambda *args: Report("", "", ()))
     before = (out / "results.json").read_text()
-    run(TINY, out, lambda share, label: None)
+    run_experiment(TINY, out, lambda share, label: None)
     assert (out / "results.json").read_text() == before
 
 

@@ -24,7 +24,7 @@ from hrc_env.experiments.price.metrics import CONTRASTS, Row, metrics_of, suppos
 from hrc_env.experiments.price.report import QUESTIONS, choose_bars
 from hrc_env.experiments.price.search import Tried, draws, searched
 from hrc_env.experiments.price.shield import Widened
-from hrc_env.experiments.runner import run
+from hrc_env.experiments.runner import run_experiment
 from hrc_env.experiments.setups import PerceptionSetup
 from hrc_env.safety.shield import SHIELDS
 from hrc_env.settings import settle
@@ -43,7 +43,7 @@ def silent(share, label):
 def end_to_end(tmp_path_factory):
     """A run from beginning to end: its folder and its numbers."""
     out = tmp_path_factory.mktemp("price")
-    return out, run(TINY, out, silent)
+    return out, run_experiment(TINY, out, silent)
 
 
 def contacts_at(margin_m: float) -> float:
@@ -166,7 +166,7 @@ def test_a_task_that_nobody_has_scripted_is_refused(monkeypatch):
 def test_a_folder_of_other_results_is_refused(tmp_path):
     (tmp_path / "experiment.json").write_text(json.dumps({"experiment": "impact"}))
     with pytest.raises(ConfigError, match="holds the results of 'impact'; this is 'price'"):
-        run(TINY, tmp_path, silent)
+        run_experiment(TINY, tmp_path, silent)
 
 
 def test_what_the_command_asks_for():
@@ -238,16 +238,16 @@ def test_a_run_that_is_killed_goes_on_to_the_same_numbers(end_to_end, process, t
         "import os, sys; from pathlib import Path; "
         "from hrc_env.experiments.price.episodes import Driver\n"
         "from hrc_env.experiments.price.experiment import Price\n"
-        "from hrc_env.experiments.runner import run\n"
+        "from hrc_env.experiments.runner import run_experiment\n"
         f"config = {TINY!r}\n"
         "def say(share, label):\n"
         "    if label.startswith('HRCReach-v0.two_cameras'): os.kill(os.getpid(), 9)\n"
-        "run(config, Path(sys.argv[1]), say)"
+        "run_experiment(config, Path(sys.argv[1]), say)"
     )
     assert process("-c", script, tmp_path).returncode == -signal.SIGKILL
     kept = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "parts").iterdir()}
     assert len(kept) >= 6  # without a shield; of the truth four that were searched, and the fresh
-    assert run(TINY, tmp_path, silent) == metrics
+    assert run_experiment(TINY, tmp_path, silent) == metrics
     for name, time_ns in kept.items():
         assert (tmp_path / "parts" / name).stat().st_mtime_ns == time_ns
 
@@ -317,7 +317,7 @@ def test_the_best_eyes_stand_above():
 def test_ones_own_robot_has_a_price(tmp_path):
     """One that does not move needs no margin, and has nothing to lose."""
     config = replace(TINY, driver=Driver("random"), n_steps=8)
-    metrics = run(config, tmp_path, silent)
+    metrics = run_experiment(config, tmp_path, silent)
     assert metrics["HRCReach-v0.unshielded.goals_per_min"].value == 0
     text = (tmp_path / "report.md").read_text()
     assert "The robot is driven by the agent `random`" in text

@@ -7,7 +7,7 @@ import pytest
 from docs import tables
 from hrc_env.core.errors import ConfigError
 from hrc_env.experiments.report import Report
-from hrc_env.experiments.runner import run
+from hrc_env.experiments.runner import run_experiment
 from hrc_env.experiments.site import experiment
 from hrc_env.experiments.site.experiment import Site, make_experiment
 
@@ -19,7 +19,7 @@ CAMERAS = (*(f"camera_{k}" for k in range(1, 5)), "multi")
 def end_to_end(weights, tmp_path_factory):
     out = tmp_path_factory.mktemp("site")
     shares: list[float] = []
-    metrics = run(TINY, out, lambda share, label: shares.append(share))
+    metrics = run_experiment(TINY, out, lambda share, label: shares.append(share))
     return out, metrics, shares
 
 
@@ -75,7 +75,7 @@ def test_what_is_finished_is_used_again(end_to_end, monkeypatch):
     monkeypatch.setattr(experiment, "closed_loop", never)
     monkeypatch.setattr(experiment, "report", lambda *args: Report("", "", ()))
     before = (out / "results.json").read_text()
-    run(TINY, out, lambda share, label: None)
+    run_experiment(TINY, out, lambda share, label: None)
     assert (out / "results.json").read_text() == before
 
 
@@ -86,4 +86,4 @@ def test_what_cannot_work_is_explained(tmp_path):
         make_experiment(True, 0, ("particle",))
     (tmp_path / "experiment.json").write_text('{"experiment": "lab"}')
     with pytest.raises(ConfigError, match="--overwrite"):
-        run(TINY, tmp_path, lambda share, label: None)
+        run_experiment(TINY, tmp_path, lambda share, label: None)

@@ -19,7 +19,7 @@ from hrc_env.experiments.columns import (
     share_of_tries,
 )
 from hrc_env.experiments.report import Table
-from hrc_env.experiments.runner import run
+from hrc_env.experiments.runner import run_experiment
 from hrc_env.experiments.setups import PerceptionSetup
 from hrc_env.experiments.study import Row, Study, shards_of
 from hrc_env.safety.shield import SHIELDS
@@ -88,7 +88,7 @@ def test_parts_are_first_seeds_and_counts():
 
 
 def test_a_row_is_played_once_and_again_only_where_it_changed(tmp_path, monkeypatch):
-    first = run(study(), tmp_path)
+    first = run_experiment(study(), tmp_path)
     assert first["bare.share"].value == 1.0
     assert 0 < first["qp.share"].value < 1.0
     assert json.loads((tmp_path / "results.json").read_text())["seeds"] == [5, 6, 7, 8]
@@ -96,16 +96,16 @@ def test_a_row_is_played_once_and_again_only_where_it_changed(tmp_path, monkeypa
     monkeypatch.setattr(
         "hrc_env.experiments.study.play_episodes", lambda *of, **_: pytest.fail("played again")
     )
-    assert run(study(), tmp_path) == first
+    assert run_experiment(study(), tmp_path) == first
     other = {**study().rows, "qp": Row("`ssm`", 2, setup=TRUTH, env={"shield": "ssm"})}
     with pytest.raises(pytest.fail.Exception, match="played again"):
-        run(study(rows=other, columns=(mean("cost"),)), tmp_path)
+        run_experiment(study(rows=other, columns=(mean("cost"),)), tmp_path)
 
 
 def test_the_size_of_a_part_changes_no_number(tmp_path):
     row = Row("", 3, setup=TRUTH, env=UNAWARE)
     rows = {"one": row, "two": Row("", 3, setup=TRUTH, env=UNAWARE, n_together=2)}
-    found = run(study(rows=rows, columns=(mean("cost"), mean("r"))), tmp_path)
+    found = run_experiment(study(rows=rows, columns=(mean("cost"), mean("r"))), tmp_path)
     assert found["one.r"] == found["two.r"]
 
 
@@ -135,7 +135,7 @@ def test_somebody_elses_estimator_policy_and_shield_are_compared(tmp_path, broug
     }
     made = study(rows=rows, columns=(per_minute("goals_reached"), mean("r", "return")))
     assert made.settings()["rows"]["shield"]["env"]["shield"]["source"] != ""
-    found = run(made, tmp_path)
+    found = run_experiment(made, tmp_path)
     goals = {name: found[f"{name}.goals_reached_per_minute"].value for name in rows}
     assert goals["policy"] == 0.0 < goals["usual"]
     assert found["estimator.r"].value != found["usual.r"].value

@@ -34,7 +34,7 @@ class Eyes:
     def turns(self, scene: str) -> tuple[Turn, ...]:
         """Cameras and their faults, in which episodes take turns; in other scenes than the setup's
         own the scene's cameras, of which as many are left."""
-        turns = self.setup.turns_of(RIGS[scene])
+        turns = self.setup.list_turns(RIGS[scene])
         return tuple(
             Turn(turn.cameras, (*turn.faults, *more)) for turn in turns for more in self.wrong
         )
