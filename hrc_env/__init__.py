@@ -70,6 +70,7 @@ if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
     from hrc_env.safety.config import ShieldConfig as ShieldConfig
     from hrc_env.safety.shield import Shield as Shield
     from hrc_env.sb3 import HRCVecEnv as HRCVecEnv
+    from hrc_env.scene.camera_images import ImageConfig as ImageConfig
     from hrc_env.scene.domain_randomization import AppearanceConfig as AppearanceConfig
     from hrc_env.scene.rig import make_cameras as make_cameras
     from hrc_env.scene.rigs import RIGS as RIGS
@@ -107,6 +108,7 @@ PUBLIC = {
     "HRCVecEnv": "hrc_env.sb3",
     "HRCVectorEnv": "hrc_env.vector.env",
     "IDS": "hrc_env.registration",
+    "ImageConfig": "hrc_env.scene.camera_images",
     "PeopleConfig": "hrc_env.motion.config",
     "make_vector": "hrc_env.vector.make",
     "save_config": "hrc_env.config",

@@ -238,12 +238,17 @@ def check_render_mode(render_mode: str | None, valid: Sequence[str] = RENDER_MOD
 
 
 def spaces(simulation: Simulation) -> tuple[Any, Any]:
-    """The spaces of one environment's observations, a `Box` or with goals a `Dict`, and actions, a
-    `Box`."""
-    where, apart = simulation.layout, simulation.task.goal
+    """The spaces of one environment's observations, a `Box` or with goals or images a `Dict`, and
+    actions, a `Box`."""
+    where, apart, images = simulation.layout, simulation.task.goal, simulation.images
     seen = Box(where.low, where.high, dtype=np.float32)
     actions = Box(-1.0, 1.0, (simulation.n_actions,), np.float32)
-    if apart is None:
+    if apart is None and images is None:
         return seen, actions
-    goals = Box(-apart.bound, apart.bound, (apart.size,), np.float32)
-    return Dict({goal.ACHIEVED: goals, goal.DESIRED: goals, observations.FLAT: seen}), actions
+    parts: dict[str, Any] = {observations.FLAT: seen}
+    if apart is not None:
+        goals = Box(-apart.bound, apart.bound, (apart.size,), np.float32)
+        parts |= {goal.ACHIEVED: goals, goal.DESIRED: goals}
+    if images is not None:
+        parts |= {name: Box(0, 255, images.shape, np.uint8) for name in images.names}
+    return Dict(parts), actions

@@ -92,7 +92,7 @@ class Views:
         keypoints, windows = simulation.pipeline.last_detections(b)
         return Glance(
             *self.pose(b),
-            simulation.pipeline.look_of(b),
+            simulation.look_of(b),
             simulation.markers(b),
             rows(simulation.estimate, np.array([b])),
             keypoints,
