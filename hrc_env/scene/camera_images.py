@@ -1,7 +1,7 @@
 """Whole images of a rig's cameras, small and quickly: what a policy sees.
 
-What stands still is drawn once for each camera and kept; in every step only what moves is drawn,
-and laid over it by depth. Images have smooth edges and no shadows.
+What stands still or lies about is drawn once for each camera and kept; in every step only what
+moves is drawn, and laid over it by depth. Images have smooth edges and no shadows.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,16 +15,16 @@ from numpy.typing import NDArray
 from hrc_env.core.errors import ConfigError, whole
 from hrc_env.core.kernels import kernel
 from hrc_env.core.mapping import answer_unknown_fields, from_mapping
-from hrc_env.core.records import Roi
-from hrc_env.core.typing import Image, Ints
+from hrc_env.core.records import Roi, WorkerMotion
+from hrc_env.core.typing import Image, Ints, JointAngles
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.scene import gl
 from hrc_env.scene.build import Scene
-from hrc_env.scene.canvas import MOVING, STILL, Canvas, Part
+from hrc_env.scene.canvas import EVERYTHING, MOVING, STILL, Canvas, Part
 from hrc_env.scene.domain_randomization import Look
 from hrc_env.scene.primitives import ROBOT_LOOKS
 from hrc_env.scene.render import CROP_QUALITY
-from hrc_env.scene.worker_visuals import HIDDEN
+from hrc_env.scene.worker_visuals import HIDDEN, SHOWN, rows_shown
 
 SMALLEST_PX, LARGEST_PX = 8, 1024
 """Sides of images that an observation may hold [px]."""
@@ -33,7 +33,7 @@ SMOOTHING = 2
 SMALL_PX = 128
 """Images with sides up to this are drawn with rounder things as coarse as `COARSE` [px]."""
 COARSE = {"numslices": 8, "numstacks": 2}
-TOO_THIN = 0.1
+TOO_THIN = 0.2
 """Rings and discs on what moves that are thinner than this share of a drawn pixel are left out."""
 KEPT_BYTES = 2**28
 """What stands still is kept for so many views as fit in here."""
@@ -94,13 +94,16 @@ def images_called(given: Any) -> ImageConfig | None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Backdrop:
-    """What stands still, bottom row first as OpenGL has it."""
+    """What stands still."""
 
     look: Look | None
     """With which it was drawn."""
     rgb: Image
+    """As it was drawn, bottom row first as OpenGL has it."""
     z: NDArray[np.float32]
-    """1 is near, 0 is far."""
+    """Likewise: 1 is near, 0 is far."""
+    mean: Image
+    """As the image shows it, top row first."""
 
 
 class CameraImages(Canvas):
@@ -119,6 +122,10 @@ class CameraImages(Canvas):
         self._wearer: int | None = None
         self._backdrops: dict[Any, _Backdrop] = {}
         self._model.geom_group[self._thin()] = HIDDEN
+        self._of_geom = self._model.body_mocapid[self._model.geom_bodyid]
+        self._lying, self._placement = np.zeros(0, np.int64), b""
+        self._of_lying = mujoco.MjvOption()
+        self._of_lying.flags[int(mujoco.mjtVisFlag.mjVIS_SKIN)] = 0
 
     def _thin(self) -> Ints:
         """Round things on what moves that are too thin for any camera's images to show."""
@@ -134,6 +141,34 @@ class CameraImages(Canvas):
         thin = model.geom_size[:, :2].min(1) < TOO_THIN * min(pixels_m)
         looks = model.geom_group == ROBOT_LOOKS
         return np.flatnonzero(moving & discs & thin & looks)
+
+    def pose(self, q: JointAngles, motion: WorkerMotion | None) -> None:
+        """Pose what moves, as `Canvas` does; what lies about counts as standing still."""
+        super().pose(q, motion)
+        if motion is None or not self._visuals.props.size:
+            return
+        shown = rows_shown(self._visuals.props, motion.held)[len(self._visuals.segments) :]
+        rows = shown[shown >= 0]
+        places = self._data.mocap_pos[rows], self._data.mocap_quat[rows]
+        placement = b"".join(each.tobytes() for each in (rows, *places))
+        if placement != self._placement:
+            self._placement = placement
+            self._lying = np.flatnonzero(np.isin(self._of_geom, rows))
+        self._model.geom_group[self._lying] = HIDDEN
+
+    def show(self, what: Part = EVERYTHING, shadows: bool = False) -> None:
+        """Choose what the next pictures hold, as `Canvas` does."""
+        known = what in self._fresh
+        super().show(what, shadows)
+        if what is not MOVING and not known and len(self._lying):
+            groups = self._model.geom_group.copy()
+            self._model.geom_group[:] = HIDDEN
+            self._model.geom_group[self._lying] = SHOWN
+            moving = int(mujoco.mjtCatBit.mjCAT_DYNAMIC)
+            mujoco.mjv_addGeoms(
+                self._model, self._data, self._of_lying, mujoco.MjvPerturb(), moving, self._shown
+            )
+            self._model.geom_group[:] = groups
 
     def dress(self, b: int, look: Look | None) -> None:
         """Draw environment `b` from the next pose on, with its look; None: as it was built."""
@@ -159,14 +194,17 @@ class CameraImages(Canvas):
         smoothing: int,
     ) -> Image:
         """What moves before what stands still; pixels are means of `smoothing` x `smoothing`."""
-        numbers = (*camera.K.ravel().tolist(), *camera.T_world_from_cam.ravel().tolist())
-        key = (self._wearer, numbers, window, height_px)
+        numbers = camera.K.tobytes(), camera.T_world_from_cam.tobytes()
+        key = (self._wearer, self._placement, numbers, window, height_px)
         behind = self._backdrops.get(key)
         if behind is None or behind.look is not self._look:
-            behind = _Backdrop(self._look, *self._seen(STILL, camera, window, height_px, fine))
+            rgb, z = self._seen(STILL, camera, window, height_px, fine)
+            mean = np.empty((fine[0] // smoothing, fine[1] // smoothing, 3), np.uint8)
+            _mean_behind(rgb, smoothing, mean)
+            behind = _Backdrop(self._look, rgb, z, mean)
         self._remember(key, behind)
         rgb, z = self._seen(MOVING, camera, window, height_px, fine)
-        image = np.empty((fine[0] // smoothing, fine[1] // smoothing, 3), np.uint8)
+        image = behind.mean.copy()
         _lay_smoothly(rgb, z, behind.rgb, behind.z, smoothing, image)
         return image
 
@@ -194,25 +232,48 @@ class CameraImages(Canvas):
 
 
 @kernel
-def _lay_smoothly(rgb, z, rgb_behind, z_behind, smoothing, out):
-    """Means over squares of `smoothing` pixels of what is nearer (1 is near), of two pictures whose
-    bottom rows come first; `out` is top row first."""
+def _mean_behind(rgb, smoothing, out):
+    """Means over squares of `smoothing` pixels of a picture whose bottom row comes first; `out` is
+    top row first."""
     height, width = out.shape[0], out.shape[1]
-    half, count = smoothing * smoothing // 2, smoothing * smoothing
+    count = smoothing * smoothing
     for row in range(height):
         for column in range(width):
-            red, green, blue = half, half, half
+            for k in range(3):
+                total = count // 2
+                for i in range(smoothing):
+                    for j in range(smoothing):
+                        total += rgb[smoothing * row + i, smoothing * column + j, k]
+                out[height - 1 - row, column, k] = total // count
+
+
+@kernel
+def _lay_smoothly(rgb, z, rgb_behind, z_behind, smoothing, out):
+    """Write over `out`, as of `_mean_behind`, the means of what is nearer (1 is near) of a picture
+    and what is behind it, where any of the picture is."""
+    height, width = out.shape[0], out.shape[1]
+    count = smoothing * smoothing
+    for row in range(height):
+        n_nearer = 0
+        for i in range(smoothing):
+            y = smoothing * row + i
+            for x in range(smoothing * width):
+                n_nearer += z[y, x] > z_behind[y, x]
+        if n_nearer == 0:
+            continue
+        for column in range(width):
+            n_nearer = 0
+            red, green, blue = count // 2, count // 2, count // 2
             for i in range(smoothing):
                 for j in range(smoothing):
                     y, x = smoothing * row + i, smoothing * column + j
-                    if z[y, x] > z_behind[y, x]:
-                        red += rgb[y, x, 0]
-                        green += rgb[y, x, 1]
-                        blue += rgb[y, x, 2]
-                    else:
-                        red += rgb_behind[y, x, 0]
-                        green += rgb_behind[y, x, 1]
-                        blue += rgb_behind[y, x, 2]
-            out[height - 1 - row, column, 0] = red // count
-            out[height - 1 - row, column, 1] = green // count
-            out[height - 1 - row, column, 2] = blue // count
+                    nearer = z[y, x] > z_behind[y, x]
+                    n_nearer += nearer
+                    shown = rgb if nearer else rgb_behind
+                    red += shown[y, x, 0]
+                    green += shown[y, x, 1]
+                    blue += shown[y, x, 2]
+            if n_nearer > 0:
+                out[height - 1 - row, column, 0] = red // count
+                out[height - 1 - row, column, 1] = green // count
+                out[height - 1 - row, column, 2] = blue // count
