@@ -3,6 +3,7 @@
 import json
 import os
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from hrc_env import __version__
 from hrc_env.core.errors import CheckpointError, learner
-from hrc_env.observations import FLAT
+from hrc_env.observations import FLAT, IMAGE
 from hrc_env.sb3 import HRCVecEnv
 from hrc_env.tasks.goal import ACHIEVED, DESIRED
 
@@ -107,8 +108,12 @@ def load(path: Path, env_info: EnvInfo) -> "TrainedAgent":
         CheckpointError: it was made for another version or another environment.
     """
     meta, size = describe(path), len(env_info.layout.low)
-    goals = dict.fromkeys((ACHIEVED, DESIRED), env_info.goal_size)
-    parts: Size = {**goals, FLAT: size} if env_info.goal_size else size
+    goals = dict.fromkeys((ACHIEVED, DESIRED), env_info.goal_size) if env_info.goal_size else {}
+    images = {name: int(np.prod(shape)) for name, shape in env_info.images.items()}
+    seen = meta["observation_size"]
+    looks = isinstance(seen, dict) and any(name.startswith(IMAGE) for name in seen)
+    beside = {**goals, **(images if looks else {})}  # a policy need not look
+    parts: Size = {**beside, FLAT: size} if beside else size
     _check_fits(path, meta, parts, env_info.n_actions)
     kind = KINDS[meta.get("algorithm", "ppo")]
     return TrainedAgent(kind.load(path, device="cpu", custom_objects=NO_BUFFER))
@@ -121,7 +126,13 @@ class TrainedAgent:
         self.learner = learner
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
-        """Deterministic actions (..., A)."""
+        """Deterministic actions (..., A); it is given what it learnt from."""
+        space = self.learner.observation_space
+        if isinstance(observation, Mapping):
+            known = space.spaces if isinstance(space, spaces.Dict) else None
+            observation = (
+                {name: observation[name] for name in known} if known else observation[FLAT]
+            )
         return self.learner.predict(observation, deterministic=True)[0]  # type: ignore[arg-type]
 
 

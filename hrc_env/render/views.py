@@ -135,7 +135,7 @@ class Views:
                 overlay.draw_markers(image, chosen, seen.markers_world)
         else:
             image = self._marked(self._view(chosen, *size), seen, markers)
-        draw_legend(image, seen.solids)
+            draw_legend(image, seen.solids)
         overlay.draw_shield(image, seen.shield_rad_s)
         return image
 
