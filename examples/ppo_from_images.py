@@ -16,7 +16,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-import gymnasium
 import numpy as np
 import torch
 import tyro
@@ -70,7 +69,9 @@ class Seen(VecEnvWrapper):
             return
         shape = spaces[self.images[0]].shape
         image = Box(0, 255, (*shape[:2], 3 * len(self.images)), np.uint8)
-        numbers = Box(-np.inf, np.inf, (3,), np.float32) if sees == "pixels" else spaces["observation"]
+        numbers = (
+            Box(-np.inf, np.inf, (3,), np.float32) if sees == "pixels" else spaces["observation"]
+        )
         self.observation_space = Dict({"image": image, "numbers": numbers})
 
     def part(self, observation: Any) -> Any:
@@ -99,7 +100,7 @@ class Seen(VecEnvWrapper):
 
 
 def pretrain(learner: PPO, env: Seen, n_images: int, n_epochs: int = 12) -> float:
-    """Teach the convolutions of a policy where the tool is, which the robot knows from its encoders.
+    """Teach the convolutions of a policy where the tool is, as the encoders have it.
 
     Returns:
         The error of new images in the end, a mean [m].
@@ -111,7 +112,10 @@ def pretrain(learner: PPO, env: Seen, n_images: int, n_epochs: int = 12) -> floa
         places.append(terms["tool_position"])
         wander = 6 * terms["goal_from_tool"] + rng.normal(0, 1, (env.num_envs, 3))
         observation = env.venv.step(np.clip(wander, -1, 1).astype(np.float32))[0]
-    seen, told = np.concatenate(images), torch.as_tensor(np.concatenate(places), dtype=torch.float32)
+    seen, told = (
+        np.concatenate(images),
+        torch.as_tensor(np.concatenate(places), dtype=torch.float32),
+    )
     network = learner.policy.features_extractor.extractors["image"]
     head = torch.nn.Linear(network.features_dim, 3)
     optimiser = torch.optim.Adam([*network.parameters(), *head.parameters()], 1e-3)
@@ -155,7 +159,10 @@ class Curve(BaseCallback):
         """Write curve and policy."""
         out = self.arguments.out
         out.mkdir(parents=True, exist_ok=True)
-        content = {"arguments": asdict(self.arguments), "steps, minutes, goals a minute": self.points}
+        content = {
+            "arguments": asdict(self.arguments),
+            "steps, minutes, goals a minute": self.points,
+        }
         (out / "curve.json").write_text(json.dumps(content, default=str))
         self.model.save(out / "policy.zip")
         axis = (figure := Figure((6, 4))).subplots()
@@ -181,7 +188,9 @@ def main(arguments: Arguments) -> None:
     torch.set_num_threads(1)
     env = make(arguments)
     policy = "MlpPolicy" if arguments.sees == "belief" else "MultiInputPolicy"
-    kind = {} if arguments.sees == "belief" else {"features_extractor_kwargs": {"cnn_output_dim": 128}}
+    kind = (
+        {} if arguments.sees == "belief" else {"features_extractor_kwargs": {"cnn_output_dim": 128}}
+    )
     learner = PPO(
         policy, VecNormalize(env, norm_obs=False, gamma=0.95), n_steps=64, batch_size=256, n_epochs=4, learning_rate=5e-4, gamma=0.95,
         seed=arguments.seed, device="cpu", policy_kwargs={"log_std_init": -0.7, "net_arch": [128, 128], **kind},

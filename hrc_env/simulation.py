@@ -124,10 +124,11 @@ class Simulation(Stateful):
             batch, self.scene.n_workers, self.bodies.capsule_names, self.model, config.ctrl_dt
         )
         self.physics = Physics(self.scene, batch)
-        shows = settings.images is not None
-        made_from = perception, settings.estimator, self.scene, batch, config
-        self.pipeline = make_pipeline(*made_from, shows_images=shows)
-        self.images = None if settings.images is None else ObservedImages(self.scene, settings.images)
+        images, estimator = settings.images, settings.estimator
+        self.pipeline = make_pipeline(
+            perception, estimator, self.scene, batch, config, shows_images=images is not None
+        )
+        self.images = None if images is None else ObservedImages(self.scene, images)
         """What draws the images of observations; None: they hold none."""
         self._looks: dict[int, tuple[np.random.Generator, Look]] = {}
         self.task_state = self.task.make_state(batch)

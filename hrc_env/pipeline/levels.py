@@ -51,8 +51,19 @@ def make_pipeline(
     level: str, estimator: EstimatorChoice, scene: Scene, batch: int, config: HRCConfig,
     shows_images: bool = False,
 ) -> PerceptionPipeline:  # fmt: skip
-    """The pipeline of a perception level; `shows_images`: policies see images beside it. Raises `ConfigError` for an unknown one, or one that
-    cannot have what `config` wants; `WeightsError`, `RenderingError` where `pixels` is impossible.
+    """Return the pipeline of a perception level.
+
+    Args:
+        level: one of `LEVELS`.
+        estimator: as of `EnvConfig`.
+        scene: with the rig's cameras.
+        batch: number of environments.
+        config: of the environment.
+        shows_images: whether observations hold images, too, whatever the level.
+
+    Raises:
+        ConfigError: an unknown level, or one that cannot have what `config` wants.
+        WeightsError, RenderingError: level "pixels" is impossible here.
     """
     if level not in LEVELS:
         raise unknown("perception", level, LEVELS)

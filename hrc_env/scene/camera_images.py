@@ -78,9 +78,9 @@ def images_called(given: Any) -> ImageConfig | None:
         given = given.tolist()
     try:
         if isinstance(given, Mapping):
-            chosen = given.get("cameras")
-            several = chosen is None or (isinstance(chosen, Sequence) and not isinstance(chosen, str))
-            return from_mapping(ImageConfig, given if several else {**given, "cameras": [chosen]})
+            one = isinstance(given.get("cameras"), int | str)
+            given = {**given, "cameras": [given["cameras"]]} if one else given
+            return from_mapping(ImageConfig, given)
         if isinstance(given, Sequence) and not isinstance(given, str) and len(given) == 2:
             return ImageConfig(*given)
     except ConfigError as error:
