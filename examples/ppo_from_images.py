@@ -114,7 +114,8 @@ class Locating(BaseFeaturesExtractor):
 
 
 def pretrain(locating: Locating, env: Seen, n_images: int, n_epochs: int = 12) -> float:
-    """Teach where the tool is, while it wanders about its goals; the mean error of new images [m]."""
+    """Teach where the tool is while it wanders about its goals; return the error of new images, a
+    mean [m]."""
     rng, images, places, seen = np.random.default_rng(0), [], [], env.reset()
     for _ in range(-(-n_images // env.num_envs)):
         images.append(seen["image"].transpose(0, 3, 1, 2))

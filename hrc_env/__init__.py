@@ -66,6 +66,7 @@ if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
     from hrc_env.registration import register_robot as register_robot
     from hrc_env.registration import register_shield as register_shield
     from hrc_env.registration import register_task as register_task
+    from hrc_env.render.views import Views as Views
     from hrc_env.rewards import RewardTerm as RewardTerm
     from hrc_env.safety.config import ShieldConfig as ShieldConfig
     from hrc_env.safety.shield import Shield as Shield
@@ -110,6 +111,7 @@ PUBLIC = {
     "IDS": "hrc_env.registration",
     "ImageConfig": "hrc_env.scene.camera_images",
     "PeopleConfig": "hrc_env.motion.config",
+    "Views": "hrc_env.render.views",
     "make_vector": "hrc_env.vector.make",
     "save_config": "hrc_env.config",
     # tasks
