@@ -176,6 +176,13 @@ class Simulation(Stateful):
                 )
         super().set_state(state)
 
+    def draw_images(self) -> Images:
+        """Return the images of what the sensors were shown last."""
+        if self.images is None:
+            return {}
+        now = self.pipeline.sensor.now
+        return self.images.draw(now, [self.look_of(b) for b in now.ids.tolist()])
+
     def look_of(self, b: int) -> Look | None:
         """How environment `b` looks in its episode (for images); None: as it was built."""
         worn, stream = self.pipeline.look_of(b), self.streams["sensor"][b]
@@ -426,14 +433,7 @@ class Simulation(Stateful):
         if apart is None and self.images is None:
             return flat
         goals = {} if apart is None else goal.parts(apart, belief)
-        return {**goals, **self._draw_images(), observations.FLAT: flat}
-
-    def _draw_images(self) -> Images:
-        """Return the images of what the sensors were shown last."""
-        if self.images is None:
-            return {}
-        now = self.pipeline.sensor.now
-        return self.images.draw(now, [self.look_of(b) for b in now.ids.tolist()])
+        return {**goals, **self.draw_images(), observations.FLAT: flat}
 
     def _reward_terms(self, command: Command, truth: Truth, belief: Belief) -> dict[str, Floats]:
         """Return every term (B,) of the reward: the task's, then those that all tasks share."""
