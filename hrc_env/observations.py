@@ -7,6 +7,7 @@ they cannot drift apart. Terms read the *estimate* of the worker, never the trut
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -346,7 +347,7 @@ def split(
     """A flat observation (..., n) as named terms in their units; goals and images beside it as they
     are."""
     if isinstance(observation, Mapping):
-        beside = {
+        beside: dict[str, Any] = {
             name: part if name.startswith(IMAGE) else np.asarray(part, float)
             for name, part in observation.items()
             if name != FLAT
