@@ -39,6 +39,7 @@ CAMERAS = tuple(
 """Near enough that a goal's radius is several pixels."""
 GOALS = {"azimuth_rad": (-0.7, 0.7), "height_m": (0.85, 1.35), "radius_m": 0.08}
 GAMMA = 0.95
+POINTS = "steps, minutes, goals a minute"
 RECENT = 64
 """Episodes of which the curve shows the mean."""
 
@@ -55,6 +56,8 @@ class Arguments:
     """Environment steps of PPO."""
     out: Path = Path("runs/images")
     """Folder for the curve and the policy."""
+    beside: tuple[Path, ...] = ()
+    """Folders of other runs, whose curves are drawn, too."""
     size: int = 64
     """Sides of the images [px]; SB3's convolutions need 36 or more."""
     num_envs: int = 32
@@ -174,14 +177,21 @@ class Curve(BaseCallback):
 
     def _write(self, out: Path) -> None:
         out.mkdir(parents=True, exist_ok=True)
-        content = {**asdict(self.arguments), "steps, minutes, goals a minute": self.points}
+        content = {**asdict(self.arguments), POINTS: self.points}
         (out / "curve.json").write_text(json.dumps(content, default=str))
         self.model.save(out / "policy.zip")
-        axis = (figure := Figure((6, 4))).subplots()
-        steps, _, goals = np.array(self.points).T
-        axis.plot(steps, goals)
-        axis.set(xlabel="environment steps of PPO", ylabel="goals a minute", ylim=(0, None))
-        figure.savefig(out / "curve.png", dpi=120, bbox_inches="tight")
+        draw([out, *self.arguments.beside], out / "curve.png")
+
+
+def draw(runs: list[Path], path: Path) -> None:
+    """Draw the curves of runs, by the names of their folders."""
+    axis = (figure := Figure((6, 4))).subplots()
+    for run in runs:
+        steps, _, goals = np.array(json.loads((run / "curve.json").read_text())[POINTS]).T
+        axis.plot(steps, goals, label=run.name.replace("_", " "))
+    axis.set(xlabel="environment steps of PPO", ylabel="goals a minute", ylim=(0, None))
+    axis.legend()
+    figure.savefig(path, dpi=120, bbox_inches="tight")
 
 
 def make_env(arguments: Arguments) -> Any:
