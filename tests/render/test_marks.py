@@ -13,6 +13,8 @@ from hrc_env.geometry.cameras import project, resized
 from hrc_env.geometry.distances import least_separation
 from hrc_env.render import overlay
 from hrc_env.render.marks import solids_of
+from hrc_env.render.stage import Stage
+from hrc_env.scene.canvas import Marks
 from hrc_env.scene.render import viewpoint_camera
 from hrc_env.vector.env import HRCVectorEnv
 
@@ -125,6 +127,28 @@ def test_capsules_of_robot_and_people_are_laid_over_the_scene():
             ]
             assert np.mean(nearer) > 0.5
         assert 0.02 < unlike(picture, plain).mean() < 0.5
+
+
+def test_a_capsule_is_drawn_from_end_to_end():
+    ends, radius_m = np.array([[-0.4, 0.0, 1.0], [0.6, 0.0, 1.0]]), 0.06
+    marks = Marks(ends[None], np.array([radius_m]), np.array([[1.0, 0.0, 0.0]]))
+    with closing(make()) as env:
+        env.reset(seed=0)
+        stage, camera = (
+            Stage(env.simulation.scene, *SIZE.values()),
+            viewpoint_camera("room", 240, 180),
+        )
+        stage.pose(*env.views.pose())
+        picture = stage.picture(camera)
+        marked = picture.copy()
+        stage.mark(marked, camera, marks, 1.0, 1.0)
+        stage.close()
+    along = ends[1] - ends[0]
+    inside = [ends[0] + share * along for share in (-0.04, 0.0, 0.3, 0.7, 1.0, 1.04)]
+    outside = [ends[0] + share * along for share in (-0.15, 1.15)]
+    differs = unlike(marked, picture)
+    assert all(differs[at(camera, point)] for point in inside)
+    assert not any(differs[at(camera, point)] for point in outside)
 
 
 def test_capsules_are_what_distances_are_taken_of():
