@@ -38,6 +38,8 @@ CAMERAS = tuple(
 )
 """Near enough that a goal's radius is several pixels."""
 GOALS = {"azimuth_rad": (-0.7, 0.7), "height_m": (0.85, 1.35), "radius_m": 0.08}
+GOAL_SCALE = 2.0
+"""Goals are given in half metres."""
 GAMMA = 0.95
 POINTS = "steps, minutes, goals a minute"
 RECENT = 64
@@ -80,7 +82,7 @@ class Seen(VecEnvWrapper):
         """Return what the policy is given, of observations (B, ...) or of one."""
         terms = self.venv.env_method("split_observation", observation, indices=[0])[0]
         self.tool = terms["tool_position"] - MIDDLE_M
-        goal = (self.tool + terms["goal_from_tool"]).astype(np.float32)
+        goal = (GOAL_SCALE * (self.tool + terms["goal_from_tool"])).astype(np.float32)
         images = [observation[f"image_{camera.name}"] for camera in CAMERAS]
         return {"image": np.concatenate(images, axis=-1), "goal": goal}
 
@@ -110,10 +112,10 @@ class Locating(BaseFeaturesExtractor):
         return self.place(self.convolutions(image))
 
     def forward(self, observations: dict[str, Tensor]) -> Tensor:
-        """(B, 6) in units in which a network learns quickly."""
+        """(B, 6) tool and goal from `MIDDLE_M`, in quarters of a metre."""
         with torch.no_grad():
             tool = self.locate(observations["image"])
-        return torch.cat([4 * tool, 4 * observations["goal"]], dim=1)
+        return torch.cat([4 * tool, 4 / GOAL_SCALE * observations["goal"]], dim=1)
 
 
 def pretrain(locating: Locating, env: Seen, n_images: int, n_epochs: int = 12) -> float:
@@ -123,7 +125,7 @@ def pretrain(locating: Locating, env: Seen, n_images: int, n_epochs: int = 12) -
     for _ in range(-(-n_images // env.num_envs)):
         images.append(seen["image"].transpose(0, 3, 1, 2))
         places.append(env.tool)
-        action = 6 * (seen["goal"] - env.tool) + rng.normal(0, 1, env.tool.shape)
+        action = 6 * (seen["goal"] / GOAL_SCALE - env.tool) + rng.normal(0, 1, env.tool.shape)
         seen = env.step(np.clip(action, -1, 1).astype(np.float32))[0]
     image = torch.as_tensor(np.concatenate(images))
     place = torch.as_tensor(np.concatenate(places), dtype=torch.float32)
@@ -190,7 +192,7 @@ def draw(runs: list[Path], path: Path) -> None:
         steps, _, goals = np.array(json.loads((run / "curve.json").read_text())[POINTS]).T
         axis.plot(steps, goals, label=run.name.replace("_", " "))
     axis.set(xlabel="environment steps of PPO", ylabel="goals a minute", ylim=(0, None))
-    axis.legend()
+    axis.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
     figure.savefig(path, dpi=120, bbox_inches="tight")
 
 
@@ -210,6 +212,8 @@ def make_learner(arguments: Arguments, env: Any) -> PPO:
     policy: dict[str, Any] = {"log_std_init": -0.7, "net_arch": [128, 128]}
     if arguments.sees == "pixels" and arguments.pretrain:
         policy["features_extractor_class"] = Locating
+    elif arguments.sees == "pixels":
+        policy["features_extractor_kwargs"] = {"cnn_output_dim": 128}
     return PPO(
         "MlpPolicy" if arguments.sees == "belief" else "MultiInputPolicy",
         VecNormalize(env, norm_obs=False, gamma=GAMMA), n_steps=64, batch_size=256, n_epochs=4,
@@ -226,6 +230,7 @@ def main(arguments: Arguments) -> None:
         error_m = pretrain(learner.policy.features_extractor, env, arguments.pretrain)
         said = f"the convolutions find the tool to {100 * error_m:.1f} cm"
         print(f"{curve.minutes:6.1f} min {said}", flush=True)
+        env.venv.seed(arguments.seed)  # PPO begins at random phases of episodes
     learner.learn(arguments.timesteps, callback=curve)
     env.close()
 
