@@ -8,7 +8,9 @@ given two camera images and the place of the goal, and nothing of the robot itse
                                      what the encoders say at the same time; then PPO learns to act
     --sees belief                    the same recipe without images, to compare with
 
-OUT/curve.png and OUT/curve.json have the goals reached, OUT/policy.zip is the policy.
+OUT/curve.png and OUT/curve.json have the goals reached, OUT/policy.zip is the policy. After 120,000
+steps mean actions reached, in 32 new episodes, 95 goals a minute from the belief, 79 from images
+after teaching, and 17 from images by reward alone (`examples/ppo_from_images.png` has the curves).
 """
 
 import json
