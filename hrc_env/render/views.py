@@ -161,7 +161,16 @@ class Views:
         return self.simulation.physics.qpos[b], motion
 
     def room(self, width: int, height: int, seen: Glance) -> Image:
-        """The room with the estimated skeleton over it."""
+        """Return the room with the estimated skeleton over it.
+
+        Args:
+            width: of the picture [px].
+            height: likewise.
+            seen: a moment, as of `glance`.
+
+        Returns:
+            (height, width, 3) of uint8, top row first.
+        """
         camera = viewpoint_camera(self.simulation.task.viewpoint, width, height)
         (image,) = self._drawn([camera], seen, shadows=True)
         overlay.draw_estimate(image, camera, seen.estimate)
@@ -170,8 +179,16 @@ class Views:
         return image
 
     def cameras(self, width: int, height: int, seen: Glance) -> list[Image]:
-        """Every camera's picture, without shadows, as the detector sees the scene, with crops,
-        detected keypoints and the estimate."""
+        """Return every camera's picture with crops, detected keypoints and the estimate.
+
+        Args:
+            width: of a picture [px].
+            height: likewise.
+            seen: a moment, as of `glance`.
+
+        Returns:
+            (height, width, 3) of uint8 each, without shadows, as the detector sees the scene.
+        """
         views = self._through_cameras(width, height, seen, self.simulation.scene.cameras)
         for c, (camera, image) in enumerate(zip(self.simulation.scene.cameras, views, strict=True)):
             for window in (of_worker[c] for of_worker in seen.windows):
@@ -184,7 +201,7 @@ class Views:
         return views
 
     def crops(self, size: int, seen: Glance) -> list[Image]:
-        """What the pose network was given: each camera's crop, with its landmarks."""
+        """Return what the pose network was given: each camera's crop, with its landmarks."""
         keypoints, images = seen.keypoints, []
         if keypoints is None or not seen.windows:
             return []
@@ -202,8 +219,18 @@ class Views:
         return images
 
     def beliefs(self, width: int, height: int, seen: Glance) -> list[Image]:
-        """What the robot knows, seen from above and from the side: itself, its task, its estimate
-        of the workers. No truth in here."""
+        """Return what the robot knows, seen from above and from the side.
+
+        It is itself, its task and its estimate of the workers; there is no truth in it.
+
+        Args:
+            width: of a picture [px].
+            height: likewise.
+            seen: a moment, as of `glance`.
+
+        Returns:
+            (height, width, 3) of uint8 each.
+        """
         chain = self.simulation.chain
         arm = capsules(chain, seen.q[: chain.n_joints])
         foot = np.array([*arm[0, 0, :2], 0.0])
@@ -222,7 +249,7 @@ class Views:
         return images
 
     def mosaic(self, b: int = 0) -> Image:
-        """The cameras of environment `b` in two columns."""
+        """Return the cameras' pictures of environment `b` in two columns."""
         return overlay.tile(self.cameras(*MOSAIC_TILE, self.glance(b)), 2)
 
     def close(self) -> None:
