@@ -5,6 +5,8 @@ import zipfile
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from hrc_env import __version__
 from hrc_env.core.errors import CheckpointError
 from hrc_env.observations import FLAT
@@ -15,7 +17,7 @@ from .env_info import EnvInfo
 
 TRAIN = "python -m hrc_env train"
 Size = int | dict[str, int]
-"""Entries of an observation, by name where goals stand apart."""
+"""Entries of an observation, by name where goals or images stand apart."""
 
 
 def load(path: Path, env_info: EnvInfo, trust: bool = False) -> sb3_files.SB3Agent:
@@ -61,9 +63,12 @@ def meta_of(path: Path) -> dict[str, Any]:
 
 def check_made_for(path: Path, meta: dict[str, Any], env_info: EnvInfo) -> None:
     """Raise `CheckpointError` unless a checkpoint of ours is for an environment."""
-    size = len(env_info.layout.low)
-    goals = dict.fromkeys((ACHIEVED, DESIRED), env_info.goal_size)
-    parts: Size = {**goals, FLAT: size} if env_info.goal_size else size
+    size, seen = len(env_info.layout.low), meta["observation_size"]
+    beside = dict.fromkeys((ACHIEVED, DESIRED), env_info.goal_size) if env_info.goal_size else {}
+    if isinstance(seen, dict):  # a policy need not look at images that there are
+        images = {name: shape for name, shape in env_info.images.items() if name in seen}
+        beside |= {name: int(np.prod(shape)) for name, shape in images.items()}
+    parts: Size = {**beside, FLAT: size} if beside else size
     check_fits(path, meta, parts, env_info.n_actions)
 
 

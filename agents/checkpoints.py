@@ -3,6 +3,7 @@
 import json
 import os
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from hrc_env import __version__
 from hrc_env.core.errors import learner
+from hrc_env.observations import FLAT
 from hrc_env.sb3 import HRCVecEnv
 
 from .acting import Size, check_fits, check_made_for, describe
@@ -98,7 +100,13 @@ class TrainedAgent:
         self.learner = learner
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
-        """Deterministic actions (..., A)."""
+        """Deterministic actions (..., A); it is given what it learnt from."""
+        space = self.learner.observation_space
+        if isinstance(observation, Mapping):
+            known = space.spaces if isinstance(space, spaces.Dict) else None
+            observation = (
+                {name: observation[name] for name in known} if known else observation[FLAT]
+            )
         return self.learner.predict(observation, deterministic=True)[0]  # type: ignore[arg-type]
 
 

@@ -1,7 +1,7 @@
 """The protocol of agents, and what they know about their environment."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol, cast
 
 import numpy as np
@@ -51,6 +51,8 @@ class EnvInfo:
     """Of the place: where things stand, and where people walk and work."""
     goal_size: int = 0
     """Entries of a goal that stands apart from the observation; 0: there is none."""
+    images: Mapping[str, tuple[int, int, int]] = field(default_factory=dict)
+    """Height, width and channels of the images that stand beside the observation, by name."""
 
 
 def env_info(env: object) -> EnvInfo:
@@ -68,7 +70,9 @@ def env_info(env: object) -> EnvInfo:
         raise ConfigError(
             f"env must be an environment of hrc_env or its simulation, got {type(env).__name__}."
         )
+    images = simulation.images
     return EnvInfo(
+        images={} if images is None else dict.fromkeys(images.names, images.shape),
         layout=simulation.layout,
         chain=simulation.chain,
         home_q=simulation.scene.home_q,

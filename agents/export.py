@@ -8,6 +8,7 @@ from dataclasses import asdict, fields, replace
 from typing import Any
 
 import numpy as np
+from gymnasium import spaces
 from rich.console import Console
 
 from hrc_env import __version__
@@ -18,6 +19,7 @@ from hrc_env.core.errors import CheckpointError, learner
 from hrc_env.core.progress import progress_bar
 from hrc_env.core.results import write_whole
 from hrc_env.evaluation.episodes import EVALUATION_SEED, measure, play_episodes
+from hrc_env.observations import IMAGE
 from hrc_env.pipeline.ready import make_ready
 from hrc_env.sb3 import HRCVecEnv
 
@@ -74,7 +76,17 @@ def run(asked: Export) -> int:
 
 
 def taken(trained: checkpoints.Learner) -> tuple[Tensors, Architecture]:
-    """What of a learner acts."""
+    """What of a learner acts.
+
+    Raises:
+        CheckpointError: it sees images: the format has no convolutions.
+    """
+    space = trained.observation_space
+    if isinstance(space, spaces.Dict) and any(name.startswith(IMAGE) for name in space.spaces):
+        raise CheckpointError(
+            "A policy that sees images cannot be exported: such files hold layers of numbers, no "
+            "convolutions. Give its policy.zip instead."
+        )
     policy: Any = trained.policy
     squashed = isinstance(trained, SAC)
     actor = policy.actor if squashed else policy

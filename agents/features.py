@@ -5,7 +5,8 @@ from typing import Any
 
 from gymnasium import spaces
 
-from hrc_env.core.errors import learner
+from hrc_env.core.errors import ConfigError, learner
+from hrc_env.observations import IMAGE
 from hrc_env.tasks.goal import ACHIEVED, DESIRED
 
 from .network import NEAR
@@ -21,6 +22,13 @@ class NearAndFar(BaseFeaturesExtractor):
     goals stand apart, the way from what is achieved to what is desired is one part more."""
 
     def __init__(self, observation_space: spaces.Space[Any]) -> None:
+        parts = observation_space.spaces if isinstance(observation_space, spaces.Dict) else ()
+        if images := [name for name in parts if name.startswith(IMAGE)]:
+            raise ConfigError(
+                f"This policy sees numbers at two scales, and the observation holds {images}: "
+                "leave out observe_images, or learn by PPO without demonstrations, whose policy "
+                "has convolutions."
+            )
         n = spaces.flatdim(observation_space)
         if isinstance(observation_space, spaces.Dict):
             n += spaces.flatdim(observation_space[ACHIEVED])

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.core.errors import check_names
+from hrc_env.observations import IMAGE
 from hrc_env.tasks.goal import ACHIEVED, DESIRED
 
 from .env_info import Observation
@@ -64,16 +65,17 @@ class Network:
 
 
 def flat(observation: Observation) -> NDArray[np.float32]:
-    """(..., n); where goals stand apart, they come first."""
+    """(..., n) without images; where goals stand apart, they come first."""
     if isinstance(observation, Mapping):
-        return np.concatenate([observation[name] for name in sorted(observation)], axis=-1)
+        numbers = [name for name in sorted(observation) if not name.startswith(IMAGE)]
+        return np.concatenate([observation[name] for name in numbers], axis=-1)
     return observation
 
 
 def near_and_far(observation: Observation) -> NDArray[np.float32]:
     """(..., 2 n) what `agents.features.NearAndFar` makes of an observation."""
     seen = flat(observation)
-    if isinstance(observation, Mapping):
+    if isinstance(observation, Mapping) and DESIRED in observation:
         seen = np.concatenate([seen, observation[DESIRED] - observation[ACHIEVED]], axis=-1)
     near = np.sign(seen) * np.log1p(NEAR * np.abs(seen)) / math.log1p(NEAR)
     return np.concatenate([seen, near], axis=-1, dtype=np.float32)

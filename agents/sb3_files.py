@@ -13,7 +13,7 @@ import json
 import pickle
 import re
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -81,7 +81,8 @@ def load(path: Path, env_info: EnvInfo, trust: bool = False) -> "SB3Agent":
         CheckpointError: no such file, other spaces, or something that wants `trust`.
     """
     data, weights = _read(path)
-    seen, actions = spaces_of(env_info)
+    said = _shapes_said(data.get("observation_space")) or {}
+    seen, actions = spaces_of(env_info, [name for name in env_info.images if name in said])
     _check_spaces(path, data, seen, actions, env_info)
     make, keywords = _architecture(path, data, trust)
     with torch.random.fork_rng(devices=[]):  # the first weights are drawn, and replaced
@@ -94,15 +95,27 @@ def check_is_one(path: Path) -> None:
     _read(path)
 
 
-def spaces_of(env_info: EnvInfo) -> tuple[spaces.Space[Any], spaces.Box]:
-    """Return the spaces of an environment's observations and actions."""
+def spaces_of(
+    env_info: EnvInfo, images: Sequence[str] = ()
+) -> tuple[spaces.Space[Any], spaces.Box]:
+    """Return the spaces of an environment's observations and actions.
+
+    Args:
+        env_info: of the environment.
+        images: names of those that a policy looks at. Their channels come first, as
+            Stable-Baselines3 turns them.
+    """
     layout, size = env_info.layout, env_info.goal_size
     flat = spaces.Box(layout.low, layout.high, dtype=np.float32)
     actions = spaces.Box(-1.0, 1.0, (env_info.n_actions,), np.float32)
-    if not size:
-        return flat, actions
-    goals = spaces.Box(-np.inf, np.inf, (size,), np.float32)
-    return spaces.Dict({ACHIEVED: goals, DESIRED: goals, FLAT: flat}), actions
+    beside = {}
+    for name in images:
+        height, width, channels = env_info.images[name]
+        beside[name] = spaces.Box(0, 255, (channels, height, width), np.uint8)
+    if size:
+        goals = spaces.Box(-np.inf, np.inf, (size,), np.float32)
+        beside |= {ACHIEVED: goals, DESIRED: goals}
+    return (spaces.Dict({**beside, FLAT: flat}) if beside else flat), actions
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +138,12 @@ class SB3Agent:
     """None: it sees observations as they are."""
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
-        """Deterministic actions (..., A), to the bit those of `model.predict`."""
+        """Deterministic actions (..., A), to the bit those of `model.predict`; of an observation
+        with more parts it is given those that it learnt from."""
+        if isinstance(observation, Mapping):
+            space = self.policy.observation_space
+            names = space.spaces if isinstance(space, spaces.Dict) else ()
+            observation = {name: observation[name] for name in names} or observation[FLAT]
         if self.statistics is not None:
             observation = self.statistics.applied(observation)
         return self.policy.predict(observation, deterministic=True)[0]  # type: ignore[arg-type]
@@ -206,9 +224,11 @@ def _shapes_of(space: spaces.Space[Any]) -> Shapes:
     return {"": tuple(space.shape or ())}
 
 
-def _shapes_said(said: Mapping[str, Any]) -> Shapes | None:
+def _shapes_said(said: Any) -> Shapes | None:
     """Return the shapes that a file's plain part tells of a space; None of one that is neither a
     box nor boxes by name."""
+    if not isinstance(said, dict) or ":type:" not in said:
+        return None
     if ".box.Box'" in str(said[":type:"]):
         return {"": tuple(map(int, said.get("_shape") or ()))}
     if ".dict.Dict'" in str(said[":type:"]):

@@ -74,10 +74,12 @@ if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
     from hrc_env.registration import register_robot as register_robot
     from hrc_env.registration import register_shield as register_shield
     from hrc_env.registration import register_task as register_task
+    from hrc_env.render.views import Views as Views
     from hrc_env.rewards import RewardTerm as RewardTerm
     from hrc_env.safety.config import ShieldConfig as ShieldConfig
     from hrc_env.safety.shield import Shield as Shield
     from hrc_env.sb3 import HRCVecEnv as HRCVecEnv
+    from hrc_env.scene.camera_images import ImageConfig as ImageConfig
     from hrc_env.scene.domain_randomization import AppearanceConfig as AppearanceConfig
     from hrc_env.scene.rig import make_cameras as make_cameras
     from hrc_env.scene.rigs import RIGS as RIGS
@@ -115,7 +117,9 @@ PUBLIC = {
     "HRCVecEnv": "hrc_env.sb3",
     "HRCVectorEnv": "hrc_env.vector.env",
     "IDS": "hrc_env.registration",
+    "ImageConfig": "hrc_env.scene.camera_images",
     "PeopleConfig": "hrc_env.motion.config",
+    "Views": "hrc_env.render.views",
     "make_vector": "hrc_env.vector.make",
     "save_config": "hrc_env.config",
     # tasks

@@ -24,7 +24,8 @@ from hrc_env.core.typing import Floats
 from hrc_env.env_config import signature_of_env
 from hrc_env.infos import words_of
 from hrc_env.registration import HasSpec
-from hrc_env.render.views import Views, picture_size
+from hrc_env.render.marks import OVERLAYS
+from hrc_env.render.views import CameraChoice, Views, picture_size
 from hrc_env.rewards import RewardConfig
 from hrc_env.settings import Settings, settle
 from hrc_env.simulation import Simulation
@@ -51,6 +52,7 @@ class EnvBase(HasSpec, Stateful):
         check_render_mode(asked.render_mode, self.PICTURES)
         share()
         self._size = picture_size(asked.width, asked.height)
+        self._shown = shown_beside(asked.render_markers, asked.overlay)
         self.render_mode, self.config, self._task = (
             asked.render_mode,
             settings.config,
@@ -136,6 +138,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         self._open(settings)
         self.simulation = Simulation(1, settings)
         self.views = Views(self.simulation)
+        """Pictures of the scene for people, at any time and of any size."""
         self.observation_space, self.action_space = spaces(self.simulation)
         self._begun = False
         self._steps_left = ENDLESS
@@ -188,12 +191,21 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         """Weigh the reward's terms so from the next step on."""
         self.simulation.set_reward(weights)
 
-    def render(self) -> NDArray[Any] | None:  # type: ignore[override]
-        """Return the scene from a good viewpoint, (H, W, 3) of uint8 or (H, W) metres of depth."""
+    def render(self, camera: CameraChoice = None) -> NDArray[Any] | None:  # type: ignore[override]
+        """Return a picture of the scene, (H, W, 3) of uint8 or (H, W) metres of depth.
+
+        Args:
+            camera: through which: an index or a name of the rig's, a viewpoint such as "room" or
+                "top", or a `CameraConfig`; None: from where the task is seen best.
+
+        Raises:
+            ConfigError: there is no such camera.
+        """
         self.refuse_closed()
         if self.render_mode is None:
             return None
-        return self.views.picture(self.render_mode == "depth_array", size=self._size)
+        is_depth = self.render_mode == "depth_array"
+        return self.views.picture(is_depth, size=self._size, camera=camera, **self._shown)
 
     def mosaic(self) -> NDArray[np.uint8]:
         """Return the images of the cameras with crops, keypoints and the estimated skeleton."""
@@ -237,13 +249,31 @@ def check_render_mode(render_mode: str | None, valid: Sequence[str] = RENDER_MOD
         raise unknown("render_mode", render_mode, valid)
 
 
+def shown_beside(markers: Any, overlay: Any) -> dict[str, bool]:
+    """What of `Views.picture` the arguments `render_markers` and `overlay` ask for.
+
+    Raises:
+        ConfigError: values that they cannot have.
+    """
+    if not isinstance(markers, bool):
+        raise ConfigError(f"render_markers must be True or False, got {markers!r}.")
+    if overlay is not None and overlay not in OVERLAYS:
+        raise unknown("overlay", overlay, OVERLAYS)
+    return {"markers": markers, "capsules": overlay == "capsules"}
+
+
 def spaces(simulation: Simulation) -> tuple[Any, Any]:
-    """The spaces of one environment's observations, a `Box` or with goals a `Dict`, and actions, a
-    `Box`."""
-    where, apart = simulation.layout, simulation.task.goal
+    """The spaces of one environment's observations, a `Box` or with goals or images a `Dict`, and
+    actions, a `Box`."""
+    where, apart, images = simulation.layout, simulation.task.goal, simulation.images
     seen = Box(where.low, where.high, dtype=np.float32)
     actions = Box(-1.0, 1.0, (simulation.n_actions,), np.float32)
-    if apart is None:
+    if apart is None and images is None:
         return seen, actions
-    goals = Box(-apart.bound, apart.bound, (apart.size,), np.float32)
-    return Dict({goal.ACHIEVED: goals, goal.DESIRED: goals, observations.FLAT: seen}), actions
+    parts: dict[str, Any] = {observations.FLAT: seen}
+    if apart is not None:
+        goals = Box(-apart.bound, apart.bound, (apart.size,), np.float32)
+        parts |= {goal.ACHIEVED: goals, goal.DESIRED: goals}
+    if images is not None:
+        parts |= {name: Box(0, 255, images.shape, np.uint8) for name in images.names}
+    return Dict(parts), actions

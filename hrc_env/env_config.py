@@ -21,6 +21,7 @@ if TYPE_CHECKING:  # at run time they would import the simulator, which `--help`
     from hrc_env.motion.config import PeopleConfig
     from hrc_env.perception.faults.fault import FaultConfig
     from hrc_env.safety.shield import ShieldChoice
+    from hrc_env.scene.camera_images import ImageConfig
     from hrc_env.scene.domain_randomization import AppearanceConfig
     from hrc_env.scene.robot import Robot
     from hrc_env.tasks.task import TaskType
@@ -80,7 +81,7 @@ class EnvConfig:
     appearance: "str | AppearanceConfig | Mapping[str, Any] | None" = None
     """How scene and workers look, drawn for every episode: "as_built", "varied", "lights",
     "surfaces", "people", an `AppearanceConfig` or a mapping; None: as `config` has it (as built).
-    Level "pixels"; "keypoints" knows the strength of the light."""
+    Level "pixels" and `observe_images`; "keypoints" knows the strength of the light."""
     control: str = "joint"
     """What an action is: "joint" (joint velocities), "tool" (tool velocity) or "twist" (that and
     the tool's turn rate); a robot with a hand has one entry more, -1 open to 1 closed."""
@@ -88,6 +89,13 @@ class EnvConfig:
     """What may change a command before the arm gets it: "qp", "ssm", "pfl", a `ShieldConfig` or a
     mapping such as {"kind": "qp", "margin_m": 0.1} (docs/reference/shields.md), a name that was
     registered or a function; None: nothing."""
+    observe_images: "ImageConfig | Mapping[str, Any] | tuple[int, int] | None" = field(
+        default=None, metadata=MANY
+    )
+    """Camera images in the observation, beside the belief: (height, width) [px] of all cameras, a
+    mapping such as {"height": 84, "width": 84, "cameras": ["camera_1"]} or an `ImageConfig`; the
+    observation is then a dictionary of "observation" and "image_<camera>", (H, W, 3) of uint8.
+    None: no images."""
     config: "HRCConfig | Mapping[str, Any] | str | Path | None" = field(default=None, metadata=MANY)
     """All other settings (docs/reference/config.md): an `HRCConfig`, a nested mapping of changes to
     the default, or the path of a TOML file of such."""
@@ -98,6 +106,11 @@ class EnvConfig:
     """Width of a picture that `render` gives [px]."""
     height: int = field(default=PICTURE_SIZE[1], metadata=NO_WORD)
     """Height of a picture that `render` gives [px]."""
+    render_markers: bool = field(default=True, metadata=NO_WORD)
+    """Whether `render` shows goals and other places that the task marks."""
+    overlay: str | None = field(default=None, metadata=NO_WORD)
+    """What `render` lays over the scene: "capsules", what stands for robot and people in distances
+    (docs/start.md); None: nothing."""
 
     def arguments(self) -> dict[str, Any]:
         """Return the fields that differ from the defaults, by name."""

@@ -7,6 +7,7 @@ they cannot drift apart. Terms read the *estimate* of the worker, never the trut
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -26,7 +27,9 @@ from hrc_env.geometry.rotations import matrix
 TOWARDS_ROBOT, FACTOR = UNCERTAINTY = ("towards_robot", "factor")
 """What else can be asked for of each joint's covariance."""
 FLAT = "observation"
-"""What the flat observation is called where goals stand beside it."""
+"""What the flat observation is called where goals or images stand beside it."""
+IMAGE = "image_"
+"""How the names of images begin that stand beside it; the camera's name follows."""
 FAR_SEPARATION_M = 1.0
 """Larger separations are reported as this: nothing near, or nobody known of."""
 
@@ -341,9 +344,14 @@ def _scale(physical: Floats, scale: Floats, low: Tensor, high: Tensor, observati
 def split(
     observation: Tensor | Mapping[str, Tensor], where: ObservationLayout
 ) -> dict[str, Floats]:
-    """A flat observation (..., n) as named terms in their units; goals beside it as they are."""
+    """A flat observation (..., n) as named terms in their units; goals and images beside it as they
+    are."""
     if isinstance(observation, Mapping):
-        goals = {k: np.asarray(part, float) for k, part in observation.items() if k != FLAT}
-        return {**split(observation[FLAT], where), **goals}
+        beside: dict[str, Any] = {
+            name: part if name.startswith(IMAGE) else np.asarray(part, float)
+            for name, part in observation.items()
+            if name != FLAT
+        }
+        return {**split(observation[FLAT], where), **beside}
     physical = observation * where.scale
     return {name: physical[..., part] for name, part in where.slices.items()}

@@ -14,6 +14,7 @@ from hrc_env.env_config import EnvConfig
 from hrc_env.geometry.camera_config import CameraConfig, camera_of, read_rig
 from hrc_env.safety.shield import Shield, shield_called
 from hrc_env.scene.build import Scene
+from hrc_env.scene.camera_images import ImageConfig, images_called
 from hrc_env.scene.rigs import RIGS
 from hrc_env.scene.robot import DEFAULT as DEFAULT_ROBOT
 from hrc_env.scene.robot import ROBOTS, Robot, robot_called
@@ -45,6 +46,8 @@ class Settings:
     """The fewest and the most of an episode."""
     shield: Shield | None
     config: HRCConfig
+    images: ImageConfig | None = None
+    """Images of cameras in the observation; None: there are none."""
 
     def recorded(self, batch: int, scene: Scene) -> dict[str, Any]:
         """What a state must have been taken with to be set."""
@@ -98,7 +101,7 @@ def make_settings(asked: EnvConfig) -> Settings:
     return Settings(
         asked, task(config.task), estimator, cameras, scene,
         robot, _worker_counts(n_workers),
-        shield_called(asked.shield), config,
+        shield_called(asked.shield), config, images_called(asked.observe_images),
     )  # fmt: skip
 
 

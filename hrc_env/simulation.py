@@ -26,6 +26,7 @@ from hrc_env.geometry.reach import check_reach
 from hrc_env.motion import fit, generator, starts
 from hrc_env.motion.activities.pieces import NoRoomError
 from hrc_env.pipeline.levels import CAMERA_LEVELS, make_pipeline, prepare
+from hrc_env.pipeline.observed_images import Images, ObservedImages
 from hrc_env.pipeline.sensor_input import SensorInput, TrueSensorInput
 from hrc_env.rewards import RewardConfig
 from hrc_env.safety import cost as costs
@@ -34,6 +35,7 @@ from hrc_env.safety.incidents import IncidentMonitor, Paths
 from hrc_env.safety.shield import shielded
 from hrc_env.scene import handling
 from hrc_env.scene.build import Scene, all_grounds, build
+from hrc_env.scene.domain_randomization import AS_BUILT, Look, draw_look
 from hrc_env.scene.limits import object_targets, robot_model
 from hrc_env.scene.physics import Physics
 from hrc_env.scene.rigs import findings
@@ -122,7 +124,13 @@ class Simulation(Stateful):
             batch, self.scene.n_workers, self.bodies.capsule_names, self.model, config.ctrl_dt
         )
         self.physics = Physics(self.scene, batch)
-        self.pipeline = make_pipeline(perception, settings.estimator, self.scene, batch, config)
+        images, estimator = settings.images, settings.estimator
+        self.pipeline = make_pipeline(
+            perception, estimator, self.scene, batch, config, shows_images=images is not None
+        )
+        self.images = None if images is None else ObservedImages(self.scene, images)
+        """What draws the images of observations; None: they hold none."""
+        self._looks: dict[int, tuple[np.random.Generator, Look]] = {}
         self.task_state = self.task.make_state(batch)
         self._everyone, self.reward_weights = np.arange(batch), config.reward
         self.action, self.shield_change = (np.zeros((batch, n)) for n in (self.n_actions, n_joints))
@@ -168,9 +176,28 @@ class Simulation(Stateful):
                 )
         super().set_state(state)
 
+    def draw_images(self) -> Images:
+        """Return the images of what the sensors were shown last."""
+        if self.images is None:
+            return {}
+        now = self.pipeline.sensor.now
+        return self.images.draw(now, [self.look_of(b) for b in now.ids.tolist()])
+
+    def look_of(self, b: int) -> Look | None:
+        """How environment `b` looks in its episode (for images); None: as it was built."""
+        worn, stream = self.pipeline.look_of(b), self.streams["sensor"][b]
+        if worn is not None or self.config.appearance == AS_BUILT:
+            return worn
+        if b not in self._looks or self._looks[b][0] is not stream:  # it follows from the stream
+            look = draw_look(self.config.appearance, self.scene.n_workers, stream)
+            self._looks[b] = stream, look
+        return self._looks[b][1]
+
     def close(self) -> None:
         """Release threads and graphics contexts."""
         self.pipeline.close()
+        if self.images is not None:
+            self.images.close()
 
     @property
     def estimate(self) -> PoseEstimate:
@@ -401,9 +428,12 @@ class Simulation(Stateful):
         return handling.loaded(self.scene, world, arm, qpos, self.task.is_load(self.task_state))[0]
 
     def _observe(self, belief: Belief) -> Observation:
-        """Return what robots see, and their goals if the task sets them apart."""
+        """Return what robots see: with goals that the task sets apart, and images, by name."""
         flat, apart = observations.observe(belief, self.layout, self.terms), self.task.goal
-        return flat if apart is None else {**goal.parts(apart, belief), observations.FLAT: flat}
+        if apart is None and self.images is None:
+            return flat
+        goals = {} if apart is None else goal.parts(apart, belief)
+        return {**goals, **self.draw_images(), observations.FLAT: flat}
 
     def _reward_terms(self, command: Command, truth: Truth, belief: Belief) -> dict[str, Floats]:
         """Return every term (B,) of the reward: the task's, then those that all tasks share."""

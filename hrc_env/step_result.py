@@ -11,8 +11,8 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.infos import Info, published
 from hrc_env.core.typing import Bools, Floats
 
-Observation = NDArray[np.float32] | dict[str, NDArray[np.float32]]
-"""(B, n), or such arrays by name where goals stand apart (`hrc_env.tasks.goal`)."""
+Observation = NDArray[np.float32] | dict[str, NDArray[Any]]
+"""(B, n) float32; or by name, where goals (`hrc_env.tasks.goal`) or images (uint8) stand beside."""
 
 
 @dataclass(frozen=True, slots=True)

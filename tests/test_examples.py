@@ -24,6 +24,15 @@ def test_the_plain_ppo_runs_and_says_how_many_goals_it_reached():
     assert re.search(r"goals reached in the last \d+ episodes: \d+%", said)
 
 
+@pytest.mark.parametrize("pretrain", ["0", "256"])
+def test_ppo_from_images_runs_and_draws_its_curve(pretrain, tmp_path):
+    words = ("--num-envs", "4", "--timesteps", "1100", "--out", str(tmp_path / "run"))
+    said = run("ppo_from_images.py", *words, "--pretrain", pretrain)
+    assert re.search(r"1280 steps .* goals a minute", said)
+    assert ("the convolutions find the tool to" in said) == (pretrain != "0")
+    assert (tmp_path / "run" / "curve.png").stat().st_size > 5000
+
+
 @pytest.mark.skipif(importlib.util.find_spec("torchrl") is None, reason="torchrl is not installed")
 def test_the_torchrl_ppo_runs():
     assert re.search(r"3072 steps in \d+ s", run("ppo_torchrl.py", *SMALL))

@@ -67,13 +67,14 @@ def read_word(word: str | None) -> Any:
 
 
 def _counts(words: Sequence[str]) -> Any:
-    """Return a number of workers, or the fewest and the most."""
+    """Return one value, or several: the fewest and the most workers, a height and a width."""
     values = [_value(word) for word in words]
     return values[0] if len(values) == 1 else values
 
 
 READERS: dict[str, Callable[[Any], Any]] = {
     "cameras": cameras_named, "n_workers": _counts, "config": read_config,
+    "observe_images": _counts,
     "faults": lambda words: [_fault(text) for text in words],
 }  # fmt: skip
 """How words become an argument, where they are not one value or a list of values."""
@@ -81,6 +82,7 @@ AGENTS_OWN = ("control",)
 """Arguments that are an agent's own if they are not given."""
 ON_THE_COMMAND_LINE = {
     "faults": "Each is a JSON object.",
+    "observe_images": "Here: HEIGHT WIDTH, or a JSON object.",
     "people": "--config motion.people.FIELD=VALUE changes one thing.",
     "appearance": "--config appearance.FIELD=VALUE changes one thing.",
     "control": "If not given: the agent's own, or joint.",

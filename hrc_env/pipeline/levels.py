@@ -48,18 +48,30 @@ def prepare(level: str, detector: DetectorConfig) -> None:
 
 
 def make_pipeline(
-    level: str, estimator: EstimatorChoice, scene: Scene, batch: int, config: HRCConfig
-) -> PerceptionPipeline:
-    """The pipeline of a perception level. Raises `ConfigError` for an unknown one, or one that
-    cannot have what `config` wants; `WeightsError`, `RenderingError` where `pixels` is impossible.
+    level: str, estimator: EstimatorChoice, scene: Scene, batch: int, config: HRCConfig,
+    shows_images: bool = False,
+) -> PerceptionPipeline:  # fmt: skip
+    """Return the pipeline of a perception level.
+
+    Args:
+        level: one of `LEVELS`.
+        estimator: as of `EnvConfig`.
+        scene: with the rig's cameras.
+        batch: number of environments.
+        config: of the environment.
+        shows_images: whether observations hold images, too, whatever the level.
+
+    Raises:
+        ConfigError: an unknown level, or one that cannot have what `config` wants.
+        WeightsError, RenderingError: level "pixels" is impossible here.
     """
     if level not in LEVELS:
         raise unknown("perception", level, LEVELS)
-    if not _knows(level, config.appearance):
+    if not (shows_images or _knows(level, config.appearance)):
         raise ConfigError(
             f"Looks are of images, and perception={level!r} has none: leave appearance out, or use "
-            "perception='pixels'. perception='keypoints' knows the strength of the light alone: "
-            'appearance={"light": (0.15, 0.5)}.'
+            "perception='pixels' or observe_images. perception='keypoints' knows the strength of "
+            'the light alone: appearance={"light": (0.15, 0.5)}.'
         )
     schedule = _schedule(scene, level, config)
     memory_s = max(config.tracker.longest_delay_s, min(schedule.longest_delay_s, 1.0))

@@ -130,13 +130,15 @@ def draw_shield(image: Image, change_rad_s: float) -> None:
         write(image, text, at, size, SHIELD)
 
 
-def label(image: Image, text: str, at: tuple[int, int], size: int = 16) -> None:
+def label(
+    image: Image, text: str, at: tuple[int, int], size: int = 16, colour: Colour = INK
+) -> None:
     """Text with its upper left corner at `at`, on a dark plate, in place."""
     x, y = at
     pad, (_, _, right, bottom) = max(3, size // 4), _font(size).getbbox(text)
     plate = image[y : y + round(bottom) + 2 * pad, x : x + round(right) + 2 * pad]
     plate[:] = (0.35 * plate + 0.65 * np.array(PANEL)).astype(np.uint8)
-    write(image, text, (x + pad, y + pad), size)
+    write(image, text, (x + pad, y + pad), size, colour)
 
 
 def write(

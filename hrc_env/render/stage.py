@@ -6,19 +6,19 @@ of them from the sun.
 """
 
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.core.records import Roi, WorkerMotion
-from hrc_env.core.typing import Floats, Image, JointAngles
+from hrc_env.core.typing import Floats, Image, JointAngles, Points3
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.render.overlay import shrink
 from hrc_env.scene import gl
 from hrc_env.scene.build import Scene
-from hrc_env.scene.canvas import BEFORE_THE_SUN, IN_THE_SHADE, MOVING, STILL, Canvas
+from hrc_env.scene.canvas import BEFORE_THE_SUN, IN_THE_SHADE, MOVING, STILL, Canvas, Marks
 
 SMOOTHING = 2
 """All is drawn so many times as large, for smooth edges."""
@@ -85,8 +85,7 @@ class Stage(Canvas):
 
     def picture(self, camera: PinholeCamera, shadows: bool = False) -> Image:
         """What a pinhole camera sees, in the size of its image."""
-        view = camera.K.tobytes(), camera.T_world_from_cam.tobytes()
-        key = (*view, camera.width_px, camera.height_px, shadows)
+        key = _key(camera, shadows)
         if key not in self._kept:
             self._kept[key] = self._still(camera, shadows)
         backdrop = self._kept[key]
@@ -98,6 +97,44 @@ class Stage(Canvas):
             _lay_over(image, backdrop, box, *self.moving(camera, box))
         return image
 
+    def mark(
+        self, image: Image, camera: PinholeCamera, marks: Marks, shown: float, hidden: float
+    ) -> None:
+        """Lay marks over a picture of the camera, in place.
+
+        Args:
+            image: as of `picture`, which was called for this camera before.
+            camera: through which it was taken.
+            marks: capsules and spheres.
+            shown: their opacity in [0, 1] where nothing is nearer,
+            hidden: and where something is.
+        """
+        middles = marks.ends_world.mean(1)
+        half_m = np.linalg.norm(np.diff(marks.ends_world, axis=1)[:, 0], axis=-1) / 2
+        box = _box(camera, middles, marks.radius_m + half_m)
+        left, top, right, bottom = box
+        if right <= left or bottom <= top:
+            return
+        _, z_moving = self.moving(camera, box)
+        fine = SMOOTHING * np.array(box)
+        z_still = self._backdrop_z(camera)[fine[1] : fine[3], fine[0] : fine[2]]
+        self.show_marks(marks)
+        rgb, z = self._read(camera, box)
+        before = z > np.maximum(z_still, z_moving)
+        share = np.where(z > 0, np.where(before, shown, hidden), 0.0).astype(np.float32)
+        size = right - left, bottom - top
+        laid = cv2.resize(rgb * share[..., None], size, interpolation=cv2.INTER_AREA)
+        free = 1 - cv2.resize(share, size, interpolation=cv2.INTER_AREA)
+        part = image[top:bottom, left:right]
+        part[:] = np.round(part * free[..., None] + laid)
+
+    def _backdrop_z(self, camera: PinholeCamera) -> Depths:
+        """Depths of what stands still, `SMOOTHING` times as large."""
+        for shadows in (True, False):
+            if (key := _key(camera, shadows)) in self._kept:
+                return self._kept[key].z
+        raise KeyError(camera.name)
+
     def moving(self, camera: PinholeCamera, box: Box) -> tuple[Image, Depths]:
         """What moves within a box of the picture: rgb and z, `SMOOTHING` times as large,
         top row first; black and 0 where nothing is."""
@@ -106,20 +143,7 @@ class Stage(Canvas):
 
     def box(self, camera: PinholeCamera) -> Box:
         """Where in the picture things that move are, and maybe a little more."""
-        middles, radii_m = self.movers()
-        size = camera.width_px, camera.height_px
-        x, y, depth = ((middles - camera.eye_world) @ camera.T_world_from_cam[:3, :3]).T
-        ahead = depth > -radii_m
-        x, y, depth, radii_m = x[ahead], y[ahead], depth[ahead], radii_m[ahead]
-        if not len(depth):
-            return 0, 0, 0, 0
-        if (depth < radii_m + 0.1).any():
-            return 0, 0, *size
-        corners = np.stack([_reach(x, depth, radii_m), _reach(y, depth, radii_m)], -1)
-        low, high = corners * camera.K[[0, 1], [0, 1]] + camera.K[:2, 2]
-        left, top = np.clip(np.floor(low - 2), 0, size).astype(int).tolist()
-        right, bottom = np.clip(np.ceil(high + 2), 0, size).astype(int).tolist()
-        return left, top, right, bottom
+        return _box(camera, *self.movers())
 
     def shade(self) -> Shade | None:
         """What moves, as the sun sees it; None without a sun or without anything that moves."""
@@ -183,6 +207,29 @@ class Stage(Canvas):
         weight = cv2.cvtColor(share[where], cv2.COLOR_GRAY2RGB)
         lit = cv2.multiply(image[where], 255 - weight, scale=1 / 255)
         image[where] = cv2.add(lit, cv2.multiply(dark[where], weight, scale=1 / 255))
+
+
+def _key(camera: PinholeCamera, shadows: bool) -> tuple[Any, ...]:
+    """By what a backdrop is known."""
+    view = camera.K.tobytes(), camera.T_world_from_cam.tobytes()
+    return (*view, camera.width_px, camera.height_px, shadows)
+
+
+def _box(camera: PinholeCamera, middles: Points3, radii_m: Floats) -> Box:
+    """Where in a camera's picture spheres are, and maybe a little more."""
+    size = camera.width_px, camera.height_px
+    x, y, depth = ((middles - camera.eye_world) @ camera.T_world_from_cam[:3, :3]).T
+    ahead = depth > -radii_m
+    x, y, depth, radii_m = x[ahead], y[ahead], depth[ahead], radii_m[ahead]
+    if not len(depth):
+        return 0, 0, 0, 0
+    if (depth < radii_m + 0.1).any():
+        return 0, 0, *size
+    corners = np.stack([_reach(x, depth, radii_m), _reach(y, depth, radii_m)], -1)
+    low, high = corners * camera.K[[0, 1], [0, 1]] + camera.K[:2, 2]
+    left, top = np.clip(np.floor(low - 2), 0, size).astype(int).tolist()
+    right, bottom = np.clip(np.ceil(high + 2), 0, size).astype(int).tolist()
+    return left, top, right, bottom
 
 
 def _reach(x: Floats, depth: Floats, radii_m: Floats) -> Floats:

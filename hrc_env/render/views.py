@@ -1,26 +1,45 @@
 """Views of a simulation for people: the room, the cameras with what was made of them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.core.batching import one, rows
-from hrc_env.core.errors import whole
+from hrc_env.core.errors import unknown, whole
 from hrc_env.core.records import Keypoints, PoseEstimate, Roi, WorkerMotion
 from hrc_env.core.typing import Floats, Image, Points3
 from hrc_env.env_config import PICTURE_SIZE
+from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.geometry.cameras import PinholeCamera, image_from_pinhole, pinhole, resized
 from hrc_env.geometry.chains import capsules
 from hrc_env.motion import generator
 from hrc_env.perception.lensed import Lensed
 from hrc_env.render import overlay
+from hrc_env.render.marks import (
+    CAPSULES_HIDDEN,
+    CAPSULES_SHOWN,
+    MARKER_HIDDEN,
+    MARKER_SHOWN,
+    Solids,
+    draw_legend,
+    markers_of,
+    marks_of,
+    solids_of,
+)
 from hrc_env.render.stage import SMOOTHING, Stage
 from hrc_env.scene.canvas import Canvas
 from hrc_env.scene.domain_randomization import Look
-from hrc_env.scene.render import PICTURE_QUALITY, CropRenderer, PictureRenderer, viewpoint_camera
+from hrc_env.scene.render import (
+    PICTURE_QUALITY,
+    VIEWPOINTS,
+    CropRenderer,
+    PictureRenderer,
+    viewpoint_camera,
+)
+from hrc_env.scene.rig import make_cameras
 from hrc_env.simulation import Simulation
 
 SMALLEST_PX, LARGEST_PX = 16, 4096
@@ -32,6 +51,9 @@ SIDES = (
 )
 """Where what is believed is seen from: eye and target from the robot's foot [m]."""
 SIDES_HFOV_DEG = 55.0
+CameraChoice: TypeAlias = int | str | CameraConfig | PinholeCamera | None
+"""A camera of the rig by its index or name, a viewpoint's name, or a camera of one's own; None: the
+task's viewpoint."""
 
 
 def picture_size(width: Any, height: Any) -> tuple[int, int]:
@@ -60,6 +82,8 @@ class Glance:
     """What the pose network was given of the first worker."""
     shield_rad_s: float = 0.0
     """By how much the shield changed the last command."""
+    solids: tuple[Solids, ...] = ()
+    """What distances are taken of, if that was asked for."""
 
 
 class Views:
@@ -75,30 +99,60 @@ class Views:
         """By purpose: the size of their pictures, and themselves."""
 
     def picture(
-        self, depth: bool = False, b: int = 0, size: tuple[int, int] = PICTURE_SIZE
+        self,
+        depth: bool = False,
+        b: int = 0,
+        size: tuple[int, int] = PICTURE_SIZE,
+        *,
+        camera: CameraChoice = None,
+        markers: bool = True,
+        capsules: bool = False,
     ) -> NDArray[Any]:
-        """Robot and worker, (height, width, 3) uint8, or distances (height, width) float32 [m]."""
-        seen, viewpoint = self.glance(b), self.simulation.task.viewpoint
+        """Return a picture of environment `b`, (height, width, 3) of uint8, top row first.
+
+        Args:
+            depth: distances along the optical axis instead, (height, width) float32 [m]; of the
+                scene alone.
+            b: the environment.
+            size: width and height [px].
+            camera: which one: an index or a name of the rig; a viewpoint such as "room" or "top";
+                or a `CameraConfig`. None: from where the task is seen best.
+            markers: whether goals and other places that the task marks are shown.
+            capsules: whether what distances are taken of is laid over the scene: capsules of robot
+                and people. Not through a camera with a lens.
+
+        Raises:
+            ConfigError: there is no such camera.
+        """
+        seen, viewpoint = self.glance(b, capsules), self.simulation.task.viewpoint
+        chosen = viewpoint if camera is None else self._camera(camera)
         if depth:
             renderer = self._renderer("depth", size, seen)
-            return renderer.picture(seen.q, seen.motion, viewpoint, depth=True)
-        (image,) = self._drawn([viewpoint_camera(viewpoint, *size)], seen, shadows=True)
+            return renderer.picture(seen.q, seen.motion, chosen, depth=True)
+        if isinstance(chosen, PinholeCamera) and chosen.lens is not None:
+            (image,) = self._through_cameras(*size, seen, [chosen])
+            if markers:
+                overlay.draw_markers(image, chosen, seen.markers_world)
+        else:
+            image = self._marked(self._view(chosen, *size), seen, markers)
+            draw_legend(image, seen.solids)
         overlay.draw_shield(image, seen.shield_rad_s)
         return image
 
-    def glance(self, b: int = 0) -> Glance:
-        """All that there is to draw of environment `b` now."""
+    def glance(self, b: int = 0, capsules: bool = False) -> Glance:
+        """All that there is to draw of environment `b` now; `capsules`: `Glance.solids`, too."""
         simulation = self.simulation
         keypoints, windows = simulation.pipeline.last_detections(b)
         return Glance(
             *self.pose(b),
-            simulation.pipeline.look_of(b),
+            simulation.look_of(b),
             simulation.markers(b),
             rows(simulation.estimate, np.array([b])),
             keypoints,
             [list(of_worker) for of_worker in windows],
             list(simulation.pipeline.crops(b)),
             float(np.linalg.norm(simulation.shield_change[b])),
+            solids_of(simulation, b) if capsules else (),
         )
 
     def pose(self, b: int = 0) -> tuple[Floats, WorkerMotion]:
@@ -107,7 +161,16 @@ class Views:
         return self.simulation.physics.qpos[b], motion
 
     def room(self, width: int, height: int, seen: Glance) -> Image:
-        """The room with the estimated skeleton over it."""
+        """Return the room with the estimated skeleton over it.
+
+        Args:
+            width: of the picture [px].
+            height: likewise.
+            seen: a moment, as of `glance`.
+
+        Returns:
+            (height, width, 3) of uint8, top row first.
+        """
         camera = viewpoint_camera(self.simulation.task.viewpoint, width, height)
         (image,) = self._drawn([camera], seen, shadows=True)
         overlay.draw_estimate(image, camera, seen.estimate)
@@ -116,9 +179,17 @@ class Views:
         return image
 
     def cameras(self, width: int, height: int, seen: Glance) -> list[Image]:
-        """Every camera's picture, without shadows, as the detector sees the scene, with crops,
-        detected keypoints and the estimate."""
-        views = self._through_cameras(width, height, seen)
+        """Return every camera's picture with crops, detected keypoints and the estimate.
+
+        Args:
+            width: of a picture [px].
+            height: likewise.
+            seen: a moment, as of `glance`.
+
+        Returns:
+            (height, width, 3) of uint8 each, without shadows, as the detector sees the scene.
+        """
+        views = self._through_cameras(width, height, seen, self.simulation.scene.cameras)
         for c, (camera, image) in enumerate(zip(self.simulation.scene.cameras, views, strict=True)):
             for window in (of_worker[c] for of_worker in seen.windows):
                 if window is not None:
@@ -130,7 +201,7 @@ class Views:
         return views
 
     def crops(self, size: int, seen: Glance) -> list[Image]:
-        """What the pose network was given: each camera's crop, with its landmarks."""
+        """Return what the pose network was given: each camera's crop, with its landmarks."""
         keypoints, images = seen.keypoints, []
         if keypoints is None or not seen.windows:
             return []
@@ -148,8 +219,18 @@ class Views:
         return images
 
     def beliefs(self, width: int, height: int, seen: Glance) -> list[Image]:
-        """What the robot knows, seen from above and from the side: itself, its task, its estimate
-        of the workers. No truth in here."""
+        """Return what the robot knows, seen from above and from the side.
+
+        It is itself, its task and its estimate of the workers; there is no truth in it.
+
+        Args:
+            width: of a picture [px].
+            height: likewise.
+            seen: a moment, as of `glance`.
+
+        Returns:
+            (height, width, 3) of uint8 each.
+        """
         chain = self.simulation.chain
         arm = capsules(chain, seen.q[: chain.n_joints])
         foot = np.array([*arm[0, 0, :2], 0.0])
@@ -168,7 +249,7 @@ class Views:
         return images
 
     def mosaic(self, b: int = 0) -> Image:
-        """The cameras of environment `b` in two columns."""
+        """Return the cameras' pictures of environment `b` in two columns."""
         return overlay.tile(self.cameras(*MOSAIC_TILE, self.glance(b)), 2)
 
     def close(self) -> None:
@@ -180,17 +261,49 @@ class Views:
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_renderers": {}}
 
-    def _through_cameras(self, width: int, height: int, seen: Glance) -> list[Image]:
-        """What every camera sees, without shadows."""
-        cameras = self.simulation.scene.cameras
+    def _camera(self, asked: Any) -> str | PinholeCamera:
+        """A camera of the rig, a viewpoint's name, or a camera of the user's own."""
+        rig = {camera.name: camera for camera in self.simulation.scene.cameras}
+        if isinstance(asked, PinholeCamera):
+            return asked
+        if isinstance(asked, CameraConfig):
+            return make_cameras([asked])[0]
+        if isinstance(asked, str):
+            if asked not in rig and asked not in VIEWPOINTS:
+                raise unknown("camera or viewpoint", asked, [*rig, *VIEWPOINTS])
+            return rig.get(asked, asked)
+        index = whole(f"camera (of {', '.join(rig)})", asked, 0, len(rig) - 1)
+        return list(rig.values())[index]
+
+    def _view(self, chosen: str | PinholeCamera, width: int, height: int) -> PinholeCamera:
+        """What a picture of this size shows of a camera or a viewpoint."""
+        if isinstance(chosen, str):
+            return viewpoint_camera(chosen, width, height)
+        return resized(chosen, width, height)
+
+    def _marked(self, camera: PinholeCamera, seen: Glance, markers: bool) -> Image:
+        """What a camera sees, in the light of the sun, with what is to be shown beside it."""
+        (image,) = self._drawn([camera], seen, shadows=True)
+        stage: Stage = self._renderers["stage"][1]
+        if seen.solids:
+            stage.mark(image, camera, marks_of(seen.solids), CAPSULES_SHOWN, CAPSULES_HIDDEN)
+        if markers and len(seen.markers_world):
+            marks = markers_of(seen.markers_world, camera)
+            stage.mark(image, camera, marks, MARKER_SHOWN, MARKER_HIDDEN)
+        return image
+
+    def _through_cameras(
+        self, width: int, height: int, seen: Glance, cameras: Sequence[PinholeCamera]
+    ) -> list[Image]:
+        """What cameras see, without shadows."""
         if all(camera.lens is None for camera in cameras):
             return self._drawn([resized(camera, width, height) for camera in cameras], seen)
         size = (SMOOTHING * width, SMOOTHING * width)
         images = Lensed(self._renderer("square", size, seen), cameras)
         views = []
-        for c, camera in enumerate(cameras):
+        for camera in cameras:
             middle_px = camera.width_px / 2, camera.height_px / 2
-            square = images.crop(c, Roi(middle_px, float(camera.width_px), 0.0))
+            square = images.view(camera, Roi(middle_px, float(camera.width_px), 0.0))
             middle = overlay.middle_rows(square, SMOOTHING * height)
             views.append(overlay.shrink(middle, width, height))
         return views

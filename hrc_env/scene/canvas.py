@@ -15,15 +15,24 @@ from numpy.typing import NDArray
 
 from hrc_env.core.errors import RenderingError, check_shape
 from hrc_env.core.records import Roi, WorkerMotion
-from hrc_env.core.typing import Floats, Image, JointAngles
+from hrc_env.core.typing import Capsules, Floats, Image, JointAngles
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.scene import gl
 from hrc_env.scene.build import Scene, drawing_model, visuals
 from hrc_env.scene.domain_randomization import Look, randomize, strew, take_off_hats
-from hrc_env.scene.primitives import DECORATION, OVERHEAD, ROBOT_CAPSULES, ROBOT_LOOKS, SOLID
+from hrc_env.scene.primitives import (
+    DECORATION,
+    OVERHEAD,
+    ROBOT_CAPSULES,
+    ROBOT_LOOKS,
+    SOLID,
+    rod_pose,
+)
 from hrc_env.scene.rig import glcam_axes
 from hrc_env.scene.worker_visuals import PARKED_M, show_bodies, show_workers
 
+SPHERE_M = 1e-6
+"""A capsule whose half length is less is drawn as a sphere [m]."""
 ALL_GROUPS = (SOLID, DECORATION, ROBOT_LOOKS, OVERHEAD)
 
 
@@ -43,6 +52,18 @@ STILL = Part(mujoco.mjtCatBit.mjCAT_STATIC, True)
 MOVING = Part(mujoco.mjtCatBit.mjCAT_DYNAMIC, False)
 IN_THE_SHADE = Part(mujoco.mjtCatBit.mjCAT_STATIC, True, sunny=False)
 BEFORE_THE_SUN = Part(mujoco.mjtCatBit.mjCAT_DYNAMIC, False, sunny=False)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Marks:
+    """Capsules that a picture shows and that are no part of the scene; of length 0: spheres."""
+
+    ends_world: Capsules
+    """(N, 2, 3) [m]."""
+    radius_m: Floats
+    """(N,)."""
+    rgb: Floats
+    """(N, 3) in [0, 1]."""
 
 
 class Canvas:
@@ -120,6 +141,29 @@ class Canvas:
         flags[mujoco.mjtRndFlag.mjRND_SKYBOX.value] = what.sky
         flags[mujoco.mjtRndFlag.mjRND_REFLECTION.value] = 0
         flags[mujoco.mjtRndFlag.mjRND_HAZE.value] = 0
+
+    def show_marks(self, marks: Marks) -> None:
+        """Choose marks alone for the next pictures, in the light of the scene."""
+        self._open()
+        self._shown = mujoco.MjvScene(self._model, maxgeom=len(marks.radius_m) + 64)
+        category = int(mujoco.mjtCatBit.mjCAT_DECOR)
+        mujoco.mjv_updateScene(
+            self._model, self._data, self._option, None, self._camera, category, self._shown
+        )
+        for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_SKYBOX):
+            self._shown.flags[flag.value] = 0
+        for (start, end), radius_m, rgb in zip(
+            marks.ends_world, marks.radius_m, marks.rgb, strict=True
+        ):
+            middle, quaternion, half_m = rod_pose(start, end)
+            turn, kind = np.zeros(9), mujoco.mjtGeom.mjGEOM_CAPSULE
+            mujoco.mju_quat2Mat(turn, quaternion)
+            if half_m < SPHERE_M:
+                kind, turn = mujoco.mjtGeom.mjGEOM_SPHERE, np.eye(3).ravel()
+            geom = self._shown.geoms[self._shown.ngeom]
+            size, rgba = np.array([radius_m, half_m, 0.0]), np.array([*rgb, 1.0], np.float32)
+            mujoco.mjv_initGeom(geom, int(kind), size, middle, turn, rgba)
+            self._shown.ngeom += 1
 
     def groups(self, groups: Sequence[int]) -> None:
         """Draw the geoms of these groups only."""

@@ -134,17 +134,24 @@ def show_props(model: mujoco.MjModel, data: mujoco.MjData, rows: Ints, held: Hel
         return
     known = rows[rows >= 0]
     data.mocap_pos[known] = PARKED_M
-    kind = np.zeros(0, np.int64) if held is None else held.kind
-    shown = np.full(len(kind), -1)
-    for prop in np.unique(kind[kind > 0]):
-        of_kind = np.flatnonzero(kind == prop)[: len(rows)]
-        shown[of_kind] = rows[: len(of_kind), prop - 1]
+    shown = rows_shown(rows, held)
     if held is not None:
         data.mocap_pos[shown[shown >= 0]] = held.position_world[shown >= 0]
         data.mocap_quat[shown[shown >= 0]] = held.quaternion_wxyz[shown >= 0]
     of_geom = model.body_mocapid[model.geom_bodyid]
     things = of_geom >= known.min()
     model.geom_group[things] = np.where(np.isin(of_geom[things], shown), SHOWN, HIDDEN)
+
+
+def rows_shown(rows: Ints, held: Held | None) -> Ints:
+    """Return (W + L,) the mocap row that shows each thing that is held or lies about, -1 of none;
+    rows: `WorkerVisuals.props`."""
+    kind = np.zeros(0, np.int64) if held is None else held.kind
+    shown = np.full(len(kind), -1)
+    for prop in np.unique(kind[kind > 0]):
+        of_kind = np.flatnonzero(kind == prop)[: len(rows)]
+        shown[of_kind] = rows[: len(of_kind), prop - 1]
+    return shown
 
 
 def _add_skin(spec: Any, skin: SkinMesh, body: Body, prefix: str) -> None:

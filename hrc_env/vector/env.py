@@ -23,6 +23,7 @@ from hrc_env.core.batching import copied, mapped, one, write_rows
 from hrc_env.core.errors import ConfigError, check_shape, whole
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.env import RENDER_MODES, EnvBase, spaces
+from hrc_env.render.views import CameraChoice
 from hrc_env.rewards import RewardConfig
 from hrc_env.settings import settle
 from hrc_env.simulation import Simulation
@@ -96,7 +97,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         self.metadata["autoreset_mode"] = self.autoreset_mode
         n_shards = min(threads_of(num_threads), self.num_envs)
         self.shards = Shards(self.num_envs, n_shards, partial(Simulation, settings=settings))
-        self.pictures = Pictures(self.shards, self.render_mode, self._size)
+        self.pictures = Pictures(self.shards, self.render_mode, self._size, self._shown)
         self.single_observation_space, self.single_action_space = spaces(self.shards.first)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
@@ -189,15 +190,21 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         for part in self.shards.parts:
             part.set_reward(weights)
 
-    def render(self) -> tuple[Any, ...] | None:  # type: ignore[override]
+    def render(self, camera: CameraChoice = None) -> tuple[Any, ...] | None:  # type: ignore[override]
         """Return every environment's picture, or its list of pictures, by the render mode.
 
         They are drawn one after the other, which is slow.
+
+        Args:
+            camera: through which, as of `HRCEnv.render`; not of lists.
+
+        Raises:
+            ConfigError: there is no such camera.
         """
         self.refuse_closed()
         if self.render_mode is None:
             return None
-        return tuple(self.pictures.of(k) for k in range(self.num_envs))
+        return tuple(self.pictures.of(k, camera) for k in range(self.num_envs))
 
     def member(self, k: int) -> Member:
         """Return environment `k` by itself."""
@@ -296,7 +303,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
 
 def _without_pictures(arguments: dict[str, Any]) -> dict[str, Any]:
     """Return arguments without those of pictures, which nobody draws."""
-    of_pictures = ("render_mode", "width", "height")
+    of_pictures = ("render_mode", "width", "height", "render_markers", "overlay")
     return {name: value for name, value in arguments.items() if name not in of_pictures}
 
 

@@ -16,6 +16,7 @@ from hrc_env.core.errors import ConfigError, NoAttributeError, unknown
 from hrc_env.core.mapping import plain
 from hrc_env.core.typing import Floats
 from hrc_env.env import ENDLESS, HRCEnv
+from hrc_env.render.views import CameraChoice
 from hrc_env.step_result import Observation
 from hrc_env.vector.options import steps_behind
 
@@ -62,10 +63,11 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
             "vector, with an action for each."
         )
 
-    def render(self) -> Any:
-        """Return a picture of this environment, or with a mode "..._list" those since the last."""
+    def render(self, camera: CameraChoice = None) -> Any:
+        """Return a picture of this environment, or with a mode "..._list" those since the last;
+        `camera` as of `HRCEnv.render`."""
         self._vector.refuse_closed()
-        return self._vector.pictures.of(self._k)
+        return self._vector.pictures.of(self._k, camera)
 
     def mosaic(self) -> NDArray[np.uint8]:
         """Return the cameras' pictures, as `HRCEnv` does."""

@@ -1,13 +1,15 @@
 """Pictures of many environments: of the present, or of every step since the last `render`."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hrc_env.core.errors import ConfigError
 from hrc_env.core.typing import Bools
 from hrc_env.env import RENDER_MODES
-from hrc_env.render.views import Views
+from hrc_env.render.views import CameraChoice, Views
 from hrc_env.vector.shards import Shards
 
 LISTS = tuple(f"{mode}_list" for mode in RENDER_MODES)
@@ -15,23 +17,40 @@ LISTS = tuple(f"{mode}_list" for mode in RENDER_MODES)
 
 
 class Pictures:
-    """Draws the environments of shards in a render mode, `size` (width, height) [px]."""
+    """Draws the environments of shards in a render mode, `size` (width, height) [px]; `shown`:
+    what of `Views.picture` is shown beside the scene."""
 
-    def __init__(self, shards: Shards, render_mode: str | None, size: tuple[int, int]) -> None:
+    def __init__(
+        self,
+        shards: Shards,
+        render_mode: str | None,
+        size: tuple[int, int],
+        shown: Mapping[str, bool],
+    ) -> None:
         self.render_mode, self.size, self.bounds = render_mode, size, shards.bounds
+        self.shown = dict(shown)
         self.views = [Views(part) for part in shards.parts]
         self._film: list[list[NDArray[Any]]] = [[] for _ in range(shards.bounds[-1])]
         """Pictures of every environment since its last `of`, in the modes `LISTS`."""
 
-    def of(self, k: int) -> Any:
+    def of(self, k: int, camera: CameraChoice = None) -> Any:
         """Return environment `k`'s picture, or its list of them, which begins anew; None without a
-        mode."""
+        mode. `camera` as of `Views.picture`.
+
+        Raises:
+            ConfigError: there is no such camera, or lists are of the usual one.
+        """
         if self.render_mode is None:
             return None
         if self.render_mode in LISTS:
+            if camera is not None:
+                raise ConfigError(
+                    f"render_mode={self.render_mode!r} keeps pictures from the usual viewpoint: "
+                    f"leave out camera={camera!r}, or use one of {', '.join(RENDER_MODES)}."
+                )
             shown, self._film[k] = self._film[k], []
             return shown
-        return self._drawn(k)
+        return self._drawn(k, camera)
 
     def mosaic(self, k: int) -> NDArray[np.uint8]:
         """Return the cameras' pictures of environment `k`, as of `Views`."""
@@ -52,9 +71,10 @@ class Pictures:
         for view in self.views:
             view.close()
 
-    def _drawn(self, k: int) -> NDArray[Any]:
+    def _drawn(self, k: int, camera: CameraChoice = None) -> NDArray[Any]:
         view, b = self._where(k)
-        return view.picture(str(self.render_mode).startswith("depth"), b, self.size)
+        is_depth = str(self.render_mode).startswith("depth")
+        return view.picture(is_depth, b, self.size, camera=camera, **self.shown)
 
     def _where(self, k: int) -> tuple[Views, int]:
         """Return the views of environment `k`'s shard, and its number there."""

@@ -360,7 +360,7 @@ class Env:
     def view(self) -> NDArray[np.uint8]:
         """Return the scene from the viewpoint of people who look on."""
         base: Any = self._env.unwrapped
-        return base.render()
+        return base.views.picture(markers=False)
 
     def picture(self) -> NDArray[np.uint8]:
         """Return the four cameras' images with crops and estimates drawn into them."""

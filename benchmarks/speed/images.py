@@ -1,0 +1,111 @@
+"""What camera images in observations cost: python -m benchmarks.speed.images
+
+Everybody takes turns, so that a noisy machine slows all of them alike: a step without images, the
+same with one and with all images, `render()`, and the rig drawn as it is for people. Milliseconds
+of processor time, medians with quartiles, and shares of `render()` and of a step; `--out` writes
+them as JSON.
+"""
+
+import json
+import sys
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import tyro
+from rich.console import Console
+from rich.table import Table
+
+from hrc_env.core.results import provenance, write_whole
+from hrc_env.geometry.cameras import resized
+
+STEP, RENDER = "a step without images", "render(), with shadows"
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """Measure what images cost."""
+
+    rounds: int = 60
+    """How often everybody has a turn."""
+    size: int = 84
+    """Sides of images and pictures [px]."""
+    task: str = "HRCReach-v0"
+    """Which environment, by its id."""
+    out: Path | None = None
+    """A JSON file for the numbers."""
+
+
+def contenders(arguments: Arguments, exits: ExitStack) -> dict[str, Callable[[], Any]]:
+    """Make everybody, ready to have a turn."""
+    size = arguments.size
+
+    def make(**given: Any) -> Any:
+        env = gymnasium.make(arguments.task, perception="keypoints", max_episode_steps=-1, **given)
+        exits.callback(env.close)
+        env.reset(seed=0)
+        return env.unwrapped
+
+    def stepped(env: Any) -> Callable[[], Any]:
+        rng, n = np.random.default_rng(0), env.action_space.shape
+        return lambda: env.step(rng.uniform(-1, 1, n).astype(np.float32))
+
+    def drawn(env: Any) -> Callable[[], Any]:
+        return env.simulation.draw_images
+
+    one = make(observe_images={"height": size, "width": size, "cameras": [0]})
+    every = make(observe_images=(size, size))
+    shown = make(render_mode="rgb_array", width=size, height=size)
+    rig = [resized(camera, size, size) for camera in shown.simulation.scene.cameras]
+    return {
+        STEP: stepped(shown),
+        "a step with one image": stepped(one),
+        "a step with all images": stepped(every),
+        "one image": drawn(one),
+        "all images": drawn(every),
+        RENDER: shown.render,
+        "all cameras as for people": lambda: shown.views._drawn(rig, shown.views.glance()),
+    }
+
+
+def measure(arguments: Arguments) -> dict[str, list[float]]:
+    """Return milliseconds of processor time of every turn, by name."""
+    with ExitStack() as exits:
+        turns = contenders(arguments, exits)
+        took: dict[str, list[float]] = {name: [] for name in turns}
+        for round_ in range(arguments.rounds + 2):
+            for name, turn in turns.items():
+                started_s = time.process_time()
+                turn()
+                if round_ >= 2:  # the first ones draw what stands still
+                    took[name].append(1e3 * (time.process_time() - started_s))
+    return took
+
+
+def main(arguments: Arguments) -> int:
+    """Measure, print a table, write the numbers."""
+    took = measure(arguments)
+    table = Table("", "ms", "quartiles", "of render()", "of a step")
+    numbers = {}
+    for name, values in took.items():
+        low, middle, high = np.percentile(values, (25, 50, 75)).tolist()
+        of_render, of_step = (float(np.median(np.divide(values, took[k]))) for k in (RENDER, STEP))
+        numbers[name] = {
+            "ms": middle, "quartiles_ms": [low, high], "of_render": of_render, "of_step": of_step,
+        }  # fmt: skip
+        cells = f"{middle:.2f}", f"{low:.2f} to {high:.2f}", f"{of_render:.2f}", f"{of_step:.2f}"
+        table.add_row(name, *cells)
+    Console().print(table)
+    if arguments.out is not None:
+        record = {**provenance(), "size_px": arguments.size, "task": arguments.task}
+        write_whole(arguments.out, json.dumps({**record, "measured": numbers}, indent=1))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(tyro.cli(Arguments, description=__doc__)))
