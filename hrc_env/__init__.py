@@ -66,6 +66,7 @@ if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
     from hrc_env.registration import register_robot as register_robot
     from hrc_env.registration import register_shield as register_shield
     from hrc_env.registration import register_task as register_task
+    from hrc_env.rewards import RewardConfig as RewardConfig
     from hrc_env.rewards import RewardTerm as RewardTerm
     from hrc_env.safety.config import ShieldConfig as ShieldConfig
     from hrc_env.safety.shield import Shield as Shield
@@ -80,6 +81,8 @@ if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
     from hrc_env.scene.robot_import import robot_from_mjcf as robot_from_mjcf
     from hrc_env.tasks.goal import Goal as Goal
     from hrc_env.tasks.task import Task as Task
+    from hrc_env.tasks.task import find_task as find_task
+    from hrc_env.tasks.task import with_rewards as with_rewards
     from hrc_env.tracking.config import TrackerConfig as TrackerConfig
     from hrc_env.tracking.estimators import Estimator as Estimator
     from hrc_env.tracking.estimators import EstimatorSpec as EstimatorSpec
@@ -116,6 +119,7 @@ PUBLIC = {
     "Goal": "hrc_env.tasks.goal",
     "ObservationTerm": "hrc_env.observations",
     "ReachTarget": "hrc_env.geometry.reach",
+    "RewardConfig": "hrc_env.rewards",
     "RewardTerm": "hrc_env.rewards",
     "Task": "hrc_env.tasks.task",
     "TaskScene": "hrc_env.world",
@@ -123,7 +127,9 @@ PUBLIC = {
     "WorkerSignal": "hrc_env.world",
     "Workplace": "hrc_env.world",
     "World": "hrc_env.world",
+    "find_task": "hrc_env.tasks.task",
     "register_task": "hrc_env.registration",
+    "with_rewards": "hrc_env.tasks.task",
     # robots and shields
     "Hand": "hrc_env.scene.robot",
     "ROBOTS": "hrc_env.scene.robot",

@@ -12,9 +12,11 @@ import numpy as np
 from hrc_env.belief import Belief
 from hrc_env.core.errors import ConfigError, check_fields, check_shape
 from hrc_env.core.kernels import kernel
+from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.typing import Floats
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class RewardConfig:
     """Weights of the terms that every task shares; a task's own are in its settings."""
@@ -40,6 +42,7 @@ KINDS = ("dense", "sparse")
 """What a task's `reward` can be: whether coming nearer counts, too."""
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class RewardTerm:
     """One summand of the reward."""

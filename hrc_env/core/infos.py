@@ -5,6 +5,7 @@ from the reset on, and no NaN: a distance to nobody is infinite, and beside a fi
 says whether the number was measured. Words are indices; `worded` gives the words.
 """
 
+import fnmatch
 import re
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -13,6 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hrc_env.core.brought import described
+from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.core.typing import Ints
 
 Info = dict[str, NDArray[Any]]
@@ -203,6 +206,29 @@ def published(info: Info) -> Info:
         if entry.flag is not None:
             told[entry.flag] = known.astype(float)
     return told
+
+
+def matching(patterns: str | Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of infos that patterns choose, in the order of the infos.
+
+    Args:
+        patterns: names, or patterns of names as of files: "safety/*"; one may stand alone.
+        names: of all infos that there are.
+
+    Raises:
+        ConfigError: a pattern that is no text, or that no name matches, with the nearest name.
+    """
+    given = [patterns] if isinstance(patterns, str) else patterns
+    if not isinstance(given, Sequence) or not all(isinstance(each, str) for each in given):
+        raise ConfigError(
+            'infos must be names or patterns of names, as ("cost", "safety/*"), got '
+            f"{described(patterns)}."
+        )
+    for each in given:
+        if not any(fnmatch.fnmatchcase(name, each) for name in names):
+            folders = dict.fromkeys(f"{name.rpartition('/')[0]}/*" for name in names if "/" in name)
+            raise unknown("info", each, [*folders, *names])
+    return tuple(name for name in names if any(fnmatch.fnmatchcase(name, each) for each in given))
 
 
 def of_workers(**parts: Ints) -> Info:

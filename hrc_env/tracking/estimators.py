@@ -22,6 +22,7 @@ import numpy as np
 
 from hrc_env.core.brought import check_arguments, check_kind, described
 from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.registry import Registry
 from hrc_env.core.skeleton import N_JOINTS
@@ -114,6 +115,7 @@ class Estimator(Protocol[State]):
         ...
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class EstimatorSpec:
     """An estimator by name: how it is made, and what may be set.
