@@ -33,6 +33,9 @@ if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
     from hrc_env.core.skeleton import MIRROR as MIRROR
     from hrc_env.env import HRCEnv as HRCEnv
     from hrc_env.env_config import EnvConfig as EnvConfig
+    from hrc_env.evaluation.dataset import Episode as Episode
+    from hrc_env.evaluation.dataset import EpisodeSet as EpisodeSet
+    from hrc_env.evaluation.dataset import load_episodes as load_episodes
     from hrc_env.evaluation.episodes import Score as Score
     from hrc_env.evaluation.episodes import evaluate as evaluate
     from hrc_env.evaluation.intervals import mean_over as mean_over
@@ -178,11 +181,14 @@ PUBLIC = {
     # agents and what their episodes come to
     "Agent": "hrc_env.agents.env_info",
     "EnvInfo": "hrc_env.agents.env_info",
+    "Episode": "hrc_env.evaluation.dataset",
+    "EpisodeSet": "hrc_env.evaluation.dataset",
     "Metric": "hrc_env.core.results",
     "Score": "hrc_env.evaluation.episodes",
     "Transition": "hrc_env.evaluation.rollout",
     "env_info": "hrc_env.agents.env_info",
     "evaluate": "hrc_env.evaluation.episodes",
+    "load_episodes": "hrc_env.evaluation.dataset",
     "make_agent": "hrc_env.agents.registry",
     "mean_over": "hrc_env.evaluation.intervals",
     "paired": "hrc_env.evaluation.intervals",

@@ -182,6 +182,9 @@ OWN = Entry("-", "", 0.0)
 ALWAYS = ("reward/", "worker_", "cost_", f"{MISCALIBRATED}_")
 """Names that begin so always have a value."""
 
+OF_BELIEF = ("reward/", "shield/", "perception/")
+"""Names that begin so are of what the robot believes."""
+
 
 @cache
 def entry_of(name: str) -> Entry:
@@ -206,6 +209,11 @@ def published(info: Info) -> Info:
         if entry.flag is not None:
             told[entry.flag] = known.astype(float)
     return told
+
+
+def is_of_belief(name: str) -> bool:
+    """Return whether an info is of what the robot believes; all others are counted on the truth."""
+    return name.startswith(OF_BELIEF)
 
 
 def matching(patterns: str | Sequence[str], names: Sequence[str]) -> tuple[str, ...]:

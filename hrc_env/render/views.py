@@ -167,6 +167,11 @@ class Views:
             images.append(image)
         return images
 
+    def of_cameras(self, width: int, height: int, b: int = 0) -> NDArray[np.uint8]:
+        """What the cameras see of environment `b`, (C, height, width, 3), without shadows and
+        without anything drawn over it."""
+        return np.stack(self._through_cameras(width, height, self.glance(b)))
+
     def mosaic(self, b: int = 0) -> Image:
         """The cameras of environment `b` in two columns."""
         return overlay.tile(self.cameras(*MOSAIC_TILE, self.glance(b)), 2)

@@ -38,6 +38,11 @@ class Pictures:
         view, b = self._where(k)
         return view.mosaic(b)
 
+    def of_cameras(self, k: int, width: int, height: int) -> NDArray[np.uint8]:
+        """Return what the cameras see of environment `k`, (C, height, width, 3)."""
+        view, b = self._where(k)
+        return view.of_cameras(width, height, b)
+
     def take(self, chosen: Bools, anew: Bools) -> None:
         """Keep pictures of the `chosen` environments (B,), and only these of those that start
         `anew`."""
