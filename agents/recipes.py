@@ -28,7 +28,10 @@ RECIPES: Mapping[str, Mapping[str, Any]] = {
     "HRCDrywall-v0": IMITATION,
     "HRCDelivery-v0": {**IMITATION, "control": "joint", "demonstrations": 1024},
 }
-"""By task: where that differs from `Run`."""
+"""How each task is learnt by default: arguments of `python -m hrc_env train` by the task's id.
+
+Where they differ from PPO, control "joint", no demonstrations and 1,000,000 steps. The learners'
+own settings are `PPOSettings` and `SACSettings`."""
 
 
 LIMITED: Mapping[str, Any] = {"timesteps": 3_000_000, "proximity": 0.0}

@@ -83,7 +83,7 @@ class HRCVecEnv(VecEnv):
         self.stagger, self.started_s = stagger, time.time()
         self.seed(seed)
         self.costs: Floats = np.zeros(num_envs)
-        """(num_envs,) the cost of the last step; 0 after a reset."""
+        """(num_envs,) the cost of the last step [control steps]; 0 after a reset."""
         self._action = np.zeros((num_envs, *(actions.shape or ())), np.float32)
         self._sums = EpisodeSums(num_envs)
 

@@ -71,13 +71,14 @@ ENTRIES: dict[str, Entry] = {
         "0 or 1", "the true surfaces touched at any physics substep, by distance"
     ),
     "cost": Entry(
-        "-", "sum of `cost.components`, both by default; 0 after a reset. There are also "
+        "control steps", "sum of `cost.components`: by default 1 for a step nearer than "
+        "`cost.proximity_m` and 1 for one that touches; 0 after a reset. There are also "
         "`towards`, contacts that begin while the robot comes; `force`, the "
         "`contact_force_ratio` of contacts; `too_near`; `near_miss`: each that is chosen is in "
         "`cost_<name>`",
     ),
-    "cost_sum": Entry("-", "the same, under the name that some safe-RL libraries read"),
-    "episode_cost": Entry("-", "running sum of `cost`"),
+    "cost_sum": Entry("control steps", "the same, under the name that some safe-RL libraries read"),
+    "episode_cost": Entry("control steps", "running sum of `cost` over the episode"),
     "safety/min_separation_m": Entry(
         "m", "least true separation of the step; infinite without workers", np.inf
     ),
