@@ -32,8 +32,8 @@ class RewardConfig:
     """Taken off for the mean squared change of the action."""
     proximity: float = 2.0
     """Taken off for closeness to the *estimated* body, times the term's shape in [0, 2.25]. With 6
-    from the first step PPO reached 0 goals an episode of `HRCReach-v0` after 135,000 steps, with 0
-    it reached 5.7."""
+    from the first step PPO (one seed) reached no goal of `HRCReach-v0` in the last 64 episodes
+    before step 135,000, with 0 it reached 5.7 in each."""
     proximity_reach_m: float = 0.3
     """Closeness begins to count below this separation of the surfaces [m]."""
     unknown: float = 0.25
