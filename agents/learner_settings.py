@@ -1,5 +1,6 @@
-"""Settings of the learners, which need no learner to be read."""
+"""How tasks are learnt, and settings of the learners: they need no learner to be read."""
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -102,3 +103,18 @@ def _features(near_and_far: bool) -> dict[str, Any]:
 
 IMITATOR = PPOSettings(hidden=(256, 256), near_and_far=True, learning_rate=5e-5, gamma=0.99)
 """Of who begins with what an expert does, and keeps most of it."""
+
+IMITATION: Mapping[str, Any] = {"control": "twist", "demonstrations": 256, "timesteps": 0}
+"""Of what PPO alone does not find; picking and delivering it gained nothing after that."""
+RECIPES: Mapping[str, Mapping[str, Any]] = {
+    "HRCReachGoal-v0": {"algorithm": "sac", "control": "tool", "timesteps": 60_000},
+    "HRCPickPlace-v0": {**IMITATION, "demonstrations": 512},
+    "HRCPickPlaceGoal-v0": {**IMITATION, "demonstrations": 512},
+    "HRCHandover-v0": IMITATION,
+    "HRCDrywall-v0": IMITATION,
+    "HRCDelivery-v0": {**IMITATION, "control": "joint", "demonstrations": 1024},
+}
+"""How each task is learnt by default: arguments of `python -m hrc_env train` by the task's id.
+
+Where they differ from PPO, control "joint", no demonstrations and 1,000,000 steps. The learners'
+own settings are `PPOSettings` and `SACSettings`."""

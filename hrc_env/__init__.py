@@ -17,9 +17,9 @@ if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
     from hrc_env.agents.env_info import Agent as Agent
     from hrc_env.agents.env_info import EnvInfo as EnvInfo
     from hrc_env.agents.env_info import env_info as env_info
+    from hrc_env.agents.learner_settings import RECIPES as RECIPES
     from hrc_env.agents.learner_settings import PPOSettings as PPOSettings
     from hrc_env.agents.learner_settings import SACSettings as SACSettings
-    from hrc_env.agents.recipes import RECIPES as RECIPES
     from hrc_env.agents.registry import make_agent as make_agent
     from hrc_env.belief import Belief as Belief
     from hrc_env.belief import standard_deviation_m as standard_deviation_m
@@ -188,7 +188,7 @@ PUBLIC = {
     "EpisodeSet": "hrc_env.evaluation.dataset",
     "Metric": "hrc_env.core.results",
     "PPOSettings": "hrc_env.agents.learner_settings",
-    "RECIPES": "hrc_env.agents.recipes",
+    "RECIPES": "hrc_env.agents.learner_settings",
     "SACSettings": "hrc_env.agents.learner_settings",
     "Score": "hrc_env.evaluation.episodes",
     "Transition": "hrc_env.evaluation.rollout",
