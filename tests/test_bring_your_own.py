@@ -178,6 +178,19 @@ def test_an_estimator_works_wherever_one_is_named():
     assert OWN in hrc("list").stdout
 
 
+def test_an_estimator_says_the_same_single_and_in_a_batch_with_late_frames_replayed():
+    late = [{"kind": "late", "cameras": ["camera_1"], "amount": 0.13}]
+    arguments = {"perception": "keypoints", "estimator": OWN, "faults": late}
+    many = gymnasium.make_vec("HRCReach-v0", 3, **arguments)
+    one = gymnasium.make("HRCReach-v0", **arguments)
+    many.reset(seed=[3, 4, 5])
+    one.reset(seed=4)
+    for _ in range(12):
+        actions = many.action_space.sample()
+        seen, *_ = many.step(actions)
+        np.testing.assert_array_equal(seen[1], one.step(actions[1])[0])
+
+
 def test_a_function_that_makes_an_estimator_is_one():
     from hrc_env_import_estimator import DltKalman
 
