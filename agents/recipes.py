@@ -6,6 +6,8 @@ from typing import Any
 
 from hrc_env.cli.train import Train
 
+from .learner_settings import RECIPES as RECIPES
+
 
 @dataclass(frozen=True, kw_only=True)
 class Run(Train):
@@ -16,19 +18,6 @@ class Run(Train):
     demonstrations: int = 0
     timesteps: int = 1_000_000
     proximity: float = 2.0
-
-
-IMITATION: Mapping[str, Any] = {"control": "twist", "demonstrations": 256, "timesteps": 0}
-"""Of what PPO alone does not find; picking and delivering it gained nothing after that."""
-RECIPES: Mapping[str, Mapping[str, Any]] = {
-    "HRCReachGoal-v0": {"algorithm": "sac", "control": "tool", "timesteps": 60_000},
-    "HRCPickPlace-v0": {**IMITATION, "demonstrations": 512},
-    "HRCPickPlaceGoal-v0": {**IMITATION, "demonstrations": 512},
-    "HRCHandover-v0": IMITATION,
-    "HRCDrywall-v0": IMITATION,
-    "HRCDelivery-v0": {**IMITATION, "control": "joint", "demonstrations": 1024},
-}
-"""By task: where that differs from `Run`."""
 
 
 LIMITED: Mapping[str, Any] = {"timesteps": 3_000_000, "proximity": 0.0}

@@ -1,4 +1,4 @@
-"""Episodes of an agent as a data set of Minari (https://minari.farama.org).
+"""Episodes of an agent as a data set: of Minari (https://minari.farama.org), or a folder.
 
 They are kept as they are finished, in a folder beside the data set, which is made of them in the
 end, at once.
@@ -7,11 +7,11 @@ end, at once.
 import contextlib
 import json
 import os
+import shlex
 import shutil
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
-from functools import partial
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
@@ -22,19 +22,26 @@ from rich.console import Console
 
 from hrc_env.cli.record import Record
 from hrc_env.core.errors import ConfigError, MissingExtraError
+from hrc_env.core.infos import matching
+from hrc_env.core.mapping import for_json
 from hrc_env.core.progress import progress_bar
-from hrc_env.core.results import write_whole
+from hrc_env.core.results import provenance, write_whole
+from hrc_env.evaluation.dataset import ABOUT, FORMAT, draft_of, name_of, read_arrays, within
+from hrc_env.evaluation.moments import Kept, Moment, grouped
 from hrc_env.evaluation.rollout import Transition, rollout
+from hrc_env.geometry.cameras import projections
 from hrc_env.pipeline.ready import make_ready
 from hrc_env.vector.env import HRCVectorEnv
 
 from .env_info import Agent, Observation, env_info
 from .registry import make_agent
 
-INFOS = ("cost", "is_success")
-"""What is kept of the infos."""
+TOP = ("cost", "is_success")
+"""Infos that a Minari data set has outside of the groups "belief" and "truth"."""
 ROOT = "MINARI_DATASETS_PATH"
 """Environment variable of Minari: where data sets are."""
+MOST_BYTES = 4 * 2**30
+"""Images of episodes that are played side by side, which are held in memory until they end."""
 Episode = dict[str, Any]
 """Arrays by name: observations, of which there is one more than of actions, and so on."""
 
@@ -43,28 +50,97 @@ def run(asked: Record) -> int:
     """Record, print the place, and return the exit status.
 
     Raises:
-        MissingExtraError: Minari is not installed.
-        ConfigError: the data set exists, or cannot be called so.
+        MissingExtraError: Minari is asked for and not installed.
+        ConfigError: the data set exists, cannot be called so, or infos or images are asked for
+            that cannot be.
     """
-    minari = _minari()
-    path = _free(minari, asked.out)
-    draft, console = path.with_name(f".{path.name}.draft"), Console()
+    minari = _minari() if asked.folder is None else None
+    path = _free_folder(asked.folder) if asked.folder else _free(minari, str(asked.out))
+    about = _about(asked)
+    draft, console = draft_of(path), Console()
     _same_as_before(asked, draft)
-    make_ready(console, asked.perception)
+    make_ready(console, asked.perception, draws=bool(asked.observe_images))
     firsts = range(0, asked.episodes, asked.num_envs)
     with progress_bar(console, "recording") as say:
         for first in firsts:
-            kept, n = draft / f"{first}.npz", min(asked.num_envs, asked.episodes - first)
-            if not kept.exists():
-                _keep(kept, _played(asked, first, n))
+            n = min(asked.num_envs, asked.episodes - first)
+            files = [draft / name_of(first + b) for b in range(n)]
+            if not all(file.exists() for file in files):
+                for file, episode in zip(files, _played(asked, first, n), strict=True):
+                    _keep(file, episode)
             say(1 / len(firsts), "")
-    episodes = [each for first in firsts for each in _kept(draft / f"{first}.npz")]
-    _write(minari, asked, path, draft, episodes)
-    n_steps = sum(len(each["rewards"]) for each in episodes)
-    shutil.rmtree(draft)
-    said = f"{len(episodes)} episodes, {n_steps:,} steps in {path}: minari.load_dataset"
-    console.print(f'{said}("{asked.out}")', markup=False, highlight=False, soft_wrap=True)
+    files = [draft / name_of(k) for k in range(asked.episodes)]
+    n_steps = sum(_steps_of(file) for file in files)
+    if minari is None:
+        write_whole(draft / ABOUT, json.dumps(about, indent=1))
+        os.replace(draft, path)
+        how = f'hrc_env.load_episodes("{path}")'
+    else:
+        _write(minari, asked, path, draft, [read_arrays(file) for file in files])
+        shutil.rmtree(draft)
+        how = f'minari.load_dataset("{asked.out}")'
+    said = f"{len(files)} episodes, {n_steps:,} steps in {path}: {how}"
+    console.print(said, markup=False, highlight=False, soft_wrap=True)
     return 0
+
+
+def _steps_of(file: Path) -> int:
+    with np.load(file) as arrays:
+        return len(arrays["rewards"])
+
+
+def _free_folder(path: Path) -> Path:
+    """The place of a data set in a folder; `ConfigError` if there is anything."""
+    if path.exists():
+        raise ConfigError(
+            f"{path} is there already, and nothing is added to it: choose another --folder, or "
+            "delete it."
+        )
+    return path
+
+
+def command(asked: Record) -> str:
+    """The line that records so."""
+    words = ["python", "-m", "hrc_env", "record", asked.task]
+    for each in fields(Record):
+        value = getattr(asked, each.name)
+        if value == each.default or each.name == "task":
+            continue
+        option = f"--{each.name.replace('_', '-')}"
+        several = value if isinstance(value, tuple | list) else [] if value is True else [value]
+        words += [option, *map(str, several)]
+    return shlex.join(words)
+
+
+def _about(asked: Record) -> dict[str, Any]:
+    """What a data set is: command, arguments, configuration, versions, seeds, cameras.
+
+    Raises:
+        ConfigError: the environment, infos or images that are asked for cannot be.
+    """
+    env = HRCVectorEnv(1, **asked.keywords())
+    try:
+        _kept_of(asked, env, env.reset(seed=asked.seed)[1], asked.num_envs)
+        first = env.shards.first
+        cameras = first.scene.cameras
+        slices = {name: [part.start, part.stop] for name, part in first.layout.slices.items()}
+        return {
+            "format": FORMAT, "command": command(asked), "task": asked.task,
+            "episodes": asked.episodes,
+            "seeds": list(range(asked.seed, asked.seed + asked.episodes)),
+            "environment": for_json(asked.keywords(), "environment"),
+            "arguments": json.loads(json.dumps(asdict(asked), default=str)),
+            "config": json.loads(json.dumps(asdict(env.config), default=str)),
+            "ctrl_dt_s": env.config.ctrl_dt, "observation": slices,
+            "cameras": [
+                {"name": camera.name, "P": P.tolist(), "size_px": [camera.width_px,
+                 camera.height_px]}
+                for camera, P in zip(cameras, projections(cameras), strict=True)
+            ],
+            **provenance(),
+        }  # fmt: skip
+    finally:
+        env.close()
 
 
 def _minari() -> Any:
@@ -117,11 +193,35 @@ def _played(asked: Record, first: int, n: int) -> list[Episode]:
     try:
         agent = make_agent(asked.agent, env_info(env.shards.first), asked.seed + first, asked.trust)
         begun = env.reset(seed=asked.seed + first)
-        steps = list(rollout(env, _Clipped(agent), begun[0]))
+        kept = _kept_of(asked, env, begun[1], n)
+        steps, moments = list[Transition](), [kept.of(env, begun[1])]
+        for step in rollout(env, _Clipped(agent), begun[0]):
+            steps.append(step)
+            moments.append(kept.of(env, step.info))
         lengths = np.sum([step.is_playing for step in steps], axis=0)
-        return [_episode(begun, steps[: lengths[b]], b, asked.seed + first + b) for b in range(n)]
+        seeds = range(asked.seed + first, asked.seed + first + n)
+        parts = [(steps[:length], moments[: length + 1]) for length in lengths]
+        return [_episode(begun[0], *parts[b], b, seed) for b, seed in enumerate(seeds)]
     finally:
         env.close()
+
+
+def _kept_of(asked: Record, env: HRCVectorEnv, info: Mapping[str, Any], n: int) -> Kept:
+    """What of each moment of `n` episodes side by side is asked for, given the infos that there
+    are; `ConfigError` for others, and for more images than memory holds."""
+    there = [name for name in info if not name.startswith("_")]
+    names = dict.fromkeys((*TOP, *matching(asked.infos, there)))
+    if (images := env.shards.first.images) is not None:
+        n_moments = (env.max_episode_steps + 1) * n
+        n_bytes = n_moments * len(images.names) * int(np.prod(images.shape))
+        if n_bytes > MOST_BYTES:
+            raise ConfigError(
+                f"Images of {len(images.names)} cameras, {images.shape[0]} x {images.shape[1]}, "
+                f"are {n_bytes / 2**30:.1f} GiB for {n} episodes side by side, and at most "
+                f"{MOST_BYTES / 2**30:.0f} are held in memory: observe smaller images, fewer "
+                "cameras, or play fewer environments together (--num-envs)."
+            )
+    return Kept(tuple(names), asked.poses, asked.keypoints)
 
 
 class _Clipped:
@@ -135,41 +235,28 @@ class _Clipped:
         return np.clip(self.agent.act(observation), -1, 1)
 
 
-def _episode(begun: tuple[Any, Any], steps: Sequence[Transition], b: int, seed: int) -> Episode:
+def _episode(
+    begun: Observation, steps: Sequence[Transition], moments: Sequence[Moment], b: int, seed: int
+) -> Episode:
     """Return the episode of environment `b`."""
-    seen = [begun[0], *(step.observation for step in steps)]
-    infos = [begun[1], *(step.info for step in steps)]
-    parts = seen if isinstance(seen[0], Mapping) else [{"": each} for each in seen]
-    observations = {f"observations/{k}": np.stack([p[k][b] for p in parts]) for k in parts[0]}
+    seen = [begun, *(step.observation for step in steps)]
+    parts = [each if isinstance(each, Mapping) else {"": each} for each in seen]
     return {
-        **observations,
+        **{f"observations/{k}": np.stack([p[k][b] for p in parts]) for k in parts[0]},
         "actions": np.stack([step.action[b] for step in steps]),
         "rewards": np.stack([step.reward[b] for step in steps]),
         "terminations": np.stack([step.terminated[b] for step in steps]),
         "truncations": np.stack([step.truncated[b] for step in steps]),
-        **{f"infos/{name}": np.stack([each[name][b] for each in infos]) for name in INFOS},
+        **{name: np.stack([each[name][b] for each in moments]) for name in moments[0]},
         "seed": np.array(seed),
     }
 
 
-def _keep(path: Path, episodes: list[Episode]) -> None:
-    """Write episodes into a file, which appears whole."""
-    named = {
-        f"{k}/{name}": array for k, each in enumerate(episodes) for name, array in each.items()
-    }
+def _keep(path: Path, episode: Episode) -> None:
+    """Write an episode into a file, which appears whole."""
     rough = path.with_suffix(".rough.npz")
-    np.savez_compressed(rough, **named)
+    np.savez_compressed(rough, **episode)
     os.replace(rough, path)
-
-
-def _kept(path: Path) -> list[Episode]:
-    """The episodes of such a file."""
-    found: dict[int, Episode] = {}
-    with np.load(path) as file:
-        for name in file.files:
-            number, _, rest = name.partition("/")
-            found.setdefault(int(number), {})[rest] = file[name]
-    return [found[k] for k in sorted(found)]
 
 
 def _write(minari: Any, asked: Record, path: Path, draft: Path, episodes: list[Episode]) -> None:
@@ -178,14 +265,17 @@ def _write(minari: Any, asked: Record, path: Path, draft: Path, episodes: list[E
     with contextlib.closing(env), _root(draft / "whole") as root, warnings.catch_warnings():
         warnings.simplefilter("ignore")  # that there is no author, and so on
         shutil.rmtree(root, ignore_errors=True)
-        minari.create_dataset_from_buffers(
+        made = minari.create_dataset_from_buffers(
             asked.out, [_buffer(k, each) for k, each in enumerate(episodes)], env=env,
             algorithm_name=asked.agent, description=asked.task, requirements=["hrc_env"],
         )  # fmt: skip
-    namespace = asked.out.rpartition("/")[0]
+        about = {"hrc_env_command": command(asked), "hrc_env_versions": json.dumps(provenance())}
+        made.storage.update_metadata(about)
+    name = str(asked.out)
+    namespace = name.rpartition("/")[0]
     if namespace and namespace not in minari.namespace.list_local_namespaces():
         minari.namespace.create_namespace(namespace)
-    os.replace(draft / "whole" / asked.out, path)
+    os.replace(draft / "whole" / name, path)
 
 
 @contextlib.contextmanager
@@ -202,17 +292,17 @@ def _root(folder: Path) -> Iterator[Path]:
 
 
 def _buffer(k: int, episode: Episode) -> Any:
-    """An episode as Minari takes it."""
+    """An episode as Minari takes it; belief and other things that were kept are groups of infos."""
     from minari.data_collector import EpisodeBuffer
 
-    within = partial(_within, episode)
-    seen = within("observations")
+    seen, infos = within(episode, "observations"), dict[str, Any]()
+    for group in ("belief", "truth", "keypoints"):
+        infos[group] = within(episode, group)
+    infos |= {name: episode[grouped(name)] for name in TOP}
+    for name in TOP:
+        infos[grouped(name).partition("/")[0]].pop(name)
     return EpisodeBuffer(
-        id=k, seed=int(episode["seed"]), observations=seen.get("", seen), infos=within("infos"),
+        id=k, seed=int(episode["seed"]), observations=seen.get("", seen),
+        infos={name: value for name, value in infos.items() if len(value)},
         **{n: episode[n] for n in ("actions", "rewards", "terminations", "truncations")},
     )  # fmt: skip
-
-
-def _within(episode: Episode, folder: str) -> Episode:
-    """What is called "folder/...", by the rest of the name."""
-    return {k[len(folder) + 1 :]: part for k, part in episode.items() if k.startswith(f"{folder}/")}

@@ -3,45 +3,16 @@
 Haarnoja et al. 2018, arXiv:1801.01290; Andrychowicz et al. 2017, arXiv:1707.01495.
 """
 
-from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from hrc_env.core.errors import learner
 from hrc_env.sb3 import HRCVecEnv
 from hrc_env.tasks.task import goal_of
 
-from .features import NearAndFar
+from .learner_settings import SACSettings as SACSettings
 
 with learner():
     from stable_baselines3 import SAC, HerReplayBuffer
-
-
-@dataclass(frozen=True, slots=True)
-class SACSettings:
-    """Settings of the learner."""
-
-    buffer_size: int = 200_000
-    """Transitions that are kept, of all environments together."""
-    batch_size: int = 256
-    """Samples in a gradient step."""
-    gradient_steps: int = 16
-    """After each step of all environments."""
-    learning_rate: float = 1e-3
-    """Adam's step size."""
-    gamma: float = 0.95
-    """Discount per step; 0.95 looks about 1 s ahead."""
-    tau: float = 0.05
-    """Share by which the target networks follow in a gradient step."""
-    ent_coef: str = "auto_0.05"
-    """Weight of the entropy: found as it goes, from this on."""
-    hidden: tuple[int, ...] = (128, 128)
-    """Hidden layers of actor and critics (ReLU)."""
-    near_and_far: bool = True
-    """Whether it sees every entry at two scales, and the way to its goal (`agents.features`):
-    without that, hindsight found no goal of reaching in 5,000 gradient steps; with it, in 800."""
-    relabelled: int = 4
-    """With hindsight, how many transitions are judged by goals that were achieved later in their
-    episode, for each that is judged by its own."""
 
 
 def make_learner(
@@ -59,19 +30,16 @@ def make_learner(
     Raises:
         NoGoalError: hindsight is asked for where there are no goals apart from the observation.
     """
-    task, values = env.simulation.task, asdict(settings)
+    task = env.simulation.task
     hindsight = task.goal is not None if her is None else her
     buffer = {}
     if hindsight:
         goal_of(task)
         kept = {"n_sampled_goal": settings.relabelled, "copy_info_dict": True}
         buffer = {"replay_buffer_class": HerReplayBuffer, "replay_buffer_kwargs": kept}
-    del values["relabelled"]
-    seen = {"features_extractor_class": NearAndFar} if values.pop("near_and_far") else {}
-    policy = {"net_arch": list(values.pop("hidden")), **seen}
     return SAC(
-        "MlpPolicy" if task.goal is None else "MultiInputPolicy", env, **values, **buffer,
-        policy_kwargs=policy, train_freq=1, learning_starts=first_steps(env), seed=seed,
+        "MlpPolicy" if task.goal is None else "MultiInputPolicy", env, **settings.keywords(),
+        **buffer, train_freq=1, learning_starts=first_steps(env), seed=seed,
         device="cpu", tensorboard_log=None if tensorboard is None else str(tensorboard),
     )  # fmt: skip
 

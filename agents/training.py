@@ -33,6 +33,7 @@ from .callbacks import (
 )
 from .cloning import CloningSettings, clone
 from .env_info import EnvInfo
+from .learner_settings import IMITATOR, PPOSettings, SACSettings
 from .ppo_lagrangian import PPOLagrangian
 from .recipes import Run, filled
 
@@ -41,9 +42,9 @@ with learner():
     from stable_baselines3 import PPO
 
 SETTINGS: dict[str, tuple[Any, Any]] = {
-    "ppo": (ppo.PPOSettings(), ppo.IMITATOR),
-    "ppo_lagrangian": (ppo.PPOSettings(), ppo.IMITATOR),
-    "sac": (sac.SACSettings(), sac.SACSettings(hidden=(256, 256))),
+    "ppo": (PPOSettings(), IMITATOR),
+    "ppo_lagrangian": (PPOSettings(), IMITATOR),
+    "sac": (SACSettings(), SACSettings(hidden=(256, 256))),
 }
 """By algorithm: of who begins with nothing, and of who begins with what an expert does."""
 DEMONSTRATION_SEED = 2_000_000

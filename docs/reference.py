@@ -242,12 +242,13 @@ def infos() -> str:
     Raises:
         ValueError: a key that is not described here, or one that is and does not appear.
     """
-    terms: dict[str, str] = {}
+    terms: dict[tuple[str, str], list[str]] = {}
     found: set[str] = set()
     for task_id in BUILT_IN:
         env = _env(task_id, "keypoints", shield="qp")
         found |= set(env.simulation.task.info(env.simulation.task_state))
-        terms |= {f"`reward/{name.strip('`')}`": doc for name, doc in _rewards(env)}
+        for name, doc in _rewards(env):
+            terms.setdefault((f"`reward/{name.strip('`')}`", doc), []).append(f"`{task_id}`")
         found |= set(env.reset(seed=1)[1])
         found |= set(env.simulation.step(np.zeros((1, env.simulation.n_actions))).info)
         env.close()
@@ -256,7 +257,10 @@ def infos() -> str:
     wrong = {name for name in found if not name.startswith(own) or name in ENTRIES} ^ set(ENTRIES)
     if wrong:
         raise ValueError(f"hrc_env/infos.py: ENTRIES and the environments differ in {wrong}.")
-    rows = [(name, "-", f"belief: {doc}") for name, doc in terms.items()]
+    rows = [
+        (name, "-", f"belief: {doc}" if len(ids) == len(BUILT_IN) else f"{', '.join(ids)}: {doc}")
+        for (name, doc), ids in sorted(terms.items(), key=lambda each: each[0][0])
+    ]
     rows += [(f"`{name}`", each.unit, _meaning(each)) for name, each in ENTRIES.items()]
     rows += [(f"`worker_N/{name}`", "-", text) for name, text in OF_WORKERS.items()]
     rows.append(("`shield/...`", "-", "what else a shield of your own says of the step"))

@@ -17,6 +17,9 @@ if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
     from hrc_env.agents.env_info import Agent as Agent
     from hrc_env.agents.env_info import EnvInfo as EnvInfo
     from hrc_env.agents.env_info import env_info as env_info
+    from hrc_env.agents.learner_settings import RECIPES as RECIPES
+    from hrc_env.agents.learner_settings import PPOSettings as PPOSettings
+    from hrc_env.agents.learner_settings import SACSettings as SACSettings
     from hrc_env.agents.registry import make_agent as make_agent
     from hrc_env.belief import Belief as Belief
     from hrc_env.belief import standard_deviation_m as standard_deviation_m
@@ -33,6 +36,9 @@ if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
     from hrc_env.core.skeleton import MIRROR as MIRROR
     from hrc_env.env import HRCEnv as HRCEnv
     from hrc_env.env_config import EnvConfig as EnvConfig
+    from hrc_env.evaluation.dataset import Episode as Episode
+    from hrc_env.evaluation.dataset import EpisodeSet as EpisodeSet
+    from hrc_env.evaluation.dataset import load_episodes as load_episodes
     from hrc_env.evaluation.episodes import Score as Score
     from hrc_env.evaluation.episodes import evaluate as evaluate
     from hrc_env.evaluation.intervals import Comparison as Comparison
@@ -75,6 +81,7 @@ if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
     from hrc_env.registration import register_shield as register_shield
     from hrc_env.registration import register_task as register_task
     from hrc_env.render.views import Views as Views
+    from hrc_env.rewards import RewardConfig as RewardConfig
     from hrc_env.rewards import RewardTerm as RewardTerm
     from hrc_env.safety.config import ShieldConfig as ShieldConfig
     from hrc_env.safety.shield import Shield as Shield
@@ -90,6 +97,8 @@ if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
     from hrc_env.scene.robot_import import robot_from_mjcf as robot_from_mjcf
     from hrc_env.tasks.goal import Goal as Goal
     from hrc_env.tasks.task import Task as Task
+    from hrc_env.tasks.task import find_task as find_task
+    from hrc_env.tasks.task import with_rewards as with_rewards
     from hrc_env.tracking.config import TrackerConfig as TrackerConfig
     from hrc_env.tracking.estimators import Estimator as Estimator
     from hrc_env.tracking.estimators import EstimatorSpec as EstimatorSpec
@@ -128,6 +137,7 @@ PUBLIC = {
     "Goal": "hrc_env.tasks.goal",
     "ObservationTerm": "hrc_env.observations",
     "ReachTarget": "hrc_env.geometry.reach",
+    "RewardConfig": "hrc_env.rewards",
     "RewardTerm": "hrc_env.rewards",
     "Task": "hrc_env.tasks.task",
     "TaskScene": "hrc_env.world",
@@ -135,7 +145,9 @@ PUBLIC = {
     "WorkerSignal": "hrc_env.world",
     "Workplace": "hrc_env.world",
     "World": "hrc_env.world",
+    "find_task": "hrc_env.tasks.task",
     "register_task": "hrc_env.registration",
+    "with_rewards": "hrc_env.tasks.task",
     # robots and shields
     "Hand": "hrc_env.scene.robot",
     "ROBOTS": "hrc_env.scene.robot",
@@ -185,13 +197,19 @@ PUBLIC = {
     "Agent": "hrc_env.agents.env_info",
     "Comparison": "hrc_env.evaluation.intervals",
     "EnvInfo": "hrc_env.agents.env_info",
+    "Episode": "hrc_env.evaluation.dataset",
+    "EpisodeSet": "hrc_env.evaluation.dataset",
     "Metric": "hrc_env.core.results",
+    "PPOSettings": "hrc_env.agents.learner_settings",
+    "RECIPES": "hrc_env.agents.learner_settings",
+    "SACSettings": "hrc_env.agents.learner_settings",
     "Score": "hrc_env.evaluation.episodes",
     "Transition": "hrc_env.evaluation.rollout",
     "compare_means": "hrc_env.evaluation.intervals",
     "compare_rates": "hrc_env.evaluation.intervals",
     "env_info": "hrc_env.agents.env_info",
     "evaluate": "hrc_env.evaluation.episodes",
+    "load_episodes": "hrc_env.evaluation.dataset",
     "make_agent": "hrc_env.agents.registry",
     "mean_over": "hrc_env.evaluation.intervals",
     "paired": "hrc_env.evaluation.intervals",

@@ -47,7 +47,7 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     ),
     "record": (
         "hrc_env.cli.record", "Record",
-        "Record an agent's episodes as a Minari data set.",
+        "Record an agent's episodes as a data set: of Minari, or a folder.",
     ),
     "experiment": (
         "hrc_env.cli.experiment", "Experiment",

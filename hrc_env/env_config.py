@@ -4,13 +4,13 @@
 as keyword arguments; the command line and the reference derive from them.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from inspect import Parameter, Signature
+from inspect import Parameter, Signature, signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hrc_env.core.errors import ConfigError
+from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.core.mapping import answer_unknown_fields, for_json, read_toml, to_toml
 from hrc_env.core.results import write_whole
 from hrc_env.tasks import DEFAULT
@@ -164,3 +164,20 @@ def signature_of_env(*first: Parameter) -> Signature:
     ]
     names = {each.name for each in first}
     return Signature([*first, *(each for each in own if each.name not in names)])
+
+
+def check_keywords(kind: type, given: Iterable[str], *inner: type) -> None:
+    """Raise `ConfigError` for a keyword that a class which passes on an environment's arguments
+    does not take, with the nearest that it does.
+
+    Args:
+        kind: the class; its own parameters are taken, too.
+        given: names of the keywords that it passes on.
+        inner: further classes to which it passes them.
+    """
+    own = [name for each in (kind, *inner) for name in signature(each.__init__).parameters]
+    names = [name for name in own if name not in ("self", "kwargs", "arguments")]
+    for name in given:
+        if name not in names and name not in EnvConfig.__dataclass_fields__:
+            valid = dict.fromkeys((*names, *(each.name for each in fields(EnvConfig))))
+            raise unknown(f"argument of {kind.__name__}", name, valid)

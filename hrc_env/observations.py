@@ -19,6 +19,7 @@ from hrc_env.belief import (
 )
 from hrc_env.core.errors import check_shape, needed
 from hrc_env.core.kernels import kernel
+from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.records import HandState, ObjectState
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Tensor
@@ -56,6 +57,7 @@ class Sizes:
     """Of the robot's joints."""
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class ObservationTerm:
     """One block of the flat observation: clip(function, -bound, bound) / scale."""

@@ -12,19 +12,28 @@ import numpy as np
 from hrc_env.belief import Belief
 from hrc_env.core.errors import ConfigError, check_fields, check_shape
 from hrc_env.core.kernels import kernel
+from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.typing import Floats
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class RewardConfig:
-    """Weights of the terms that every task shares; a task's own are in its settings."""
+    """Weights of the terms that every task shares; a task's own are in its settings.
+
+    A learner that is charged for closeness before it knows its task learns to stand still, far from
+    people. Let the weight of `proximity` grow from 0 (`set_reward`; `train --ramp`), and look at
+    goals, not at the return.
+    """
 
     effort: float = 0.02
     """Taken off for the mean squared action."""
     smoothness: float = 0.02
     """Taken off for the mean squared change of the action."""
     proximity: float = 2.0
-    """Taken off for closeness to the *estimated* body, times the term's shape in [0, 2.25]."""
+    """Taken off for closeness to the *estimated* body, times the term's shape in [0, 2.25]. With 6
+    from the first step PPO (one seed) reached no goal of `HRCReach-v0` in the last 64 episodes
+    before step 135,000, with 0 it reached 5.7 in each."""
     proximity_reach_m: float = 0.3
     """Closeness begins to count below this separation of the surfaces [m]."""
     unknown: float = 0.25
@@ -40,6 +49,7 @@ KINDS = ("dense", "sparse")
 """What a task's `reward` can be: whether coming nearer counts, too."""
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class RewardTerm:
     """One summand of the reward."""

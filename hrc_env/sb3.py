@@ -6,7 +6,7 @@ PPO("MlpPolicy", HRCVecEnv(64, stagger=True, perception="keypoints"))
 
 import time
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,12 +18,14 @@ from numpy.typing import NDArray
 from hrc_env.core.errors import ConfigError, check_shape, learner, whole
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.env import ENDLESS
+from hrc_env.env_config import check_keywords
 from hrc_env.evaluation.sums import EpisodeSums, value_of_step
 from hrc_env.rewards import RewardConfig
 from hrc_env.simulation import Simulation
 from hrc_env.step_result import Observation
 from hrc_env.tasks.goal import TERM
 from hrc_env.vector.env import HRCVectorEnv
+from hrc_env.vector.infos import chosen_infos
 from hrc_env.vector.member import TOGETHER, Member, info_of
 from hrc_env.vector.options import steps_behind
 
@@ -42,19 +44,36 @@ class HRCVecEnv(VecEnv):
     `reset(seed=s + k)`. The info of a step holds its "cost" only (with goals also the rest of the
     reward, for HER with `copy_info_dict`), but where an episode ended the whole, with
     "terminal_observation", "TimeLimit.truncated" and the statistics, "episode": `Monitor`'s work is
-    done. Attributes and methods of one environment are those of `hrc_env.vector.member.Member`.
+    done. `infos=` adds others to every step, for wrappers that shape the reward or count: those of
+    "reward/..." are of the belief, "cost", "safety/...", "tracking/..." and "worker_N/..." of the
+    truth, which no robot knows (docs/reference/infos.md). Attributes and methods of one
+    environment are those of `hrc_env.vector.member.Member`.
 
     Args:
         num_envs: how many environments step together.
         stagger: after a `seed()`, let each environment's first episode end early at a random
             time, so that a short rollout sees all phases of an episode. Not for evaluation.
         seed: of the first reset.
+        infos: names of infos that every step has, too, or patterns of such: "safety/*".
         kwargs: as of `HRCVectorEnv`.
+
+    Raises:
+        ConfigError: a pattern of infos that none matches, with the nearest; and as of
+            `HRCVectorEnv`.
     """
 
     def __init__(
-        self, num_envs: int, *, stagger: bool = False, seed: int = 0, **kwargs: Any
+        self,
+        num_envs: int,
+        *,
+        stagger: bool = False,
+        seed: int = 0,
+        infos: str | Sequence[str] = (),
+        **kwargs: Any,
     ) -> None:
+        check_keywords(HRCVecEnv, kwargs, HRCVectorEnv)
+        self.info_names = chosen_infos(infos, kwargs)
+        """Names of infos that were chosen for every step."""
         self.env = HRCVectorEnv(num_envs, autoreset_mode=AutoresetMode.SAME_STEP, **kwargs)
         space, actions = self.env.single_observation_space, self.env.single_action_space
         self._past: list[list[Past]] = [[] for _ in range(num_envs)]
@@ -64,7 +83,7 @@ class HRCVecEnv(VecEnv):
         self.stagger, self.started_s = stagger, time.time()
         self.seed(seed)
         self.costs: Floats = np.zeros(num_envs)
-        """(num_envs,) the cost of the last step; 0 after a reset."""
+        """(num_envs,) the cost of the last step [control steps]; 0 after a reset."""
         self._action = np.zeros((num_envs, *(actions.shape or ())), np.float32)
         self._sums = EpisodeSums(num_envs)
 
@@ -142,12 +161,13 @@ class HRCVecEnv(VecEnv):
         return observation, reward.astype(np.float32), done, infos
 
     def _infos(self, fresh: Mapping[str, Any]) -> list[dict[str, Any]]:
-        """Of every step: its cost, and what `compute_reward` adds to a goal's term."""
+        """Of every step: its cost, what `compute_reward` adds to a goal's term, what was chosen."""
         columns = {"cost": self.costs}
         for term in self.simulation.task.reward_terms if self.simulation.task.goal else ():
             if term.name != TERM:
                 name = f"reward/{term.name}"
                 columns[name] = value_of_step(fresh, name, self.num_envs)
+        columns |= {name: fresh[name] for name in self.info_names if name not in columns}
         values = zip(*(column.tolist() for column in columns.values()), strict=True)
         return [dict(zip(columns, row, strict=True)) for row in values]
 

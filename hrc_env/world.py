@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.records import HandState, ObjectState, RobotState
 from hrc_env.core.typing import Bools, Floats, Ints, Points3, Velocities3
 
@@ -67,6 +68,7 @@ class Grounds:
     """Paths keep so far from that axis [m]: a pedestal's radius and half a person."""
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class Weld:
     """Two sites that can be held together, as wide as they are apart; off at first."""
@@ -81,6 +83,7 @@ class Weld:
     """Whether it holds their turns, too."""
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class TaskScene:
     """What a task puts into a scene, from the middle of the robot's foot on [m]."""
@@ -114,6 +117,7 @@ class WorkerProgress:
     """(B, W, 3) and how fast it is [m/s]."""
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class WorkerSignal:
     """What a task says to workers who wait for it."""

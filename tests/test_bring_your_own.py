@@ -35,7 +35,7 @@ from hrc_env.worker.body import worker_truth
 from tests.tasks.variants import vary
 
 EXAMPLES = ROOT / "examples" / "bring_your_own"
-TASK, OWN = "HRCTend-v0", "alpha_beta"
+TASK, OWN = "HRCTend-v0", "dlt_kalman"
 
 
 pytestmark = pytest.mark.usefixtures("brought")
@@ -184,7 +184,11 @@ def test_a_file_that_is_not_there_is_named(tmp_path):
 
 def test_an_estimator_works_wherever_one_is_named():
     many = gymnasium.make_vec(
-        "HRCReach-v0", 2, perception="keypoints", estimator=OWN, config={"tracker": {"alpha": 0.4}}
+        "HRCReach-v0",
+        2,
+        perception="keypoints",
+        estimator=OWN,
+        config={"tracker": {"sigma_scale": 1.5}},
     )
     many.reset(seed=[3, 4])
     for _ in range(30):
@@ -193,12 +197,25 @@ def test_an_estimator_works_wherever_one_is_named():
     assert OWN in hrc("list").stdout
 
 
+def test_an_estimator_says_the_same_single_and_in_a_batch_with_late_frames_replayed():
+    late = [{"kind": "late", "cameras": ["camera_1"], "amount": 0.13}]
+    arguments = {"perception": "keypoints", "estimator": OWN, "faults": late}
+    many = gymnasium.make_vec("HRCReach-v0", 3, **arguments)
+    one = gymnasium.make("HRCReach-v0", **arguments)
+    many.reset(seed=[3, 4, 5])
+    one.reset(seed=4)
+    for _ in range(12):
+        actions = many.action_space.sample()
+        seen, *_ = many.step(actions)
+        np.testing.assert_array_equal(seen[1], one.step(actions[1])[0])
+
+
 def test_a_function_that_makes_an_estimator_is_one():
-    from hrc_env_import_estimator import AlphaBeta
+    from hrc_env_import_estimator import DltKalman
 
     env = gymnasium.make(
         "HRCReach-v0", perception="keypoints",
-        estimator=lambda P, dt_s, config: AlphaBeta(P, dt_s, ESTIMATORS[OWN].config()),
+        estimator=lambda P, dt_s, config: DltKalman(P, dt_s, ESTIMATORS[OWN].config()),
     )  # fmt: skip
     assert env.reset(seed=1)[1]["tracking/mpjpe_m"] < 0.2
 
@@ -206,7 +223,7 @@ def test_a_function_that_makes_an_estimator_is_one():
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({}, "There is the estimator 'alpha_beta' already"),
+        ({}, "There is the estimator 'dlt_kalman' already"),
         ({"make": lambda P, dt_s, config: object()}, "lacks init, reset, predict"),
         ({"config": dict}, "must be a kind of TrackerConfig"),
         ({"make": lambda *given: Wrong(*given, np.nan)}, "estimate.mean_world must be finite"),

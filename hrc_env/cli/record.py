@@ -1,12 +1,13 @@
-"""python -m hrc_env record: an agent's episodes as a Minari data set, by `agents/recording.py`."""
+"""python -m hrc_env record: an agent's episodes as a data set, by `agents/recording.py`."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated
 
 import tyro
 
 import hrc_env
-from hrc_env.cli.checks import at_least
+from hrc_env.cli.checks import at_least, writable_folder
 from hrc_env.cli.environment import EnvironmentArguments
 from hrc_env.core.errors import ConfigError, check_names
 from hrc_env.tasks import DEFAULT
@@ -14,10 +15,11 @@ from hrc_env.tasks import DEFAULT
 
 @dataclass(frozen=True, kw_only=True)
 class Record(EnvironmentArguments):
-    """Record an agent's episodes as a Minari data set.
+    """Record an agent's episodes as a data set: of Minari, or a folder.
 
     What is finished is kept when this is stopped or killed: the same command goes on there. The
-    data set appears when it is whole, where Minari looks for it (MINARI_DATASETS_PATH).
+    data set appears when it is whole: with --out where Minari looks for it (MINARI_DATASETS_PATH),
+    with --folder there, and hrc_env.load_episodes(FOLDER) reads it.
     """
 
     task: Annotated[str, tyro.conf.Positional] = DEFAULT
@@ -32,8 +34,16 @@ class Record(EnvironmentArguments):
     """How many episodes."""
     seed: int = 0
     """Seed of the first episode; the next ones count up."""
-    out: str
-    """Name of the data set, with a version: hrc/pick-place/scripted-v0."""
+    out: str | None = None
+    """Name of a Minari data set, with a version: hrc/pick-place/scripted-v0. This or --folder."""
+    folder: Path | None = None
+    """A folder for the data set, which must not be there yet."""
+    infos: tuple[str, ...] = ("cost", "is_success")
+    """Which infos are kept, by names or patterns: cost "safety/*" "reward/*"."""
+    poses: bool = False
+    """Keep the workers' joints, as believed and as they are."""
+    keypoints: bool = False
+    """Keep the keypoints that the estimator was given; at --perception keypoints."""
     perception: str = "keypoints"
     """What the robot sees with: keypoints (camera emulator), truth or none."""
     num_envs: int = 16
@@ -47,9 +57,21 @@ class Record(EnvironmentArguments):
         at_least("--seed", self.seed, 0)
         if self.perception == "pixels":
             raise ConfigError(
-                "--perception pixels is too slow to record: record keypoints, which emulates it."
+                "--perception pixels is too slow to record: record keypoints, which emulates it; "
+                "--observe-images 84 84 keeps what the cameras see."
             )
-        from hrc_env.agents import recording  # here: it imports Minari
+        if (self.out is None) == (self.folder is None):
+            raise ConfigError(
+                "Say where the data set goes: --out NAME-v0, which Minari loads, or --folder "
+                "FOLDER, which hrc_env.load_episodes reads; one of them."
+            )
+        if self.folder is not None:
+            writable_folder(self.folder.absolute().parent, "--folder")
+        if self.keypoints and self.perception != "keypoints":
+            raise ConfigError(
+                f"--keypoints are of cameras, and --perception {self.perception} has none."
+            )
+        from hrc_env.agents import recording  # here: --help imports no simulator
         from hrc_env.agents.registry import check_agent
 
         check_agent(self.agent)

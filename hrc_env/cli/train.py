@@ -29,7 +29,8 @@ class Train(EnvironmentArguments):
     where the task has goals apart. This, control, demonstrations and timesteps are what suits the
     task if not given (agents/recipes.py)."""
     cost_limit: float | None = None
-    """With ppo_lagrangian: what an episode may cost (info["cost"], counted on the truth)."""
+    """With ppo_lagrangian: what an episode may cost (info["cost"], counted on the truth) [control
+    steps]."""
     her: bool | None = None
     """With sac: True or False, whether transitions are judged by other goals, too; by default where
     there are goals."""

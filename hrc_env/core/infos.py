@@ -5,6 +5,7 @@ from the reset on, and no NaN: a distance to nobody is infinite, and beside a fi
 says whether the number was measured. Words are indices; `worded` gives the words.
 """
 
+import fnmatch
 import re
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -13,6 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hrc_env.core.brought import described
+from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.core.typing import Ints
 
 Info = dict[str, NDArray[Any]]
@@ -68,13 +71,14 @@ ENTRIES: dict[str, Entry] = {
         "0 or 1", "the true surfaces touched at any physics substep, by distance"
     ),
     "cost": Entry(
-        "-", "sum of `cost.components`, both by default; 0 after a reset. There are also "
+        "control steps", "sum of `cost.components`: by default 1 for a step nearer than "
+        "`cost.proximity_m` and 1 for one that touches; 0 after a reset. There are also "
         "`towards`, contacts that begin while the robot comes; `force`, the "
         "`contact_force_ratio` of contacts; `too_near`; `near_miss`: each that is chosen is in "
         "`cost_<name>`",
     ),
-    "cost_sum": Entry("-", "the same, under the name that some safe-RL libraries read"),
-    "episode_cost": Entry("-", "running sum of `cost`"),
+    "cost_sum": Entry("control steps", "the same, under the name that some safe-RL libraries read"),
+    "episode_cost": Entry("control steps", "running sum of `cost` over the episode"),
     "safety/min_separation_m": Entry(
         "m", "least true separation of the step; infinite without workers", np.inf
     ),
@@ -179,6 +183,9 @@ OWN = Entry("-", "", 0.0)
 ALWAYS = ("reward/", "worker_", "cost_", f"{MISCALIBRATED}_")
 """Names that begin so always have a value."""
 
+OF_BELIEF = ("reward/", "shield/", "perception/")
+"""Names that begin so are of what the robot believes."""
+
 
 @cache
 def entry_of(name: str) -> Entry:
@@ -203,6 +210,34 @@ def published(info: Info) -> Info:
         if entry.flag is not None:
             told[entry.flag] = known.astype(float)
     return told
+
+
+def is_of_belief(name: str) -> bool:
+    """Return whether an info is of what the robot believes; all others are counted on the truth."""
+    return name.startswith(OF_BELIEF)
+
+
+def matching(patterns: str | Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of infos that patterns choose, in the order of the infos.
+
+    Args:
+        patterns: names, or patterns of names as of files: "safety/*"; one may stand alone.
+        names: of all infos that there are.
+
+    Raises:
+        ConfigError: a pattern that is no text, or that no name matches, with the nearest name.
+    """
+    given = [patterns] if isinstance(patterns, str) else patterns
+    if not isinstance(given, Sequence) or not all(isinstance(each, str) for each in given):
+        raise ConfigError(
+            'infos must be names or patterns of names, as ("cost", "safety/*"), got '
+            f"{described(patterns)}."
+        )
+    for each in given:
+        if not any(fnmatch.fnmatchcase(name, each) for name in names):
+            folders = dict.fromkeys(f"{name.rpartition('/')[0]}/*" for name in names if "/" in name)
+            raise unknown("info", each, [*folders, *names])
+    return tuple(name for name in names if any(fnmatch.fnmatchcase(name, each) for each in given))
 
 
 def of_workers(**parts: Ints) -> Info:

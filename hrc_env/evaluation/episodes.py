@@ -40,7 +40,7 @@ class Score:
     contacts_per_episode: float
     """Touches of the true worker; one that lasts counts once."""
     cost_per_episode: float
-    """Mean sum of `info["cost"]`, which is counted on the truth."""
+    """Mean sum of `info["cost"]`, which is counted on the truth [control steps]."""
     close_steps_per_episode: float
     """Steps nearer than the proximity limit to the true worker."""
     median_min_separation_m: float

@@ -138,6 +138,6 @@ def _totals(diary: Diary, counts: Mapping[str, float], seconds: float) -> dict[s
         "lost steps [%]": 100 * (1 - len(known) / len(diary)),
         "minimum separation [m]": float(diary["true_m"].min()),
         **{f"{name} [count]": n for name, n in counts.items()},
-        "cost [count]": float(diary["cost"].sum()),
+        "cost [control steps]": float(diary["cost"].sum()),
         "film drawn [frames/s]": len(diary) / STEPS_PER_FRAME / seconds,
     }

@@ -21,7 +21,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from hrc_env.core.errors import ConfigError, check_names
-from hrc_env.core.mapping import from_mapping, plain, read_toml, to_toml
+from hrc_env.core.mapping import answer_unknown_fields, from_mapping, plain, read_toml, to_toml
 from hrc_env.core.typing import Floats, Rotations, Transforms
 from hrc_env.geometry.lens import COEFFICIENTS, Lens, distorted_radius, rays_cam
 from hrc_env.geometry.rotations import about_axis, look_at
@@ -36,6 +36,7 @@ LONGEST_S = 1.0
 """Greatest latency [s]: the tracker's memory is no longer."""
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class CameraConfig:
     """One fixed camera."""

@@ -22,6 +22,7 @@ import numpy as np
 
 from hrc_env.core.errors import ConfigError, check_names
 from hrc_env.core.kernels import kernel
+from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.typing import Floats
 
 COEFFICIENTS = {
@@ -43,6 +44,7 @@ _NEWTON_STEPS = 12
 _STEP = 1e-5
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class Lens:
     """How a lens bends the image."""

@@ -7,12 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from hrc_env.core.errors import ConfigError
+from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.typing import Floats, Points3
 from hrc_env.geometry.chains import SerialChain, forward
 
 Triple = tuple[float, float, float]
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class ReachTarget:
     """A place that the tool point has to get to."""

@@ -7,12 +7,14 @@ from typing import Any
 import numpy as np
 
 from hrc_env.core.errors import ConfigError
+from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.motion.clip import Clip
 from hrc_env.motion.schedule import JOBS, Job, check_jobs
 
 Range = tuple[float, float]
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class PeopleConfig:
     """What workers notice of the robot, and how brisk they are; judgement without a source."""

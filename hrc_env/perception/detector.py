@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from hrc_env.core.batching import Stateful
 from hrc_env.core.errors import ConfigError, check_fields, check_names, check_shape
+from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.records import Roi
 from hrc_env.core.registry import Registry
 from hrc_env.core.skeleton import BLAZEPOSE_INDEX, N_JOINTS
@@ -54,6 +55,7 @@ DETECTORS: Registry[Callable[[], KeypointFunction] | None] = Registry(
 """By name: what makes the function, once for every thread that calls it."""
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class DetectorConfig:
     """Which networks find people, and what is believed of them."""

@@ -7,6 +7,7 @@ import numpy as np
 
 from hrc_env.config import HRCConfig
 from hrc_env.core.batching import Stateful, rows, write_rows
+from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Floats, Image, Ints
@@ -54,6 +55,12 @@ class PerceptionPipeline(Stateful):
     def last_detections(self, b: int) -> tuple[Keypoints | None, Windows]:
         """What environment `b` saw last, and through which windows (for pictures)."""
         return None, []
+
+    @property
+    def given(self) -> Keypoints:
+        """The keypoints (B, C, W, J) that the estimator was given last; `ConfigError` without
+        cameras."""
+        raise ConfigError("Keypoints are of cameras, and this perception level has none.")
 
     def crops(self, b: int) -> list[Image | None]:
         """What the network was given of `b`'s first worker, one a camera (for pictures)."""
@@ -230,6 +237,11 @@ class PoseTracking(PerceptionPipeline):
         if keypoints.time_s is None:
             return np.zeros(keypoints.px.shape[:2])
         return self.steps[ids, None] * self.setup.dt_s - keypoints.time_s
+
+    @property
+    def given(self) -> Keypoints:
+        """The keypoints (B, C, W, J) that the estimator was given last."""
+        return self.keypoints
 
     def last_detections(self, b: int) -> tuple[Keypoints | None, Windows]:
         """The keypoints of environment `b`."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from hrc_env.core.errors import ConfigError, check_fields, check_names
+from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.typing import Records
 
 KINDS = ("qp", "ssm", "pfl")
@@ -19,6 +20,7 @@ SETTINGS = np.dtype([(name, "f8") for name in NUMBERS], align=True)
 """The same as kernels read them."""
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class ShieldConfig:
     """Settings of a built-in shield: its kind, margins and limits.

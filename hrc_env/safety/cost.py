@@ -27,7 +27,7 @@ class CostConfig:
     """What counts as unsafe, and what happens then."""
 
     components: tuple[str, ...] = ("proximity", "contact")
-    """What is summed up: some of `COMPONENTS`."""
+    """What is summed up: some of `COMPONENTS`; the sum of the default ones is in control steps."""
     proximity_m: float = 0.15
     """A step costs 1 when the true surfaces come nearer than this [m]."""
     contact_terminates: bool = False
@@ -45,7 +45,7 @@ class CostConfig:
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """The cost of one step, per environment (B,)."""
+    """The cost of one step, per environment (B,) [control steps]."""
 
     proximity: Floats
     contact: Floats
@@ -77,5 +77,5 @@ def parts(cost: Cost, happened: Records, config: CostConfig) -> dict[str, Floats
 
 
 def total(costs: Mapping[str, Floats], config: CostConfig) -> Floats:
-    """(B,) the cost of a step: the sum of the chosen parts."""
+    """(B,) the cost of a step: the sum of the chosen parts, by default in control steps."""
     return sum((costs[name] for name in config.components[1:]), costs[config.components[0]])

@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 
 from hrc_env.core.errors import ConfigError
+from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.typing import Floats
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.scene.worker_visuals import HIDDEN, WorkerVisuals
@@ -29,6 +30,7 @@ STREAM = 0x10075
 """Tells the stream for looks from those that a generator's `spawn` gives: these count from 0."""
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class AppearanceConfig:
     """Between what looks are drawn; as it stands, everything looks as it was built."""

@@ -17,7 +17,7 @@ import numpy as np
 
 from hrc_env.core.brought import check_kind
 from hrc_env.core.errors import ConfigError, check_names
-from hrc_env.core.mapping import from_mapping, read_toml
+from hrc_env.core.mapping import answer_unknown_fields, from_mapping, read_toml
 from hrc_env.core.registry import Registry
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.scene.primitives import (
@@ -38,6 +38,7 @@ PREFIX = "robot/"
 DEFAULT = "ur10e_like"
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class Hand:
     """A gripper at the end of an arm, after whose joints and motors its own come in the MJCF."""
@@ -53,6 +54,7 @@ class Hand:
     and sight; they touch people only."""
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class Suction:
     """Cups at the end of an arm: what they touch sticks to them until it is torn off."""
@@ -69,6 +71,7 @@ class Suction:
     """Those of the robot's capsules that stand for the cups; they touch people only."""
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class Robot:
     """A serial arm, or a base that drives; names are those of its MJCF."""

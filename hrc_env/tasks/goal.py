@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from hrc_env.belief import Belief
 from hrc_env.core.errors import ConfigError, check_shape
+from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.typing import Bools, Floats, Tensor
 from hrc_env.rewards import RewardTerm
 
@@ -22,6 +23,7 @@ TERM = "goal"
 """The reward's term that follows from a goal."""
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class Goal:
     """What a task wants, apart from its observation. Functions are over batches (B, ...).

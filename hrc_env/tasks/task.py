@@ -9,6 +9,7 @@ import numpy as np
 
 from hrc_env import observations, rewards
 from hrc_env.belief import Belief
+from hrc_env.core.brought import described
 from hrc_env.core.errors import ConfigError, NoGoalError, unknown
 from hrc_env.core.registry import Registry
 from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, Points3, Rngs
@@ -248,6 +249,40 @@ def find_task(task: str | TaskType) -> TaskType:
     if task not in TASKS:
         raise unknown("task", task, sorted({*BUILT_IN, *TASKS}))
     return TASKS[task]
+
+
+def with_rewards(task: str | TaskType, *terms: RewardTerm, id: str) -> TaskType:
+    """Return a task that is rewarded for more than another one, and is else the same.
+
+    It is a subclass, as you may write one yourself: `class Mine(hrc_env.find_task(ID))` with an
+    `id` and `rewards = (*hrc_env.find_task(ID).rewards, term)`. Terms of people read the belief,
+    `Belief.estimate` and `Belief.separation`; they are given the task's settings as weights, and
+    stand in `info` as "reward/NAME". `register_task` makes the id known.
+
+    Args:
+        task: that is taken, its id or class.
+        terms: what is added; each returns (B,) a number for every environment.
+        id: of the new task, such as "MyReach-v0".
+
+    Raises:
+        ConfigError: there is no such task, no term, one that is no `RewardTerm`, or one whose name
+            the task or all tasks have.
+    """
+    base = find_task(task)
+    if not terms:
+        raise ConfigError(f"Give at least one RewardTerm to add to {base.id}, got none.")
+    names = [term.name for term in base().reward_terms]
+    for term in terms:
+        if not isinstance(term, RewardTerm):
+            raise ConfigError(f"A reward's term must be a RewardTerm, got {described(term)}.")
+        if term.name in names:
+            raise ConfigError(
+                f"{base.id} has a term {term.name!r} already; choose another name than "
+                f"{', '.join(map(repr, names))}."
+            )
+        names.append(term.name)
+    added = {"id": id, "rewards": (*base.rewards, *terms), "__doc__": base.__doc__}
+    return cast(TaskType, type(base.__name__, (base,), added))
 
 
 def goal_of(task: Task[Any, Any]) -> Goal:

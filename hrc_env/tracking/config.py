@@ -6,8 +6,10 @@ from typing import TypeVar
 import numpy as np
 
 from hrc_env.core.errors import ConfigError, check_fields, check_names
+from hrc_env.core.mapping import answer_unknown_fields
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class TrackerConfig:
     """How workers are acquired, lost and reported, whatever the estimator.
@@ -60,6 +62,7 @@ class TrackerConfig:
             )
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class ParticleConfig(TrackerConfig):
     """The default estimator: hypotheses about what is discrete, each with a Gaussian.
@@ -163,6 +166,7 @@ class ParticleConfig(TrackerConfig):
         check_names("part in mirrored_parts", self.mirrored_parts, ("body", "limbs"))
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class PaperConfig(TrackerConfig):
     """The paper's Algorithm 1.
@@ -202,6 +206,7 @@ class PaperConfig(TrackerConfig):
             )
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class TriangulationConfig(TrackerConfig):
     """Triangulation, frame by frame.

@@ -15,13 +15,14 @@ A control step is `predict` and then `update`; `estimate` may be asked at any ti
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
-from hrc_env.core.brought import check_arguments, described
+from hrc_env.core.brought import check_arguments, check_kind, described
 from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.registry import Registry
 from hrc_env.core.skeleton import N_JOINTS
@@ -46,11 +47,19 @@ State = TypeVar("State")
 class Estimator(Protocol[State]):
     """From keypoints to a belief, for B environments with W workers each.
 
-    The state is an array, or a record of arrays, with leading axes (B, W), changed in place:
-    copying the arrays copies it. Random numbers for environment b come from `rngs[b]` only, and
-    nothing that happens in one environment depends on the others or on how many there are.
+    A control step is `predict` and then `update`; in between, level "pixels" puts the cameras'
+    windows where `estimate` expects the workers. The state is an array, or a record of arrays, with
+    leading axes (B, W), changed in place: copying the arrays copies it. Random numbers for
+    environment b come from `rngs[b]` only, and nothing that happens in one environment depends on
+    the others or on how many there are.
     Positions are in the world, +Z up, in metres and seconds; pixels are those of the cameras'
     projections, u to the right and v down.
+
+    A frame that arrives late is no concern of an estimator. The package keeps what was believed at
+    the end of every control step (copies of the state), goes back to the last one before the frame
+    was taken, and calls `predict` and `update` again from there. So `predict` may be asked for
+    parts of a control step, and `update` comes once for each moment at which frames were taken; an
+    estimator that would rather do this itself says so (`EstimatorSpec.handles_late_frames`).
     """
 
     @property
@@ -73,11 +82,12 @@ class Estimator(Protocol[State]):
         ...
 
     def predict(self, state: State, dt_s: float, rngs: Rngs) -> None:
-        """Let time pass (Algorithm 1, line 7).
+        """Let time pass (Algorithm 1, line 7): move means on, widen covariances, count ages up.
 
         Args:
             state: changed in place.
-            dt_s: time since the last call [s].
+            dt_s: time since the last call, above 0 [s]: a control step, or where cameras are late
+                or out of step the part of one up to the next frame.
             rngs: one generator for each environment of the batch.
         """
         ...
@@ -87,7 +97,11 @@ class Estimator(Protocol[State]):
 
         Args:
             state: changed in place.
-            keypoints: (B, C, W, J) in pinhole pixels, NaN where a joint was not found.
+            keypoints: (B, C, W, J) in pinhole pixels, already sorted by worker. A joint that was
+                not found, and every joint of a camera that gave no frame, has NaN pixels,
+                confidence 0 and infinite sigma: that is no measurement, never one at 0. All of
+                them belong to the time up to which `predict` was called; `Keypoints.time_s` is of
+                interest to who handles late frames alone.
             rngs: one generator for each environment of the batch.
         """
         ...
@@ -101,6 +115,7 @@ class Estimator(Protocol[State]):
         ...
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class EstimatorSpec:
     """An estimator by name: how it is made, and what may be set.
@@ -116,13 +131,18 @@ class EstimatorSpec:
     config: type[TrackerConfig] = TrackerConfig
     """The kind of its settings."""
     needs_pairs: bool = False
-    """Whether it makes nothing of a camera alone; see `out_of_sequence.OutOfSequence`."""
+    """Whether it makes nothing of a camera alone: beside a frame that comes alone, because it is
+    late or of another rate, it is then shown the other cameras' last ones."""
+    handles_late_frames: bool = False
+    """Whether it uses late frames at their own time by itself. False, the default: the package
+    does, round any estimator, by going back and replaying what came since. True: `update` gets
+    frames as they arrive, once a control step, with their times in `Keypoints.time_s`."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A spec that is known by its name is pickled as that."""
         if ESTIMATORS.get(self.name) is self:
             return estimator_called, (self.name,)
-        return EstimatorSpec, (self.name, self.make, self.config, self.needs_pairs)
+        return EstimatorSpec, tuple(getattr(self, each.name) for each in fields(self))
 
 
 def _kalman(P: Floats, ctrl_dt: float, config: ParticleConfig) -> ParticleEstimator:
@@ -202,7 +222,7 @@ def make_estimator(
     Returns:
         The estimator. Of one that is not built in, arguments and estimates are checked
         (`checked.CheckedEstimator`); with `config.longest_delay_s` late frames are used at their
-        own time (`out_of_sequence.OutOfSequence`).
+        own time (`out_of_sequence.OutOfSequence`), unless it handles them itself.
 
     Raises:
         ConfigError: the estimator is unknown or needs the future (`OFFLINE`), P is of another shape
@@ -218,7 +238,7 @@ def make_estimator(
     made = spec.make(P, ctrl_dt, settings)
     if spec not in BUILT_IN:
         made = CheckedEstimator(spec.name, made)
-    if settings.longest_delay_s > 0:
+    if settings.longest_delay_s > 0 and not spec.handles_late_frames:
         return OutOfSequence(made, len(P), ctrl_dt, settings.longest_delay_s, spec.needs_pairs)
     return made
 
@@ -238,6 +258,8 @@ def check_estimator(spec: EstimatorSpec) -> None:
         raise ConfigError(f"An estimator must be an EstimatorSpec, got {type(spec).__name__}.")
     if not (isinstance(spec.config, type) and issubclass(spec.config, TrackerConfig)):
         raise ConfigError(f"{spec.name}: config must be a kind of TrackerConfig.")
+    for name in ("needs_pairs", "handles_late_frames"):
+        check_kind(f"{spec.name}: {name}", getattr(spec, name), bool)
     made = make_estimator(spec, _P, _DT_S)
     state, rngs = made.init(3, 2), [np.random.default_rng(b) for b in range(3)]
     made.reset(state, np.arange(3), rngs)
@@ -245,5 +267,9 @@ def check_estimator(spec: EstimatorSpec) -> None:
     nothing = Keypoints(np.full((*seen, 2), np.nan), np.zeros(seen), np.full(seen, np.inf))
     made.predict(state, _DT_S, rngs)
     made.update(state, nothing, rngs)
+    if spec.handles_late_frames:
+        times_s = np.tile([_DT_S / 2, np.nan], (3, 1))  # one frame is late, the other never comes
+        made.predict(state, _DT_S, rngs)
+        made.update(state, replace(nothing, time_s=times_s), rngs)
     made.estimate(state)
     made.forecast(state, 0.2)

@@ -23,6 +23,7 @@ from hrc_env.core.batching import copied, mapped, one, write_rows
 from hrc_env.core.errors import ConfigError, check_shape, whole
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.env import RENDER_MODES, EnvBase, spaces
+from hrc_env.env_config import check_keywords
 from hrc_env.render.views import CameraChoice
 from hrc_env.rewards import RewardConfig
 from hrc_env.settings import settle
@@ -80,6 +81,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         num_threads: int | None = None,
         **arguments: Any,
     ) -> None:
+        check_keywords(HRCVectorEnv, arguments)
         arguments = {"perception": "keypoints", **arguments}
         if arguments["perception"] == "pixels":
             raise ConfigError(

@@ -4,16 +4,20 @@ The layout is that of gymnasium's `VectorEnv._add_info`. Names are the same in e
 mask is false an environment has no info now, and the value is zero.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.core.infos import published, worded
+from hrc_env.core.infos import matching, published, worded
 from hrc_env.core.typing import Bools, Floats, Ints
+from hrc_env.env_config import EnvConfig
 from hrc_env.infos import words_of
+from hrc_env.settings import settle
+from hrc_env.simulation import Simulation
 from hrc_env.step_result import StepResult
 
 
@@ -48,6 +52,30 @@ def table(result: StepResult, ids: Ints | slice, batch: int) -> InfoTable:
 def _unknown(batch: int, values: Any) -> Any:
     """Return (B,) entries of the type of `values`, NaN if that has one."""
     return np.full(batch, np.nan if values.dtype.kind == "f" else -1, values.dtype)
+
+
+def chosen_infos(patterns: str | Sequence[str], arguments: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the names of infos that patterns choose, before an environment is played.
+
+    Args:
+        patterns: names, or patterns of names: "safety/*".
+        arguments: of `HRCVectorEnv`, whose infos they are; a small environment of them is asked.
+
+    Raises:
+        ConfigError: a pattern that no name matches, or that is no text.
+    """
+    if not isinstance(patterns, str) and not patterns:
+        return ()
+    own = {each.name for each in fields(EnvConfig)} - {"render_mode", "width", "height"}
+    given = {name: value for name, value in arguments.items() if name in own}
+    with warnings.catch_warnings():  # the environment itself says what there is to say
+        warnings.simplefilter("ignore")
+        small = Simulation(1, settle(**{"perception": "keypoints", **given}))
+    try:
+        first = small.reset(np.arange(1), [np.random.default_rng(0)])
+    finally:
+        small.close()
+    return matching(patterns, list(first.info_of(0)))
 
 
 def words_of_infos(

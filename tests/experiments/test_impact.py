@@ -432,11 +432,11 @@ def test_a_quick_run_says_so_and_marks_nothing(tmp_path):
 def test_an_estimator_that_a_file_registers_is_compared(tmp_path, process, brought):
     """One command, one file."""
     config = replace(
-        make_experiment(True, 2, ["alpha_beta"]),
+        make_experiment(True, 2, ["dlt_kalman"]),
         n_steps=12,
         policies=("scripted_slowed",),
         margins_m=(),
     )
     metrics = run_experiment(config, tmp_path, silent)
-    assert "scripted_slowed.keypoints_alpha_beta_4cam_0ms.cost" in metrics
+    assert "scripted_slowed.keypoints_dlt_kalman_4cam_0ms.cost" in metrics
     assert (tmp_path / "figures").is_dir()

@@ -129,7 +129,7 @@ def test_somebody_elses_estimator_policy_and_shield_are_compared(tmp_path, broug
 
     rows = {
         "usual": Row("usual", 1),
-        "estimator": Row("alpha_beta", 1, setup=PerceptionSetup(estimator="alpha_beta")),
+        "estimator": Row("dlt_kalman", 1, setup=PerceptionSetup(estimator="dlt_kalman")),
         "policy": Row("still", 1, agent=lambda env_info: Still()),
         "shield": Row("halved", 1, env={"shield": halved}),
     }
@@ -140,7 +140,7 @@ def test_somebody_elses_estimator_policy_and_shield_are_compared(tmp_path, broug
     assert goals["policy"] == 0.0 < goals["usual"]
     assert found["estimator.r"].value != found["usual.r"].value
     assert goals["shield"] < goals["usual"]
-    assert "alpha_beta" in ESTIMATORS
+    assert "dlt_kalman" in ESTIMATORS
     assert halved not in SHIELDS.values()
 
 

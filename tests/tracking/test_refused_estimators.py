@@ -1,9 +1,11 @@
 """What an estimator is given, lacks or says that is wrong in one thing only is refused."""
 
+import pickle
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import cloudpickle
 import numpy as np
 import pytest
 from simulated import DT, LAB, keypoints
@@ -124,6 +126,8 @@ def test_a_belief_in_which_one_thing_is_wrong_is_refused(name, when):
         ("particle", "must be an EstimatorSpec, got str"),
         (spec_of(config=dict), "must be a kind of TrackerConfig"),
         (spec_of(config=TrackerConfig()), "must be a kind of TrackerConfig"),
+        (spec_of(needs_pairs="no"), "told: needs_pairs must be a bool, got str 'no'"),
+        (spec_of(handles_late_frames=None), "told: handles_late_frames must be a bool, got None"),
         *(
             (spec_of(make=without(name)), f"the estimator lacks {name};")
             for name in ("init", "reset", "predict", "update", "estimate", "forecast")
@@ -161,6 +165,23 @@ def test_a_delay_is_used_where_one_is_set():
     for delay_s, late in ((0.0, False), (0.04, True)):
         made = make_estimator("particle", LAB, 1e-3, ParticleConfig(longest_delay_s=delay_s))
         assert isinstance(made, OutOfSequence) == late
+
+
+def test_who_handles_late_frames_gets_them_as_they_arrive():
+    """With their times, once a step; nothing is replayed."""
+    seen: list[Any] = []
+
+    class Own(Told):
+        def update(self, state: None, keypoints: Any, rngs: Any) -> None:
+            seen.append(keypoints.time_s)
+
+    spec = spec_of(make=lambda *given: Own(believed(), believed()), handles_late_frames=True)
+    check_estimator(spec)
+    assert any(times is not None and (times[:, 0] < DT).all() for times in seen)
+    made = make_estimator(spec, LAB, DT, TrackerConfig(longest_delay_s=0.5))
+    assert not isinstance(made, OutOfSequence)
+    kept = pickle.loads(cloudpickle.dumps(spec))
+    assert kept.handles_late_frames
 
 
 def test_an_estimator_is_called_by_its_name_itself_or_what_makes_it():

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from hrc_env.core.errors import ConfigError, unknown, whole
+from hrc_env.core.mapping import answer_unknown_fields
 
 FOREVER_S = 1e9
 TIMING, PLACE, IMAGE = "timing", "place", "image"
@@ -48,6 +49,7 @@ ALL = "all"
 """In the place of a camera's name: every camera."""
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class FaultConfig:
     """One fault of some cameras during a part of every episode."""
