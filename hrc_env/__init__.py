@@ -66,12 +66,15 @@ if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
     from hrc_env.registration import register_robot as register_robot
     from hrc_env.registration import register_shield as register_shield
     from hrc_env.registration import register_task as register_task
+    from hrc_env.reset_options import ResetOptions as ResetOptions
+    from hrc_env.rewards import RewardConfig as RewardConfig
     from hrc_env.rewards import RewardTerm as RewardTerm
     from hrc_env.safety.config import ShieldConfig as ShieldConfig
     from hrc_env.safety.shield import Shield as Shield
     from hrc_env.sb3 import HRCVecEnv as HRCVecEnv
     from hrc_env.scene.domain_randomization import AppearanceConfig as AppearanceConfig
     from hrc_env.scene.rig import make_cameras as make_cameras
+    from hrc_env.scene.rig_distribution import RigDistribution as RigDistribution
     from hrc_env.scene.rigs import RIGS as RIGS
     from hrc_env.scene.robot import ROBOTS as ROBOTS
     from hrc_env.scene.robot import Hand as Hand
@@ -108,6 +111,8 @@ PUBLIC = {
     "HRCVectorEnv": "hrc_env.vector.env",
     "IDS": "hrc_env.registration",
     "PeopleConfig": "hrc_env.motion.config",
+    "ResetOptions": "hrc_env.reset_options",
+    "RigDistribution": "hrc_env.scene.rig_distribution",
     "make_vector": "hrc_env.vector.make",
     "save_config": "hrc_env.config",
     # tasks
@@ -116,6 +121,7 @@ PUBLIC = {
     "Goal": "hrc_env.tasks.goal",
     "ObservationTerm": "hrc_env.observations",
     "ReachTarget": "hrc_env.geometry.reach",
+    "RewardConfig": "hrc_env.rewards",
     "RewardTerm": "hrc_env.rewards",
     "Task": "hrc_env.tasks.task",
     "TaskScene": "hrc_env.world",

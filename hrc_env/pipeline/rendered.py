@@ -30,10 +30,12 @@ class RenderedCameras(Sensor):
     CHANGES = ("recent", "worn")
 
     def __init__(
-        self, scene: Scene, batch: int, appearance: AppearanceConfig, schedule: Schedule
-    ) -> None:
+        self, scene: Scene, batch: int, appearance: AppearanceConfig, schedule: Schedule,
+        renderer: CropRenderer | None = None,
+    ) -> None:  # fmt: skip
+        """`renderer`: one of the same scene, whatever its cameras; None: make one."""
         self.scene, self.appearance = scene, appearance
-        self.renderer = CropRenderer(scene)
+        self.renderer = renderer or CropRenderer(scene)
         self.images = CameraFilm(Lensed(self.renderer, scene.cameras), schedule)
         """An `ImageSource` of what `show` has made present."""
         self.recent = Recent(batch, schedule)
@@ -60,7 +62,7 @@ class RenderedCameras(Sensor):
         pose = self.now.qpos[row].copy(), copied(one(self.now.motion, row))
         step = recent.begin(b)
         before = recent.at(b, step - 1)
-        actual = recent.schedule.actual(self.scene.cameras, recent.seeds[b], step)
+        actual = recent.schedule_of(b).actual(self.scene.cameras, recent.seeds[b], step)
         last = pose if before is None else (before.q, before.motion)
         shots, times_s = recent.arrived(b, Shot(step, *pose, last, actual))
         self.renderer.randomize(self.worn[b])
@@ -75,12 +77,19 @@ class PixelPipeline(PoseTracking):
     LOOKS = SEARCHES
 
     def __init__(
-        self, scene: Scene, batch: int, tracker: Estimator, config: HRCConfig, schedule: Schedule
-    ) -> None:
-        self.cameras = RenderedCameras(scene, batch, config.appearance, schedule)
+        self, scene: Scene, batch: int, tracker: Estimator, config: HRCConfig, schedule: Schedule,
+        like: "PixelPipeline | None" = None,
+    ) -> None:  # fmt: skip
+        """`like`: a pipeline of the same scene and detector with other cameras, whose renderer and
+        networks this one uses."""
+        renderer = None if like is None else like.cameras.renderer
+        self.cameras = RenderedCameras(scene, batch, config.appearance, schedule, renderer)
         super().__init__(batch, scene, tracker, config, self.cameras)
         known = floor(scene.grounds), self.calibration.sigma
         self.looking = Looking(batch, scene.cameras, scene.n_workers, config.detector, *known)
+        self._borrows = like is not None
+        if like is not None:
+            self.looking.detector.borrow_networks(like.looking.detector)
 
     def detect(self, ids: Ints, expected: PoseEstimate, sensor_rngs: Generators) -> Keypoints:
         """Landmarks of crops round the expected workers, or of a search where there are none."""
@@ -129,6 +138,8 @@ class PixelPipeline(PoseTracking):
         return self.cameras.worn[b]
 
     def close(self) -> None:
-        """Stop the detector's thread and free the graphics context."""
+        """Stop the detector's threads and free the graphics context, unless they are borrowed."""
+        if self._borrows:
+            return
         self.looking.detector.close()
         self.cameras.renderer.close()

@@ -51,6 +51,8 @@ class Glance:
     look: Look | None
     markers_world: Points3
     """(M, 3) what the task has to show [m]."""
+    cameras: tuple[PinholeCamera, ...]
+    """Those of its episode."""
     estimate: PoseEstimate
     """Of a batch of one, as are the keypoints."""
     keypoints: Keypoints | None
@@ -94,6 +96,7 @@ class Views:
             *self.pose(b),
             simulation.pipeline.look_of(b),
             simulation.markers(b),
+            simulation.cameras_of(b),
             rows(simulation.estimate, np.array([b])),
             keypoints,
             [list(of_worker) for of_worker in windows],
@@ -119,7 +122,7 @@ class Views:
         """Every camera's picture, without shadows, as the detector sees the scene, with crops,
         detected keypoints and the estimate."""
         views = self._through_cameras(width, height, seen)
-        for c, (camera, image) in enumerate(zip(self.simulation.scene.cameras, views, strict=True)):
+        for c, (camera, image) in enumerate(zip(seen.cameras, views, strict=True)):
             for window in (of_worker[c] for of_worker in seen.windows):
                 if window is not None:
                     overlay.draw_window(image, camera, window)
@@ -134,8 +137,7 @@ class Views:
         keypoints, images = seen.keypoints, []
         if keypoints is None or not seen.windows:
             return []
-        cameras = self.simulation.scene.cameras
-        parts = zip(cameras, seen.crops, seen.windows[0], strict=True)
+        parts = zip(seen.cameras, seen.crops, seen.windows[0], strict=True)
         for c, (camera, crop, window) in enumerate(parts):
             if crop is None or window is None:
                 image = overlay.panel(size, size)
@@ -182,7 +184,7 @@ class Views:
 
     def _through_cameras(self, width: int, height: int, seen: Glance) -> list[Image]:
         """What every camera sees, without shadows."""
-        cameras = self.simulation.scene.cameras
+        cameras = seen.cameras
         if all(camera.lens is None for camera in cameras):
             return self._drawn([resized(camera, width, height) for camera in cameras], seen)
         size = (SMOOTHING * width, SMOOTHING * width)

@@ -160,6 +160,30 @@ class Task(Generic[ConfigT, StateT]):
         """
         return ()
 
+    def goal_targets(self, goal: Floats) -> Sequence[ReachTarget]:
+        """Return where the tool has to get to for a goal that `reset(options={"goal": ...})` gives.
+
+        A task that takes goals defines this and `set_goal`; it is asked before the episode starts,
+        and what is out of reach is refused.
+
+        Raises:
+            ConfigError: this is no goal; by default always, as the task takes none.
+        """
+        known = [
+            each for each in dict.fromkeys((*BUILT_IN, *TASKS)) if takes_goals(find_task(each))
+        ]
+        raise ConfigError(
+            f"{self.id} takes no goal of a reset: leave options['goal'] out. {', '.join(known)} "
+            "do; a task of yours does if it defines goal_targets and set_goal (hrc_env.Task)."
+        )
+
+    def set_goal(self, state: StateT, ids: Ints, goals: Floats, world: World) -> None:
+        """Give environments `ids` these goals (n, ...) in the place of those that `reset` drew.
+
+        `world` is of these environments only.
+        """
+        raise NotImplementedError
+
     def object_poses(self, state: StateT, ids: Ints) -> Floats | None:
         """Return (n, O, 7) where loose objects lie after `reset`.
 
@@ -247,6 +271,11 @@ def find_task(task: str | TaskType) -> TaskType:
     if task not in TASKS:
         raise unknown("task", task, sorted({*BUILT_IN, *TASKS}))
     return TASKS[task]
+
+
+def takes_goals(task: TaskType) -> bool:
+    """Return whether a reset can give a task its goal."""
+    return task.set_goal is not Task.set_goal
 
 
 def goal_of(task: Task[Any, Any]) -> Goal:
