@@ -145,7 +145,7 @@ def _begin_as_cast(
         if not len(wrong):
             return
         draws = rng.random(draws.shape)
-    named = ", ".join(f"{activity_names[activities[w]]!r} of worker {w + 1}" for w in wrong)
+    named = ", ".join(f"{activity_names[activities[w]]!r} of worker_{w}" for w in wrong)
     raise ConfigError(
         f"No beginning of an episode with {named} was found in {CAST_TRIES} draws: there are fewer "
         "free places for that than workers. Let fewer workers begin so."
