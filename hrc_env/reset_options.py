@@ -31,14 +31,13 @@ from hrc_env.tasks.task import Task
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ResetOptions:
-    """What of an episode is fixed: the names in `env.reset(options={...})`, which takes the record,
-    too.
+    """What of an episode is fixed: the names that `reset(options={...})` takes.
 
-    What is not given is drawn as it is without options, from the same random streams. A vector
-    environment takes one value for all environments; of `goal`, `start_q`, `n_workers` and
-    `steps_left` also an array with a row for each; of anything "each", a list of a mapping (or
-    None) for each. `set_options` takes the same but `steps_left`: for all resets to come, also
-    those after the end of an episode.
+    The record itself may be given, too. What is not given is drawn as it is without options, from
+    the same random streams. A vector environment takes one value for all environments; of `goal`,
+    `start_q`, `n_workers` and `steps_left` also an array with a row for each; and of any of them
+    "each", a list of a mapping (or None) for each. `set_options` takes the same but `steps_left`:
+    for all resets to come, also those after the end of an episode.
     """
 
     goal: ArrayLike | None = None

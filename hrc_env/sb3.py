@@ -86,8 +86,9 @@ class HRCVecEnv(VecEnv):
         return seeds
 
     def set_options(self, options: Any = None) -> None:
-        """Take options for the next reset only, as SB3 does; for all to come:
-        `env_method("set_options", options)`.
+        """Take options for the next reset.
+
+        For all resets to come: `env_method("set_options", options)`.
 
         Args:
             options: as of `HRCVectorEnv.reset`, of one environment each; one mapping for all

@@ -178,9 +178,13 @@ class Task(Generic[ConfigT, StateT]):
         )
 
     def set_goal(self, state: StateT, ids: Ints, goals: Floats, world: World) -> None:
-        """Give environments `ids` these goals (n, ...) in the place of those that `reset` drew.
+        """Give environments `ids` these goals in the place of those that `reset` drew.
 
-        `world` is of these environments only.
+        Args:
+            state: of all environments; rows `ids` are written.
+            ids: (n,) the environments in question.
+            goals: (n, ...) as `goal_targets` was given each.
+            world: of these environments only.
         """
         raise NotImplementedError
 
