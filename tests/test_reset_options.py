@@ -19,8 +19,12 @@ LATE = {"kind": "late", "cameras": ["all"], "amount": [0.0, 0.3]}
 OPTIONS: list[dict[str, Any]] = [
     {"goal": GOAL, "people": "unaware"},
     {"n_workers": 2, "bodies": ["worker_2", "worker_1"], "activity": ["hammer", None]},
-    {"cameras": ["camera_2", "camera_4"], "faults": [{**LATE, "kind": "wrong_rotation"}]},
-    {"cameras": DRAWN, "appearance": {"light": (0.2, 0.5)}, "faults": [LATE]},
+    {
+        "n_workers": 1,
+        "cameras": ["camera_2", "camera_4"],
+        "faults": [{**LATE, "kind": "wrong_rotation"}],
+    },
+    {"n_workers": 2, "cameras": DRAWN, "appearance": {"light": (0.2, 0.5)}, "faults": [LATE]},
 ]
 """Of four environments, of which each fixes something else."""
 ARGUMENTS: dict[str, Any] = {
@@ -168,6 +172,8 @@ def test_people_of_one_episode_do_not_look_out_for_the_robot() -> None:
 
     assert reactions(None) > 0.0
     assert reactions({"people": "unaware"}) == 0.0
+    blind = {"pause_probability": 1.0, "step_back_probability": 0.0, "notice_m": 0.0}
+    assert reactions({"people": {**blind, "fast_m_s": 99.0}}) == 0.0
 
 
 def test_fault_amounts_are_drawn_anew_for_every_episode() -> None:
