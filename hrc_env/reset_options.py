@@ -295,15 +295,14 @@ def _rig(
 def _faults(given: Options, room: Room) -> tuple[FaultConfig, ...] | None:
     if "faults" not in given:
         return None
-    faults = restored(tuple[FaultConfig, ...], given["faults"], "faults")
-    return tuple(faults)
+    faults: tuple[FaultConfig, ...] = restored(tuple[FaultConfig, ...], given["faults"], "faults")
+    return faults
 
 
 def _appearance(given: Options, room: Room) -> AppearanceConfig | None:
     if "appearance" not in given:
         return None
-    appearance = restored(AppearanceConfig, given["appearance"], "appearance")
-    assert isinstance(appearance, AppearanceConfig)
+    appearance: AppearanceConfig = restored(AppearanceConfig, given["appearance"], "appearance")
     return appearance
 
 
