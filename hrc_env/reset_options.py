@@ -66,6 +66,8 @@ class ResetOptions:
 
 
 NAMES = tuple(each.name for each in dataclasses.fields(ResetOptions))
+OF_SEVERAL = ("reset_mask", "each")
+"""Options that only vector environments have."""
 ONE_RESET = ("steps_left",)
 """Options that are of one reset only."""
 Options = Mapping[str, Any]
@@ -84,10 +86,12 @@ def named_options(options: Options | ResetOptions | None, *more: str) -> dict[st
         raise ConfigError(
             f"Options of a reset must be a mapping or hrc_env.ResetOptions, got {options!r}."
         )
-    given = dict(options or {})
+    given, valid = dict(options or {}), tuple(dict.fromkeys((*NAMES, *more)))
     for name in given:
-        if name not in (*NAMES, *more):
-            raise unknown("reset option", name, (*NAMES, *more))
+        if name in OF_SEVERAL and name not in valid:
+            raise unknown("reset option of one environment", name, valid)
+        if name not in valid:
+            raise unknown("reset option", name, valid)
     return {name: value for name, value in given.items() if value is not None}
 
 
