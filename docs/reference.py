@@ -25,8 +25,10 @@ from hrc_env.env_config import EnvConfig
 from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.geometry.lens import Lens
 from hrc_env.perception.faults.fault import FaultConfig
+from hrc_env.reset_options import ResetOptions
 from hrc_env.safety.config import ShieldConfig
 from hrc_env.safety.contact import REGIONS, effective_mass, permitted_contact_speed
+from hrc_env.scene.rig_distribution import RigDistribution
 from hrc_env.tasks import BUILT_IN
 from hrc_env.tasks.task import find_task
 from hrc_env.tracking.config import PaperConfig, TrackerConfig, TriangulationConfig
@@ -108,7 +110,8 @@ float64. Distances are to the *estimated* body. Cost is counted on the true one
 A worker is somewhere in their schedule, at a random phase, and no part of the robot within 0.1 m of
 them: such starts are drawn again. The estimator starts from its prior and
 the first images. Episodes are truncated by `TimeLimit`, or after n steps where they began with
-`reset(options={{"steps_left": n}})`. Contact ends them only with
+`reset(options={{"steps_left": n}})`. What else options fix: `ResetOptions`
+([configuration](config.md)). Contact ends them only with
 `config={{"cost": {{"contact_terminates": True}}}}`.
 """
 PAGE = """\
@@ -288,7 +291,9 @@ def config() -> str:
         for kind, title in (
             (CameraConfig, "A camera: an item of `scene.cameras` and of `cameras=`"),
             (Lens, "A lens: `lens` of a camera"),
+            (RigDistribution, "Rigs drawn for every episode: `cameras=`"),
             (FaultConfig, "A fault: an item of `faults`"),
+            (ResetOptions, "Options of `reset` and `set_options`"),
             (PaperConfig, '`tracker` with `estimator="paper"`'),
             (TriangulationConfig, '`tracker` with `estimator="triangulation"` or `"ransac"`'),
         )

@@ -81,6 +81,7 @@ if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
     from hrc_env.registration import register_shield as register_shield
     from hrc_env.registration import register_task as register_task
     from hrc_env.render.views import Views as Views
+    from hrc_env.reset_options import ResetOptions as ResetOptions
     from hrc_env.rewards import RewardConfig as RewardConfig
     from hrc_env.rewards import RewardTerm as RewardTerm
     from hrc_env.safety.config import ShieldConfig as ShieldConfig
@@ -89,6 +90,7 @@ if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
     from hrc_env.scene.camera_images import ImageConfig as ImageConfig
     from hrc_env.scene.domain_randomization import AppearanceConfig as AppearanceConfig
     from hrc_env.scene.rig import make_cameras as make_cameras
+    from hrc_env.scene.rig_distribution import RigDistribution as RigDistribution
     from hrc_env.scene.rigs import RIGS as RIGS
     from hrc_env.scene.robot import ROBOTS as ROBOTS
     from hrc_env.scene.robot import Hand as Hand
@@ -128,6 +130,8 @@ PUBLIC = {
     "IDS": "hrc_env.registration",
     "ImageConfig": "hrc_env.scene.camera_images",
     "PeopleConfig": "hrc_env.motion.config",
+    "ResetOptions": "hrc_env.reset_options",
+    "RigDistribution": "hrc_env.scene.rig_distribution",
     "Views": "hrc_env.render.views",
     "make_vector": "hrc_env.vector.make",
     "save_config": "hrc_env.config",

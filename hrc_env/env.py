@@ -22,10 +22,12 @@ from hrc_env.core.infos import Words, worded
 from hrc_env.core.registry import share
 from hrc_env.core.typing import Floats
 from hrc_env.env_config import signature_of_env
+from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.infos import words_of
 from hrc_env.registration import HasSpec
 from hrc_env.render.marks import OVERLAYS
 from hrc_env.render.views import CameraChoice, Views, picture_size
+from hrc_env.reset_options import ResetOptions, lasting_options, named_options
 from hrc_env.rewards import RewardConfig
 from hrc_env.settings import Settings, settle
 from hrc_env.simulation import Simulation
@@ -34,7 +36,6 @@ from hrc_env.tasks import DEFAULT, goal
 from hrc_env.tasks.task import TaskType, goal_of
 
 RENDER_MODES = ("rgb_array", "depth_array")
-RESET_OPTIONS = ("steps_left",)
 ENDLESS = 2**62
 """Steps that are left where nobody said otherwise; time limits are gymnasium's `TimeLimit`."""
 
@@ -75,7 +76,8 @@ class EnvBase(HasSpec, Stateful):
         """
         apart, others = goal_of(self._task), [term.name for term in rewards.SHARED_TERMS]
         others = [term.name for term in self._task.rewards] + others
-        return partial(goal.judged, apart, config=self.config.task, others=others)
+        factor = self._reward_factor(goal.TERM)
+        return partial(goal.judged, apart, config=self.config.task, others=others, factor=factor)
 
     @property
     def compute_terminated(self) -> Callable[[Any, Any, Any], Any]:
@@ -106,6 +108,10 @@ class EnvBase(HasSpec, Stateful):
             NoGoalError: as of `compute_reward`.
         """
         return partial(goal.ended, goal_of(self._task))
+
+    def _reward_factor(self, term: str) -> float:
+        """The factor on a term of the reward (`set_reward`)."""
+        raise NotImplementedError
 
     def refuse_closed(self) -> None:
         """Raise a `ConfigError` once the environment is closed."""
@@ -142,6 +148,8 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         self.observation_space, self.action_space = spaces(self.simulation)
         self._begun = False
         self._steps_left = ENDLESS
+        self._options: dict[str, Any] = {}
+        self._next_options: dict[str, Any] = {}
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -150,14 +158,20 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
 
         Args:
             seed: of its random stream; with None the stream goes on.
-            options: "steps_left": after so many steps this episode is truncated, if its time
-                limit does not end it before.
+            options: what of the episode is fixed, in place of what `set_options` says: fields of
+                `ResetOptions` by name, such as {"goal": (0.4, 0.3, 1.1), "n_workers": 0}.
+
+        Raises:
+            ConfigError: an option that cannot be; nothing has begun then.
         """
         self.refuse_closed()
-        steps_left = _steps_left(options or {})
+        given = {**self._options, **self._next_options, **_named(options)}
+        steps_left = _steps_left(given)
+        fixed = [self.simulation.fix(given)] if given else []
+        self._next_options = {}
         super().reset(seed=seed)
         self._begun, self._steps_left = True, steps_left
-        result = self.simulation.reset(np.array([0]), [self.np_random])
+        result = self.simulation.reset(np.array([0]), [self.np_random], fixed)
         return one(result.observation, 0), result.info_of(0)
 
     def step(
@@ -187,9 +201,60 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         """The bodies that `worker_N/body` of infos counts."""
         return self.simulation.bodies.names
 
-    def set_reward(self, weights: RewardConfig) -> None:
-        """Weigh the reward's terms so from the next step on."""
-        self.simulation.set_reward(weights)
+    @property
+    def rig(self) -> tuple[CameraConfig, ...]:
+        """The cameras of this episode, as they are told."""
+        return self.simulation.rig_of(0)
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """What `set_options` says, by name."""
+        return dict(self._options)
+
+    @options.setter
+    def options(self, options: Mapping[str, Any] | ResetOptions | None) -> None:
+        self.set_options(options)
+
+    @property
+    def next_options(self) -> dict[str, Any]:
+        """Options of the next reset alone, besides those it is given; vector environments of
+        processes set them."""
+        return dict(self._next_options)
+
+    @next_options.setter
+    def next_options(self, options: Mapping[str, Any] | ResetOptions | None) -> None:
+        self._next_options = named_options(options)
+
+    def set_options(self, options: Mapping[str, Any] | ResetOptions | None = None) -> None:
+        """Fix something of all episodes to come, until this is called again: a curriculum.
+
+        `get_state` does not hold it.
+
+        Args:
+            options: as of `reset`, in place of those before; what `reset` is given goes before
+                them. None: nothing is fixed any more.
+
+        Raises:
+            ConfigError: an option that cannot be, or is of one reset.
+        """
+        given = lasting_options(options)
+        self.simulation.fix(given)
+        self._options = given
+
+    def set_reward(
+        self, weights: RewardConfig | None = None, factors: Mapping[str, float] | None = None
+    ) -> None:
+        """Weigh the reward's terms so from the next step on.
+
+        Args:
+            weights: of the terms that all tasks share; None: as they are.
+            factors: on any terms by name, also the task's own: {"goal": 2.0}; terms that are not
+                named have the factor 1. None: as they are.
+
+        Raises:
+            ConfigError: an unknown term, or a factor that is no finite number.
+        """
+        self.simulation.set_reward(weights, factors)
 
     def render(self, camera: CameraChoice = None) -> NDArray[Any] | None:  # type: ignore[override]
         """Return a picture of the scene, (H, W, 3) of uint8 or (H, W) metres of depth.
@@ -216,6 +281,9 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         """Return an observation's terms by name, in metres, seconds and radians, goals too."""
         return observations.split(observation, self.simulation.layout)
 
+    def _reward_factor(self, term: str) -> float:
+        return self.simulation.reward_factors.get(term, 1.0)
+
     def close(self) -> None:
         """Release threads and graphics contexts."""
         self.views.close()
@@ -223,17 +291,20 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         self.closed = True
 
 
+def _named(options: Mapping[str, Any] | ResetOptions | None) -> dict[str, Any]:
+    """Options of one environment's reset by name; `ConfigError` for those of a vector."""
+    for name in options if isinstance(options, Mapping) else ():
+        if name == "elapsed_steps":
+            raise ConfigError(
+                "elapsed_steps is an option of vector environments: one environment does not know "
+                'its time limit, which is a wrapper of gymnasium. Say options={"steps_left": n} '
+                "(time limit minus elapsed steps), which both take."
+            )
+    return named_options(options)
+
+
 def _steps_left(options: Mapping[str, Any]) -> int:
     """What the options of a reset say."""
-    if "elapsed_steps" in options:
-        raise ConfigError(
-            "elapsed_steps is an option of vector environments: one environment does not know "
-            'its time limit, which is a wrapper of gymnasium. Say options={"steps_left": n} '
-            "(time limit minus elapsed steps), which both take."
-        )
-    for name in options:
-        if name not in RESET_OPTIONS:
-            raise unknown("reset option", name, RESET_OPTIONS)
     return whole('options["steps_left"]', options.get("steps_left", ENDLESS), 1, ENDLESS)
 
 

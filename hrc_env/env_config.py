@@ -23,6 +23,7 @@ if TYPE_CHECKING:  # at run time they would import the simulator, which `--help`
     from hrc_env.safety.shield import ShieldChoice
     from hrc_env.scene.camera_images import ImageConfig
     from hrc_env.scene.domain_randomization import AppearanceConfig
+    from hrc_env.scene.rig_distribution import RigDistribution
     from hrc_env.scene.robot import Robot
     from hrc_env.tasks.task import TaskType
     from hrc_env.tracking.estimators import EstimatorChoice
@@ -55,10 +56,13 @@ class EnvConfig:
     (Algorithm 1 as printed), "paper_restarts" (with what it lacks), "triangulation" or "ransac";
     one that was registered, an `EstimatorSpec`, or a function that makes an estimator
     (docs/bring_your_own.md)."""
-    cameras: "str | Path | Sequence[Any] | None" = field(default=None, metadata=MANY)
+    cameras: "str | Path | Sequence[Any] | RigDistribution | Mapping[str, Any] | None" = field(
+        default=None, metadata=MANY
+    )
     """Indices or names of the scene's cameras to use; or a rig of your own: its name ("lab_gopro"),
-    a TOML file's path, or a list of places (x, y, z) [m], `CameraConfig`s or mappings; None: all
-    cameras of the scene."""
+    a TOML file's path, or a list of places (x, y, z) [m], `CameraConfig`s or mappings; or a
+    `RigDistribution` (or mapping), from which every episode's rig is drawn; None: all cameras of
+    the scene."""
     scene: str | None = None
     """Name of the place: "lab", a workshop, or "site", a construction site; None: that which the
     task is made for."""

@@ -3,14 +3,14 @@
 Of people terms read the estimate only; what a step brought for the task is judged in the world.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from hrc_env.belief import Belief
-from hrc_env.core.errors import ConfigError, check_fields, check_shape
+from hrc_env.core.errors import ConfigError, check_fields, check_names, check_shape
 from hrc_env.core.kernels import kernel
 from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.typing import Floats
@@ -134,6 +134,20 @@ def evaluated(
 ) -> dict[str, Floats]:
     """The value (B,) of each of these terms by its name."""
     return {term.name: term.function(now, step, previous_action, weights) for term in terms}
+
+
+def checked_factors(factors: Mapping[str, float], terms: Sequence[RewardTerm]) -> dict[str, float]:
+    """Factors on a reward's terms by name, or `ConfigError` for a name that is none, with the
+    nearest, and for what is no finite number."""
+    names = [term.name for term in terms]
+    check_names("reward term", factors, names)
+    for name, factor in factors.items():
+        number = isinstance(factor, int | float | np.number) and not isinstance(factor, bool)
+        if not number or not np.isfinite(factor):
+            raise ConfigError(
+                f"The factor on reward term {name!r} must be a finite number, got {factor!r}."
+            )
+    return {name: float(factor) for name, factor in factors.items()}
 
 
 def total(terms: Mapping[str, Floats], batch: int) -> Floats:

@@ -20,6 +20,7 @@ from hrc_env.core.typing import Bools, Floats
 from hrc_env.env import ENDLESS
 from hrc_env.env_config import check_keywords
 from hrc_env.evaluation.sums import EpisodeSums, value_of_step
+from hrc_env.reset_options import named_options
 from hrc_env.rewards import RewardConfig
 from hrc_env.simulation import Simulation
 from hrc_env.step_result import Observation
@@ -27,7 +28,7 @@ from hrc_env.tasks.goal import TERM
 from hrc_env.vector.env import HRCVectorEnv
 from hrc_env.vector.infos import chosen_infos
 from hrc_env.vector.member import TOGETHER, Member, info_of
-from hrc_env.vector.options import steps_behind
+from hrc_env.vector.options import ALONE, steps_behind
 
 with learner():
     from stable_baselines3.common.monitor import Monitor
@@ -106,9 +107,11 @@ class HRCVecEnv(VecEnv):
     def set_options(self, options: Any = None) -> None:
         """Take options for the next reset.
 
+        For all resets to come: `env_method("set_options", options)`.
+
         Args:
-            options: "steps_left" or "elapsed_steps", as of `HRCVectorEnv.reset` a number each; one
-                mapping for all environments or a list of them.
+            options: as of `HRCVectorEnv.reset`, of one environment each; one mapping for all
+                environments or a list of them.
 
         Raises:
             ConfigError: an unknown option, a value that cannot work, or a list of another
@@ -116,9 +119,9 @@ class HRCVecEnv(VecEnv):
         """
         each = options if isinstance(options, (list, tuple)) else [options] * self.num_envs
         check_shape("options", (len(each),), (self.num_envs,), "a mapping for each environment")
-        for one in each:
-            steps_behind(one, self.env.max_episode_steps)
-        super().set_options([dict(one or {}) for one in each])
+        for k, one in enumerate(each):
+            self.env.check_options(k, one)
+        super().set_options([dict(named_options(one, *ALONE)) for one in each])
 
     def reset(self) -> Observation:  # type: ignore[override]
         """Start every environment: from its seed the first time, then on with its stream."""
@@ -126,9 +129,13 @@ class HRCVecEnv(VecEnv):
         elapsed = np.zeros(self.num_envs, int)
         if self._phases is not None:
             elapsed, self._phases = self._phases.integers(limit, size=self.num_envs), None
-        for k, options in enumerate(self._options):
-            elapsed[k] = steps_behind(options, limit) if options else elapsed[k]
-        observation, infos = self.env.reset(seed=self._seeds, options={"elapsed_steps": elapsed})
+        each = [dict(options or {}) for options in self._options]
+        for k, options in enumerate(each):
+            steps = {name: options.pop(name) for name in ALONE if name in options}
+            elapsed[k] = steps_behind(steps, limit) if steps else elapsed[k]
+        given = {"each": each} if any(each) else {}
+        options = {"elapsed_steps": elapsed, **given}
+        observation, infos = self.env.reset(seed=self._seeds, options=options)
         self._reset_seeds()
         self._reset_options()
         self.costs = np.zeros(self.num_envs)
@@ -171,9 +178,11 @@ class HRCVecEnv(VecEnv):
         values = zip(*(column.tolist() for column in columns.values()), strict=True)
         return [dict(zip(columns, row, strict=True)) for row in values]
 
-    def set_reward(self, weights: RewardConfig) -> None:
-        """Weigh the reward's terms so from the next step on, in every environment."""
-        self.env.set_reward(weights)
+    def set_reward(
+        self, weights: RewardConfig | None = None, factors: Mapping[str, float] | None = None
+    ) -> None:
+        """Weigh the reward's terms so from the next step on, in all environments (`HRCEnv`)."""
+        self.env.set_reward(weights, factors)
 
     def close(self) -> None:
         """Release threads and graphics contexts."""

@@ -15,6 +15,7 @@ from hrc_env.geometry.camera_config import CameraConfig, camera_of, read_rig
 from hrc_env.safety.shield import Shield, shield_called
 from hrc_env.scene.build import Scene
 from hrc_env.scene.camera_images import ImageConfig, images_called
+from hrc_env.scene.rig_distribution import RigDistribution
 from hrc_env.scene.rigs import RIGS
 from hrc_env.scene.robot import DEFAULT as DEFAULT_ROBOT
 from hrc_env.scene.robot import ROBOTS, Robot, robot_called
@@ -48,6 +49,8 @@ class Settings:
     config: HRCConfig
     images: ImageConfig | None = None
     """Images of cameras in the observation; None: there are none."""
+    rigs: RigDistribution | None = None
+    """From which every episode's rig is drawn; None: all have the same."""
 
     def recorded(self, batch: int, scene: Scene) -> dict[str, Any]:
         """What a state must have been taken with to be set."""
@@ -57,7 +60,7 @@ class Settings:
             "estimator": self.estimator.name, "scene": self.scene, "robot": self.robot.name,
             "cameras": tuple(camera.name for camera in scene.cameras),
             "n_workers": (fewest, most) if fewest < most else most, "control": self.asked.control,
-            "config": self.config,
+            "config": self.config, **({} if self.rigs is None else {"rigs": self.rigs}),
         }  # fmt: skip
 
 
@@ -76,6 +79,10 @@ def make_settings(asked: EnvConfig) -> Settings:
     config, cameras = resolve(asked.config, task, estimator), asked.cameras
     if isinstance(cameras, np.ndarray):
         cameras = cameras.tolist()
+    rigs = None
+    if isinstance(cameras, RigDistribution | Mapping):
+        rigs = restored(RigDistribution, cameras, "cameras")
+        cameras = rigs.rig or None
     if (rig := rig_of(cameras)) is not None:
         config, cameras = replace(config, scene=replace(config.scene, cameras=rig)), None
     for name, path in PARTS.items():
@@ -101,7 +108,7 @@ def make_settings(asked: EnvConfig) -> Settings:
     return Settings(
         asked, task(config.task), estimator, cameras, scene,
         robot, _worker_counts(n_workers),
-        shield_called(asked.shield), config, images_called(asked.observe_images),
+        shield_called(asked.shield), config, images_called(asked.observe_images), rigs,
     )  # fmt: skip
 
 
@@ -114,7 +121,7 @@ def rig_of(cameras: Any) -> tuple[CameraConfig, ...] | None:
             return RIGS[str(cameras)]
         raise ConfigError(
             f"cameras={cameras!r} is no rig: valid are {', '.join(map(repr, RIGS))}, a path that "
-            "ends in .toml, or a list of names, indices, places or cameras."
+            "ends in .toml, a list of names, indices, places or cameras, or a RigDistribution."
         )
     several = isinstance(cameras, Sequence)
     if not several or all(isinstance(each, str | int | float | np.number) for each in cameras):

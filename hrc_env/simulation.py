@@ -5,9 +5,10 @@ streams only, never on the size of the batch.
 """
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -19,25 +20,32 @@ from hrc_env.core.batching import State, Stateful, picked, rows, write_rows
 from hrc_env.core.errors import ConfigError, check_shape, needed
 from hrc_env.core.infos import Info
 from hrc_env.core.records import PoseEstimate, WorkerMotion, WorkerTruth
-from hrc_env.core.streams import children
+from hrc_env.core.streams import aside, children
 from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, JointVelocities, Points3, Records
 from hrc_env.geometry import chains
+from hrc_env.geometry.camera_config import CameraConfig
+from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.geometry.reach import check_reach
 from hrc_env.motion import fit, generator, starts
 from hrc_env.motion.activities.pieces import NoRoomError
-from hrc_env.pipeline.levels import CAMERA_LEVELS, make_pipeline, prepare
+from hrc_env.pipeline.episodic import CameraSetup, EpisodicPipeline, EpisodicState
+from hrc_env.pipeline.levels import CAMERA_LEVELS, PipelineOfEpisode, make_pipeline, prepare
 from hrc_env.pipeline.observed_images import Images, ObservedImages
 from hrc_env.pipeline.sensor_input import SensorInput, TrueSensorInput
+from hrc_env.reset_options import Fixed, Options, Room, faults_of, fix
 from hrc_env.rewards import RewardConfig
 from hrc_env.safety import cost as costs
 from hrc_env.safety import incidents
 from hrc_env.safety.incidents import IncidentMonitor, Paths
 from hrc_env.safety.shield import shielded
 from hrc_env.scene import handling
-from hrc_env.scene.build import Scene, all_grounds, build
-from hrc_env.scene.domain_randomization import AS_BUILT, Look, draw_look
+from hrc_env.scene.build import Scene, all_grounds, build, with_rig
+from hrc_env.scene.domain_randomization import AS_BUILT, AppearanceConfig, Look, draw_look
 from hrc_env.scene.limits import object_targets, robot_model
 from hrc_env.scene.physics import Physics
+from hrc_env.scene.rig import make_cameras
+from hrc_env.scene.rig_distribution import STREAM as RIG_STREAM
+from hrc_env.scene.rig_distribution import draw_rig
 from hrc_env.scene.rigs import findings
 from hrc_env.settings import Settings
 from hrc_env.step_result import Observation, StepResult, agreed
@@ -52,6 +60,8 @@ CLOSING_M_S = 8.0
 STREAMS = ("robot", "motion", "sensor", "tracker", "task")
 """Who draws numbers, each from a generator of its own, in the order in which these are handed out:
 the worker's walk does not depend on who looks at it."""
+ALL_DRAWN = Fixed()
+NOTHING_GIVEN: Mapping[int, Fixed] = MappingProxyType({})
 MEASURING = "objects"
 """And who measures loose objects, where there are any: from a child of the task's."""
 
@@ -98,6 +108,7 @@ class Simulation(Stateful):
         prepare(perception, config.detector)
         self.batch, self.config, self.control = batch, config, settings.asked.control
         self.perception, self.shield, self.task = perception, settings.shield, settings.task
+        self._estimator = settings.estimator
         self.bodies = stack(pool(config.worker))
         self._make_people_and_scene(settings)
         if perception in CAMERA_LEVELS:
@@ -133,6 +144,13 @@ class Simulation(Stateful):
         self._looks: dict[int, tuple[np.random.Generator, Look]] = {}
         self.task_state = self.task.make_state(batch)
         self._everyone, self.reward_weights = np.arange(batch), config.reward
+        self.reward_factors: dict[str, float] = {}
+        """On terms of the reward by name; 1 on those that are not named."""
+        self._rigs = settings.rigs if perception in CAMERA_LEVELS else None
+        if settings.rigs is not None:
+            settings.rigs.counts(len(self.scene.cameras))
+        if self._rigs is not None:  # refused here rather than at the first reset
+            draw_rig(self._rigs, self.scene, np.random.default_rng(0))
         self.action, self.shield_change = (np.zeros((batch, n)) for n in (self.n_actions, n_joints))
         self.episode_cost, self.separation_m = np.zeros(batch), np.zeros(batch)
         made = (batch, self.scene.n_workers, config.tracker)
@@ -144,10 +162,17 @@ class Simulation(Stateful):
         """The task's loose objects as they were measured last; None: there are none."""
         self.streams = {name: [np.random.default_rng(0)] * batch for name in (*STREAMS, MEASURING)}
 
-    def reset(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> StepResult:
-        """Start environments `ids` anew, one generator each; their rows of a result."""
+    def reset(
+        self, ids: Ints, rngs: Sequence[np.random.Generator], fixed: Sequence[Fixed | None] = ()
+    ) -> StepResult:
+        """Start environments `ids` anew, one generator each; their rows of a result.
+
+        `fixed` is what of each one's episode is not drawn; none: all is.
+        """
+        given = {b: each for b, each in zip(ids.tolist(), fixed, strict=False) if each is not None}
         self._hand_out(ids, rngs)
-        truth = self._begin(ids)
+        self._hang_cameras(ids, given)
+        truth = self._begin(ids, given)
         belief = self._perceive(truth)
         return self._open(truth, belief)
 
@@ -158,38 +183,86 @@ class Simulation(Stateful):
         belief = self._perceive(truth)
         return self._judge(command, truth, belief)
 
-    def set_reward(self, weights: RewardConfig) -> None:
-        """Weigh the reward's terms so from the next step on."""
-        self.reward_weights = weights
+    def fix(self, options: Options) -> Fixed:
+        """Return what a reset's options fix of one environment's episode, checked; `ConfigError` as
+        of `reset_options.fix`."""
+        camera_sees = self.config.faults, self.config.appearance
+        room = Room(
+            self.task, self.scene, self.chain, self.perception, *camera_sees, self.bodies.names,
+            self.motion.mind, self.physics.touched_at, self.images,
+        )  # fmt: skip
+        return fix(options, room)
+
+    def set_reward(
+        self, weights: RewardConfig | None = None, factors: Mapping[str, float] | None = None
+    ) -> None:
+        """Weigh the reward's terms so from the next step on.
+
+        Args:
+            weights: of the terms that all tasks share; None: as they are.
+            factors: on any terms by name, the task's own among them; 1 on the others. None: as they
+                are.
+
+        Raises:
+            ConfigError: an unknown term, or a factor that is no finite number.
+        """
+        if not isinstance(weights, RewardConfig | None):
+            raise ConfigError(
+                f"weights must be a RewardConfig, got {weights!r}; factors on terms by name are "
+                'set_reward(factors={"NAME": 2.0}).'
+            )
+        checked = (
+            None if factors is None else rewards.checked_factors(factors, self.task.reward_terms)
+        )
+        self.reward_weights = self.reward_weights if weights is None else weights
+        self.reward_factors = self.reward_factors if checked is None else checked
+
+    def rig_of(self, b: int) -> tuple[CameraConfig, ...]:
+        """Return the cameras of environment b in its episode."""
+        own = self._cameras_own(b)
+        return self.scene.rig if own is None else own.rig
+
+    def cameras_of(self, b: int) -> tuple[PinholeCamera, ...]:
+        """Return the same with their matrices."""
+        rig = self.rig_of(b)
+        return self.scene.cameras if rig == self.scene.rig else make_cameras(rig)
 
     def get_state(self) -> State:
         """A copy of everything that changes, generators included, and the settings."""
-        return {"settings": self.settings, **super().get_state()}
+        factors = {"reward_factors": self.reward_factors} if self.reward_factors else {}
+        return {"settings": self.settings, **super().get_state(), **factors}
 
     def set_state(self, state: State) -> None:
         """Continue from a state that was taken with the same settings, bit for bit."""
-        for name, value in self.settings.items():
-            if state["settings"][name] != value:
+        for name in {**self.settings, **state["settings"]}:
+            taken, value = state["settings"].get(name), self.settings.get(name)
+            if taken != value:
                 raise ConfigError(
-                    f"The state was taken with {name}={state['settings'][name]!r}; "
+                    f"The state was taken with {name}={taken!r}; "
                     f"here {name} is {value!r}. Make the environment with the same arguments."
                 )
+        if isinstance(state["pipeline"], EpisodicState):
+            self._let_cameras_differ()
         super().set_state(state)
+        self.reward_factors = dict(state.get("reward_factors", {}))
 
     def draw_images(self) -> Images:
         """Return the images of what the sensors were shown last."""
         if self.images is None:
             return {}
         now = self.pipeline.sensor.now
-        return self.images.draw(now, [self.look_of(b) for b in now.ids.tolist()])
+        ids = now.ids.tolist()
+        rigs = [self.cameras_of(b) for b in ids]
+        return self.images.draw(now, [self.look_of(b) for b in ids], rigs)
 
     def look_of(self, b: int) -> Look | None:
         """How environment `b` looks in its episode (for images); None: as it was built."""
         worn, stream = self.pipeline.look_of(b), self.streams["sensor"][b]
-        if worn is not None or self.config.appearance == AS_BUILT:
+        appearance = self._appearance_of(b)
+        if worn is not None or appearance == AS_BUILT:
             return worn
         if b not in self._looks or self._looks[b][0] is not stream:  # it follows from the stream
-            look = draw_look(self.config.appearance, self.scene.n_workers, stream)
+            look = draw_look(appearance, self.scene.n_workers, stream)
             self._looks[b] = stream, look
         return self._looks[b][1]
 
@@ -227,6 +300,14 @@ class Simulation(Stateful):
         view = self.task.view(self.task_state, np.array([b]))
         return self.task.markers(view)[0]
 
+    def _cameras_own(self, b: int) -> CameraSetup | None:
+        """The cameras of environment b's episode; None: those that all were made with."""
+        return self.pipeline.setup_of(b) if isinstance(self.pipeline, EpisodicPipeline) else None
+
+    def _appearance_of(self, b: int) -> AppearanceConfig:
+        own = self._cameras_own(b)
+        return self.config.appearance if own is None else own.appearance
+
     def _make_people_and_scene(self, settings: Settings) -> None:
         config, (fewest, most) = settings.config, settings.n_workers
         scene_for = partial(
@@ -254,15 +335,56 @@ class Simulation(Stateful):
             if self.measured is not None:
                 self.streams[MEASURING][b] = self.streams["task"][b].spawn(1)[0]
 
-    def _begin(self, ids: Ints) -> Truth:
+    def _let_cameras_differ(self) -> EpisodicPipeline:
+        """Let environments have cameras of their own, if they cannot yet."""
+        if not isinstance(self.pipeline, EpisodicPipeline):
+            made = self.perception, self._estimator, self.scene, self.config
+            make = PipelineOfEpisode(*made, self.images is not None)
+            self.pipeline = EpisodicPipeline(self.pipeline, self.settings["cameras"], make)
+        return self.pipeline
+
+    def _hang_cameras(self, ids: Ints, given: Mapping[int, Fixed]) -> None:
+        """Give environments `ids` the cameras of the episodes that begin."""
+        differ = self._rigs is not None or any(each.changes_cameras for each in given.values())
+        if not differ and not isinstance(self.pipeline, EpisodicPipeline):
+            return
+        pipeline = self._let_cameras_differ()
+        for b in ids.tolist():
+            pipeline.assign(b, self._cameras_of_episode(b, given.get(b, ALL_DRAWN)))
+
+    def _cameras_of_episode(self, b: int, fixed: Fixed) -> CameraSetup | None:
+        """The cameras of environment b's next episode; None: those it was made with."""
+        rigs = self._rigs if fixed.rig is None else fixed.rigs
+        if not fixed.changes_cameras and rigs is None:
+            return None
+        rig, config = self.scene.rig if fixed.rig is None else fixed.rig, self.config
+        if rigs is not None:
+            rng = aside(self.streams["sensor"][b], RIG_STREAM)
+            rig = draw_rig(rigs, with_rig(self.scene, rig), rng)
+        faults = config.faults if fixed.faults is None else fixed.faults
+        return CameraSetup(
+            rig,
+            faults_of(faults, self.settings["cameras"], rig),
+            config.appearance if fixed.appearance is None else fixed.appearance,
+        )
+
+    def _begin(self, ids: Ints, given: Mapping[int, Fixed]) -> Truth:
         """Put workers, robots and objects of environments `ids` where episodes begin."""
         self.action[ids], self.episode_cost[ids], self.separation_m[ids] = 0.0, 0.0, 0.0
         self.shield_change[ids] = 0.0
         self.monitor.reset(ids)
         people, task_rngs = (self.motion, self.streams["motion"]), self.streams["task"]
-        q = starts.apart(ids, self._draw_starts, *people, self.chain, self.bodies)
+        casts = {b: each.cast for b, each in given.items() if each.cast is not None}
+        draw = partial(self._draw_starts, given=given) if given else self._draw_starts
+        q = starts.apart(ids, draw, *people, self.chain, self.bodies, casts)
         robot = chains.robot_state(self.chain, q, np.zeros_like(q))
         self.task.reset(self.task_state, ids, task_rngs, World(robot, place=self.place))
+        for b, each in given.items():
+            if each.goal is not None:
+                its_q = q[ids == b]
+                its_robot = chains.robot_state(self.chain, its_q, np.zeros_like(its_q))
+                world = World(its_robot, place=self.place)
+                self.task.set_goal(self.task_state, np.array([b]), each.goal[None], world)
         poses = self.task.object_poses(self.task_state, ids)
         if poses is not None:
             expected = (len(ids), len(self.scene.objects.names), 7)
@@ -414,12 +536,16 @@ class Simulation(Stateful):
             check_shape(name, over.shape, (self.batch,), "one an environment")
         return over.astype(bool)
 
-    def _draw_starts(self, ids: Ints) -> JointAngles:
-        """Draw the angles (len(ids), N) with which robots start."""
+    def _draw_starts(self, ids: Ints, given: Mapping[int, Fixed] = NOTHING_GIVEN) -> JointAngles:
+        """Draw the angles (len(ids), N) with which robots start, or take those that are given."""
         rngs = picked(self.streams["robot"], ids)
         q = self.task.draw_start(rngs, self.place, self.scene.home_q, self._spread_rad)
         expected = (len(ids), self.chain.n_joints)
         check_shape(f"{self.task.id}: draw_start", np.shape(q), expected, "an angle a joint")
+        q = np.array(q) if given else q
+        for row, b in enumerate(ids.tolist() if given else ()):
+            if b in given and given[b].start_q is not None:
+                q[row] = given[b].start_q
         return q
 
     def _load(self, world: World) -> World:
@@ -439,10 +565,13 @@ class Simulation(Stateful):
         """Return every term (B,) of the reward: the task's, then those that all tasks share."""
         own, shared = self.task.own_rewards, rewards.SHARED_TERMS
         step = truth.task_step, command.previous_action
-        return {
+        terms = {
             **rewards.evaluated(own, belief, *step, self.config.task),
             **rewards.evaluated(shared, belief, *step, self.reward_weights),
         }
+        for name, factor in self.reward_factors.items():
+            terms[name] = factor * np.asarray(terms[name])
+        return terms
 
     def _episode_info(self, ids: Ints, activity: Ints, happened: Records | None) -> Info:
         """Return what the episodes of environments `ids` have come to, and who is there."""

@@ -118,9 +118,10 @@ def test_what_is_finished_when_it_is_killed_is_not_played_again(tmp_path, monkey
 BAD = {
     "infos that there are not": (["--infos", "safty/*"], "Did you mean 'safety/*'"),
     "images of no size": (["--observe-images", "0", "84"], "height of images [px] must be"),
-    "images of 10,000 pixels": (["--observe-images", "84", "10000"], "width of images [px] must be"),
+    "images of 10,000 pixels": (
+        ["--observe-images", "84", "10000"], "width of images [px] must be"),
     "images for which there is no memory": (
-        ["--observe-images", "1024", "1024"], "at most 4 are held in memory"),
+        ["--num-envs", "9", "--observe-images", "1024", "1024"], "at most 4 are held in memory"),
     "keypoints without cameras": (
         ["--keypoints", "--perception", "truth"], "--perception truth has none"),
     "two places": (["--out", "hrc/reach-v0"], "Say where the data set goes"),

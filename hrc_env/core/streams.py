@@ -40,6 +40,14 @@ class _Words(ISpawnableSeedSequence):
         return SeedSequence(self.entropy)
 
 
+def aside(rng: np.random.Generator, number: int) -> np.random.Generator:
+    """A generator that depends on where `rng` came from, and not on what was drawn from it; `rng`
+    stays as it is. Each purpose has a `number` of its own, far above the count of children."""
+    seeds: Any = rng.bit_generator.seed_seq
+    key = (*seeds.spawn_key, number)
+    return np.random.default_rng(SeedSequence(seeds.entropy, spawn_key=key))
+
+
 def children(rng: np.random.Generator, n: int) -> list[np.random.Generator]:
     """n generators that start from numbers which `rng` draws; others each time."""
     drawn = rng.integers(0, 2**64, (n, WORDS), np.uint64)

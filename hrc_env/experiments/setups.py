@@ -72,7 +72,11 @@ class PerceptionSetup:
         return self.list_turns(RIGS["lab"])
 
     def list_turns(self, rig: Sequence[CameraConfig]) -> tuple[Turn, ...]:
-        """The same with another rig of four."""
+        """Return cameras and their faults with another rig of four.
+
+        Args:
+            rig: its cameras.
+        """
         turns = (
             Turn(tuple(rig[c] for c in kept)) if self.is_alone else left_with(rig, kept)
             for kept in RIGS_OF[self.n_cameras]

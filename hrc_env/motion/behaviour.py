@@ -5,6 +5,7 @@ another one of its kind, or waits.
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -37,7 +38,7 @@ def follow_up(state: MotionState, b: int, w: int, draws: Floats) -> None:
     pace, clock_s, time_s = float(me["pace"]), float(me["clock_s"]), float(me["time_s"])
     end = 0.0 if pace < 0.0 else float(me["duration_s"])
     over = (time_s - end) / pace if pace != 0.0 else 0.0
-    who = Decision(state.mind, workers, w, draws, clock_s - over, state.loads[b])
+    who = Decision(state.mind_of(b), workers, w, draws, clock_s - over, state.loads[b])
     leave(end, who.now, frames, me)
     if me["activity"] in (st.SET_DOWN, st.PUSH):
         lying.lay_down(who.loads, state.mind.plan.grounds.places, me)
@@ -48,12 +49,16 @@ def follow_up(state: MotionState, b: int, w: int, draws: Floats) -> None:
     me["time_s"] = over
 
 
-def begin_episode(state: MotionState, b: int, n_present: int, bodies: Ints, draws: Floats) -> None:
+def begin_episode(
+    state: MotionState, b: int, n_present: int, bodies: Ints, draws: Floats,
+    activities: Sequence[int] = (),
+) -> None:  # fmt: skip
     """Put n_present workers of environment b at places of theirs, in the middle of something.
 
-    They have `bodies` (W,); draws (W, 2, N_DRAWS) are for places and first activities.
+    They have `bodies` (W,); draws (W, 2, N_DRAWS) are for places and first activities, which are
+    `activities` of the first workers, where there is a place for them.
     """
-    mind, workers = state.mind, state.workers[b]
+    mind, workers = state.mind_of(b), state.workers[b]
     workers[...] = np.zeros((), st.WORKER)
     workers["present"] = np.arange(len(workers)) < n_present
     bones, workers["body"] = mind.anatomy, bodies
@@ -65,6 +70,8 @@ def begin_episode(state: MotionState, b: int, n_present: int, bodies: Ints, draw
     everyone = [
         Decision(mind, workers, w, draws[w, 0], 0.0, state.loads[b]) for w in range(len(workers))
     ]
+    for who, activity in zip(everyone, activities, strict=False):
+        who.wanted = None if activity == dc.ANY_ACTIVITY else activity
     for who in everyone:
         d, me = who.draws, who.me
         me["speed_m_s"] = who.draw(0, mind.config.people.speed_m_s)

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -35,6 +35,8 @@ PLACES, N_DRAWS = N_START + 8, N_START + 8 + 3 * 5
 """First of the draws for places, three for each of five; uniform numbers of one decision."""
 N_STAGES = 4
 """So many of the places from which a clip has room are tried."""
+ANY_ACTIVITY = -1
+"""In the place of an activity: whichever is drawn."""
 ROBOT_WORK_M = 1.1
 """Height of the work at the robot [m]."""
 
@@ -58,6 +60,20 @@ class BehaviourParams:
     """How far a robot that drives reaches round the points of it that people watch [m]."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Cast:
+    """Who is in one episode, and with what they begin, as far as it is not drawn."""
+
+    n_workers: int | None = None
+    bodies: tuple[int, ...] | None = None
+    """Row of the bodies that there are, for each of the first workers."""
+    activities: tuple[int, ...] | None = None
+    """What each of the first workers begins with: indices of `state.ACTIVITY_NAMES`, or
+    `ANY_ACTIVITY`."""
+    mind: BehaviourParams | None = None
+    """How they are with the robot; None: as in all episodes."""
+
+
 @dataclass(frozen=True, slots=True)
 class MotionState:
     """All that changes is in the arrays: copying them copies the state."""
@@ -67,6 +83,12 @@ class MotionState:
     loads: Records
     """(B, L) of `lying.LOAD`."""
     mind: BehaviourParams
+    minds: dict[int, BehaviourParams] = field(default_factory=dict)
+    """Those of environments whose episode has one of its own."""
+
+    def mind_of(self, b: int) -> BehaviourParams:
+        """Return the constants of environment b's episode."""
+        return self.minds.get(b, self.mind)
 
 
 @dataclass(slots=True)
@@ -85,6 +107,8 @@ class Decision:
     """(L,) of their environment: what lies about."""
     load: int = 0
     """What they hold when they decide."""
+    wanted: int | None = None
+    """The activity that they have to begin the episode with; None: any."""
 
     @property
     def me(self) -> Worker:
@@ -196,7 +220,10 @@ def take_first_place(who: Decision) -> None:
     begins = [k for k, _ in mind.schedule.begins]
     near = draw < mind.config.near_probability or not begins
     first = mind.schedule.robot if near else begins[int(who.draws[BOW] * len(begins))]
-    for job in (first, mind.schedule.robot, *begins):
+    jobs: tuple[int, ...] = (first, mind.schedule.robot, *begins)
+    if who.wanted is not None:
+        jobs = _jobs_of(who, who.wanted, near)
+    for job in jobs:
         chosen = mind.schedule.jobs[job]
         for place in _free_places(who, chosen):
             me["job"], me["at"], me["spot"] = job, WORKPLACE_KINDS.index(chosen.at), place
@@ -204,6 +231,27 @@ def take_first_place(who: Decision) -> None:
             me["until_s"] = max(0.05, dwell * who.draws.item(LASTS))
             return
     me["job"], me["at"], me["spot"] = mind.schedule.robot, NOWHERE, _loneliest(who)
+
+
+def jobs_by_activity(schedule: Schedule) -> dict[str, list[int]]:
+    """Return the jobs with which workers can be told to begin an episode, by their activity: empty
+    hands do for them, they have a place, and nobody is waited for."""
+    jobs: dict[str, list[int]] = {}
+    for k, job in enumerate(schedule.jobs):
+        loaded = job.activity in ("set down", "hand over") or job.by != "walk"
+        if job.at != HERE and not job.waits and not loaded:
+            jobs.setdefault(job.activity, []).append(k)
+    return jobs
+
+
+def _jobs_of(who: Decision, activity: int, near: bool) -> tuple[int, ...]:
+    """The jobs of an activity in the order in which they are tried, those at the robot first if
+    `near`."""
+    schedule = who.mind.schedule
+    jobs = jobs_by_activity(schedule).get(st.ACTIVITY_NAMES[activity], [])
+    first = int(who.draws[BOW] * len(jobs))
+    turned = (*jobs[first:], *jobs[:first])
+    return tuple(sorted(turned, key=lambda k: near and schedule.jobs[k].at != "robot"))
 
 
 def _loneliest(who: Decision) -> Place:

@@ -3,8 +3,9 @@
 Every activity is a closed form in the time since it began; velocities are its difference quotients.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -21,7 +22,13 @@ from hrc_env.motion.behaviour import begin_episode, follow_up
 from hrc_env.motion.blending import RATE_H_S, evaluate
 from hrc_env.motion.clip import Clip, load_clip
 from hrc_env.motion.config import PEOPLE, MotionConfig, PeopleConfig, numbers
-from hrc_env.motion.decision import N_DRAWS, BehaviourParams, MotionState
+from hrc_env.motion.decision import (
+    ANY_ACTIVITY,
+    N_DRAWS,
+    BehaviourParams,
+    Cast,
+    MotionState,
+)
 from hrc_env.motion.floorplan import floorplan, room_for
 from hrc_env.motion.holding import N_HELD, prop_pose
 from hrc_env.motion.kinematics import pose, quaternion, spin
@@ -33,7 +40,7 @@ from hrc_env.worker.body import N_SEGMENTS, Body
 from hrc_env.world import FOOT_M, Grounds, WorkerProgress, WorkerSignal, Workplace
 
 __all__ = [
-    "ABSENT", "PEOPLE", "Clip", "MotionConfig", "MotionState", "PeopleConfig", "activity",
+    "ABSENT", "PEOPLE", "Cast", "Clip", "MotionConfig", "MotionState", "PeopleConfig", "activity",
     "activity_names", "advance", "current", "make_state", "reset", "watch",
 ]  # fmt: skip
 
@@ -43,6 +50,10 @@ ABSENT = -1
 """The activity of who is not in an episode."""
 PARKED_Z_M, HALT_S = -100.0, 0.3
 """Height of who is not in an episode, where no camera looks [m]; hands halt within so long [s]."""
+
+CAST_TRIES = 40
+"""So often the beginning of an episode is drawn in which workers are to do certain things."""
+NOBODY_CAST: Mapping[int, Cast] = MappingProxyType({})
 
 OPEN_FLOOR = Grounds(
     walkable_x_m=(-0.1, 2.4),
@@ -91,14 +102,54 @@ def make_state(
     return MotionState(np.zeros((batch, n_workers), st.WORKER), there, mind)
 
 
-def reset(state: MotionState, ids: Ints, rngs: Sequence[np.random.Generator]) -> None:
-    """Start environments `ids` anew; rngs holds one generator for each of the B environments."""
+def reset(
+    state: MotionState, ids: Ints, rngs: Sequence[np.random.Generator],
+    casts: Mapping[int, Cast] = NOBODY_CAST,
+) -> None:  # fmt: skip
+    """Start environments `ids` anew; rngs holds one generator for each of the B environments.
+
+    `casts` says by environment what is not drawn; the same numbers are drawn with and without one.
+    `ConfigError` where workers find no place for an activity with which they are to begin.
+    """
     n_workers, fewest = state.workers.shape[1], state.mind.fewest
     for b in np.asarray(ids).tolist():
         bodies = drawn_bodies(rngs[b].random(n_workers), len(state.mind.anatomy.size))
         n = n_workers if fewest == n_workers else int(rngs[b].integers(fewest, n_workers + 1))
         lay_out(state.loads[b], state.mind.loads, rngs[b].spawn(1)[0])
-        begin_episode(state, b, n, bodies, rngs[b].random((n_workers, 2, N_DRAWS)))
+        draws = rngs[b].random((n_workers, 2, N_DRAWS))
+        state.minds.pop(b, None)
+        if b in casts:
+            _begin_as_cast(state, b, (n, bodies), draws, casts[b], rngs[b])
+        else:
+            begin_episode(state, b, n, bodies, draws)
+
+
+def _begin_as_cast(
+    state: MotionState, b: int, drawn: tuple[int, Ints], draws: Floats, cast: Cast,
+    rng: np.random.Generator,
+) -> None:  # fmt: skip
+    """Begin the episode of environment b with a cast; draw again until all do as they are to."""
+    n, bodies = drawn
+    n = n if cast.n_workers is None else cast.n_workers
+    if cast.bodies is not None:
+        bodies[: len(cast.bodies)] = cast.bodies
+    if cast.mind is not None:
+        state.minds[b] = cast.mind
+    activities, loads = np.array(cast.activities or (), np.int64)[:n], state.loads[b].copy()
+    wrong: Ints = np.zeros(0, np.int64)
+    for _ in range(CAST_TRIES):
+        state.loads[b] = loads
+        begin_episode(state, b, n, bodies, draws, activities.tolist())
+        begun = state.workers[b]["activity"][: len(activities)]
+        wrong = np.flatnonzero((activities != ANY_ACTIVITY) & (begun != activities))
+        if not len(wrong):
+            return
+        draws = rng.random(draws.shape)
+    named = ", ".join(f"{activity_names[activities[w]]!r} of worker_{w}" for w in wrong)
+    raise ConfigError(
+        f"No beginning of an episode with {named} was found in {CAST_TRIES} draws: there are fewer "
+        "free places for that than workers. Let fewer workers begin so."
+    )
 
 
 def drawn_bodies(draws: Floats, n_bodies: int) -> Ints:
@@ -137,10 +188,24 @@ def watch(
     after the last look, and how far what they wait for has come."""
     if cue is not None:
         attend(cue.stage, cue.offered_world, dt_s, state.workers)
-    people = state.mind.config.people
-    settings = (people.notice_m, people.fast_m_s, people.calm_s, state.mind.robot_girth_m)
     bodies = motion.position_world, motion.velocity_world
-    notice(dt_s, settings, elbow_and_tool_world, *bodies, state.workers)
+    seen = elbow_and_tool_world, *bodies, state.workers
+    for mind, rows in _by_mind(state):
+        people = mind.config.people
+        settings = (people.notice_m, people.fast_m_s, people.calm_s, mind.robot_girth_m)
+        for part in (slice(None),) if rows is None else rows:
+            notice(dt_s, settings, *(each[part] for each in seen))
+
+
+def _by_mind(state: MotionState) -> Iterator[tuple[BehaviourParams, list[slice] | None]]:
+    """Each set of constants with the environments that it is of; None: all."""
+    if not state.minds:
+        yield state.mind, None
+        return
+    of_all = [slice(b, b + 1) for b in range(len(state.workers)) if b not in state.minds]
+    yield state.mind, of_all
+    for b, mind in state.minds.items():
+        yield mind, [slice(b, b + 1)]
 
 
 def progress(state: MotionState, motion: WorkerMotion) -> WorkerProgress:

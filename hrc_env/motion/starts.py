@@ -1,6 +1,6 @@
 """How episodes begin: robots apart from people."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -25,6 +25,7 @@ def apart(
     rngs: Rngs,
     chain: SerialChain,
     bodies: Body,
+    casts: Mapping[int, generator.Cast] = generator.NOBODY_CAST,
 ) -> JointAngles:
     """(len(ids), N) where robots of environments `ids` begin, whose workers' motion begins, too.
 
@@ -34,19 +35,21 @@ def apart(
     Args:
         draw: of these environments a start each.
         rngs: of the workers, one of each environment of the batch.
+        casts: what of the workers is not drawn, by environment.
     """
-    generator.reset(motion, ids, rngs)
+    generator.reset(motion, ids, rngs, casts)
     q, near = draw(ids), np.arange(len(ids))
     for k in range(TRIES):
         near = near[gap_m(ids[near], q[near], motion, chain, bodies) < APART_M]
         if not len(near):
             return q
         if k >= ROBOT_TRIES:
-            generator.reset(motion, ids[near], rngs)
+            generator.reset(motion, ids[near], rngs, casts)
         q[near] = draw(ids[near])
     raise ConfigError(
         f"No start with robot and workers {APART_M} m apart was found in {TRIES} draws: whatever "
-        "start_spread_rad, the task's start and what workers do leave open is nearer."
+        "start_spread_rad, the task's start, the reset's options and what workers do leave open is "
+        "nearer."
     )
 
 

@@ -143,6 +143,7 @@ class PoseDetector(Stateful):
         """Cameras whose images were blank in the last search: dark, white, of one colour, noise."""
         self._looks: dict[int, list[int]] = {}
         self._threads: ThreadPoolExecutor | None = None
+        self._lender: PoseDetector | None = None
 
     def detect(
         self,
@@ -199,6 +200,13 @@ class PoseDetector(Stateful):
         """Treat this track as new: the detector stage is asked at its next look."""
         self._looks.pop(track, None)
 
+    def borrow_networks(self, lender: "PoseDetector") -> None:
+        """Run the networks on the threads of another detector of the same settings, which closes
+        them."""
+        if lender.config != self.config:
+            raise ConfigError("A detector borrows networks from one of the same settings.")
+        self._lender = lender
+
     def close(self) -> None:
         """Stop the threads and free their networks; the next look makes them anew."""
         if self._threads is not None:
@@ -254,15 +262,22 @@ class PoseDetector(Stateful):
 
     def _share(self, jobs: Iterable[Callable[[_Networks], ResultT]]) -> list[ResultT]:
         """Results in order."""
-        if self._threads is None:
-            self._threads = ThreadPoolExecutor(2, thread_name_prefix="hrc_env-detector")
+        threads = self._started()
         given: list[Callable[[], ResultT]] = []
         for job in jobs:
             try:
-                given.append(self._threads.submit(self._done, job).result)
+                given.append(threads.submit(self._done, job).result)
             except RuntimeError:  # the interpreter is ending, and its threads take no more work
                 given.append(functools.partial(self._done, job))
         return [result() for result in given]
+
+    def _started(self) -> ThreadPoolExecutor:
+        """The threads, started if need be; a lender's if there is one."""
+        if self._lender is not None:
+            return self._lender._started()
+        if self._threads is None:
+            self._threads = ThreadPoolExecutor(2, thread_name_prefix="hrc_env-detector")
+        return self._threads
 
     def _done(self, job: Callable[[_Networks], ResultT]) -> ResultT:
         """What a job gives with this thread's networks."""

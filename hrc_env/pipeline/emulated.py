@@ -86,9 +86,11 @@ class EmulatedCameras(TrueState):
         steps = np.zeros(len(ids), int) if self.recent is None else self.recent.steps[ids] + 1
         shape = (len(ids), len(self.scene.cameras))
         dim = Quality(np.ones(shape), np.zeros(shape), np.zeros(shape, np.bool_))
-        for row, (light, step) in enumerate(zip(self.light[ids], steps.tolist(), strict=True)):
+        for row, (b, step) in enumerate(zip(ids.tolist(), steps.tolist(), strict=True)):
+            light = self.light[b]
+            schedule = self.schedule if self.recent is None else self.recent.schedule_of(b)
             for c in range(shape[1]):
-                faults = self.schedule.of(IMAGE, c, step)
+                faults = schedule.of(IMAGE, c, step)
                 picture = quality_of(float(light), [fault.how_much for _, fault in faults])
                 for whole, part in zip(dim, picture, strict=True):
                     whole[row, c] = part
@@ -98,7 +100,7 @@ class EmulatedCameras(TrueState):
     def _arrived(self, look: _Look, state: Any, rngs: Generators, recent: Recent) -> Keypoints:
         """What has come of every camera: images of now, older ones, or none."""
         rig, ids = self.scene.cameras, look.now.ids.tolist()
-        actual = [recent.schedule.actual(rig, recent.seeds[b], recent.begin(b)) for b in ids]
+        actual = [recent.schedule_of(b).actual(rig, recent.seeds[b], recent.begin(b)) for b in ids]
         if all(cameras is rig for cameras in actual):
             shown = self._emulated(look, state, rngs, rig)
         else:

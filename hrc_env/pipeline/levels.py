@@ -8,7 +8,8 @@
 | `none` | nothing: the estimate stays the prior |
 """
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from hrc_env.config import HRCConfig
 from hrc_env.core.batching import rows, write_rows
@@ -18,14 +19,15 @@ from hrc_env.core.records import PoseEstimate
 from hrc_env.core.typing import Ints
 from hrc_env.geometry.cameras import projections
 from hrc_env.perception.detector import DetectorConfig
-from hrc_env.perception.faults.fault import IMAGE, KINDS
+from hrc_env.perception.faults.fault import IMAGE, KINDS, FaultConfig
 from hrc_env.perception.faults.schedule import Schedule
 from hrc_env.perception.weights import fetch_weights
 from hrc_env.pipeline.emulated import EmulatorPipeline
+from hrc_env.pipeline.episodic import CameraSetup
 from hrc_env.pipeline.rendered import PixelPipeline
 from hrc_env.pipeline.sensor_input import Generators, Sensor, TrueState, with_truth
 from hrc_env.pipeline.tracking import PerceptionPipeline
-from hrc_env.scene.build import Scene
+from hrc_env.scene.build import Scene, with_rig
 from hrc_env.scene.domain_randomization import AS_BUILT, AppearanceConfig
 from hrc_env.tracking import oracle
 from hrc_env.tracking.config import TrackerConfig
@@ -50,6 +52,7 @@ def prepare(level: str, detector: DetectorConfig) -> None:
 def make_pipeline(
     level: str, estimator: EstimatorChoice, scene: Scene, batch: int, config: HRCConfig,
     shows_images: bool = False,
+    like: PerceptionPipeline | None = None,
 ) -> PerceptionPipeline:  # fmt: skip
     """Return the pipeline of a perception level.
 
@@ -60,6 +63,8 @@ def make_pipeline(
         batch: number of environments.
         config: of the environment.
         shows_images: whether observations hold images, too, whatever the level.
+        like: a pipeline of the same level and scene with other cameras, which lends what takes
+            time; None: there is none.
 
     Raises:
         ConfigError: an unknown level, or one that cannot have what `config` wants.
@@ -67,13 +72,8 @@ def make_pipeline(
     """
     if level not in LEVELS:
         raise unknown("perception", level, LEVELS)
-    if not (shows_images or _knows(level, config.appearance)):
-        raise ConfigError(
-            f"Looks are of images, and perception={level!r} has none: leave appearance out, or use "
-            "perception='pixels' or observe_images. perception='keypoints' knows the strength of "
-            'the light alone: appearance={"light": (0.15, 0.5)}.'
-        )
-    schedule = _schedule(scene, level, config)
+    check_knows(level, config.appearance, config.faults, shows_images)
+    schedule = Schedule(scene.rig, config.faults, config.ctrl_dt)
     memory_s = max(config.tracker.longest_delay_s, min(schedule.longest_delay_s, 1.0))
     settings = replace(config.tracker, longest_delay_s=memory_s)
     tracker = make_estimator(estimator, projections(scene.cameras), config.ctrl_dt, settings)
@@ -84,7 +84,26 @@ def make_pipeline(
         return NoPerception(prior, config.ctrl_dt)
     if level == "keypoints":
         return EmulatorPipeline(scene, batch, tracker, config, schedule)
-    return PixelPipeline(scene, batch, tracker, config, schedule)
+    lender = like if isinstance(like, PixelPipeline) else None
+    return PixelPipeline(scene, batch, tracker, config, schedule, lender)
+
+
+@dataclass(frozen=True, slots=True)
+class PipelineOfEpisode:
+    """Makes the pipeline of one environment whose episode has cameras of its own."""
+
+    level: str
+    estimator: EstimatorChoice
+    scene: Scene
+    config: HRCConfig
+    shows_images: bool
+    """Whether observations hold images, too."""
+
+    def __call__(self, setup: CameraSetup, like: PerceptionPipeline) -> PerceptionPipeline:
+        """Return the pipeline; `like` is that of the others."""
+        scene = with_rig(self.scene, setup.rig)
+        config = replace(self.config, faults=setup.faults, appearance=setup.appearance)
+        return make_pipeline(self.level, self.estimator, scene, 1, config, self.shows_images, like)
 
 
 def _knows(level: str, appearance: AppearanceConfig) -> bool:
@@ -94,9 +113,20 @@ def _knows(level: str, appearance: AppearanceConfig) -> bool:
     return level == "pixels" or appearance == AS_BUILT
 
 
-def _schedule(scene: Scene, level: str, config: HRCConfig) -> Schedule:
-    """What the cameras do over an episode; refuses faults that a level does not know."""
-    faults = config.faults
+def check_knows(
+    level: str,
+    appearance: AppearanceConfig,
+    faults: Sequence[FaultConfig],
+    shows_images: bool = False,
+) -> None:
+    """Raise `ConfigError` for looks and faults that a perception level does not know; observations
+    that hold images show all looks."""
+    if not (shows_images or _knows(level, appearance)):
+        raise ConfigError(
+            f"Looks are of images, and perception={level!r} has none: leave appearance out, or use "
+            "perception='pixels' or observe_images. perception='keypoints' knows the strength of "
+            'the light alone: appearance={"light": (0.15, 0.5)}.'
+        )
     if faults and level not in CAMERA_LEVELS:
         raise ConfigError(
             f"Faults are of cameras; perception={level!r} has none. Leave them out, or use one of "
@@ -110,7 +140,6 @@ def _schedule(scene: Scene, level: str, config: HRCConfig) -> Schedule:
             f"{', '.join(kind for kind, each in KINDS.items() if each.group != IMAGE)}, "
             f"{', '.join(EMULATED)}."
         )
-    return Schedule(scene.rig, faults, config.ctrl_dt)
 
 
 class Oracle(PerceptionPipeline):

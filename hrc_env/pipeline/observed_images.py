@@ -10,6 +10,7 @@ from hrc_env.core.batching import one
 from hrc_env.core.errors import ConfigError, unknown, whole
 from hrc_env.core.records import Roi
 from hrc_env.core.typing import Image
+from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.observations import IMAGE
 from hrc_env.perception.lensed import Lensed
@@ -44,20 +45,38 @@ class ObservedImages:
         """Names of the images in an observation."""
         return tuple(f"{IMAGE}{camera.name}" for camera in self.cameras)
 
-    def draw(self, now: SensorInput, looks: Sequence[Look | None]) -> Images:
+    def draw(
+        self,
+        now: SensorInput,
+        looks: Sequence[Look | None],
+        rigs: Sequence[Sequence[PinholeCamera]],
+    ) -> Images:
         """Return the images (B, H, W, 3) of the environments that are shown, by name.
 
         Args:
             now: the scene; rows are environments.
             looks: of these environments; None: as it was built.
+            rigs: the cameras of their episodes; of one that does not hang the image is black.
         """
-        images = {name: np.empty((len(now.ids), *self.shape), np.uint8) for name in self.names}
+        images = {name: np.zeros((len(now.ids), *self.shape), np.uint8) for name in self.names}
         for row, (b, look) in enumerate(zip(now.ids.tolist(), looks, strict=True)):
             self._drawer.dress(b, look)
             self._drawer.pose(now.qpos[row], one(now.motion, row))
-            for name, camera in zip(self.names, self.cameras, strict=True):
-                images[name][row] = self._image(camera)
+            for camera in rigs[row]:
+                if (name := f"{IMAGE}{camera.name}") in images:
+                    images[name][row] = self._image(camera)
         return images
+
+    def check(self, rig: Sequence[CameraConfig]) -> None:
+        """Raise `ConfigError` for a rig of which these images cannot be drawn."""
+        lensed = [camera.name for camera in self.cameras if camera.lens is not None]
+        for camera in rig:
+            if camera.lens is not None and f"{IMAGE}{camera.name}" in self.names and not lensed:
+                raise ConfigError(
+                    f"Camera {camera.name!r} of an episode has a lens, and the environment was "
+                    "made to observe images of cameras without: make it with cameras= that have "
+                    "lenses, or without observe_images."
+                )
 
     def close(self) -> None:
         """Free the graphics context."""

@@ -26,10 +26,12 @@ class RenderedCameras(ImageSensor):
     CHANGES = ("recent", "worn")
 
     def __init__(
-        self, scene: Scene, batch: int, appearance: AppearanceConfig, schedule: Schedule
-    ) -> None:
+        self, scene: Scene, batch: int, appearance: AppearanceConfig, schedule: Schedule,
+        renderer: CropRenderer | None = None,
+    ) -> None:  # fmt: skip
+        """`renderer`: one of the same scene, whatever its cameras; None: make one."""
         self.scene, self.appearance = scene, appearance
-        self.renderer = CropRenderer(scene)
+        self.renderer = renderer or CropRenderer(scene)
         self.film = CameraFilm(Lensed(self.renderer, scene.cameras), schedule)
         self.images, self.tells_times = self.film, not schedule.is_plain
         self.recent = Recent(batch, schedule)
@@ -56,7 +58,7 @@ class RenderedCameras(ImageSensor):
         pose = self.now.qpos[row].copy(), copied(one(self.now.motion, row))
         step = recent.begin(b)
         before = recent.at(b, step - 1)
-        actual = recent.schedule.actual(self.scene.cameras, recent.seeds[b], step)
+        actual = recent.schedule_of(b).actual(self.scene.cameras, recent.seeds[b], step)
         last = pose if before is None else (before.q, before.motion)
         shots, times_s = recent.arrived(b, Shot(step, *pose, last, actual))
         self.renderer.randomize(self.worn[b])
@@ -68,19 +70,28 @@ class PixelPipeline(ImageTracking):
     """Level `pixels`: rendered crops through the pose network."""
 
     def __init__(
-        self, scene: Scene, batch: int, tracker: Estimator, config: HRCConfig, schedule: Schedule
-    ) -> None:
+        self, scene: Scene, batch: int, tracker: Estimator, config: HRCConfig, schedule: Schedule,
+        like: "PixelPipeline | None" = None,
+    ) -> None:  # fmt: skip
+        """`like`: a pipeline of the same scene and detector with other cameras, whose renderer and
+        networks this one uses."""
         setup = setup_in(scene, config)
         known = floor(scene.grounds), setup.calibration.sigma
         looking = Looking(batch, scene.cameras, scene.n_workers, config.detector, *known)
-        self.cameras = RenderedCameras(scene, batch, config.appearance, schedule)
+        renderer = None if like is None else like.cameras.renderer
+        self.cameras = RenderedCameras(scene, batch, config.appearance, schedule, renderer)
         super().__init__(batch, setup, tracker, self.cameras, looking)
+        self._borrows = like is not None
+        if like is not None:
+            looking.detector.borrow_networks(like.looking.detector)
 
     def look_of(self, b: int) -> Look | None:
         """How environment b looks in its episode."""
         return self.cameras.worn[b]
 
     def close(self) -> None:
-        """Stop the detector's thread and free the graphics context."""
+        """Stop the detector's threads and free the graphics context, unless they are borrowed."""
+        if self._borrows:
+            return
         super().close()
         self.cameras.renderer.close()

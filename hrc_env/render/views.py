@@ -73,6 +73,8 @@ class Glance:
     look: Look | None
     markers_world: Points3
     """(M, 3) what the task has to show [m]."""
+    cameras: tuple[PinholeCamera, ...]
+    """Those of its episode."""
     estimate: PoseEstimate
     """Of a batch of one, as are the keypoints."""
     keypoints: Keypoints | None
@@ -125,7 +127,7 @@ class Views:
             ConfigError: there is no such camera.
         """
         seen, viewpoint = self.glance(b, capsules), self.simulation.task.viewpoint
-        chosen = viewpoint if camera is None else self._camera(camera)
+        chosen = viewpoint if camera is None else _chosen(camera, seen.cameras)
         if depth:
             renderer = self._renderer("depth", size, seen)
             return renderer.picture(seen.q, seen.motion, chosen, depth=True)
@@ -147,6 +149,7 @@ class Views:
             *self.pose(b),
             simulation.look_of(b),
             simulation.markers(b),
+            simulation.cameras_of(b),
             rows(simulation.estimate, np.array([b])),
             keypoints,
             [list(of_worker) for of_worker in windows],
@@ -189,8 +192,8 @@ class Views:
         Returns:
             (height, width, 3) of uint8 each, without shadows, as the detector sees the scene.
         """
-        views = self._through_cameras(width, height, seen, self.simulation.scene.cameras)
-        for c, (camera, image) in enumerate(zip(self.simulation.scene.cameras, views, strict=True)):
+        views = self._through_cameras(width, height, seen, seen.cameras)
+        for c, (camera, image) in enumerate(zip(seen.cameras, views, strict=True)):
             for window in (of_worker[c] for of_worker in seen.windows):
                 if window is not None:
                     overlay.draw_window(image, camera, window)
@@ -205,8 +208,7 @@ class Views:
         keypoints, images = seen.keypoints, []
         if keypoints is None or not seen.windows:
             return []
-        cameras = self.simulation.scene.cameras
-        parts = zip(cameras, seen.crops, seen.windows[0], strict=True)
+        parts = zip(seen.cameras, seen.crops, seen.windows[0], strict=True)
         for c, (camera, crop, window) in enumerate(parts):
             if crop is None or window is None:
                 image = overlay.panel(size, size)
@@ -260,20 +262,6 @@ class Views:
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_renderers": {}}
-
-    def _camera(self, asked: Any) -> str | PinholeCamera:
-        """A camera of the rig, a viewpoint's name, or a camera of the user's own."""
-        rig = {camera.name: camera for camera in self.simulation.scene.cameras}
-        if isinstance(asked, PinholeCamera):
-            return asked
-        if isinstance(asked, CameraConfig):
-            return make_cameras([asked])[0]
-        if isinstance(asked, str):
-            if asked not in rig and asked not in VIEWPOINTS:
-                raise unknown("camera or viewpoint", asked, [*rig, *VIEWPOINTS])
-            return rig.get(asked, asked)
-        index = whole(f"camera (of {', '.join(rig)})", asked, 0, len(rig) - 1)
-        return list(rig.values())[index]
 
     def _view(self, chosen: str | PinholeCamera, width: int, height: int) -> PinholeCamera:
         """What a picture of this size shows of a camera or a viewpoint."""
@@ -329,6 +317,20 @@ class Views:
         renderer.randomize(seen.look)
         renderer.pose(seen.q, seen.motion)
         return renderer
+
+
+def _chosen(asked: Any, cameras: Sequence[PinholeCamera]) -> str | PinholeCamera:
+    """A camera of a rig, a viewpoint's name, or a camera of the user's own."""
+    rig = {camera.name: camera for camera in cameras}
+    if isinstance(asked, PinholeCamera):
+        return asked
+    if isinstance(asked, CameraConfig):
+        return make_cameras([asked])[0]
+    if isinstance(asked, str):
+        if asked not in rig and asked not in VIEWPOINTS:
+            raise unknown("camera or viewpoint", asked, [*rig, *VIEWPOINTS])
+        return rig.get(asked, asked)
+    return cameras[whole(f"camera (of {', '.join(rig)})", asked, 0, len(rig) - 1)]
 
 
 _MAKERS: dict[str, Callable[..., Canvas]] = {

@@ -235,6 +235,12 @@ def _build(recipe: Recipe) -> Scene:
     )
 
 
+def with_rig(scene: Scene, rig: tuple[CameraConfig, ...]) -> Scene:
+    """The same scene with other cameras, all of them in use: its physics knows none."""
+    config = replace(scene.config, cameras=rig)
+    return replace(scene, config=config, cameras=make_cameras(select(rig)))
+
+
 def without_workers(scene: Scene) -> Scene:
     """The same scene with nobody in it."""
     return _build(scene.recipe._replace(n_workers=0))

@@ -19,7 +19,7 @@ from hrc_env.core.typing import Capsules, Floats, Image, JointAngles
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.scene import gl
 from hrc_env.scene.build import Scene, drawing_model, visuals
-from hrc_env.scene.domain_randomization import Look, randomize, strew, take_off_hats
+from hrc_env.scene.domain_randomization import Look, randomize, restore, strew, take_off_hats
 from hrc_env.scene.primitives import (
     DECORATION,
     OVERHEAD,
@@ -96,12 +96,16 @@ class Canvas:
         self.groups(ALL_GROUPS)
 
     def randomize(self, look: Look | None) -> None:
-        """Draw with this look from the next pose on; None leaves it."""
-        if look is not None and look is not self._look:
-            self._look = look
-            self._kept.clear()
+        """Draw with this look from the next pose on; None: as it was built."""
+        if look is self._look:
+            return
+        self._look = look
+        self._kept.clear()
+        if look is None:
+            restore(self._model, self._built)
+        else:
             randomize(self._model, self._built, self._visuals, look)
-            self._take_over_textures()
+        self._take_over_textures()
 
     def pose(self, q: JointAngles, motion: WorkerMotion | None) -> None:
         """Put the arm at q (N,), or all that moves at q (nq,), the workers and what they hold where

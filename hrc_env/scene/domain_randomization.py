@@ -12,6 +12,7 @@ import numpy as np
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.mapping import answer_unknown_fields
+from hrc_env.core.streams import aside
 from hrc_env.core.typing import Floats
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.scene.worker_visuals import HIDDEN, WorkerVisuals
@@ -119,7 +120,7 @@ class Look(NamedTuple):
 def draw_look(config: AppearanceConfig, n_workers: int, rng: np.random.Generator) -> Look:
     """An episode's looks, for as many workers as there is room for; `rng` is the environment's
     sensor generator and stays as it is."""
-    own = _own_stream(rng)
+    own = aside(rng, STREAM)
     low, high = config.light
     warmth = config.warmth * own.uniform(-1, 1)
     return Look(
@@ -148,6 +149,21 @@ def randomize(
         is_cloth = built.skin(k).name.endswith(CLOTH)
         factor = look.clothing_rgb[worker] if is_cloth else look.skin_rgb[worker]
         model.skin_rgba[k, :3] = built.skin_rgba[k, :3] * factor
+
+
+def restore(model: mujoco.MjModel, built: mujoco.MjModel) -> None:
+    """Take every look off a drawing model of the caller's own."""
+    for name in (
+        "light_dir",
+        "light_diffuse",
+        "light_specular",
+        "mat_rgba",
+        "mat_texid",
+        "skin_rgba",
+    ):
+        getattr(model, name)[:] = getattr(built, name)
+    for name in ("ambient", "diffuse"):
+        getattr(model.vis.headlight, name)[:] = getattr(built.vis.headlight, name)
 
 
 def take_off_hats(model: mujoco.MjModel, visuals: WorkerVisuals, look: Look) -> None:
@@ -201,10 +217,3 @@ def _randomize_surfaces(model: mujoco.MjModel, built: mujoco.MjModel, look: Look
     model.mat_rgba[still, :3] = colour * tint
     model.mat_texid[:] = built.mat_texid
     model.mat_texid[still[plain]] = -1
-
-
-def _own_stream(rng: np.random.Generator) -> np.random.Generator:
-    """A generator that depends on where `rng` came from, and not on what was drawn from it."""
-    seeds = rng.bit_generator.seed_seq
-    key = (*seeds.spawn_key, STREAM)  # type: ignore[attr-defined]
-    return np.random.default_rng(np.random.SeedSequence(seeds.entropy, spawn_key=key))  # type: ignore[attr-defined]

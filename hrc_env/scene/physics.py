@@ -19,6 +19,7 @@ from hrc_env.scene.build import Scene, without_workers
 from hrc_env.scene.cups import Cups, load_n, seals
 from hrc_env.scene.limits import slew_rad_s2
 from hrc_env.scene.objects import held_by
+from hrc_env.scene.robot import PREFIX
 from hrc_env.scene.worker import CAPSULE_FIELDS, capsule_shapes
 from hrc_env.world import Effects
 
@@ -192,6 +193,19 @@ class Physics:
         self._roll(alone, None)
         self._check_health()
         return self._trace.copy()
+
+    def touched_at(self, q: JointAngles) -> str | None:
+        """Return the name of what still stands or lies in the way of the robot at angles q (N,)
+        [rad], its own other parts included; None: nothing. Loose objects are as in the MJCF."""
+        model = without_workers(self.scene).model
+        data = mujoco.MjData(model)
+        data.qpos[: self._n] = q
+        mujoco.mj_forward(model, data)
+        for contact in data.contact[: data.ncon]:
+            names = [model.geom(geom).name for geom in contact.geom]
+            if contact.dist < 0.0 and any(name.startswith(PREFIX) for name in names):
+                return " and ".join(name.removeprefix(PREFIX) or "something" for name in names)
+        return None
 
     def get_state(self) -> Floats:
         """(B, n) everything that changes; `set_state` brings it back bit for bit."""

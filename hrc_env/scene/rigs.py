@@ -111,22 +111,35 @@ def findings(scene: Scene) -> list[str]:
     """What is poor about a scene's rig, in sentences: nothing for a good one, as its own is."""
     if scene.config.cameras == RIGS.get(scene.name) and len(scene.cameras) > 1:
         return []
-    seen = sees(scene.cameras, scene.obstacles, workspace(scene.grounds))
+    seen = _shares_seen(scene)
+    said = poor_cameras(scene)
+    if len(scene.cameras) == 1:
+        said.append(
+            f"One camera, {scene.cameras[0].name!r}, sees {100 * seen[0]:.0f} % of the "
+            "workspace: depth then rests on the body's known size, what it does not see is "
+            "unknown, and triangulation has nothing to work with."
+        )
+    return said
+
+
+def poor_cameras(scene: Scene) -> list[str]:
+    """Which of a scene's cameras hang in something or see hardly any of the workspace, a sentence
+    each."""
     said = []
-    for camera, share in zip(scene.cameras, seen.mean(1), strict=True):
+    for camera, share in zip(scene.cameras, _shares_seen(scene), strict=True):
         inside = _inside_something(camera, scene.obstacles)
         if inside or share < POOR_SHARE:
             said.append(
                 f"Camera {camera.name!r} sees {100 * share:.0f} % of the workspace: it "
                 f"{'hangs in or behind a wall or a thing' if inside else 'looks elsewhere'}."
             )
-    if len(scene.cameras) == 1:
-        said.append(
-            f"One camera, {scene.cameras[0].name!r}, sees {100 * seen[0].mean():.0f} % of the "
-            "workspace: depth then rests on the body's known size, what it does not see is "
-            "unknown, and triangulation has nothing to work with."
-        )
     return said
+
+
+def _shares_seen(scene: Scene) -> Floats:
+    """(C,) the share of the workspace that each camera sees."""
+    seen = sees(scene.cameras, scene.obstacles, workspace(scene.grounds))
+    return np.asarray(seen.mean(1))
 
 
 def _inside_something(camera: PinholeCamera, still: Floats) -> bool:

@@ -74,6 +74,7 @@ def judged(
     info: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None,
     config: Any,
     others: Sequence[str] = (),
+    factor: float = 1.0,
 ) -> Floats | float:
     """The reward of achieving this when that is desired.
 
@@ -86,12 +87,13 @@ def judged(
             arrays by name as a vector environment has them.
         config: settings of the task.
         others: names of the reward's other terms, in their order.
+        factor: on the goal's term (`set_reward`).
 
     Returns:
         A number, or (B,).
     """
     reached, wanted = _pair(goal, achieved, desired)
-    value = np.zeros(reached.shape[:-1]) + goal.reward(reached, wanted, config)
+    value = np.zeros(reached.shape[:-1]) + factor * goal.reward(reached, wanted, config)
     for name in others:
         value = value + _told(info, f"reward/{name}", value.shape)
     return value if value.ndim else float(value)

@@ -127,6 +127,17 @@ def nearest_targets(config: TargetConfig) -> list[ReachTarget]:
     return [ReachTarget("the nearest goal", at, within_m=within_m)]
 
 
+def given_target(goal: Floats, config: TargetConfig) -> list[ReachTarget]:
+    """Return the place of a goal that a user gives; `ConfigError` if it is no place."""
+    place = np.asarray(goal, float)
+    if place.shape != (3,) or not np.isfinite(place).all() or place[2] < 0.0:
+        raise ConfigError(
+            "The goal of a reset must be a place (x, y, z) above the floor [m, world], "
+            f"got {goal!r}."
+        )
+    return [ReachTarget("the goal", place, within_m=config.radius_m)]
+
+
 def drawn_goal(rng: np.random.Generator, config: TargetConfig) -> tuple[float, float, float]:
     """A place for the tool [m]."""
     x, y = config.base_xy_world
@@ -185,6 +196,15 @@ class Reach(Task[ReachConfig, Records]):
 
     def reach_targets(self) -> list[ReachTarget]:
         return nearest_targets(self.config)
+
+    def goal_targets(self, goal: Floats) -> list[ReachTarget]:
+        """A place (3,) [m, world]: the first goal of the episode."""
+        return given_target(goal, self.config)
+
+    def set_goal(self, state: Records, ids: Ints, goals: Floats, world: World) -> None:
+        state["goal_world"][ids] = goals
+        off_m = np.linalg.norm(goals - world.robot.tool_world, axis=-1)
+        state["distance_m"][ids] = off_m
 
     def reset(self, state: Records, ids: Ints, rngs: Rngs, world: World) -> None:
         """Start environments `ids` anew with a first goal each."""

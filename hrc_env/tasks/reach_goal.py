@@ -9,7 +9,7 @@ from hrc_env.core.typing import Floats, Ints, Points3, Records, Rngs
 from hrc_env.geometry.reach import ReachTarget
 from hrc_env.tasks import BUILT_IN
 from hrc_env.tasks.goal import Goal
-from hrc_env.tasks.reach import TargetConfig, drawn_goal, nearest_targets
+from hrc_env.tasks.reach import TargetConfig, drawn_goal, given_target, nearest_targets
 from hrc_env.tasks.task import Task
 from hrc_env.world import World
 
@@ -70,6 +70,14 @@ class ReachGoal(Task[ReachGoalConfig, Records]):
 
     def reach_targets(self) -> list[ReachTarget]:
         return nearest_targets(self.config)
+
+    def goal_targets(self, goal: Floats) -> list[ReachTarget]:
+        """A place (3,) [m, world]: the goal of the episode."""
+        return given_target(goal, self.config)
+
+    def set_goal(self, state: Records, ids: Ints, goals: Floats, world: World) -> None:
+        state["goal_world"][ids] = goals
+        state["there"][ids] = reached(world.robot.tool_world, goals, self.config) == 0.0
 
     def reset(self, state: Records, ids: Ints, rngs: Rngs, world: World) -> None:
         """Give environments `ids` a goal each."""

@@ -162,6 +162,34 @@ class Task(Generic[ConfigT, StateT]):
         """
         return ()
 
+    def goal_targets(self, goal: Floats) -> Sequence[ReachTarget]:
+        """Return where the tool has to get to for a goal that `reset(options={"goal": ...})` gives.
+
+        A task that takes goals defines this and `set_goal`; it is asked before the episode starts,
+        and what is out of reach is refused.
+
+        Raises:
+            ConfigError: this is no goal; by default always, as the task takes none.
+        """
+        known = [
+            each for each in dict.fromkeys((*BUILT_IN, *TASKS)) if takes_goals(find_task(each))
+        ]
+        raise ConfigError(
+            f"{self.id} takes no goal of a reset: leave options['goal'] out. {', '.join(known)} "
+            "do; a task of yours does if it defines goal_targets and set_goal (hrc_env.Task)."
+        )
+
+    def set_goal(self, state: StateT, ids: Ints, goals: Floats, world: World) -> None:
+        """Give environments `ids` these goals in the place of those that `reset` drew.
+
+        Args:
+            state: of all environments; rows `ids` are written.
+            ids: (n,) the environments in question.
+            goals: (n, ...) as `goal_targets` was given each.
+            world: of these environments only.
+        """
+        raise NotImplementedError
+
     def object_poses(self, state: StateT, ids: Ints) -> Floats | None:
         """Return (n, O, 7) where loose objects lie after `reset`.
 
@@ -283,6 +311,11 @@ def with_rewards(task: str | TaskType, *terms: RewardTerm, id: str) -> TaskType:
         names.append(term.name)
     added = {"id": id, "rewards": (*base.rewards, *terms), "__doc__": base.__doc__}
     return cast(TaskType, type(base.__name__, (base,), added))
+
+
+def takes_goals(task: TaskType) -> bool:
+    """Return whether a reset can give a task its goal."""
+    return task.set_goal is not Task.set_goal
 
 
 def goal_of(task: Task[Any, Any]) -> Goal:

@@ -25,6 +25,7 @@ from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.env import RENDER_MODES, EnvBase, spaces
 from hrc_env.env_config import check_keywords
 from hrc_env.render.views import CameraChoice
+from hrc_env.reset_options import Fixed, ResetOptions, lasting_options, named_options
 from hrc_env.rewards import RewardConfig
 from hrc_env.settings import settle
 from hrc_env.simulation import Simulation
@@ -33,10 +34,14 @@ from hrc_env.tasks.task import Task
 from hrc_env.vector.infos import InfoTable, table, words_of_infos
 from hrc_env.vector.member import TOGETHER, Member
 from hrc_env.vector.options import (
+    ALONE,
     MAX_ENVS,
+    OF_VECTORS,
     autoreset_of,
+    options_of_each,
     read_options,
     seeds_of,
+    steps_behind,
     threads_of,
     time_limit,
 )
@@ -111,6 +116,10 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         self._steps = np.zeros(self.num_envs, int)
         self._ended = np.zeros(self.num_envs, bool)
         self._observation: Observation | None = None
+        self._options: list[dict[str, Any]] = [{}] * self.num_envs
+        """What of each environment's episodes is fixed until further notice."""
+        self._fixed: list[Fixed | None] = [None] * self.num_envs
+        """The same, checked."""
         self.notes: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         """Attributes of every environment that a user has set."""
 
@@ -118,7 +127,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         self,
         *,
         seed: int | Sequence[int | None] | None = None,
-        options: Mapping[str, Any] | None = None,
+        options: Mapping[str, Any] | ResetOptions | None = None,
     ) -> tuple[Observation, dict[str, Any]]:
         """Start episodes of all environments, or of some.
 
@@ -128,21 +137,24 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
             options: "reset_mask", (num_envs,) bool: only these environments start anew.
                 "steps_left", one or (num_envs,) int: after so many steps these first episodes are
                 truncated, if not before. Or "elapsed_steps", (num_envs,) int: how much of the
-                time limit they have behind them.
+                time limit they have behind them. What of the episodes is fixed: the other fields
+                of `ResetOptions`, and "each", a list of a mapping of them for each environment.
 
         Returns:
             Observations of all environments, and infos of those that started.
         """
         self.refuse_closed()
         seeds = seeds_of(seed, self.num_envs)
-        mask, elapsed_steps = read_options(options, self.num_envs, self.max_episode_steps)
+        asked = read_options(options, self.num_envs, self.max_episode_steps)
+        mask, elapsed_steps = asked.mask, asked.elapsed_steps
         if self._observation is None and not mask.all():
             raise ConfigError("The first reset() must be for everyone: leave out the reset_mask.")
         ids = np.flatnonzero(mask)
+        fixed = self._fix_each(ids, asked.each)
         for k in ids.tolist():
             if seeds[k] is not None:
                 self._streams[k] = seeding.np_random(seeds[k])
-        fresh = self._begin(ids)
+        fresh = self._begin(ids, fixed)
         self._steps[ids] = elapsed_steps[ids]
         if self._observation is None:
             self._observation = mapped(fresh.observation, np.empty_like)
@@ -187,10 +199,46 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         """
         return words_of_infos(infos, self.num_envs, self.shards.first.bodies.names)
 
-    def set_reward(self, weights: RewardConfig) -> None:
-        """Weigh the reward's terms so from the next step on, in every environment."""
+    def set_options(self, options: Mapping[str, Any] | ResetOptions | None = None) -> None:
+        """Fix something of all episodes to come, as `HRCEnv.set_options`, in every environment.
+
+        Args:
+            options: as of `reset`, "each" included; None: nothing is fixed any more.
+
+        Raises:
+            ConfigError: an option that cannot be, or is of one reset.
+        """
+        each = options_of_each(lasting_options(options, *OF_VECTORS), self.num_envs)
+        for of_one in each:
+            lasting_options(of_one)
+        nothing: list[dict[str, Any]] = [{}] * self.num_envs
+        everyone = np.arange(self.num_envs)
+        fixed = _fixed_each(self.shards.first, everyone, nothing, each)
+        self._options, self._fixed = each, fixed
+
+    def check_options(self, k: int, options: Mapping[str, Any] | ResetOptions | None) -> None:
+        """Raise the `ConfigError` that a reset of environment `k` with these options raises."""
+        given = named_options(options, *ALONE)
+        steps_behind({n: given.pop(n) for n in ALONE if n in given}, self.max_episode_steps)
+        self.shards.first.fix({**self._options[k], **given})
+
+    def options_of(self, k: int) -> dict[str, Any]:
+        """Return what is fixed of environment `k`'s episodes to come, by name."""
+        return dict(self._options[k])
+
+    def set_options_of(self, k: int, options: Mapping[str, Any] | ResetOptions | None) -> None:
+        """Fix something of the episodes to come of environment `k` alone."""
+        given = lasting_options(options)
+        fixed = self.shards.first.fix(given) if given else None
+        self._options = [given if b == k else each for b, each in enumerate(self._options)]
+        self._fixed[k] = fixed
+
+    def set_reward(
+        self, weights: RewardConfig | None = None, factors: Mapping[str, float] | None = None
+    ) -> None:
+        """Weigh the reward's terms so from the next step on, in all environments (`HRCEnv`)."""
         for part in self.shards.parts:
-            part.set_reward(weights)
+            part.set_reward(weights, factors)
 
     def render(self, camera: CameraChoice = None) -> tuple[Any, ...] | None:  # type: ignore[override]
         """Return every environment's picture, or its list of pictures, by the render mode.
@@ -274,15 +322,25 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         self.pictures.close()
         self.shards.close()
 
-    def _begin(self, ids: Ints) -> StepResult:
+    def _reward_factor(self, term: str) -> float:
+        return self.shards.first.reward_factors.get(term, 1.0)
+
+    def _begin(self, ids: Ints, fixed: Sequence[Fixed | None] = ()) -> StepResult:
         """Start environments `ids` anew; their random streams go on."""
         self._steps[ids] = 0
-        return self.shards.reset(ids, [self._streams[k][0] for k in ids.tolist()])
+        return self.shards.reset(ids, [self._streams[k][0] for k in ids.tolist()], fixed)
+
+    def _fix_each(self, ids: Ints, each: Sequence[dict[str, Any]]) -> list[Fixed | None]:
+        """What is fixed of the episodes of environments `ids`, by the options of a reset (B,) and
+        those of all."""
+        if not any(each):
+            return [self._fixed[k] for k in ids.tolist()]
+        return _fixed_each(self.shards.first, ids, self._options, each)
 
     def _restart(self, who: Bools, observation: Observation, info: InfoTable) -> None:
         """Start environments `who` (B,) anew and write what they see over what they saw."""
         ids = np.flatnonzero(who)
-        fresh = self._begin(ids)
+        fresh = self._begin(ids, [self._fixed[k] for k in ids.tolist()])
         write_rows(observation, ids, fresh.observation)
         info.write(ids, fresh)
 
@@ -307,6 +365,20 @@ def _without_pictures(arguments: dict[str, Any]) -> dict[str, Any]:
     """Return arguments without those of pictures, which nobody draws."""
     of_pictures = ("render_mode", "width", "height", "render_markers", "overlay")
     return {name: value for name, value in arguments.items() if name not in of_pictures}
+
+
+def _fixed_each(
+    simulation: Simulation, ids: Ints, lasting: Sequence[dict[str, Any]],
+    each: Sequence[dict[str, Any]],
+) -> list[Fixed | None]:  # fmt: skip
+    """What options (B,), those of all resets and those of one, fix of environments `ids`."""
+    known: dict[tuple[int, int], Fixed | None] = {}
+    for k in ids.tolist():
+        key = id(lasting[k]), id(each[k])
+        if key not in known:
+            options = {**lasting[k], **each[k]}
+            known[key] = simulation.fix(options) if options else None
+    return [known[id(lasting[k]), id(each[k])] for k in ids.tolist()]
 
 
 def _finals(observation: Observation, info: InfoTable, who: Bools) -> dict[str, Any]:

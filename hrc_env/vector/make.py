@@ -13,10 +13,12 @@ from numpy.typing import NDArray
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.machine import n_cores
 from hrc_env.registration import HasSpec
+from hrc_env.reset_options import ResetOptions, lasting_options, named_options
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import TASKS, find_task
 from hrc_env.vector.env import HRCVectorEnv
 from hrc_env.vector.infos import words_of_infos
+from hrc_env.vector.options import options_of_each
 
 PROCESSES_PER_CORE = 2
 """More processes that render and run networks only wait for each other."""
@@ -24,6 +26,22 @@ PROCESSES_PER_CORE = 2
 
 class PixelVectorEnv(HasSpec, AsyncVectorEnv):  # type: ignore[misc]  # `spec` is a property
     """Environments at level "pixels", a process for each."""
+
+    def reset_async(self, seed: int | list[int | None] | None = None, options: Any = None) -> None:
+        """Ask for resets, each environment's with options of its own, as of `HRCVectorEnv`."""
+        given = named_options(options, "reset_mask", "each")
+        mask = {name: given.pop(name) for name in ("reset_mask",) if name in given}
+        each = options_of_each(given, self.num_envs)
+        if any(of_one is not each[0] for of_one in each):
+            chosen = mask.get("reset_mask", [True] * self.num_envs)
+            asked = zip(each, chosen, strict=True)
+            self.set_attr("next_options", [of_one if go else {} for of_one, go in asked])
+            each = [{}]
+        super().reset_async(seed, {**each[0], **mask} or None)
+
+    def set_options(self, options: Mapping[str, Any] | ResetOptions | None = None) -> None:
+        """Fix something of all episodes to come, as `HRCVectorEnv.set_options` does."""
+        self.set_attr("options", options_of_each(lasting_options(options, "each"), self.num_envs))
 
     def words(self, infos: Mapping[str, Any]) -> dict[str, NDArray[np.object_]]:
         """Return in words what infos say, as `HRCVectorEnv.words` does."""

@@ -16,9 +16,10 @@ from hrc_env.core.errors import ConfigError, NoAttributeError, unknown
 from hrc_env.core.mapping import plain
 from hrc_env.core.typing import Floats
 from hrc_env.env import ENDLESS, HRCEnv
+from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.render.views import CameraChoice
+from hrc_env.reset_options import ResetOptions
 from hrc_env.step_result import Observation
-from hrc_env.vector.options import steps_behind
 
 if TYPE_CHECKING:
     from hrc_env.vector.env import HRCVectorEnv
@@ -47,12 +48,10 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
         """Start an episode of this environment; as of `HRCEnv`, and "elapsed_steps"."""
-        number = self._vector.num_envs
-        alone = np.arange(number) == self._k
-        behind = np.full(number, steps_behind(options, self._vector.max_episode_steps))
+        alone = np.arange(self._vector.num_envs) == self._k
         observation, infos = self._vector.reset(
             seed=[seed if each else None for each in alone],
-            options={"reset_mask": alone, "elapsed_steps": behind},
+            options={"reset_mask": alone, "each": [options if each else None for each in alone]},
         )
         return copied(one(observation, self._k)), info_of(infos, self._k)
 
@@ -62,6 +61,25 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
             f"Environment {self._k} of {self._vector} steps with the others: call step() of the "
             "vector, with an action for each."
         )
+
+    @property
+    def rig(self) -> tuple[CameraConfig, ...]:
+        """The cameras of this environment's episode."""
+        simulation, b = self._vector.shards.where(self._k)
+        return simulation.rig_of(b)
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """What is fixed of its episodes to come, by name; to be set, as of `HRCEnv`."""
+        return self._vector.options_of(self._k)
+
+    @options.setter
+    def options(self, options: Mapping[str, Any] | ResetOptions | None) -> None:
+        self.set_options(options)
+
+    def set_options(self, options: Mapping[str, Any] | ResetOptions | None = None) -> None:
+        """Fix something of the episodes to come of this environment, as `HRCEnv` does."""
+        self._vector.set_options_of(self._k, options)
 
     def render(self, camera: CameraChoice = None) -> Any:
         """Return a picture of this environment, or with a mode "..._list" those since the last;
@@ -135,13 +153,14 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self._vector.notes[self._k][name]
 
     def __setattr__(self, name: str, value: Any) -> None:
-        if name == "np_random":
+        if name in ("np_random", "options"):
             super().__setattr__(name, value)
         elif name in TAKEN or hasattr(type(self), name):
             raise ConfigError(
                 f"{name!r} of one environment of many cannot be set: environments take their "
-                "settings when they are made. What can be set is `np_random` and attributes of "
-                "your own; reset(options=...) and set_reward(...) change episodes and rewards."
+                "settings when they are made. What can be set is `np_random`, `options` and "
+                "attributes of your own; reset(options=...), set_options(...) and set_reward(...) "
+                "change episodes and rewards."
             )
         else:
             self._vector.notes[self._k][name] = value

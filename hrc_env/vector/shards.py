@@ -14,6 +14,7 @@ import numpy as np
 from hrc_env.core.batching import State
 from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.core.typing import Floats, Ints
+from hrc_env.reset_options import Fixed
 from hrc_env.simulation import Simulation
 from hrc_env.step_result import StepResult, joined
 
@@ -29,17 +30,25 @@ class Shards:
         """That of the calling thread."""
         self._pool: ThreadPoolExecutor | None = None
 
-    def reset(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> StepResult:
+    def reset(
+        self, ids: Ints, rngs: Sequence[np.random.Generator], fixed: Sequence[Fixed | None] = ()
+    ) -> StepResult:
         """Start environments `ids` (sorted) anew, one generator each; their rows. In one thread:
-        this is Python for the most part, in which others would only wait."""
+        this is Python for the most part, in which others would only wait. `fixed`: as of
+        `Simulation.reset`."""
         cuts = pairwise(np.searchsorted(ids, self.bounds).tolist())
         parts = zip(self.parts, self.bounds[:-1], cuts, strict=True)
         jobs = [
-            (first, partial(part.reset, ids[low:high] - first, rngs[low:high]))
+            (first, partial(part.reset, ids[low:high] - first, rngs[low:high], fixed[low:high]))
             for part, first, (low, high) in parts
             if low < high
         ]
         return joined(_all_done(jobs))
+
+    def where(self, k: int) -> tuple[Simulation, int]:
+        """Return the simulation of environment k, and its number there."""
+        shard = int(np.searchsorted(self.bounds, k, "right")) - 1
+        return self.parts[shard], k - self.bounds[shard]
 
     def step(self, action: Floats) -> StepResult:
         """One control step of every environment; action (B, A) in [-1, 1]."""

@@ -36,12 +36,16 @@ class CameraFilm:
 
     def __init__(self, viewer: Lensed, schedule: Schedule) -> None:
         self.stage, self.viewer, self.schedule = viewer.drawer, viewer, schedule
+        self._now = schedule
+        """That of the episode whose images are shown."""
         self._shots: Sequence[Shot | None] = ()
         self._seed = 0
         self._drawn: Any = None
 
     def show(self, shots: Sequence[Shot | None], seed: int) -> None:
         """The scene that each camera's image shows; the episode's number for faults."""
+        if seed != self._seed or not self._shots:
+            self._now = self.schedule.of_episode(seed)
         self._shots, self._seed, self._drawn = tuple(shots), seed, None
 
     def crop(self, camera_index: int, window: Roi) -> Image:
@@ -50,7 +54,7 @@ class CameraFilm:
         if shot is None:
             return np.zeros((self.stage.size_px, self.stage.size_px, 3), np.uint8)
         image = self._taken(shot, camera_index, window)
-        for k, fault in self.schedule.of(IMAGE, camera_index, shot.step):
+        for k, fault in self._now.of(IMAGE, camera_index, shot.step):
             if fault.kind != "motion_blur":
                 seeds = (self._seed, k, camera_index, shot.step)
                 image = spoil(Shown(image, shot.cameras[camera_index], window, seeds), fault)
@@ -58,7 +62,7 @@ class CameraFilm:
 
     def _taken(self, shot: Shot, c: int, window: Roi) -> Image:
         """The light that came while the shutter was open."""
-        camera, open_s = shot.cameras[c], self.schedule.exposure_s(c, shot.step)
+        camera, open_s = shot.cameras[c], self._now.exposure_s(c, shot.step)
         if open_s == 0.0:
             self._pose(shot, 0.0)
             return self.viewer.view(camera, window)

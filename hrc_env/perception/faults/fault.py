@@ -3,8 +3,10 @@ episode's number for faults: all else is that of the same seed without faults.""
 
 import numbers
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
+
+import numpy as np
 
 from hrc_env.core.errors import ConfigError, unknown, whole
 from hrc_env.core.mapping import answer_unknown_fields
@@ -58,8 +60,9 @@ class FaultConfig:
     """A key of `KINDS`."""
     cameras: tuple[int | str, ...]
     """Those that have it, by name or index (from 0) among those in use; ("all",) is every one."""
-    amount: float | None = None
-    """How much, in the kind's unit; None is the kind's usual amount."""
+    amount: float | tuple[float, float] | None = None
+    """How much, in the kind's unit; (least, most): drawn evenly, anew for every episode; None is
+    the kind's usual amount."""
     from_s: float = 0.0
     """When in the episode it begins [s]; 0 is the reset."""
     until_s: float = FOREVER_S
@@ -75,11 +78,18 @@ class FaultConfig:
                 f"got {self.cameras!r}."
             )
         low, high = KINDS[self.kind].bounds
-        number = isinstance(self.how_much, int | float) and not isinstance(self.how_much, bool)
-        if not number or not low <= self.how_much <= high:
+        ends = self.amount if isinstance(self.amount, tuple | list) else (self.how_much,)
+        if not all(map(_is_number, ends)) or not all(low <= end <= high for end in ends):
             raise ConfigError(
                 f"Fault {self.kind!r}: amount must be from {low:g} to {high:g} "
                 f"{KINDS[self.kind].unit}, got {self.amount!r}."
+            )
+        if isinstance(self.amount, tuple | list) and not (
+            len(ends) == 2 and isinstance(self.amount, tuple) and ends[0] <= ends[1]
+        ):
+            raise ConfigError(
+                f"Fault {self.kind!r}: a range of amounts must be (least, most), from which every "
+                f"episode's amount is drawn, got {self.amount!r}."
             )
         if not 0 <= self.from_s < self.until_s:
             raise ConfigError(
@@ -94,8 +104,21 @@ class FaultConfig:
 
     @property
     def how_much(self) -> float:
-        """The amount, in the kind's unit."""
+        """The amount, in the kind's unit; of a range the greatest."""
+        if isinstance(self.amount, tuple):
+            return self.amount[1]
         return KINDS[self.kind].usual if self.amount is None else self.amount
+
+    @property
+    def is_range(self) -> bool:
+        """Whether every episode has an amount of its own."""
+        return isinstance(self.amount, tuple)
+
+    def drawn(self, rng: np.random.Generator) -> "FaultConfig":
+        """Return the fault of one episode: with an amount drawn from the range, if it is one."""
+        if not isinstance(self.amount, tuple):
+            return self
+        return replace(self, amount=float(rng.uniform(*self.amount)))
 
     def active(self, time_s: float) -> bool:
         """Return whether an image of this time of the episode has it; 0.5 ms are nothing."""
@@ -111,6 +134,10 @@ def check_cameras(faults: Sequence[FaultConfig], names: Sequence[str]) -> None:
                 whole(what, camera, 0, len(names) - 1)
             elif camera not in (*names, ALL):
                 raise unknown(f"camera of fault {fault.kind!r}:", camera, (*names, ALL))
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _is_choice(camera: object) -> bool:

@@ -16,6 +16,8 @@ from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.perception.faults.fault import ALL, KINDS, PLACE, TIMING, FaultConfig, check_cameras
 
+_AMOUNT = 0xA303
+"""Tells the draws of a fault's amount from those of its cameras, which count from 0."""
 _EARLY = 1e-6
 """Share of a step by which times may be too small for having been added up."""
 
@@ -60,6 +62,13 @@ class Schedule:
     def frozen_steps(self) -> frozenset[int]:
         """Steps whose scenes frozen images show."""
         return frozenset(self._frozen_at(f) for f in self.faults if f.kind == "frozen")
+
+    def of_episode(self, seed: int) -> "Schedule":
+        """Return the schedule of one episode, in which every fault has one amount."""
+        if not any(fault.is_range for fault in self.faults):
+            return self
+        numbered = enumerate(self.faults)
+        return replace(self, faults=tuple(f.drawn(draws(seed, k, _AMOUNT)) for k, f in numbered))
 
     def of(self, group: str, c: int, step: int | None) -> list[tuple[int, FaultConfig]]:
         """Faults of a group that camera c has at a step (None: ever), each with its number."""
@@ -138,6 +147,8 @@ class Recent(Stateful):
         self.seeds: list[int] = [0] * batch
         """Each episode's number for faults."""
         self._kept: list[dict[int, Any]] = [{} for _ in range(batch)]
+        self._episodes: dict[int, tuple[int, Schedule]] = {}
+        """By environment: its episode's number, and the schedule that follows from it."""
         self._reach = max(1, schedule.longest_memory)
         self._pinned = schedule.frozen_steps
 
@@ -146,6 +157,14 @@ class Recent(Stateful):
         for b in ids.tolist():
             child = rngs[b].spawn(1)[0]
             self.steps[b], self.seeds[b], self._kept[b] = -1, int(child.integers(2**31)), {}
+
+    def schedule_of(self, b: int) -> Schedule:
+        """Return what cameras do in the present episode of environment b."""
+        seed = self.seeds[b]
+        known = self._episodes.get(b)
+        if known is None or known[0] != seed:
+            known = self._episodes[b] = seed, self.schedule.of_episode(seed)
+        return known[1]
 
     def begin(self, b: int) -> int:
         """Count a step of environment b, and let go of what is too old."""
@@ -163,7 +182,7 @@ class Recent(Stateful):
     def arrived(self, b: int, record: Any) -> tuple[list[Any], Floats]:
         """Keep a record of the present step; those that the cameras (C,) show now, None without an
         image, and (C,) when these were taken, as they say [s; the reset's at `dt_s`]; NaN: none."""
-        schedule, seed, step = self.schedule, self.seeds[b], int(self.steps[b])
+        schedule, seed, step = self.schedule_of(b), self.seeds[b], int(self.steps[b])
         self._kept[b][step] = record
         frames = [schedule.frame(seed, step, c) for c in range(len(schedule.cameras))]
         records = [None if frame is None else self.at(b, frame.shows) for frame in frames]

@@ -1,0 +1,133 @@
+"""Rigs that are drawn anew for every episode: how far cameras, lenses and their number differ."""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from hrc_env.core.errors import ConfigError, check_fields, unknown, whole
+from hrc_env.geometry.camera_config import MOST_CAMERAS, CameraConfig, axes_of, intrinsics
+from hrc_env.geometry.rotations import from_rotation_vector, look_at
+from hrc_env.scene.build import Scene, with_rig
+from hrc_env.scene.rigs import RIGS, poor_cameras
+
+TRIES = 100
+"""So often a rig is drawn whose cameras all see the workspace."""
+STREAM = 0x10076
+"""Tells the stream for rigs from those that a generator's `spawn` gives: these count from 0."""
+
+
+@dataclass(frozen=True, slots=True)
+class RigDistribution:
+    """Rigs round one rig: in every episode cameras hang, look and are as many as is drawn.
+
+    Estimators know the rig of their episode, as after a calibration; what they are told wrongly is
+    a fault ("wrong_rotation", "wrong_translation", "wrong_focal"). A rig with a camera that hangs
+    in or behind something, or sees little of the workspace, is drawn again.
+    """
+
+    around: str | tuple[CameraConfig, ...] = ()
+    """The rig in the middle: its name ("lab_gopro") or its cameras; none: the scene's own."""
+    place_m: float = 0.0
+    """Each camera hangs at most so far from its place along each axis [m]."""
+    turn_rad: float = 0.0
+    """And is turned by at most so much, about any axis [rad]."""
+    focal_share: float = 0.0
+    """Its focal length is longer or shorter by at most this share."""
+    n_cameras: int | tuple[int, int] | None = None
+    """How many of the cameras there are; (fewest, most): drawn, too; None: all of them. Which ones
+    is drawn."""
+
+    def __post_init__(self) -> None:
+        if isinstance(self.around, str) and self.around not in RIGS:
+            raise unknown("rig in RigDistribution.around", self.around, RIGS)
+        check_fields(self, "not be negative", "place_m", "turn_rad")
+        check_fields(self, "be in [0, 1)", "focal_share")
+        if self.n_cameras is not None:
+            ends = self.n_cameras if isinstance(self.n_cameras, tuple) else (self.n_cameras,) * 2
+            low, high = (whole("RigDistribution.n_cameras", k, 1, MOST_CAMERAS) for k in ends)
+            if low > high:
+                raise ConfigError(
+                    f"RigDistribution.n_cameras must be (fewest, most), got {self.n_cameras}."
+                )
+
+    @property
+    def rig(self) -> tuple[CameraConfig, ...]:
+        """The rig in the middle; empty: the scene's own."""
+        return RIGS[self.around] if isinstance(self.around, str) else self.around
+
+    def counts(self, n_cameras: int) -> tuple[int, int]:
+        """Return the fewest and the most cameras of an episode, of a rig that has so many."""
+        if self.n_cameras is None:
+            return n_cameras, n_cameras
+        low, high = self.n_cameras if isinstance(self.n_cameras, tuple) else (self.n_cameras,) * 2
+        if high > n_cameras:
+            raise ConfigError(
+                f"RigDistribution.n_cameras={self.n_cameras}: the rig that it is around has "
+                f"{n_cameras} cameras. Name no more, or give `around` more of them."
+            )
+        return low, high
+
+
+def draw_rig(
+    distribution: RigDistribution, scene: Scene, rng: np.random.Generator
+) -> tuple[CameraConfig, ...]:
+    """Draw an episode's rig; the scene has the rig that it is around.
+
+    Raises:
+        ConfigError: no draw of `TRIES` gave a rig whose cameras all see the workspace.
+    """
+    refused = ""
+    for _ in range(TRIES):
+        try:
+            rig = _drawn(distribution, scene.rig, rng)
+        except ConfigError as error:  # a camera that cannot be
+            refused = str(error)
+            continue
+        poor = poor_cameras(with_rig(scene, rig))
+        if not poor:
+            return rig
+        refused = poor[0]
+    raise ConfigError(
+        f"{distribution}: no rig was found in {TRIES} draws whose cameras all see the workspace. "
+        f"The last one: {refused} Let it differ less, or hang the cameras elsewhere."
+    )
+
+
+def _drawn(
+    distribution: RigDistribution, rig: tuple[CameraConfig, ...], rng: np.random.Generator
+) -> tuple[CameraConfig, ...]:
+    """Draw a rig once; each camera's draws depend on its place in the rig only."""
+    fewest, most = distribution.counts(len(rig))
+    n = int(rng.integers(fewest, most + 1))
+    used = sorted(rng.permutation(len(rig))[:n].tolist())
+    off = rng.uniform(-1, 1, (len(rig), 3)), rng.standard_normal((len(rig), 3))
+    shares = rng.uniform(0, 1, len(rig)), rng.uniform(-1, 1, len(rig))
+    return tuple(
+        _moved(
+            rig[c],
+            distribution.place_m * off[0][c],
+            distribution.turn_rad * shares[0][c] * off[1][c] / np.linalg.norm(off[1][c]),
+            1.0 + distribution.focal_share * float(shares[1][c]),
+        )
+        for c in used
+    )
+
+
+def _moved(camera: CameraConfig, by_m: Any, turn_rad: Any, focal: float) -> CameraConfig:
+    """A camera `by_m` (3,) from its place, turned by a rotation vector (3,), of a focal length so
+    many times as long."""
+    eye = np.array(camera.eye_world) + by_m
+    R_world_from_cam = from_rotation_vector(turn_rad) @ axes_of(camera)
+    away_m = math.dist(camera.eye_world, camera.target_world)
+    target = eye + away_m * R_world_from_cam[:, 2]
+    rolled = look_at(eye, target).T @ R_world_from_cam
+    K = intrinsics(camera)
+    return replace(
+        camera,
+        eye_world=tuple(eye.tolist()),
+        target_world=tuple(target.tolist()),
+        roll_deg=math.degrees(math.atan2(rolled[1, 0], rolled[0, 0])),
+        focal_px=camera.focal_px if focal == 1.0 else (focal * K[0, 0], focal * K[1, 1]),
+    )
