@@ -1,4 +1,4 @@
-"""Checkpoints for acting: what they were made for, and their policy; nothing in files is run."""
+"""Checkpoints for acting: their environment, and their policy; nothing in files is run."""
 
 import json
 import zipfile

@@ -100,7 +100,7 @@ class TrainedAgent:
         self.learner = learner
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
-        """Deterministic actions (..., A); it is given what it learnt from."""
+        """Deterministic actions (..., A); it is given the parts from which it learnt."""
         space = self.learner.observation_space
         if isinstance(observation, Mapping):
             known = space.spaces if isinstance(space, spaces.Dict) else None

@@ -76,7 +76,7 @@ def run(asked: Export) -> int:
 
 
 def taken(trained: checkpoints.Learner) -> tuple[Tensors, Architecture]:
-    """What of a learner acts.
+    """Return the networks of a learner that act.
 
     Raises:
         CheckpointError: it sees images: the format has no convolutions.

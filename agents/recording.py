@@ -113,7 +113,8 @@ def command(asked: Record) -> str:
 
 
 def _about(asked: Record) -> dict[str, Any]:
-    """What a data set is: command, arguments, configuration, versions, seeds, cameras.
+    """Return the metadata of a data set: command, arguments, configuration, versions, seeds,
+    cameras.
 
     Raises:
         ConfigError: the environment, infos or images that are asked for cannot be.
@@ -207,8 +208,8 @@ def _played(asked: Record, first: int, n: int) -> list[Episode]:
 
 
 def _kept_of(asked: Record, env: HRCVectorEnv, info: Mapping[str, Any], n: int) -> Kept:
-    """What of each moment of `n` episodes side by side is asked for, given the infos that there
-    are; `ConfigError` for others, and for more images than memory holds."""
+    """Return the requested parts of each moment of `n` episodes side by side, of the infos that
+    there are; `ConfigError` for other infos, and for more images than memory holds."""
     there = [name for name in info if not name.startswith("_")]
     names = dict.fromkeys((*TOP, *matching(asked.infos, there)))
     if (images := env.shards.first.images) is not None:

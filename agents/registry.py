@@ -18,7 +18,7 @@ OTHERS = (
     "wrote (.zip) or python -m hrc_env export (.safetensors), or MODULE:FUNCTION, which is given "
     "an EnvInfo and returns what has act(observation)"
 )
-"""What else is an agent, in words."""
+"""Other forms of an agent, for errors."""
 
 
 def make_agent(name: str, env_info: EnvInfo, seed: int = 0, trust: bool = False) -> Agent:
@@ -55,7 +55,7 @@ def make_agent(name: str, env_info: EnvInfo, seed: int = 0, trust: bool = False)
 
 
 def check_agent(name: str) -> None:
-    """Raise `ConfigError` for what cannot be an agent, before an environment is made.
+    """Raise `ConfigError` for a name that is no agent, before an environment is made.
 
     Files are looked for, and functions are imported; whether they fit is found when they are
     given an `EnvInfo`.

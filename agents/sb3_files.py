@@ -37,7 +37,7 @@ with learner():
 
 TRUST = "If you trust who made it: --trust, in Python trust=True."
 PICKLED = ":serialized:"
-"""Key of what JSON cannot hold, as base64 of a pickle."""
+"""Key of a value that JSON cannot hold, as base64 of a pickle."""
 POLICIES = {
     "stable_baselines3.common.policies": (
         "ActorCriticPolicy", "ActorCriticCnnPolicy", "MultiInputActorCriticPolicy",
@@ -57,7 +57,7 @@ EXTRACTORS = {
     }.items()
     for name in names
 }  # fmt: skip
-"""What may stand before the first layer, without a pickle."""
+"""Extractors of features that are known without a pickle."""
 ACTIVATIONS = tuple(
     f"torch.nn.modules.activation.{name}"
     for name in ("Tanh", "ReLU", "ELU", "LeakyReLU", "SiLU", "GELU", "Mish", "Sigmoid")
@@ -120,7 +120,7 @@ def spaces_of(
 
 @dataclass(frozen=True, slots=True)
 class Statistics:
-    """By what `VecNormalize` scales observations."""
+    """Statistics by which `VecNormalize` scales observations."""
 
     wrapper: VecNormalize
 
@@ -150,7 +150,7 @@ class SB3Agent:
 
 
 def _read(path: Path) -> tuple[Mapping[str, Any], Mapping[str, torch.Tensor]]:
-    """Return what a file says of its policy, and the weights; neither is unpickled."""
+    """Return the description and the weights of the policy in a file; neither is unpickled."""
     if not path.exists():
         raise CheckpointError(f"No checkpoint at {path}. Train one: python -m hrc_env train")
     try:
@@ -257,7 +257,7 @@ def _words(shapes: Shapes) -> str:
 def _architecture(
     path: Path, data: Mapping[str, Any], trust: bool
 ) -> tuple[Callable[..., BasePolicy], dict[str, Any]]:
-    """Return what makes the policy, and with which arguments beside the spaces."""
+    """Return the function that makes the policy, and its arguments beside the spaces."""
     kind, said = data.get("policy_class"), data.get("policy_kwargs", {})
     if not isinstance(kind, dict) or not isinstance(said, dict):
         raise CheckpointError(f"{path} does not say which policy it holds.")

@@ -52,7 +52,7 @@ DEMONSTRATION_SEED = 2_000_000
 ONLY_OF_A_RUN = ("out", "timesteps", "threads", "episodes", "film", "resume")
 """Arguments that a resumed run does not take from the run that it goes on with."""
 SHARES = {"success_rate": ", of attempts", "is_success": ", of episodes"}
-"""What two numbers of a score are shares of."""
+"""The whole of which two numbers of a score are shares."""
 FILM_SEEDS = 8
 """Number of episodes of which the film shows the one that comes closest to the worker."""
 STOPPED = 130

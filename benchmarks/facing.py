@@ -82,7 +82,7 @@ class Facing:
 
     @property
     def quick_note(self) -> str:
-        """What tables and figures of a short run say of themselves; "" of others."""
+        """The warning on tables and figures of a short run; "" if it is long enough."""
         is_short = max(self.episodes) < max(Facing().episodes)
         return quick_words(max(self.episodes), self.seconds) if is_short else ""
 

@@ -127,7 +127,7 @@ def resolved_twist(
 
 @kernel(makes_arrays=True)
 def _resolve(J, wanted, squared_damping, qd):
-    """Add to `qd` (B, N) what brings J qd (B, M) to what is wanted, by damped least squares.
+    """Add to `qd` (B, N) the change that brings J qd (B, M) to `wanted`, by damped least squares.
 
     Sums are of a fixed order, as those of a linear algebra library are not: stiff contacts enlarge
     the last bit.

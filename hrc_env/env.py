@@ -203,12 +203,12 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
 
     @property
     def rig(self) -> tuple[CameraConfig, ...]:
-        """The cameras of this episode, as they are told."""
+        """The cameras of this episode, as the estimator knows them."""
         return self.simulation.rig_of(0)
 
     @property
     def options(self) -> dict[str, Any]:
-        """What `set_options` says, by name."""
+        """Options of `set_options`, by name."""
         return dict(self._options)
 
     @options.setter
@@ -321,7 +321,7 @@ def check_render_mode(render_mode: str | None, valid: Sequence[str] = RENDER_MOD
 
 
 def shown_beside(markers: Any, overlay: Any) -> dict[str, bool]:
-    """What of `Views.picture` the arguments `render_markers` and `overlay` ask for.
+    """Return the arguments of `Views.picture` for `render_markers` and `overlay`.
 
     Raises:
         ConfigError: values that they cannot have.

@@ -113,8 +113,8 @@ class EnvConfig:
     render_markers: bool = field(default=True, metadata=NO_WORD)
     """Whether `render` shows goals and other places that the task marks."""
     overlay: str | None = field(default=None, metadata=NO_WORD)
-    """What `render` lays over the scene: "capsules", what stands for robot and people in distances
-    (docs/start.md); None: nothing."""
+    """An overlay of `render`: "capsules", the shapes of robot and people of which distances are
+    taken (docs/start.md); None: nothing."""
 
     def arguments(self) -> dict[str, Any]:
         """Return the fields that differ from the defaults, by name."""

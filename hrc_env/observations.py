@@ -28,7 +28,7 @@ from hrc_env.geometry.rotations import matrix
 TOWARDS_ROBOT, FACTOR = UNCERTAINTY = ("towards_robot", "factor")
 """What else can be asked for of each joint's covariance."""
 FLAT = "observation"
-"""What the flat observation is called where goals or images stand beside it."""
+"""Name of the flat observation where goals or images stand beside it."""
 IMAGE = "image_"
 """How the names of images begin that stand beside it; the camera's name follows."""
 FAR_SEPARATION_M = 1.0

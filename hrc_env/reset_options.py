@@ -1,4 +1,4 @@
-"""What of an episode a user fixes: the options of `reset` and `set_options`, checked in words."""
+"""Options of `reset` and `set_options`: parts of an episode that a user fixes, checked in words."""
 
 import dataclasses
 import warnings
@@ -32,9 +32,9 @@ from hrc_env.tasks.task import Task
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ResetOptions:
-    """What of an episode is fixed: the names that `reset(options={...})` takes.
+    """Parts of an episode that are fixed: the names that `reset(options={...})` takes.
 
-    The record itself may be given, too. What is not given is drawn as it is without options, from
+    The record itself may be given, too. Other parts are drawn as they are without options, from
     the same random streams. A vector environment takes one value for all environments; of `goal`,
     `start_q`, `n_workers` and `steps_left` also an array with a row for each; and of any of them
     "each", a list of a mapping (or None) for each. `set_options` takes the same but `steps_left`:
@@ -51,15 +51,15 @@ class ResetOptions:
     people: "str | PeopleConfig | Mapping[str, Any] | None" = None
     """How workers are with the robot, as the environment's `people`."""
     activity: "str | Sequence[str | None] | None" = None
-    """What workers are doing when the episode begins, "hammer" for example: one for all, or one for
-    each (None: drawn). They go on with what follows."""
+    """The first activity of workers, "hammer" for example: one for all, or one for
+    each (None: drawn). They go on as usual."""
     start_q: ArrayLike | None = None
     """(N,) the joint angles with which the robot starts [rad, m of slides]."""
     cameras: Any = None
     """The rig, as the environment's `cameras`; its cameras are called as those of the environment,
     and may be fewer. A `RigDistribution`: drawn."""
     faults: "Sequence[FaultConfig | Mapping[str, Any]] | None" = None
-    """What goes wrong with cameras, in place of the environment's `faults`."""
+    """Faults of cameras, in place of the environment's `faults`."""
     appearance: "str | AppearanceConfig | Mapping[str, Any] | None" = None
     """How scene and workers look, in place of the environment's `appearance`."""
     steps_left: int | None = None
@@ -111,7 +111,8 @@ def lasting_options(options: Options | ResetOptions | None, *more: str) -> dict[
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fixed:
-    """What of one environment's episode is not drawn, checked; None: drawn, or as it was made."""
+    """Parts of one environment's episode that are not drawn, checked; None: drawn, or as it was
+    made."""
 
     goal: Floats | None = None
     cast: Cast | None = None
@@ -130,7 +131,7 @@ class Fixed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Room:
-    """What options are checked against: what an environment was made with."""
+    """Settings of an environment against which options are checked."""
 
     task: Task[Any, Any]
     scene: Scene
@@ -140,15 +141,15 @@ class Room:
     appearance: AppearanceConfig
     bodies: tuple[str, ...]
     mind: BehaviourParams
-    """What workers decide by."""
+    """The workers' parameters of decision."""
     touched_at: Callable[[JointAngles], str | None]
-    """What is in the way of the robot at joint angles."""
+    """Returns the name of an obstacle at joint angles; None: none is touched."""
     images: ObservedImages | None = None
-    """What draws the images of observations; None: they hold none."""
+    """Draws the images of observations; None: they hold none."""
 
 
 def fix(options: Options, room: Room) -> Fixed:
-    """Return what the options of one environment's reset fix.
+    """Return the fixed parts of one environment's episode.
 
     Raises:
         ConfigError: an option that cannot be, or two that exclude each other; before anything of
@@ -218,7 +219,7 @@ def _start_q(start_q: Any, room: Room) -> JointAngles | None:
 
 
 def _cast(given: Options, room: Room) -> Cast | None:
-    """Who is there, with what they begin, and how they are."""
+    """Return the people who are there, their first activities, and their behaviour."""
     if not {"n_workers", "bodies", "people", "activity"} & set(given):
         return None
     most, n = room.scene.n_workers, None

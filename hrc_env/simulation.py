@@ -140,7 +140,7 @@ class Simulation(Stateful):
             perception, estimator, self.scene, batch, config, shows_images=images is not None
         )
         self.images = None if images is None else ObservedImages(self.scene, images)
-        """What draws the images of observations; None: they hold none."""
+        """Draws the images of observations; None: they hold none."""
         self._looks: dict[int, tuple[np.random.Generator, Look]] = {}
         self.task_state = self.task.make_state(batch)
         self._everyone, self.reward_weights = np.arange(batch), config.reward
@@ -184,7 +184,7 @@ class Simulation(Stateful):
         return self._judge(command, truth, belief)
 
     def fix(self, options: Options) -> Fixed:
-        """Return what a reset's options fix of one environment's episode, checked; `ConfigError` as
+        """Return the parts of one environment's episode that options fix, checked; `ConfigError` as
         of `reset_options.fix`."""
         camera_sees = self.config.faults, self.config.appearance
         room = Room(
@@ -247,7 +247,7 @@ class Simulation(Stateful):
         self.reward_factors = dict(state.get("reward_factors", {}))
 
     def draw_images(self) -> Images:
-        """Return the images of what the sensors were shown last."""
+        """Return the images of the moment that the sensors were shown last."""
         if self.images is None:
             return {}
         now = self.pipeline.sensor.now

@@ -47,7 +47,7 @@ class MotionBench:
 
     @property
     def quick_note(self) -> str:
-        """What tables and figures of a short run say of themselves; "" of others."""
+        """The warning on tables and figures of a short run; "" if it is long enough."""
         is_short = self.n_seeds <= QUICK.n_seeds
         return quick_words(self.n_seeds) if is_short else ""
 

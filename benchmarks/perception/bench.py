@@ -99,7 +99,7 @@ class PerceptionBench:
 
     @property
     def quick_note(self) -> str:
-        """What tables and figures of a short run say of themselves; "" of others."""
+        """The warning on tables and figures of a short run; "" if it is long enough."""
         is_short = self.n_emulated <= QUICK.n_emulated or self.n_steps <= QUICK.n_steps
         return quick_words(self.n_emulated, self.n_steps * DT_S) if is_short else ""
 

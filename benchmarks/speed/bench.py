@@ -79,7 +79,7 @@ class SpeedBench:
 
     @property
     def quick_note(self) -> str:
-        """What tables and figures of a short run say of themselves; "" of others."""
+        """The warning on tables and figures of a short run; "" if it is long enough."""
         is_short = self.n_rounds <= QUICK.n_rounds
         return f"Quick run, {self.n_rounds} round: too few to compare anything." if is_short else ""
 

@@ -1,4 +1,4 @@
-"""What camera images in observations cost: python -m benchmarks.speed.images
+"""The time that camera images in observations take: python -m benchmarks.speed.images
 
 Everybody takes turns, so that a noisy machine slows all of them alike: a step without images, the
 same with one and with all images, `render()`, and the rig drawn as it is for people. Milliseconds
@@ -29,10 +29,10 @@ STEP, RENDER = "a step without images", "render(), with shadows"
 
 @dataclass(frozen=True)
 class Arguments:
-    """Measure what images cost."""
+    """Measure the time that images take."""
 
     rounds: int = 60
-    """How often everybody has a turn."""
+    """Number of turns of each contender."""
     size: int = 84
     """Sides of images and pictures [px]."""
     task: str = "HRCReach-v0"
@@ -42,7 +42,7 @@ class Arguments:
 
 
 def contenders(arguments: Arguments, exits: ExitStack) -> dict[str, Callable[[], Any]]:
-    """Make everybody, ready to have a turn."""
+    """Make all contenders."""
     size = arguments.size
 
     def make(**given: Any) -> Any:

@@ -60,7 +60,7 @@ class TrackingBench:
 
     @property
     def selection(self) -> Selection:
-        """What of the bench is run."""
+        """The part of the bench that is run."""
         return Selection(self.estimators, self.sequences)
 
     @property
@@ -76,7 +76,7 @@ class TrackingBench:
 
     @property
     def quick_note(self) -> str:
-        """What tables and figures of a short run say of themselves; "" of others."""
+        """The warning on tables and figures of a short run; "" if it is long enough."""
         is_short = self.n_seeds <= QUICK.n_seeds
         return quick_words(self.n_seeds) if is_short else ""
 

@@ -18,7 +18,7 @@ SMOOTHER = "smoother"
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """What of the bench is run."""
+    """The part of the bench that is run."""
 
     estimators: tuple[str, ...] = ()
     """Who beside the default; everybody if none are named."""
@@ -53,7 +53,7 @@ class Selection:
         return [DEFAULT, *self.rivals(), *last]
 
     def timed(self) -> list[str]:
-        """Return whose time is taken."""
+        """Return the estimators that are timed."""
         return [name for name in ESTIMATORS if name in (DEFAULT, *self.rivals())]
 
     def rows(self) -> list[tuple[str, str, str]]:

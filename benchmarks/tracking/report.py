@@ -34,7 +34,7 @@ _BATCHES = {"1": "batch 1", "64": "batch 64", "hard_64": "batch 64, mean over ha
 
 
 def report(metrics: Metrics, selection: Selection = EVERYTHING) -> Report:
-    """What is to be read; sections of which nothing was run are left out."""
+    """Return the report; sections of which nothing was run are left out."""
     rivals = [DEFAULT, *selection.rivals()]
     with_names = [name for name in rivals if name != DLT]
     swaps = {"": f"identity_swaps.{{rig}}.{TWO_WORKERS}.{{name}}"}

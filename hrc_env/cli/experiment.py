@@ -85,7 +85,7 @@ class ImpactExperiment(AnyExperiment):
     """Who acts, instead of scripted, scripted_slowed and ppo, which is trained here first: some of
     these, random, hrc://ID/NAME, files (.zip, .safetensors) or MODULE:FUNCTION, as of play."""
     control: str | None = None
-    """What actions are of robots that do not say it: joint, if not given, tool or twist."""
+    """Control of policies whose files do not name one: joint, if not given, tool or twist."""
     trust: bool = False
     """Read pickles in their checkpoints, which run code of whoever made them; see play."""
 
@@ -107,7 +107,7 @@ class PriceExperiment(AnyExperiment):
     """Who acts, instead of scripted: one of random, scripted_slowed, hrc://ID/NAME, a file (.zip,
     .safetensors) or MODULE:FUNCTION, as of play. Other tasks are then left out."""
     control: str | None = None
-    """What its actions are if it does not say it: joint, if not given, tool or twist."""
+    """Its control, if its file does not name one: joint, if not given, tool or twist."""
     trust: bool = False
     """Read pickles in its checkpoint, which run code of whoever made it; see play."""
 

@@ -29,8 +29,8 @@ class Play(EnvironmentArguments):
     agent: str = "scripted_slowed"
     """random, scripted, scripted_slowed, hrc://ID/NAME (python -m hrc_env list); the path of a
     checkpoint of `train` or of Stable-Baselines3 (.zip) or of a policy of `export` (.safetensors);
-    or MODULE:FUNCTION, a function that is given an EnvInfo and returns what has act(observation).
-    Files of this package know --control."""
+    or MODULE:FUNCTION, a function that is given an EnvInfo and returns an object with
+    act(observation). Files of this package know --control."""
     trust: bool = False
     """Read pickles in a checkpoint of Stable-Baselines3, which run code of whoever made it: for
     policy or network classes of its author's own, and for statistics of VecNormalize."""

@@ -17,7 +17,7 @@ from hrc_env.tasks import DEFAULT
 class Record(EnvironmentArguments):
     """Record an agent's episodes as a data set: of Minari, or a folder.
 
-    What is finished is kept when this is stopped or killed: the same command goes on there. The
+    Finished episodes are kept when this is stopped or killed: the same command goes on there. The
     data set appears when it is whole: with --out where Minari looks for it (MINARI_DATASETS_PATH),
     with --folder there, and hrc_env.load_episodes(FOLDER) reads it.
     """
@@ -27,7 +27,7 @@ class Record(EnvironmentArguments):
     agent: str = "scripted"
     """random, scripted, scripted_slowed, hrc://ID/NAME; the path of a checkpoint of `train` or of
     Stable-Baselines3 (.zip) or of a policy of `export` (.safetensors); or MODULE:FUNCTION, a
-    function that is given an EnvInfo and returns what has act(observation)."""
+    function that is given an EnvInfo and returns an object with act(observation)."""
     trust: bool = False
     """Read pickles in a checkpoint, which run code of whoever made it; see play."""
     episodes: int = 100

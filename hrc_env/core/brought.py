@@ -49,7 +49,8 @@ def check_arguments(what: str, function: Callable[..., Any], *names: str) -> Non
 
 
 def function_called(what: str, name: str, meaning: str) -> Any:
-    """Return what "module:function" names; modules in the working folder are found, too.
+    """Return the function that "module:function" names; modules in the working folder are found,
+    too.
 
     Args:
         what: it is to be, as an agent.

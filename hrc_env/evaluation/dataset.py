@@ -1,4 +1,4 @@
-"""Data sets of episodes in a folder: a file of arrays for each episode, and what they are.
+"""Data sets of episodes in a folder: a file of arrays for each episode, and metadata.
 
 `dataset.json` holds versions, command, arguments, configuration and cameras; `episode_00000.npz`
 and so on hold the arrays, with belief and truth under names of their own ("belief/...",
@@ -19,7 +19,7 @@ from hrc_env.core.errors import ConfigError, HRCError, whole
 from hrc_env.core.records import Keypoints
 
 ABOUT = "dataset.json"
-"""The file that says what a folder of episodes is."""
+"""The file of a folder's metadata."""
 FORMAT = 1
 """Version of the folder's form."""
 Arrays = Mapping[str, NDArray[Any]]
@@ -29,8 +29,8 @@ Arrays = Mapping[str, NDArray[Any]]
 class Episode:
     """One recorded episode of T steps: T + 1 moments, of which the first is the reset's.
 
-    Belief is what the robot knew, truth what was: an agent that learns from `truth` learns from
-    what no robot has. Positions are in the world [m].
+    `belief` is the robot's, `truth` the world's: an agent that learns from `truth` uses information
+    that no robot has. Positions are in the world [m].
     """
 
     seed: int
@@ -147,7 +147,7 @@ def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def within(arrays: Arrays, folder: str) -> dict[str, NDArray[Any]]:
-    """Return what is called "folder/...", by the rest of the name."""
+    """Return the arrays called "folder/...", by the rest of the name."""
     return {k[len(folder) + 1 :]: v for k, v in arrays.items() if k.startswith(f"{folder}/")}
 
 

@@ -1,4 +1,4 @@
-"""What is kept of every moment of recorded episodes: chosen infos, poses, keypoints."""
+"""Parts of every moment of recorded episodes: chosen infos, poses, keypoints."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -19,14 +19,14 @@ Moment = dict[str, NDArray[Any]]
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """What is kept of a moment."""
+    """The parts of a moment that are kept."""
 
     infos: tuple[str, ...] = ()
     """Names of infos."""
     poses: bool = False
     """Whether the workers' joints are, as believed and as they are."""
     keypoints: bool = False
-    """Whether what the estimator was given is."""
+    """Whether the keypoints that the estimator was given are."""
 
     def of(self, env: HRCVectorEnv, info: Mapping[str, Any]) -> Moment:
         """Return the present moment of every environment, with the infos of its step or reset."""

@@ -1,4 +1,4 @@
-"""Agents that studies are given: whether there are such, what is kept of them, what makes them."""
+"""Agents that studies are given: their check, their record in results, their maker."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -29,13 +29,14 @@ def check_choice(agent: AgentChoice) -> None:
 
 
 def maker_of(agent: AgentChoice, trust: bool = False) -> Callable[[EnvInfo], Agent]:
-    """Return what makes an agent for an `EnvInfo`."""
+    """Return the function that makes an agent for an `EnvInfo`."""
     return partial(make_agent, agent, trust=trust) if isinstance(agent, str) else agent
 
 
 def described(agent: AgentChoice) -> Any:
-    """Return what parts of a study depend on of an agent, as JSON can hold it: its name; of a
-    file its digest; of a function of the user's own its name and the digest of its file."""
+    """Return the description of an agent that keys the parts of a study, as JSON can hold it: its
+    name; of a file its digest; of a function of the user's own its name and the digest of its
+    file."""
     if not isinstance(agent, str):
         name = getattr(agent, "__qualname__", type(agent).__qualname__)
         return {"function": name, "source": source_digest(agent)}

@@ -92,8 +92,8 @@ class Report:
     spread: str = "95 % intervals over seeds"
     """What the low and high ends of its numbers are."""
     quick: str = ""
-    """What a run that is too short to compare anything says of itself, below each of its tables and
-    on each of its figures, which mark no difference then; "" of others."""
+    """The warning of a run that is too short to compare anything, below each
+    table and on each figure, which mark no difference then; "" of other runs."""
 
     def write(
         self, out: Path, settings: Mapping[str, Any], seeds: Sequence[int], metrics: Metrics
@@ -121,7 +121,7 @@ class Report:
 
 
 def quick_words(n_seeds: int, seconds: float | None = None) -> str:
-    """Return what the report of a short run says of itself.
+    """Return the warning in the report of a short run.
 
     Args:
         n_seeds: of its rows, at most.

@@ -54,7 +54,7 @@ class Experiment(Protocol[PlayedT]):
         ...
 
     def report(self, played: PlayedT, metrics: dict[str, Metric], figures: Path) -> Report:
-        """Draw the figures into a folder; return what is to be read.
+        """Draw the figures into a folder; return the report.
 
         An experiment that may be too short to compare anything says so by `quick_note`, as of
         `Report.quick`.

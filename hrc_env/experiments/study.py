@@ -1,4 +1,4 @@
-"""Studies of whole episodes: a question, the rows that answer it, and what is counted in them.
+"""Studies of whole episodes: a question, the rows that answer it, and their statistics.
 
     SHIELD = Study(
         name="shielded", title="What the shield keeps", about="...", depends=("env", "shield"),
@@ -148,7 +148,7 @@ class Study:
     """By name, in the order in which they are played and shown; those of policies that have not
     learnt yet may be left out, where `tables` are given."""
     columns: tuple[Column, ...]
-    """What is counted, of every row (`hrc_env.columns`)."""
+    """Statistics of every row (`hrc_env.columns`)."""
     heads: tuple[str, ...] = ("",)
     """Headings of the rows' words."""
     note: str = ""
@@ -216,7 +216,7 @@ class Study:
 
     @property
     def quick_note(self) -> str:
-        """What tables of the short form say of themselves; "" of others."""
+        """The warning on tables of the short form; "" of the whole study."""
         if not (self.is_quick and self.rows):
             return ""
         seconds = DT_S * max(row.n_steps for row in self.rows.values())
@@ -285,7 +285,7 @@ class Study:
         return (Table(self.name, self.title, rows, columns, self.heads, self.note),)
 
     def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
-        """Return what is to be read.
+        """Return the tables as a report.
 
         Args:
             played: episodes by row.

@@ -62,13 +62,13 @@ class BehaviourParams:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cast:
-    """Who is in one episode, and with what they begin, as far as it is not drawn."""
+    """The people of one episode, and their first activities, as far as these are not drawn."""
 
     n_workers: int | None = None
     bodies: tuple[int, ...] | None = None
     """Row of the bodies that there are, for each of the first workers."""
     activities: tuple[int, ...] | None = None
-    """What each of the first workers begins with: indices of `state.ACTIVITY_NAMES`, or
+    """The first activity of each of the first workers: indices of `state.ACTIVITY_NAMES`, or
     `ANY_ACTIVITY`."""
     mind: BehaviourParams | None = None
     """How they are with the robot; None: as in all episodes."""

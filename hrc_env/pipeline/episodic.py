@@ -29,15 +29,16 @@ class CameraSetup:
     """The cameras of one episode."""
 
     rig: tuple[CameraConfig, ...]
-    """As they hang, and as the estimator is told."""
+    """As they hang, and as the estimator knows them."""
     faults: tuple[FaultConfig, ...]
-    """What goes wrong with them."""
+    """Their faults."""
     appearance: AppearanceConfig
     """How the scene looks to them."""
 
 
 class MakePipeline(Protocol):
-    """Makes a pipeline of one environment with other cameras, which borrows what it can."""
+    """Makes a pipeline of one environment with other cameras, which borrows renderer and
+    networks."""
 
     def __call__(self, setup: CameraSetup, like: PerceptionPipeline) -> PerceptionPipeline: ...
 
@@ -125,12 +126,12 @@ class EpisodicPipeline(PerceptionPipeline):
         )
 
     def last_detections(self, b: int) -> tuple[Keypoints | None, Windows]:
-        """What environment `b` saw last, and through which windows."""
+        """Return the last keypoints of environment `b`, and their windows."""
         pipeline, b = self._of(b)
         return pipeline.last_detections(b)
 
     def crops(self, b: int) -> list[Image | None]:
-        """What the network was given of `b`'s first worker, one a camera."""
+        """Return the crops of `b`'s first worker that the network was given, one a camera."""
         pipeline, b = self._of(b)
         return pipeline.crops(b)
 

@@ -22,7 +22,7 @@ class ImageSensor(Sensor):
     images: ImageSource
     """The present images of the environment that `show` was last asked for."""
     tells_times = True
-    """Whether images may be old, and say when they were taken."""
+    """Whether images may be old, and carry the time at which they were taken."""
 
     def show(self, b: int) -> Floats:
         """Make the images of environment b present, and return when each camera's was taken (C,)
@@ -78,7 +78,7 @@ class ImageTracking(PoseTracking):
         return self.looking.unexplained[ids]
 
     def followed(self, ids: Ints, expected: PoseEstimate) -> PoseEstimate:
-        """Return what is expected of the workers who are to be followed."""
+        """Return the expected poses of the workers who are followed."""
         return self.looking.followed(ids, expected)
 
     def others(self, ids: Ints) -> Others:
@@ -96,7 +96,7 @@ class ImageTracking(PoseTracking):
         return super().last_detections(b)[0], self.looking.windows[b]
 
     def crops(self, b: int) -> list[Image | None]:
-        """What the network was given of the first worker of environment `b`."""
+        """Return the crops of the first worker of environment `b` that the network was given."""
         return self.looking.crops(b)
 
     def close(self) -> None:

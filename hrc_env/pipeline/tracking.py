@@ -1,4 +1,4 @@
-"""The loop of all who follow people with cameras: predict, look, update, say who is there."""
+"""The loop of following people with cameras: predict, look, update, judge presence."""
 
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -88,7 +88,7 @@ class TrackingSetup:
     """Where people are followed, how many and how often."""
 
     cameras: tuple[PinholeCamera, ...]
-    """The rig, as it is said to be."""
+    """The rig, as it is calibrated."""
     n_workers: int
     """People who are followed at most."""
     coverage: Coverage
@@ -108,13 +108,13 @@ def setup_in(scene: Scene, config: HRCConfig) -> TrackingSetup:
 
 
 class PoseTracking(PerceptionPipeline):
-    """Follows people with cameras: predict, look where they should be, update, say who is there.
+    """Follows people with cameras: predict, look where they should be, update, judge presence.
 
     Args:
         batch: number of environments.
         setup: where people are followed.
         tracker: the estimator.
-        sensor: what keypoints are found in.
+        sensor: in whose images keypoints are found.
     """
 
     CHANGES = ("state", "keypoints", "sensor", "steps", "frozen", "monitored", "presence")
@@ -147,7 +147,7 @@ class PoseTracking(PerceptionPipeline):
     def perceive(
         self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators
     ) -> PoseEstimate:
-        """Take in what the sensor measures after the usual time."""
+        """Take in the measurements after the usual time."""
         return self.follow(ids, self.setup.dt_s, sensor_rngs, tracker_rngs)
 
     def follow(

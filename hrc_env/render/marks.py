@@ -1,4 +1,5 @@
-"""What pictures show beside the scene: what the task marks, and what distances are taken of."""
+"""Marks in pictures beside the scene: places that the task marks, and shapes of which distances are
+taken."""
 
 from dataclasses import dataclass
 
@@ -16,7 +17,7 @@ from hrc_env.simulation import Simulation
 from hrc_env.worker.body import worker_truth
 
 OVERLAYS = ("capsules",)
-"""What can be laid over a picture of the scene."""
+"""Overlays of a picture of the scene."""
 MARKER_M, MARKER_PX = 0.05, 4
 """Radius of a marker [m], and in a picture at least [px]."""
 MARKER_SHOWN, MARKER_HIDDEN = 0.8, 0.3

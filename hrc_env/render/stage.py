@@ -210,7 +210,7 @@ class Stage(Canvas):
 
 
 def _key(camera: PinholeCamera, shadows: bool) -> tuple[Any, ...]:
-    """By what a backdrop is known."""
+    """Key of a backdrop."""
     view = camera.K.tobytes(), camera.T_world_from_cam.tobytes()
     return (*view, camera.width_px, camera.height_px, shadows)
 

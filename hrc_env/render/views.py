@@ -85,7 +85,7 @@ class Glance:
     shield_rad_s: float = 0.0
     """By how much the shield changed the last command."""
     solids: tuple[Solids, ...] = ()
-    """What distances are taken of, if that was asked for."""
+    """Shapes of which distances are taken, for the overlay."""
 
 
 class Views:
@@ -204,7 +204,7 @@ class Views:
         return views
 
     def crops(self, size: int, seen: Glance) -> list[Image]:
-        """Return what the pose network was given: each camera's crop, with its landmarks."""
+        """Return each camera's crop, as the pose network was given it, with its landmarks."""
         keypoints, images = seen.keypoints, []
         if keypoints is None or not seen.windows:
             return []
@@ -221,9 +221,8 @@ class Views:
         return images
 
     def beliefs(self, width: int, height: int, seen: Glance) -> list[Image]:
-        """Return what the robot knows, seen from above and from the side.
-
-        It is itself, its task and its estimate of the workers; there is no truth in it.
+        """Return the belief, seen from above and from the side: the robot, its task and the
+        estimate of the workers; there is no truth in it.
 
         Args:
             width: of a picture [px].
@@ -264,13 +263,13 @@ class Views:
         return {**self.__dict__, "_renderers": {}}
 
     def _view(self, chosen: str | PinholeCamera, width: int, height: int) -> PinholeCamera:
-        """What a picture of this size shows of a camera or a viewpoint."""
+        """Return the camera of a picture of this size."""
         if isinstance(chosen, str):
             return viewpoint_camera(chosen, width, height)
         return resized(chosen, width, height)
 
     def _marked(self, camera: PinholeCamera, seen: Glance, markers: bool) -> Image:
-        """What a camera sees, in the light of the sun, with what is to be shown beside it."""
+        """Return a camera's picture, in the light of the sun, with marks and capsules."""
         (image,) = self._drawn([camera], seen, shadows=True)
         stage: Stage = self._renderers["stage"][1]
         if seen.solids:
@@ -283,7 +282,7 @@ class Views:
     def _through_cameras(
         self, width: int, height: int, seen: Glance, cameras: Sequence[PinholeCamera]
     ) -> list[Image]:
-        """What cameras see, without shadows."""
+        """Return the cameras' pictures, without shadows."""
         if all(camera.lens is None for camera in cameras):
             return self._drawn([resized(camera, width, height) for camera in cameras], seen)
         size = (SMOOTHING * width, SMOOTHING * width)

@@ -27,7 +27,7 @@ class CostConfig:
     """What counts as unsafe, and what happens then."""
 
     components: tuple[str, ...] = ("proximity", "contact")
-    """What is summed up: some of `COMPONENTS`; the sum of the default ones is in control steps."""
+    """Summands: some of `COMPONENTS`; the sum of the default ones is in control steps."""
     proximity_m: float = 0.15
     """A step costs 1 when the true surfaces come nearer than this [m]."""
     contact_terminates: bool = False

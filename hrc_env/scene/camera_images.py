@@ -1,7 +1,7 @@
-"""Whole images of a rig's cameras, small and quickly: what a policy sees.
+"""Whole images of a rig's cameras for policies, small and quickly.
 
-What stands still or lies about is drawn once for each camera and kept; in every step only what
-moves is drawn, and laid over it by depth. Images have smooth edges and no shadows.
+Still and lying things are drawn once for each camera and kept; in every step only moving things
+are drawn, and laid over it by depth. Images have smooth edges and no shadows.
 """
 
 from collections.abc import Mapping, Sequence
@@ -36,7 +36,7 @@ COARSE = {"numslices": 8, "numstacks": 2}
 TOO_THIN = 0.2
 """Rings and discs on what moves that are thinner than this share of a drawn pixel are left out."""
 KEPT_BYTES = 2**28
-"""What stands still is kept for so many views as fit in here."""
+"""Memory in which views of still things are kept."""
 
 
 @answer_unknown_fields
@@ -44,7 +44,7 @@ KEPT_BYTES = 2**28
 class ImageConfig:
     """Which images an observation holds beside the belief: `observe_images`.
 
-    Each is what a camera of the rig sees at that moment, lens and looks included, without faults,
+    Each is the view of a camera of the rig at that moment, lens and looks included, without faults,
     delays and shadows; its whole image is squeezed into `height` x `width`. A mapping of these
     fields, or (height, width), stands for it.
     """
@@ -94,7 +94,7 @@ def images_called(given: Any) -> ImageConfig | None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Backdrop:
-    """What stands still."""
+    """The still things of a view."""
 
     look: Look | None
     """With which it was drawn."""
@@ -109,7 +109,7 @@ class _Backdrop:
 class CameraImages(Canvas):
     """Draws whole images of pinhole cameras, (height, width, 3), and square windows of them.
 
-    Environments that look alike share what stands still; with looks of their own each has its own.
+    Environments that look alike share still things; with looks of their own each has its own.
     """
 
     def __init__(self, scene: Scene, height_px: int, width_px: int, size_px: int = 1) -> None:
@@ -143,7 +143,7 @@ class CameraImages(Canvas):
         return np.flatnonzero(moving & discs & thin & looks)
 
     def pose(self, q: JointAngles, motion: WorkerMotion | None) -> None:
-        """Pose what moves, as `Canvas` does; what lies about counts as standing still."""
+        """Pose moving things, as `Canvas` does; things that lie about count as still."""
         super().pose(q, motion)
         if motion is None or not self._visuals.props.size:
             return
@@ -157,7 +157,7 @@ class CameraImages(Canvas):
         self._model.geom_group[self._lying] = HIDDEN
 
     def show(self, what: Part = EVERYTHING, shadows: bool = False) -> None:
-        """Choose what the next pictures hold, as `Canvas` does."""
+        """Choose the parts of the next pictures, as `Canvas` does."""
         known = what in self._fresh
         super().show(what, shadows)
         if what is not MOVING and not known and len(self._lying):
@@ -193,7 +193,7 @@ class CameraImages(Canvas):
         fine: tuple[int, int],
         smoothing: int,
     ) -> Image:
-        """What moves before what stands still; pixels are means of `smoothing` x `smoothing`."""
+        """Return moving things before still ones; pixels are means of `smoothing` x `smoothing`."""
         numbers = camera.K.tobytes(), camera.T_world_from_cam.tobytes()
         key = (self._wearer, self._placement, numbers, window, height_px)
         behind = self._backdrops.get(key)
@@ -209,7 +209,7 @@ class CameraImages(Canvas):
         return image
 
     def _remember(self, key: Any, behind: _Backdrop) -> None:
-        """Keep what stands still, the latest last; the oldest make room."""
+        """Keep a view of still things, the latest last; the oldest make room."""
         self._backdrops.pop(key, None)
         self._backdrops[key] = behind
         most = max(KEPT_BYTES // (behind.rgb.nbytes + behind.z.nbytes), len(self.scene.cameras))

@@ -117,7 +117,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         self._ended = np.zeros(self.num_envs, bool)
         self._observation: Observation | None = None
         self._options: list[dict[str, Any]] = [{}] * self.num_envs
-        """What of each environment's episodes is fixed until further notice."""
+        """The parts of each environment's episodes that are fixed until further notice."""
         self._fixed: list[Fixed | None] = [None] * self.num_envs
         """The same, checked."""
         self.notes: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
@@ -223,7 +223,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         self.shards.first.fix({**self._options[k], **given})
 
     def options_of(self, k: int) -> dict[str, Any]:
-        """Return what is fixed of environment `k`'s episodes to come, by name."""
+        """Return the fixed parts of environment `k`'s episodes to come, by name."""
         return dict(self._options[k])
 
     def set_options_of(self, k: int, options: Mapping[str, Any] | ResetOptions | None) -> None:

@@ -70,7 +70,7 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     @property
     def options(self) -> dict[str, Any]:
-        """What is fixed of its episodes to come, by name; to be set, as of `HRCEnv`."""
+        """Fixed parts of its episodes to come, by name; to be set, as of `HRCEnv`."""
         return self._vector.options_of(self._k)
 
     @options.setter

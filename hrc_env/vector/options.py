@@ -69,20 +69,20 @@ def seeds_of(seed: int | Sequence[int | None] | None, num_envs: int) -> list[int
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Asked:
-    """What the options of a vector environment's reset say."""
+    """The options of a vector environment's reset, read."""
 
     mask: Bools
     """(B,) which environments it is for."""
     elapsed_steps: Ints
     """(B,) steps that their episodes have behind them."""
     each: list[dict[str, Any]]
-    """What of each one's episode is fixed, by name."""
+    """The fixed parts of each episode, by name."""
 
 
 def read_options(
     options: Mapping[str, Any] | ResetOptions | None, num_envs: int, max_episode_steps: int
 ) -> Asked:
-    """Return what a reset's options say; `ConfigError` for an option that there is not, or a value
+    """Return a reset's options, read; `ConfigError` for an option that there is not, or a value
     that cannot work."""
     given = named_options(options, *OF_VECTORS)
     mask = _mask(given.pop("reset_mask", np.ones(num_envs, bool)), num_envs)

@@ -69,7 +69,7 @@ class Impact:
     policies: tuple[str, ...] = POLICIES
     """Whose perception is exchanged: `POLICIES`, or agents as `hrc_env.make_agent` takes them."""
     control: str | None = None
-    """What actions are of policies that do not say it themselves; None: the default."""
+    """The control of policies whose files do not name one; None: the default."""
     trust: bool = False
     """Whether pickles in their checkpoints are read, as of `make_agent`."""
     setups: tuple[str, ...] = field(default_factory=usual_setups)
@@ -113,7 +113,7 @@ class Impact:
 
     @property
     def quick_note(self) -> str:
-        """What tables and figures of a quick run say of themselves; "" of others."""
+        """The warning on tables and figures of a quick run; "" if it is not quick."""
         return quick_words(self.n_seeds, self.n_steps * DT_S) if self.is_quick else ""
 
     @property
@@ -180,7 +180,7 @@ class Impact:
         return table
 
     def _by_control(self, policies: Sequence[Policy]) -> dict[str | None, list[Policy]]:
-        """Return policies by what their actions are, which is a matter of the environment."""
+        """Return policies by their control, which is an argument of the environment."""
         found: dict[str | None, list[Policy]] = {}
         for policy in policies:
             found.setdefault(control_for(policy, self.control), []).append(policy)

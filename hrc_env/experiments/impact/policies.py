@@ -28,7 +28,7 @@ WORDS = {
     PPO: "was trained here on the reference",
 }
 POLICIES = tuple(WORDS)
-"""Those of the study, with what they do in words; others are the user's own."""
+"""Those of the study, with a description of each; others are the user's own."""
 SEED = 0
 """Of the learner and of the environments that it learns in."""
 N_ENVS = 64
@@ -57,7 +57,8 @@ class Policy:
 
 
 def made_of(policy: Policy, ppo: str) -> dict[str, Any]:
-    """Return what rows of a policy depend on besides people and perception, as JSON can hold it.
+    """Return the settings of a policy that key its rows, besides people and perception, as JSON
+    can hold them.
 
     Args:
         policy: of the rows.
@@ -69,8 +70,8 @@ def made_of(policy: Policy, ppo: str) -> dict[str, Any]:
 
 
 def control_for(policy: Policy, control: str | None) -> str | None:
-    """Return what the actions of a policy are: what its file says, or else the one that is asked
-    for; PPO has learnt with the default one."""
+    """Return the control of a policy: that of its file, or else the requested one; PPO has learnt
+    with the default one."""
     if policy.name == PPO:
         return None
     return control if policy.name in POLICIES else control_of(policy.name) or control

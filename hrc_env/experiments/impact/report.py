@@ -85,7 +85,7 @@ def report(
 
     Args:
         figures: folder of the figure.
-        table: what was played.
+        table: of the episodes.
         metrics: numbers of it.
         robots: whose perception was exchanged: agents by their labels in the table.
         warning: what stands above all where too little was played: no difference is marked then.
@@ -130,7 +130,7 @@ def report(
 
 
 def _acting(robots: Mapping[str, str]) -> str:
-    """Return who acts, in words."""
+    """Return the names of the policies."""
     said = [
         f"`{label}` {ROBOTS[label]}" if label in ROBOTS else f"`{label}` is the agent `{agent}`"
         for label, agent in robots.items()

@@ -67,7 +67,7 @@ class Lab:
 
     @property
     def quick_note(self) -> str:
-        """What tables and figures of a short run say of themselves; "" of others."""
+        """The warning on tables and figures of a short run; "" if it is long enough."""
         is_short = self.n_seeds <= QUICK.n_seeds or self.max_frames <= QUICK.max_frames
         return quick_words(self.n_seeds, self.max_frames * DT_S) if is_short else ""
 

@@ -1,4 +1,4 @@
-"""Episodes of a robot under a shield, seen with some eyes: what came of each.
+"""Episodes of a robot under a shield, seen with some eyes, and their outcomes.
 
 As in `experiments.impact`: the same seeds and workers for everybody, who take no notice of the
 robot; contacts are those of `safety.incidents`.
@@ -43,12 +43,12 @@ STEP = np.dtype([
 
 @dataclass(frozen=True, slots=True)
 class Driver:
-    """Who drives the robot."""
+    """The agent that drives the robot."""
 
     agent: str = SCRIPTED
     """As `hrc_env.make_agent` takes it."""
     control: str | None = None
-    """What its actions are, if its file does not say it; None: the default."""
+    """Its control, if its file does not name one; None: the default."""
     trust: bool = False
     """Whether pickles in its checkpoint are read, as of `make_agent`."""
 
@@ -59,7 +59,8 @@ class Driver:
         return {} if control is None else {"control": control}
 
     def settings(self) -> dict[str, Any]:
-        """Return what episodes depend on of it, as JSON can hold it; nothing of the usual one."""
+        """Return the settings of the agent that episodes depend on, as JSON can hold them; none of
+        the default agent."""
         found = {} if self.agent == SCRIPTED else {"agent": described(self.agent)}
         return found | self.given
 

@@ -71,7 +71,7 @@ class Price:
     n_steps: int | None = None
     """Control steps of an episode; None: the task's."""
     driver: Driver = field(default_factory=Driver)
-    """Who drives the robot."""
+    """The agent that drives the robot."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for what cannot work."""
@@ -120,7 +120,7 @@ class Price:
 
     @property
     def quick_note(self) -> str:
-        """What tables and figures of a short run say of themselves; "" of others."""
+        """The warning on tables and figures of a short run; "" if it is long enough."""
         is_short = self.n_seeds < 300 or self.n_fresh < 600
         return quick_words(self.n_seeds, self.steps_of(self.task) * DT_S) if is_short else ""
 

@@ -103,7 +103,7 @@ def report(figures: Path, config: Any, played: Played, metrics: Metrics) -> Repo
 
 
 def _driven(driver: Driver) -> str:
-    """Return who drives the robot, in words."""
+    """Return the name of the agent that drives the robot."""
     usual = driver.agent == SCRIPTED
     return "the scripted one" if usual else f"driven by the agent `{driver.agent}`"
 

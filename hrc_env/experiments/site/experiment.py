@@ -82,7 +82,7 @@ class Site:
 
     @property
     def quick_note(self) -> str:
-        """What tables and figures of a short run say of themselves; "" of others."""
+        """The warning on tables and figures of a short run; "" if it is long enough."""
         is_short = self.n_seeds <= QUICK.n_seeds or self.seconds <= QUICK.seconds
         return quick_words(self.n_seeds, self.seconds) if is_short else ""
 

@@ -159,7 +159,7 @@ class Recent(Stateful):
             self.steps[b], self.seeds[b], self._kept[b] = -1, int(child.integers(2**31)), {}
 
     def schedule_of(self, b: int) -> Schedule:
-        """Return what cameras do in the present episode of environment b."""
+        """Return the faults in the present episode of environment b."""
         seed = self.seeds[b]
         known = self._episodes.get(b)
         if known is None or known[0] != seed:
