@@ -171,7 +171,7 @@ def fix(options: Options, room: Room) -> Fixed:
                 'options["cameras"] are of a perception level with cameras; at perception='
                 f"{room.level!r} images show the rig with which the environment was made."
             )
-        room.images.check(rig)
+        room.images.check(rig if rigs is None else rigs.possible(rig))
     if faults is not None:
         names = [camera.name for camera in (room.scene.rig if rig is None else rig)]
         check_cameras(faults, names)

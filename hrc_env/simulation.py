@@ -139,7 +139,8 @@ class Simulation(Stateful):
         self.pipeline = make_pipeline(
             perception, estimator, self.scene, batch, config, shows_images=images is not None
         )
-        self.images = None if images is None else ObservedImages(self.scene, images)
+        bends = settings.rigs is not None and settings.rigs.bends
+        self.images = None if images is None else ObservedImages(self.scene, images, bends)
         """Draws the images of observations; None: they hold none."""
         self._looks: dict[int, tuple[np.random.Generator, Look]] = {}
         self.task_state = self.task.make_state(batch)

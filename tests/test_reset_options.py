@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 
 import hrc_env
-from hrc_env import ConfigError, HRCEnv, HRCVectorEnv, ResetOptions, RigDistribution
+from hrc_env import (
+    ConfigError,
+    HRCEnv,
+    HRCVectorEnv,
+    Lens,
+    ResetOptions,
+    RigDistribution,
+)
 from hrc_env.vector.make import PixelVectorEnv
 
 GOAL = (0.5, 0.3, 1.1)
@@ -388,3 +395,51 @@ def test_pixels_take_a_rig_of_the_episode(pixels) -> None:
     assert env.mosaic().ndim == 3
     assert_same(free, episode(env, 4))
     env.close()
+
+
+GOPRO = Lens("kannala_brandt", (0.0667,))
+
+
+def test_lenses_are_drawn_and_people_are_tracked_through_them() -> None:
+    env = make(cameras=RigDistribution(lenses=(Lens(), GOPRO)))
+    worn, errors_m = set(), []
+    for seed in range(4):
+        env.reset(seed=seed)
+        worn |= {camera.lens.model for camera in env.rig}
+        for _ in range(20):
+            *_, info = env.step(np.zeros(6, np.float32))
+            errors_m.append(info["tracking/mpjpe_m"])
+    assert worn == {"none", "kannala_brandt"}
+    assert np.nanmedian(errors_m) < 0.1
+
+
+@pytest.mark.usefixtures("pixels")
+def test_images_are_of_the_rig_of_the_episode() -> None:
+    """The image of a camera that does not hang is black; with the same rig images are the same."""
+    env = make(observe_images=(32, 48))
+    two = {"cameras": ["camera_3", "camera_1"]}
+    whole, _ = env.reset(seed=1)
+    fewer, _ = env.reset(seed=1, options=two)
+    for name in ("image_camera_1", "image_camera_3"):
+        np.testing.assert_array_equal(whole[name], fewer[name])
+    assert not fewer["image_camera_2"].any()
+    drawn, _ = env.reset(seed=1, options={"cameras": RigDistribution(turn_rad=0.2)})
+    assert (drawn["image_camera_1"] != whole["image_camera_1"]).any()
+    again, _ = env.reset(seed=1)
+    np.testing.assert_array_equal(whole["image_camera_2"], again["image_camera_2"])
+
+
+@pytest.mark.usefixtures("pixels")
+def test_images_take_a_lens_where_the_environment_was_made_for_lenses() -> None:
+    lenses = RigDistribution(lenses=(GOPRO,))
+    with pytest.raises(ConfigError, match="was made to observe images of cameras without"):
+        make(observe_images=(32, 32)).reset(seed=1, options={"cameras": lenses})
+    env = make(observe_images=(32, 32), cameras=lenses)
+    seen, _ = env.reset(seed=1)
+    assert len(np.unique(seen["image_camera_1"])) > 20
+
+
+def test_images_show_no_other_rig_where_nothing_looks_through_cameras(pixels) -> None:
+    env = make(perception="truth", observe_images=(32, 32))
+    with pytest.raises(ConfigError, match="are of a perception level with cameras"):
+        env.reset(seed=1, options={"cameras": ["camera_1"]})

@@ -26,8 +26,13 @@ Images = dict[str, NDArray[np.uint8]]
 class ObservedImages:
     """Draws the chosen cameras of a scene's rig; an image follows from scene and look alone."""
 
-    def __init__(self, scene: Scene, config: ImageConfig) -> None:
+    def __init__(self, scene: Scene, config: ImageConfig, bends: bool = False) -> None:
         """Open a graphics context for the images of `config`.
+
+        Args:
+            scene: with the rig.
+            config: of the images.
+            bends: whether cameras of an episode may have lenses where those of the scene have none.
 
         Raises:
             ConfigError: a camera that is not in the rig, or twice.
@@ -35,7 +40,8 @@ class ObservedImages:
         """
         self.cameras = _chosen(scene.cameras, config.cameras)
         self.shape = config.height, config.width, 3
-        squares = [_square_px(each, config) for each in self.cameras if each.lens is not None]
+        self._bends = bends or any(camera.lens is not None for camera in self.cameras)
+        squares = [_square_px(each, config) for each in self.cameras] if self._bends else []
         self._drawer = CameraImages(scene, config.height, config.width, max(squares, default=1))
         self._lensed = Lensed(self._drawer, self.cameras)
         self._drawer.show()  # without OpenGL it says so here, not in an episode
@@ -69,9 +75,9 @@ class ObservedImages:
 
     def check(self, rig: Sequence[CameraConfig]) -> None:
         """Raise `ConfigError` for a rig of which these images cannot be drawn."""
-        lensed = [camera.name for camera in self.cameras if camera.lens is not None]
         for camera in rig:
-            if camera.lens is not None and f"{IMAGE}{camera.name}" in self.names and not lensed:
+            bent = camera.lens.model != "none" and f"{IMAGE}{camera.name}" in self.names
+            if bent and not self._bends:
                 raise ConfigError(
                     f"Camera {camera.name!r} of an episode has a lens, and the environment was "
                     "made to observe images of cameras without: make it with cameras= that have "

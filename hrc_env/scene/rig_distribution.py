@@ -1,13 +1,16 @@
 """Rigs that are drawn anew for every episode: how far cameras, lenses and their number differ."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from hrc_env.core.brought import check_kinds
 from hrc_env.core.errors import ConfigError, check_fields, unknown, whole
 from hrc_env.geometry.camera_config import MOST_CAMERAS, CameraConfig, axes_of, intrinsics
+from hrc_env.geometry.lens import Lens
 from hrc_env.geometry.rotations import from_rotation_vector, look_at
 from hrc_env.scene.build import Scene, with_rig
 from hrc_env.scene.rigs import RIGS, poor_cameras
@@ -35,6 +38,8 @@ class RigDistribution:
     """And is turned by at most so much, about any axis [rad]."""
     focal_share: float = 0.0
     """Its focal length is longer or shorter by at most this share."""
+    lenses: tuple[Lens, ...] = ()
+    """Each camera has one of these lenses; none: its own."""
     n_cameras: int | tuple[int, int] | None = None
     """How many of the cameras there are; (fewest, most): drawn, too; None: all of them. Which ones
     is drawn."""
@@ -44,6 +49,8 @@ class RigDistribution:
             raise unknown("rig in RigDistribution.around", self.around, RIGS)
         check_fields(self, "not be negative", "place_m", "turn_rad")
         check_fields(self, "be in [0, 1)", "focal_share")
+        if self.lenses:
+            check_kinds("RigDistribution.lenses", self.lenses, Lens)
         if self.n_cameras is not None:
             ends = self.n_cameras if isinstance(self.n_cameras, tuple) else (self.n_cameras,) * 2
             low, high = (whole("RigDistribution.n_cameras", k, 1, MOST_CAMERAS) for k in ends)
@@ -51,6 +58,15 @@ class RigDistribution:
                 raise ConfigError(
                     f"RigDistribution.n_cameras must be (fewest, most), got {self.n_cameras}."
                 )
+
+    def possible(self, rig: Sequence[CameraConfig]) -> list[CameraConfig]:
+        """Return every camera of the rig in the middle with every lens that it may have."""
+        return [replace(each, lens=lens) for each in rig for lens in self.lenses or (each.lens,)]
+
+    @property
+    def bends(self) -> bool:
+        """Whether a camera may get a lens that is no pinhole."""
+        return any(lens.model != "none" for lens in self.lenses)
 
     @property
     def rig(self) -> tuple[CameraConfig, ...]:
@@ -104,9 +120,14 @@ def _drawn(
     used = sorted(rng.permutation(len(rig))[:n].tolist())
     off = rng.uniform(-1, 1, (len(rig), 3)), rng.standard_normal((len(rig), 3))
     shares = rng.uniform(0, 1, len(rig)), rng.uniform(-1, 1, len(rig))
+    lenses = [camera.lens for camera in rig]
+    if distribution.lenses:
+        lenses = [
+            distribution.lenses[k] for k in rng.integers(len(distribution.lenses), size=len(rig))
+        ]
     return tuple(
         _moved(
-            rig[c],
+            replace(rig[c], lens=lenses[c]),
             distribution.place_m * off[0][c],
             distribution.turn_rad * shares[0][c] * off[1][c] / np.linalg.norm(off[1][c]),
             1.0 + distribution.focal_share * float(shares[1][c]),
