@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol, cast
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from hrc_env.control import ControlConfig
 from hrc_env.core.errors import ConfigError
 from hrc_env.geometry.chains import SerialChain
-from hrc_env.observations import ObservationLayout
+from hrc_env.observations import ObservationLayout, split
 from hrc_env.world import Grounds
 
 if TYPE_CHECKING:
@@ -25,7 +25,8 @@ class Agent(Protocol):
     """A policy: all that an evaluation asks of it is `act`."""
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
-        """Return actions (..., A) in [-1, 1] for observations (..., n)."""
+        """Return actions (..., A) in [-1, 1] for observations (..., n), of one environment or of
+        many; `EnvInfo.split` gives an observation's terms."""
         ...
 
 
@@ -53,6 +54,15 @@ class EnvInfo:
     """Entries of a goal that stands apart from the observation; 0: there is none."""
     images: Mapping[str, tuple[int, int, int]] = field(default_factory=dict)
     """Height, width and channels of the images that stand beside the observation, by name."""
+
+    def split(self, observation: Observation) -> dict[str, NDArray[Any]]:
+        """Return an observation's terms by name, in metres, seconds and radians, goals and images
+        too.
+
+        Args:
+            observation: (..., n), or such arrays by name.
+        """
+        return split(observation, self.layout)
 
 
 def env_info(env: object) -> EnvInfo:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.observations import split
+from hrc_env.tasks.task import ancestor_of
 
 from .delivery import Deliverer
 from .drywall import BoardHolder
@@ -58,14 +59,16 @@ EXPERTS: dict[str, Callable[[EnvInfo, Yielding | None], Agent]] = {
 
 
 def expert(env_info: EnvInfo, yielding: Yielding | None = None) -> Agent:
-    """The scripted agent for a task, with or without yielding.
+    """Return the scripted agent for a task, or for one that it derives from, with or without
+    yielding.
 
     Raises:
         ConfigError: nobody has written one.
     """
-    if env_info.task not in EXPERTS:
+    task = ancestor_of(env_info.task, EXPERTS)
+    if task not in EXPERTS:
         raise ConfigError(
             f"There is no scripted agent for {env_info.task}; there is for {', '.join(EXPERTS)}. "
             "The agent 'random' and checkpoints work with every task."
         )
-    return EXPERTS[env_info.task](env_info, yielding)
+    return EXPERTS[task](env_info, yielding)

@@ -14,6 +14,7 @@ from hrc_env.core.errors import CheckpointError, ConfigError, unknown
 from hrc_env.core.mapping import from_mapping
 from hrc_env.core.results import Metric
 from hrc_env.tasks.goal import ACHIEVED, DESIRED
+from hrc_env.tasks.task import ancestor_of
 
 from .env_info import EnvInfo
 from .network import Architecture, Network
@@ -143,7 +144,7 @@ def differences(card: Card, env_info: EnvInfo) -> list[str]:
     said = [
         f"its {what} is {of}, here it is {here}"
         for what, of, here in (
-            ("task", card.task, env_info.task),
+            ("task", card.task, ancestor_of(env_info.task, [card.task])),
             ("control", card.control, env_info.control),
             ("number of actions", card.n_actions, env_info.n_actions),
         )

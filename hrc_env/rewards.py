@@ -5,6 +5,7 @@ Of people terms read the estimate only; what a step brought for the task is judg
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from inspect import signature
 from typing import Any
 
 import numpy as np
@@ -59,8 +60,22 @@ class RewardTerm:
     doc: str
     """A sentence for the environment's page."""
     function: Callable[[Belief, Any, Floats, Any], Floats]
-    """(belief, the task's progress, previous action (B, A), weights) -> (B,). The weights are a
-    `RewardConfig`; those of a task's term are the task's settings."""
+    """(belief, step, previous action (B, A), weights) -> (B,). The step is a task's, as
+    `Task.advance` returned it. The weights are a `RewardConfig`; those of a task's term are the
+    task's settings. Of the belief are for example `separation.distance_m` (B, W),
+    `robot.tool_world` (B, 3) and `estimate.mean_world` (B, W, J, 3), in metres."""
+
+    def __post_init__(self) -> None:
+        """Raise `ConfigError` for a function that does not take four arguments."""
+        try:
+            signature(self.function).bind(*range(4))
+        except TypeError as error:
+            raise ConfigError(
+                f"The function of the reward term {self.name!r} must take (belief, step, previous "
+                f"action, weights): {error}."
+            ) from error
+        except ValueError:  # a builtin has no signature
+            return
 
 
 def check_kind(config: Any) -> None:

@@ -139,6 +139,12 @@ class Simulation(Stateful):
         self.pipeline = make_pipeline(
             perception, estimator, self.scene, batch, config, shows_images=images is not None
         )
+        if images is not None and settings.rigs is not None and perception not in CAMERA_LEVELS:
+            raise ConfigError(
+                f"cameras=RigDistribution(...) is of a perception level with cameras, and at "
+                f"perception={perception!r} no rig is drawn, which images would show: use "
+                f"{' or '.join(map(repr, CAMERA_LEVELS))}, or give one rig."
+            )
         bends = settings.rigs is not None and settings.rigs.bends
         self.images = None if images is None else ObservedImages(self.scene, images, bends)
         """Draws the images of observations; None: they hold none."""

@@ -190,10 +190,10 @@ def another_worker(patch: pytest.MonkeyPatch) -> None:
     """Somebody else does something else somewhere else: only the robot's numbers are the same."""
     reset = generator.reset
 
-    def begin(state: Any, ids: Any, rngs: list[np.random.Generator]) -> None:
+    def begin(state: Any, ids: Any, rngs: list[np.random.Generator], *casts: Any) -> None:
         for b in ids.tolist():
             rngs[b] = np.random.default_rng([77, int(rngs[b].integers(2**31))])
-        reset(state, ids, rngs)
+        reset(state, ids, rngs, *casts)
 
     patch.setattr(simulation.generator, "reset", begin)
 

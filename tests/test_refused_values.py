@@ -167,9 +167,14 @@ def test_a_level_is_taken_with_what_it_knows(level, changes):
 )
 def test_images_may_look_different_and_have_faults(monkeypatch, changes):
     """Drawing them is another matter, which is left out here."""
-    monkeypatch.setattr(levels, "PixelPipeline", lambda *given: "made")
+
+    class Made:
+        def __init__(self, *given):
+            pass
+
+    monkeypatch.setattr(levels, "PixelPipeline", Made)
     config = replace(settle().config, **changes)
-    assert make_pipeline("pixels", "particle", SCENE, 1, config) == "made"
+    assert isinstance(make_pipeline("pixels", "particle", SCENE, 1, config), Made)
 
 
 @pytest.mark.parametrize(

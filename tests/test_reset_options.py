@@ -443,3 +443,18 @@ def test_images_show_no_other_rig_where_nothing_looks_through_cameras(pixels) ->
     env = make(perception="truth", observe_images=(32, 32))
     with pytest.raises(ConfigError, match="are of a perception level with cameras"):
         env.reset(seed=1, options={"cameras": ["camera_1"]})
+
+
+def test_drawn_cameras_hang_in_the_room() -> None:
+    """The laboratory's walls, and its ceiling, end at 3.045, 2.74 and 2.59 m."""
+    env = make(cameras=RigDistribution(place_m=0.3, n_cameras=4))
+    for seed in range(10):
+        env.reset(seed=seed)
+        eyes_world = np.abs([camera.eye_world for camera in env.rig])
+        assert (eyes_world < (3.045, 2.74, 2.59)).all()
+
+
+def test_where_images_would_show_a_rig_that_is_not_drawn_it_is_refused() -> None:
+    drawn = RigDistribution(place_m=0.1)
+    with pytest.raises(ConfigError, match="at perception='truth' no rig is drawn"):
+        make(perception="truth", observe_images=(32, 32), cameras=drawn)

@@ -221,8 +221,9 @@ class Views:
         return images
 
     def beliefs(self, width: int, height: int, seen: Glance) -> list[Image]:
-        """Return the belief, seen from above and from the side: the robot, its task and the
-        estimate of the workers; there is no truth in it.
+        """Return the belief, seen from above and from the side.
+
+        It is the robot, its task and the estimate of the workers; there is no truth in it.
 
         Args:
             width: of a picture [px].

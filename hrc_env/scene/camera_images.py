@@ -45,8 +45,8 @@ class ImageConfig:
     """Which images an observation holds beside the belief: `observe_images`.
 
     Each is the view of a camera of the rig at that moment, lens and looks included, without faults,
-    delays and shadows; its whole image is squeezed into `height` x `width`. A mapping of these
-    fields, or (height, width), stands for it.
+    delays and shadows, black if it does not hang in the episode; its whole image is squeezed into
+    `height` x `width`. A mapping of these fields, or (height, width), stands for it.
     """
 
     height: int = 84

@@ -62,6 +62,8 @@ class Room:
     places: tuple[Workplace, ...]
     clutter_places: tuple[Workplace, ...]
     """Further ones, with clutter."""
+    ceiling_m: float | None = None
+    """Height of its ceiling [m]; None: it is open to the sky."""
     open_walls: tuple[Footprint, ...] = ()
     """With clutter: what nobody walks through; stands for all footprints that it holds."""
     flat: tuple[Footprint, ...] = ()

@@ -9,6 +9,7 @@ import numpy as np
 
 from hrc_env.core.brought import check_kinds
 from hrc_env.core.errors import ConfigError, check_fields, unknown, whole
+from hrc_env.core.streams import children
 from hrc_env.geometry.camera_config import MOST_CAMERAS, CameraConfig, axes_of, intrinsics
 from hrc_env.geometry.lens import Lens
 from hrc_env.geometry.rotations import from_rotation_vector, look_at
@@ -16,7 +17,7 @@ from hrc_env.scene.build import Scene, with_rig
 from hrc_env.scene.rigs import RIGS, poor_cameras
 
 TRIES = 100
-"""So often a rig is drawn whose cameras all see the workspace."""
+"""A camera is drawn at most so often until it sees the workspace."""
 STREAM = 0x10076
 """Tells the stream for rigs from those that a generator's `spawn` gives: these count from 0."""
 
@@ -26,8 +27,9 @@ class RigDistribution:
     """Rigs round one rig: in every episode cameras hang, look and are as many as is drawn.
 
     Estimators know the rig of their episode, as after a calibration; what they are told wrongly is
-    a fault ("wrong_rotation", "wrong_translation", "wrong_focal"). A rig with a camera that hangs
-    in or behind something, or sees little of the workspace, is drawn again.
+    a fault ("wrong_rotation", "wrong_translation", "wrong_focal"). A camera that hangs in
+    or behind something, outside of the room, or sees little of the workspace, is drawn again.
+    Levels without cameras draw none.
     """
 
     around: str | tuple[CameraConfig, ...] = ()
@@ -92,47 +94,41 @@ def draw_rig(
     """Draw an episode's rig; the scene has the rig that it is around.
 
     Raises:
-        ConfigError: no draw of `TRIES` gave a rig whose cameras all see the workspace.
+        ConfigError: no draw of `TRIES` gave a camera that sees the workspace.
     """
-    refused = ""
-    for _ in range(TRIES):
-        try:
-            rig = _drawn(distribution, scene.rig, rng)
-        except ConfigError as error:  # a camera that cannot be
-            refused = str(error)
-            continue
-        poor = poor_cameras(with_rig(scene, rig))
-        if not poor:
-            return rig
-        refused = poor[0]
-    raise ConfigError(
-        f"{distribution}: no rig was found in {TRIES} draws whose cameras all see the workspace. "
-        f"The last one: {refused} Let it differ less, or hang the cameras elsewhere."
-    )
-
-
-def _drawn(
-    distribution: RigDistribution, rig: tuple[CameraConfig, ...], rng: np.random.Generator
-) -> tuple[CameraConfig, ...]:
-    """Draw a rig once; each camera's draws depend on its place in the rig only."""
+    rig = scene.rig
     fewest, most = distribution.counts(len(rig))
     n = int(rng.integers(fewest, most + 1))
     used = sorted(rng.permutation(len(rig))[:n].tolist())
-    off = rng.uniform(-1, 1, (len(rig), 3)), rng.standard_normal((len(rig), 3))
-    shares = rng.uniform(0, 1, len(rig)), rng.uniform(-1, 1, len(rig))
-    lenses = [camera.lens for camera in rig]
-    if distribution.lenses:
-        lenses = [
-            distribution.lenses[k] for k in rng.integers(len(distribution.lenses), size=len(rig))
-        ]
-    return tuple(
-        _moved(
-            replace(rig[c], lens=lenses[c]),
-            distribution.place_m * off[0][c],
-            distribution.turn_rad * shares[0][c] * off[1][c] / np.linalg.norm(off[1][c]),
-            1.0 + distribution.focal_share * float(shares[1][c]),
-        )
-        for c in used
+    streams = children(rng, len(rig))  # a camera's draws depend on its place in the rig only
+    return tuple(_draw_camera(distribution, scene, rig[c], streams[c]) for c in used)
+
+
+def _draw_camera(
+    distribution: RigDistribution, scene: Scene, camera: CameraConfig, rng: np.random.Generator
+) -> CameraConfig:
+    """Draw a camera until it hangs in the room and sees the workspace."""
+    refused = ""
+    for _ in range(TRIES):
+        lens, axis = camera.lens, rng.standard_normal(3)
+        by_m = distribution.place_m * rng.uniform(-1, 1, 3)
+        turn_rad = distribution.turn_rad * rng.uniform() * axis / np.linalg.norm(axis)
+        focal = 1.0 + distribution.focal_share * rng.uniform(-1, 1)
+        if distribution.lenses:
+            lens = distribution.lenses[rng.integers(len(distribution.lenses))]
+        try:
+            drawn = _moved(replace(camera, lens=lens), by_m, turn_rad, focal)
+        except ConfigError as error:  # a camera that cannot be
+            refused = str(error)
+            continue
+        poor = poor_cameras(with_rig(scene, (drawn,)))
+        if not poor:
+            return drawn
+        refused = poor[0]
+    raise ConfigError(
+        f"{distribution}: no place was found for camera {camera.name!r} in {TRIES} draws from "
+        f"which it sees the workspace. The last one: {refused} Let it "
+        "differ less, or hang it elsewhere."
     )
 
 

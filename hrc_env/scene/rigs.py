@@ -18,7 +18,7 @@ from hrc_env.geometry.cameras import (
 from hrc_env.geometry.shapes import AXES, BOX, CENTRE, HALF_SIZE, KIND, PLANE, REACH, WIDTH
 from hrc_env.geometry.sight import hidden, nothing
 from hrc_env.scene.build import Scene
-from hrc_env.scene.places import within
+from hrc_env.scene.places import SCENES, within
 from hrc_env.scene.rig import LAB_CAMERAS, SITE_CAMERAS
 from hrc_env.world import Grounds
 
@@ -128,10 +128,13 @@ def poor_cameras(scene: Scene) -> list[str]:
     said = []
     for camera, share in zip(scene.cameras, _shares_seen(scene), strict=True):
         inside = _inside_something(camera, scene.obstacles)
-        if inside or share < POOR_SHARE:
+        ceiling_m = SCENES[scene.name].ceiling_m
+        above = ceiling_m is not None and camera.eye_world[2] > ceiling_m
+        if inside or above or share < POOR_SHARE:
+            where = "hangs in or behind a wall or a thing" if inside else "looks elsewhere"
             said.append(
                 f"Camera {camera.name!r} sees {100 * share:.0f} % of the workspace: it "
-                f"{'hangs in or behind a wall or a thing' if inside else 'looks elsewhere'}."
+                f"{'hangs above the ceiling' if above else where}."
             )
     return said
 
@@ -143,10 +146,14 @@ def _shares_seen(scene: Scene) -> Floats:
 
 
 def _inside_something(camera: PinholeCamera, still: Floats) -> bool:
-    """Whether an eye is inside a box or behind a plane that stands still."""
+    """Whether an eye is inside a box, below the floor, or behind a wall or beside it as high as it
+    is; planes are floors and walls."""
     axes = still[:, AXES:HALF_SIZE].reshape(-1, 3, 3)
     away = np.einsum("gij,gj->gi", axes, camera.eye_world - still[:, CENTRE:AXES])
     within = np.abs(away) < still[:, HALF_SIZE:REACH]
     in_box = (still[:, KIND] == BOX) & within.all(1)
-    behind = (still[:, KIND] == PLANE) & (away[:, 2] < 0) & within[:, :2].all(1)
+    high_m = (np.abs(axes[:, :, 2]) * still[:, HALF_SIZE:REACH]).sum(1)
+    beside = np.abs(camera.eye_world[2] - still[:, CENTRE + 2]) <= high_m
+    is_floor = axes[:, 2, 2] > 0.5
+    behind = (still[:, KIND] == PLANE) & (away[:, 2] < 0) & (beside | is_floor)
     return bool((in_box | behind).any())

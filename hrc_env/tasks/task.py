@@ -1,6 +1,6 @@
 """Tasks: the base class with its hooks, and the tasks that are known by an id."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from importlib import import_module
 from inspect import getdoc
 from typing import Any, ClassVar, Generic, TypeVar, cast
@@ -311,6 +311,24 @@ def with_rewards(task: str | TaskType, *terms: RewardTerm, id: str) -> TaskType:
         names.append(term.name)
     added = {"id": id, "rewards": (*base.rewards, *terms), "__doc__": base.__doc__}
     return cast(TaskType, type(base.__name__, (base,), added))
+
+
+def ancestor_of(task: str, ids: Collection[str]) -> str:
+    """Return the nearest task among `ids` whose agents act in a task, or the task's own id.
+
+    That is the task itself, or one that it derives from with the same observations and goals, as
+    `with_rewards` makes them.
+    """
+    if task not in (*BUILT_IN, *TASKS):  # a class that is not registered
+        return task
+    kind = find_task(task)
+    for each in kind.__mro__:
+        if not issubclass(each, Task) or "id" not in vars(each):
+            continue
+        alike = each.observations == kind.observations and each.goal == kind.goal
+        if each.id in ids and alike and each.needs_gripper == kind.needs_gripper:
+            return each.id
+    return task
 
 
 def takes_goals(task: TaskType) -> bool:

@@ -82,7 +82,7 @@ def test_parts_are_the_same_whatever_else_is_run(tmp_path, monkeypatch):
     made = {path: path.stat().st_mtime_ns for path in (tmp_path / "parts").iterdir()}
     assert {path.name for path in made} == {"lab.clean.particle.json", "lab.clean.ransac.json"}
     some = replace(TINY, estimators=("ransac",), sequences=("lab.clean", "site.matched"))
-    metrics = runner.run(some, tmp_path)
+    metrics = runner.run_experiment(some, tmp_path)
     assert all(path.stat().st_mtime_ns == t for path, t in made.items())
     assert "rmse_m.lab.clean.ransac" in metrics
     assert "ratio_to_bound.ransac" in metrics

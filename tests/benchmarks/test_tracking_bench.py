@@ -47,7 +47,7 @@ def end_to_end(tmp_path_factory):
     """The folder of a bench on a few frames of two sequences, and what it said."""
     out, said = tmp_path_factory.mktemp("bench"), []
     with small():
-        runner.run(TINY, out, lambda share, label: said.append((share, label)))
+        runner.run_experiment(TINY, out, lambda share, label: said.append((share, label)))
     return out, said
 
 
@@ -95,7 +95,7 @@ def test_a_second_run_makes_only_what_is_missing(end_to_end):
     real = tracking_bench.run_cell
     with small() as patch:
         patch.setattr(tracking_bench, "run_cell", lambda *a: made.append(a[0]) or real(*a))
-        runner.run(TINY, out, lambda share, label: None)
+        runner.run_experiment(TINY, out, lambda share, label: None)
     assert made == ["paper"]
     again = json.loads(missing.read_text())
     assert {**again, "seconds": before["seconds"]} == before

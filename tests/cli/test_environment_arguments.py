@@ -17,7 +17,7 @@ from hrc_env.env import HRCEnv
 from hrc_env.safety.config import ShieldConfig
 from hrc_env.settings import settle
 
-OF_RENDER = {"render_mode", "width", "height"}
+OF_RENDER = {"render_mode", "width", "height", "render_markers", "overlay"}
 """What only `render` reads, which no command calls: films have a form of their own."""
 
 

@@ -265,7 +265,7 @@ def test_a_report_holds_its_pictures_its_origin_and_all_numbers(tmp_path):
 
 def test_an_experiment_plays_each_part_once_and_again_with_other_settings(tmp_path):
     for n in (1, 1, 2):
-        found = runner.run(Counting(n), tmp_path)
+        found = runner.run_experiment(Counting(n), tmp_path)
         assert found["x"].value == n
     assert PLAYED == [1, 2]
     assert runner.changed(Counting(1), n=None) == Counting(1)

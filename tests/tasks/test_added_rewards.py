@@ -7,6 +7,7 @@ import pytest
 
 import hrc_env
 from hrc_env.tasks.check import check_task
+from hrc_env.tasks.task import TASKS
 from hrc_env.vector.env import HRCVectorEnv
 
 
@@ -57,3 +58,37 @@ def test_a_task_with_a_term_more_goes_to_other_processes():
 def test_what_cannot_be_added_is_refused_in_words(task, terms, said):
     with pytest.raises(hrc_env.ConfigError, match=said):
         hrc_env.with_rewards(task, *terms, id="Mine-v0")
+
+
+@pytest.mark.parametrize("task_id", ["HRCReach-v0", "HRCReachGoal-v0"])
+def test_agents_of_a_task_act_in_the_one_with_a_term_more(task_id, monkeypatch):
+    more = hrc_env.with_rewards(task_id, CALM, id="Calm-v0")
+    monkeypatch.setitem(TASKS, "Calm-v0", more)
+    actions = []
+    for task in (task_id, "Calm-v0"):
+        env = hrc_env.HRCEnv(task, perception="truth")
+        observation, _ = env.reset(seed=2)
+        actions.append(hrc_env.make_agent("scripted", hrc_env.env_info(env)).act(observation))
+    np.testing.assert_array_equal(*actions)
+
+
+def test_agents_do_not_act_in_a_task_that_shows_something_else(monkeypatch):
+    base = hrc_env.find_task("HRCReach-v0")
+    blind = type("Blind", (base,), {"id": "Blind-v0", "observations": base.observations[:1]})
+    monkeypatch.setitem(TASKS, "Blind-v0", blind)
+    env = hrc_env.HRCEnv("Blind-v0", perception="truth")
+    with pytest.raises(hrc_env.ConfigError, match="no scripted agent for Blind-v0"):
+        hrc_env.make_agent("scripted", hrc_env.env_info(env))
+
+
+def test_a_term_of_other_arguments_is_refused_when_it_is_made():
+    with pytest.raises(hrc_env.ConfigError, match=r"must take \(belief, step, previous action"):
+        hrc_env.RewardTerm("odd", "", lambda belief: belief.action[:, 0])
+
+
+def test_an_agent_reads_terms_in_their_units():
+    env = hrc_env.HRCEnv(perception="truth")
+    observation, _ = env.reset(seed=2)
+    told = hrc_env.env_info(env).split(observation)
+    for name, term in env.split_observation(observation).items():
+        np.testing.assert_array_equal(told[name], term)
