@@ -25,8 +25,10 @@ class Agent(Protocol):
     """A policy: all that an evaluation asks of it is `act`."""
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
-        """Return actions (..., A) in [-1, 1] for observations (..., n), of one environment or of
-        many; `EnvInfo.split` gives an observation's terms."""
+        """Return actions (..., A) in [-1, 1] for observations (..., n).
+
+        They are of one environment or of many; `EnvInfo.split` gives an observation's terms.
+        """
         ...
 
 
@@ -56,8 +58,9 @@ class EnvInfo:
     """Height, width and channels of the images that stand beside the observation, by name."""
 
     def split(self, observation: Observation) -> dict[str, NDArray[Any]]:
-        """Return an observation's terms by name, in metres, seconds and radians, goals and images
-        too.
+        """Return an observation's terms by name, in metres, seconds and radians.
+
+        Goals and images are among them.
 
         Args:
             observation: (..., n), or such arrays by name.
