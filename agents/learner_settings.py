@@ -89,8 +89,9 @@ class SACSettings:
         """Return the keyword arguments of `stable_baselines3.SAC`; torch is imported here."""
         values = asdict(self)
         del values["relabelled"]
-        seen = _features(values.pop("near_and_far"))
-        return {**values, "policy_kwargs": {"net_arch": list(values.pop("hidden")), **seen}}
+        hidden = list(values.pop("hidden"))
+        policy = {"net_arch": hidden, **_features(values.pop("near_and_far"))}
+        return {**values, "policy_kwargs": policy}
 
 
 def _features(near_and_far: bool) -> dict[str, Any]:

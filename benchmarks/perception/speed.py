@@ -12,7 +12,7 @@ from benchmarks.speed.stopwatch import Place, Stopwatch
 from hrc_env.env import HRCEnv
 from hrc_env.motion import generator
 from hrc_env.perception.network import LANDMARK_SIDE, load_landmarker
-from hrc_env.pipeline.rendered import PixelPipeline
+from hrc_env.pipeline.image_tracking import ImageTracking
 from hrc_env.pipeline.tracking import PoseTracking
 from hrc_env.scene.canvas import Canvas
 from hrc_env.scene.physics import Physics
@@ -20,7 +20,7 @@ from hrc_env.scene.render import CropRenderer
 
 STAGES: Mapping[str, Sequence[Place]] = {
     "draw": ((Canvas, "pose"), (CropRenderer, "view")),
-    "detect": ((PixelPipeline, "detect"),),
+    "detect": ((ImageTracking, "detect"),),
     "track": ((PoseTracking, "perceive"),),
     "physics": ((Physics, "step"),),
     "motion": ((generator, "advance"), (generator, "watch")),
