@@ -179,8 +179,8 @@ def _square(J, squared_damping, gram):
 
 @kernel
 def _factorise(gram):
-    """Write L (below the diagonal, of ones) and D (on it) of gram = L D L^T; a
-    pivot that is not positive ends its column."""
+    """Write L (below the diagonal, of ones) and D (on it) of gram = L D L^T; a pivot that is not
+    positive ends its column."""
     for j in range(len(gram)):
         pivot = gram[j, j]
         for k in range(j):

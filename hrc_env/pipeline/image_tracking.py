@@ -30,8 +30,8 @@ class ImageSensor(Sensor):
         raise NotImplementedError
 
     def stuck(self, ids: Ints) -> Bools:
-        """Return (B, C) the cameras whose images prove no absence, as they repeat; or (C,)."""
-        return np.zeros(1, np.bool_)
+        """Return (B, C) the cameras whose images prove no absence, as they repeat; (B, 1): none."""
+        return np.zeros((len(ids), 1), np.bool_)
 
     def robots_world(self) -> Capsules | None:
         """Return (B, K, 2, 3) the robots' capsules [m]; None: unknown."""

@@ -158,7 +158,7 @@ class PoseTracking(PerceptionPipeline):
         Args:
             ids: (B,) environments.
             dt_s: time since their last update [s].
-            sensor_rngs, tracker_rngs: a generator for each environment of the batch.
+            sensor_rngs, tracker_rngs: (B,) a generator for each of `ids`.
 
         Returns:
             What is believed of the workers (B, W, ...), and who is there or unknown.
