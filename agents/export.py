@@ -12,12 +12,10 @@ from gymnasium import spaces
 from rich.console import Console
 
 from hrc_env import __version__
-from hrc_env.cli.environment import read_word
-from hrc_env.cli.export import Export
-from hrc_env.cli.train import Train
 from hrc_env.core.errors import CheckpointError, learner
 from hrc_env.core.progress import progress_bar
 from hrc_env.core.results import write_whole
+from hrc_env.env_words import read_word
 from hrc_env.evaluation.episodes import EVALUATION_SEED, measure, play_episodes
 from hrc_env.observations import IMAGE
 from hrc_env.pipeline.ready import make_ready
@@ -29,6 +27,7 @@ from .features import NearAndFar
 from .network import Architecture, Network, Tensors
 from .policies import SUFFIX, Card, Worth
 from .recipes import filled
+from .requests import ExportRequest, TrainingRequest
 from .training import ONLY_OF_A_RUN, asked_of
 
 with learner():
@@ -38,7 +37,7 @@ with learner():
 ACTIVATIONS = {torch.nn.Tanh: "tanh", torch.nn.ReLU: "relu"}
 
 
-def run(asked: Export) -> int:
+def run(asked: ExportRequest) -> int:
     """Write weights and card; returns the exit status.
 
     Raises:
@@ -103,10 +102,10 @@ def taken(trained: checkpoints.Learner) -> tuple[Tensors, Architecture]:
     return tensors, Architecture(activation, near_and_far=near, squashed=squashed)
 
 
-def command(arguments: Train) -> str:
+def command(arguments: TrainingRequest) -> str:
     """The line that trains so."""
     words = ["python", "-m", "hrc_env", "train"]
-    for each in fields(Train):
+    for each in fields(TrainingRequest):
         value = getattr(arguments, each.name)
         if value == each.default or (each.name in ONLY_OF_A_RUN and each.name != "timesteps"):
             continue
@@ -125,7 +124,7 @@ def _packed(tensors: Tensors) -> bytes:
 def _worth(
     network: Network,
     shield: str,
-    asked: Export,
+    asked: ExportRequest,
     kwargs: Mapping[str, Any],
     console: Console,
 ) -> Worth:

@@ -4,13 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from hrc_env.cli.train import Train
-
 from .learner_settings import RECIPES as RECIPES
+from .requests import TrainingRequest
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run(Train):
+class Run(TrainingRequest):
     """Arguments that leave nothing open: what suits most tasks."""
 
     algorithm: str = "ppo"
@@ -24,7 +23,7 @@ LIMITED: Mapping[str, Any] = {"timesteps": 3_000_000, "proximity": 0.0}
 """With a limit of cost, which then is all that keeps the robot away."""
 
 
-def filled(arguments: Train) -> Run:
+def filled(arguments: TrainingRequest) -> Run:
     """The arguments with the recipe of their task for what they leave open."""
     recipe = RECIPES.get(arguments.task, {})
     if arguments.algorithm == "ppo_lagrangian":

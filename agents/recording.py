@@ -20,7 +20,6 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
 
-from hrc_env.cli.record import Record
 from hrc_env.core.errors import ConfigError, MissingExtraError
 from hrc_env.core.infos import matching
 from hrc_env.core.mapping import for_json
@@ -35,6 +34,7 @@ from hrc_env.vector.env import HRCVectorEnv
 
 from .env_info import Agent, Observation, env_info
 from .registry import make_agent
+from .requests import RecordingRequest
 
 TOP = ("cost", "is_success")
 """Infos that a Minari data set has outside of the groups "belief" and "truth"."""
@@ -46,7 +46,7 @@ Episode = dict[str, Any]
 """Arrays by name: observations, of which there is one more than of actions, and so on."""
 
 
-def run(asked: Record) -> int:
+def run(asked: RecordingRequest) -> int:
     """Record, print the place, and return the exit status.
 
     Raises:
@@ -99,10 +99,10 @@ def _free_folder(path: Path) -> Path:
     return path
 
 
-def command(asked: Record) -> str:
+def command(asked: RecordingRequest) -> str:
     """The line that records so."""
     words = ["python", "-m", "hrc_env", "record", asked.task]
-    for each in fields(Record):
+    for each in fields(RecordingRequest):
         value = getattr(asked, each.name)
         if value == each.default or each.name == "task":
             continue
@@ -112,7 +112,7 @@ def command(asked: Record) -> str:
     return shlex.join(words)
 
 
-def _about(asked: Record) -> dict[str, Any]:
+def _about(asked: RecordingRequest) -> dict[str, Any]:
     """Return the metadata of a data set: command, arguments, configuration, versions, seeds,
     cameras.
 
@@ -177,7 +177,7 @@ def _free(minari: Any, name: str) -> Path:
     return path
 
 
-def _same_as_before(asked: Record, draft: Path) -> None:
+def _same_as_before(asked: RecordingRequest, draft: Path) -> None:
     """Make the draft's folder, or see that it was begun with the same arguments."""
     record, now = draft / "asked.json", json.dumps(asdict(asked), indent=1, default=str)
     if record.exists() and record.read_text() != now:
@@ -188,7 +188,7 @@ def _same_as_before(asked: Record, draft: Path) -> None:
     write_whole(record, now)
 
 
-def _played(asked: Record, first: int, n: int) -> list[Episode]:
+def _played(asked: RecordingRequest, first: int, n: int) -> list[Episode]:
     """Episodes `first` to `first + n - 1`, side by side."""
     env = HRCVectorEnv(n, **asked.keywords())
     try:
@@ -207,7 +207,7 @@ def _played(asked: Record, first: int, n: int) -> list[Episode]:
         env.close()
 
 
-def _kept_of(asked: Record, env: HRCVectorEnv, info: Mapping[str, Any], n: int) -> Kept:
+def _kept_of(asked: RecordingRequest, env: HRCVectorEnv, info: Mapping[str, Any], n: int) -> Kept:
     """Return the requested parts of each moment of `n` episodes side by side, of the infos that
     there are; `ConfigError` for other infos, and for more images than memory holds."""
     there = [name for name in info if not name.startswith("_")]
@@ -260,7 +260,9 @@ def _keep(path: Path, episode: Episode) -> None:
     os.replace(rough, path)
 
 
-def _write(minari: Any, asked: Record, path: Path, draft: Path, episodes: list[Episode]) -> None:
+def _write(
+    minari: Any, asked: RecordingRequest, path: Path, draft: Path, episodes: list[Episode]
+) -> None:
     """Make the data set inside the draft, then move it to its place."""
     env = gymnasium.make(asked.task, **asked.keywords())
     with contextlib.closing(env), _root(draft / "whole") as root, warnings.catch_warnings():

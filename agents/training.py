@@ -12,7 +12,6 @@ from typing import Any, get_type_hints
 import numpy as np
 from rich.console import Console
 
-from hrc_env.cli.train import Train
 from hrc_env.core.errors import CheckpointError, RenderingError, learner
 from hrc_env.core.mapping import restored
 from hrc_env.core.progress import Meter, progress_bar
@@ -36,6 +35,7 @@ from .env_info import EnvInfo
 from .learner_settings import IMITATOR, PPOSettings, SACSettings
 from .ppo_lagrangian import PPOLagrangian
 from .recipes import Run, filled
+from .requests import TrainingRequest
 
 with learner():
     import torch
@@ -59,7 +59,7 @@ STOPPED = 130
 """Exit status of what Ctrl-C stopped."""
 
 
-def run(arguments: Train) -> int:
+def run(arguments: TrainingRequest) -> int:
     """Train, evaluate, draw, film; returns the exit status.
 
     Raises:
@@ -96,7 +96,7 @@ def run(arguments: Train) -> int:
     return 0
 
 
-def judge(arguments: Train, folder: Path, console: Console) -> Score:
+def judge(arguments: TrainingRequest, folder: Path, console: Console) -> Score:
     """What the policy is worth, also printed."""
     checkpoint = folder / "policy.zip"
     console.print(f"Evaluating {arguments.episodes} episodes on fixed seeds ...")
@@ -129,7 +129,7 @@ def unused(folder: Path) -> Path:
     return candidate
 
 
-def as_before(arguments: Train, folder: Path) -> Train:
+def as_before(arguments: TrainingRequest, folder: Path) -> TrainingRequest:
     """The arguments of a resumed run: the environment and the seed are those of its beginning.
 
     Raises:
@@ -146,7 +146,7 @@ def as_before(arguments: Train, folder: Path) -> Train:
     return replace(before, **{**own, "timesteps": total})
 
 
-def asked_of(folder: Path) -> Train:
+def asked_of(folder: Path) -> TrainingRequest:
     """Return the arguments of a run; of those in `ONLY_OF_A_RUN`, only the steps.
 
     Raises:
@@ -155,13 +155,14 @@ def asked_of(folder: Path) -> Train:
     record = folder / "run.json"
     if not record.exists():
         raise CheckpointError(f"{folder} holds no run: {record} is missing.")
-    said, hints = json.loads(record.read_text())["arguments"], get_type_hints(Train)
+    said = json.loads(record.read_text())["arguments"]
     if said.get("n_workers") is not None:  # earlier runs hold numbers, not words
         said["n_workers"] = [str(n) for n in np.atleast_1d(said["n_workers"])]
     said = {name: value for name, value in said.items() if value is not None}
     left = {*ONLY_OF_A_RUN} - {"timesteps"}
-    names = [each.name for each in fields(Train) if each.name in said and each.name not in left]
-    return Train(**{name: restored(hints[name], said[name], name) for name in names})
+    known, hints = {each.name for each in fields(TrainingRequest)}, get_type_hints(TrainingRequest)
+    names = [name for name in said if name in known - left]
+    return TrainingRequest(**{name: restored(hints[name], said[name], name) for name in names})
 
 
 def train(arguments: Run, folder: Path, console: Console) -> tuple[Curve, dict[str, float] | None]:
@@ -227,7 +228,7 @@ def _clone(learner: Any, arguments: Run, env: HRCVecEnv, console: Console) -> No
     env.seed(arguments.seed)
 
 
-def film(folder: Path, arguments: Train, console: Console) -> bool:
+def film(folder: Path, arguments: TrainingRequest, console: Console) -> bool:
     """Film the policy's closest encounter with the worker; whether this machine can draw."""
     from hrc_env.evaluation.film import film_episode, nearest_seed
 

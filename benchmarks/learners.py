@@ -20,8 +20,8 @@ from benchmarks.command import StudyArguments, run_study
 from benchmarks.common import TASKS, exactly
 from benchmarks.learning import Training
 from hrc_env.agents.recipes import filled
+from hrc_env.agents.requests import TrainingRequest
 from hrc_env.cli.entry import show_errors
-from hrc_env.cli.train import Train
 from hrc_env.core.errors import check_names
 from hrc_env.core.results import Metric, over
 from hrc_env.evaluation.episodes import EVALUATION_SEED
@@ -78,7 +78,7 @@ def make_study(trainings: Trainings) -> Study:
     """Return the study of the policies that have learnt, beside scripted agents."""
     rows = {}
     for task, runs in trainings.items():
-        env = filled(Train(task=task)).keywords() | {"config": {}}  # the default reward
+        env = filled(TrainingRequest(task=task)).keywords() | {"config": {}}  # the default reward
         for name in ("perception", "estimator", "num_threads"):
             env.pop(name, None)
         rows[f"{task}.scripted"] = Row(task, 128, env=env)

@@ -17,11 +17,11 @@ from assets.recordings.synthetic import STYLES
 from benchmarks.__main__ import Benchmarks
 from hrc_env import __main__, observations
 from hrc_env.belief import NEAR_FLOOR_M
-from hrc_env.cli.environment import EnvironmentArguments
 from hrc_env.core.docstrings import field_docs
 from hrc_env.core.infos import ALWAYS, ENTRIES, OF_WORKERS, Entry
 from hrc_env.env import HRCEnv
 from hrc_env.env_config import EnvConfig
+from hrc_env.env_words import EnvironmentArguments
 from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.geometry.lens import Lens
 from hrc_env.perception.faults.fault import FaultConfig

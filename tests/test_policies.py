@@ -23,7 +23,7 @@ from hrc_env.agents.export import command, taken
 from hrc_env.agents.network import Architecture, Network
 from hrc_env.agents.recipes import filled
 from hrc_env.agents.registry import make_agent
-from hrc_env.cli.train import Train
+from hrc_env.agents.requests import TrainingRequest
 from hrc_env.core.errors import CheckpointError, ConfigError
 from hrc_env.env import HRCEnv
 from hrc_env.safety.shield import SHIELDS
@@ -65,10 +65,10 @@ def here(**kwargs):
     return env_info(env.simulation)
 
 
-def asked_by(line: str) -> Train:
+def asked_by(line: str) -> TrainingRequest:
     """What a command line asks for."""
     words = shlex.split(line.removeprefix("python -m hrc_env train"))
-    return tyro.cli(Train, args=words, config=(tyro.conf.OmitArgPrefixes,))
+    return tyro.cli(TrainingRequest, args=words, config=(tyro.conf.OmitArgPrefixes,))
 
 
 def spoil(path: Path, **fields: object) -> None:
@@ -116,11 +116,13 @@ def test_who_learnt_under_a_shield_is_judged_under_it_and_without(tmp_path, monk
 
 
 def test_the_command_of_a_card_asks_for_the_same():
-    asked = Train(n_workers=("1", "2"), cost_limit=30.0, algorithm="ppo_lagrangian", film=False,
-                  config=("reward.effort=0.1", "tracker.lost_after_s=1"))  # fmt: skip
+    asked = TrainingRequest(
+        n_workers=("1", "2"), cost_limit=30.0, algorithm="ppo_lagrangian", film=False,
+        config=("reward.effort=0.1", "tracker.lost_after_s=1"),
+    )  # fmt: skip
     said = command(asked)
     assert asked_by(said) == replace(asked, film=True)
-    assert command(Train()) == "python -m hrc_env train"
+    assert command(TrainingRequest()) == "python -m hrc_env train"
 
 
 @pytest.mark.parametrize("task", ["HRCReach-v0", "HRCReachGoal-v0"])

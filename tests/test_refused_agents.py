@@ -18,9 +18,8 @@ from hrc_env.agents.env_info import EnvInfo, env_info
 from hrc_env.agents.experts import expert
 from hrc_env.agents.recording import _same_as_before
 from hrc_env.agents.registry import control_of, make_agent
+from hrc_env.agents.requests import RecordingRequest, TrainingRequest
 from hrc_env.agents.training import as_before, asked_of
-from hrc_env.cli.record import Record
-from hrc_env.cli.train import Train
 from hrc_env.core.errors import CheckpointError, ConfigError
 from hrc_env.env import HRCEnv
 from hrc_env.evaluation.episodes import evaluate
@@ -100,16 +99,16 @@ def test_a_run_goes_on_where_there_is_more_to_learn(tmp_path):
     (tmp_path / "run.json").write_text(json.dumps({"arguments": {"timesteps": 512, "seed": 3}}))
     assert (asked_of(tmp_path).timesteps, asked_of(tmp_path).seed) == (512, 3)
     made(meta_of(), tmp_path / "policy.zip")
-    assert as_before(Train(timesteps=513), tmp_path).timesteps == 513
+    assert as_before(TrainingRequest(timesteps=513), tmp_path).timesteps == 513
     for wanted in (512, 1, None):
         with pytest.raises(CheckpointError, match="has learnt 512 steps already"):
-            as_before(Train(timesteps=wanted), tmp_path)
+            as_before(TrainingRequest(timesteps=wanted), tmp_path)
     made(meta_of(num_timesteps=511), tmp_path / "policy.zip")
-    assert as_before(Train(), tmp_path).timesteps == 512
+    assert as_before(TrainingRequest(), tmp_path).timesteps == 512
     (tmp_path / "run.json").write_text(json.dumps({"arguments": {"timesteps": None}}))
     made(meta_of(num_timesteps=0), tmp_path / "policy.zip")
     with pytest.raises(CheckpointError, match="has learnt 0 steps already"):
-        as_before(Train(), tmp_path)
+        as_before(TrainingRequest(), tmp_path)
 
 
 def test_a_ramp_takes_no_time_at_the_least():
@@ -119,7 +118,7 @@ def test_a_ramp_takes_no_time_at_the_least():
 
 
 def test_a_record_goes_on_with_the_same_arguments_only(tmp_path):
-    asked = Record(out="own-v0")
+    asked = RecordingRequest(out="own-v0")
     _same_as_before(asked, tmp_path)
     _same_as_before(asked, tmp_path)
     with pytest.raises(ConfigError, match="were recorded with other arguments"):

@@ -7,24 +7,16 @@ from typing import Annotated
 
 import tyro
 
+from hrc_env.agents.requests import ExportRequest
 from hrc_env.cli.checks import at_least, writable_folder
 from hrc_env.core.errors import ConfigError
 
 
-@dataclass(frozen=True, kw_only=True)
-class Export:
+@dataclass(frozen=True)
+class Export(ExportRequest):
     """Make of a run's policy a file that executes nothing, and a card of what it is worth."""
 
     run_folder: Annotated[Path, tyro.conf.Positional]
-    """The folder of a run of `train`."""
-    name: str
-    """What it is to be called: small letters, digits and _."""
-    out: Path = Path("policies")
-    """Folder for ID/NAME.safetensors and ID/NAME.json."""
-    episodes: int = 256
-    """Episodes of each evaluation."""
-    shields: tuple[str, ...] = ()
-    """It is judged as it learnt, and under these shields, too: none, or as of --shield."""
 
     def run(self) -> int:
         """Judge and write."""

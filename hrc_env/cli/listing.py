@@ -6,7 +6,7 @@ from rich.console import Console
 from rich.table import Table
 
 from hrc_env import IDS
-from hrc_env.cli.environment import EnvironmentArguments
+from hrc_env.env_words import EnvironmentArguments
 
 
 @dataclass(frozen=True, kw_only=True)

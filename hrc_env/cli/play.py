@@ -13,9 +13,9 @@ from rich.table import Table
 
 import hrc_env
 from hrc_env.cli.checks import at_least, writable_file
-from hrc_env.cli.environment import EnvironmentArguments
 from hrc_env.core.errors import check_names
 from hrc_env.core.progress import track
+from hrc_env.env_words import EnvironmentArguments
 from hrc_env.pipeline.ready import make_ready
 from hrc_env.tasks import DEFAULT
 

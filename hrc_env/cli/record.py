@@ -1,20 +1,19 @@
 """python -m hrc_env record: an agent's episodes as a data set, by `agents/recording.py`."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated
 
 import tyro
 
 import hrc_env
+from hrc_env.agents.requests import RecordingRequest
 from hrc_env.cli.checks import at_least, writable_folder
-from hrc_env.cli.environment import EnvironmentArguments
 from hrc_env.core.errors import ConfigError, check_names
 from hrc_env.tasks import DEFAULT
 
 
 @dataclass(frozen=True, kw_only=True)
-class Record(EnvironmentArguments):
+class Record(RecordingRequest):
     """Record an agent's episodes as a data set: of Minari, or a folder.
 
     Finished episodes are kept when this is stopped or killed: the same command goes on there. The
@@ -24,30 +23,6 @@ class Record(EnvironmentArguments):
 
     task: Annotated[str, tyro.conf.Positional] = DEFAULT
     """Which environment, by its id."""
-    agent: str = "scripted"
-    """random, scripted, scripted_slowed, hrc://ID/NAME; the path of a checkpoint of `train` or of
-    Stable-Baselines3 (.zip) or of a policy of `export` (.safetensors); or MODULE:FUNCTION, a
-    function that is given an EnvInfo and returns an object with act(observation)."""
-    trust: bool = False
-    """Read pickles in a checkpoint, which run code of whoever made it; see play."""
-    episodes: int = 100
-    """How many episodes."""
-    seed: int = 0
-    """Seed of the first episode; the next ones count up."""
-    out: str | None = None
-    """Name of a Minari data set, with a version: hrc/pick-place/scripted-v0. This or --folder."""
-    folder: Path | None = None
-    """A folder for the data set, which must not be there yet."""
-    infos: tuple[str, ...] = ("cost", "is_success")
-    """Which infos are kept, by names or patterns: cost "safety/*" "reward/*"."""
-    poses: bool = False
-    """Keep the workers' joints, as believed and as they are."""
-    keypoints: bool = False
-    """Keep the keypoints that the estimator was given; at --perception keypoints."""
-    perception: str = "keypoints"
-    """What the robot sees with: keypoints (camera emulator), truth or none."""
-    num_envs: int = 16
-    """Environments that step together, and episodes that are kept at once."""
 
     def run(self) -> int:
         """Record; a `ConfigError` for a data set that there is, or a name that cannot be one."""

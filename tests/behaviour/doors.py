@@ -664,7 +664,7 @@ def learn(
     """
     from hrc_env.agents import export, training  # here, as in all of this part: they need PyTorch
     from hrc_env.agents.recipes import Run
-    from hrc_env.cli.export import Export
+    from hrc_env.agents.requests import ExportRequest
 
     torch_on_one_thread()
     console, values = Console(file=io.StringIO()), {}
@@ -677,7 +677,7 @@ def learn(
                 values[f"run_{k}/{name}"] = value
     values |= _score(training.judge(asked, folder, console))
     with contextlib.redirect_stdout(io.StringIO()):
-        export.run(Export(run_folder=folder, name="probe", out=folder, episodes=4))
+        export.run(ExportRequest(run_folder=folder, name="probe", out=folder, episodes=4))
     (folder / env_id / "probe.safetensors").rename(folder / EXPORTED)
     card = folder / env_id / "probe.json"
     for name, metric in json.loads(card.read_text())["worth"][0].items():
@@ -690,9 +690,9 @@ def learn(
 def recipe_of(env_id: str, algorithm: str | None) -> dict[str, str]:
     """Return how a task is learnt by a learner, or by its own if None, where nothing is asked."""
     from hrc_env.agents.recipes import filled
-    from hrc_env.cli.train import Train
+    from hrc_env.agents.requests import TrainingRequest
 
-    run = filled(Train(task=env_id, algorithm=algorithm))
+    run = filled(TrainingRequest(task=env_id, algorithm=algorithm))
     return {name: str(getattr(run, field)) for name, field in RECIPE_FIELDS.items()}
 
 
@@ -740,13 +740,13 @@ def record_episodes(
     import minari
 
     from hrc_env.agents import recording
-    from hrc_env.cli.record import Record
+    from hrc_env.agents.requests import RecordingRequest
 
     name, before = "hrc/probe-v0", os.environ.get(recording.ROOT)
     with tempfile.TemporaryDirectory() as place, contextlib.redirect_stdout(io.StringIO()):
         os.environ[recording.ROOT] = place
         try:
-            recording.run(Record(task=env_id, agent=agent, episodes=n_episodes, seed=seed,
+            recording.run(RecordingRequest(task=env_id, agent=agent, episodes=n_episodes, seed=seed,
                                  out=name, num_envs=2))  # fmt: skip
             found = list(minari.load_dataset(name).iterate_episodes())
         finally:

@@ -9,11 +9,11 @@ import gymnasium
 import pytest
 
 from hrc_env.__main__ import main
-from hrc_env.cli.environment import EnvironmentArguments, cameras_named, read_config
 from hrc_env.cli.play import Demo, Play
 from hrc_env.cli.train import Train
 from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCEnv
+from hrc_env.env_words import EnvironmentArguments, cameras_named, read_config
 from hrc_env.safety.config import ShieldConfig
 from hrc_env.settings import settle
 
