@@ -6,12 +6,13 @@ from importlib import import_module
 from pathlib import Path
 
 from hrc_env.cli.checks import at_least, writable_file
+from hrc_env.cli.engines import EngineArguments
 from hrc_env.cli.show import show
 from hrc_env.tasks import BUILT_IN
 
 
 @dataclass(frozen=True, kw_only=True)
-class Benchmark:
+class Benchmark(EngineArguments):
     """Judge a policy on fixed seeds: beside unaware, hurried and attentive people, with four
     cameras, late ones, one, and the truth, without and with a shield.
 
@@ -44,14 +45,14 @@ class Benchmark:
         at_least("--seeds", self.seeds, 1)
         if self.enter is not None:
             writable_file(self.enter, ".json", "--enter")
+        engine = self.chosen()
         leaderboard = import_module("hrc_env.experiments.leaderboard")
         runner = import_module("hrc_env.experiments.runner")
         study = leaderboard.make_study(self.policy, self.ids, self.control, self.seeds, self.trust)
         words = self.policy.removeprefix("hrc://").replace("/", "-").replace(":", "-")
         out = self.out or Path("out/benchmark") / words
-        status = show(
-            partial(runner.run_experiment, study, overwrite=self.overwrite), out, "benchmark"
-        )
+        run = partial(runner.run_experiment, study, overwrite=self.overwrite, engine=engine)
+        status = show(run, out, "benchmark")
         if self.enter is not None:
             leaderboard.enter(self.enter, self.policy, out / "results.json")
             print(f"Entered: {self.enter}")

@@ -1,6 +1,6 @@
 """python -m hrc_env experiment: the paper's two, what perception is worth, ablations."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -9,13 +9,14 @@ from typing import Annotated, ClassVar
 import tyro
 
 from hrc_env.cli.checks import at_least
+from hrc_env.cli.engines import EngineArguments
 from hrc_env.cli.estimators import estimators_named
 from hrc_env.cli.show import show
 from hrc_env.tasks import DEFAULT
 
 
 @dataclass(frozen=True)
-class AnyExperiment:
+class AnyExperiment(EngineArguments):
     """What every experiment is asked."""
 
     name: ClassVar[str]
@@ -33,12 +34,13 @@ class AnyExperiment:
         at_least("--seeds", self.seeds, 1)
         experiment = import_module(f"hrc_env.experiments.{self.name}.experiment")
         runner = import_module("hrc_env.experiments.runner")
-        asked = {each.name: getattr(self, each.name) for each in fields(self)}
+        asked, engine = self.without_engine(), self.chosen()
         out, overwrite = asked.pop("out"), asked.pop("overwrite")
         if "estimator" in asked:
             asked["estimator"] = estimators_named(asked["estimator"])
         made = experiment.make_experiment(**asked)
-        return show(partial(runner.run_experiment, made, overwrite=overwrite), out, "experiment")
+        run = partial(runner.run_experiment, made, overwrite=overwrite, engine=engine)
+        return show(run, out, "experiment")
 
 
 @dataclass(frozen=True)

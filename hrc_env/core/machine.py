@@ -6,6 +6,8 @@ from pathlib import Path
 
 CGROUP = Path("/sys/fs/cgroup")
 """Where a container's limits are."""
+CORES = "HRC_ENV_CORES"
+"""Environment variable: how many cores a process may use at most; engines set it for workers."""
 
 
 def n_cores() -> int:
@@ -14,11 +16,14 @@ def n_cores() -> int:
 
 
 def usable_cores() -> float:
-    """Cores that this process may use: by affinity, and by its container's share."""
+    """Cores that this process may use: by affinity, its container's share, and `CORES`."""
+    asked = os.environ.get(CORES, "")
     cores = float(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 0)
     cores = cores or float(os.cpu_count() or 1)
     quota, *period = _limit("cpu.max").split() or ["max"]
-    return min(cores, int(quota) / int(period[0])) if quota.isdigit() and period else cores
+    if quota.isdigit() and period:
+        cores = min(cores, int(quota) / int(period[0]))
+    return min(cores, float(asked)) if asked.isdigit() and int(asked) else cores
 
 
 def usable_memory_gb() -> float:

@@ -58,6 +58,10 @@ class Meter:
         if self._bar.disable and self._clock() - self._line_s >= EVERY_S:
             self._say()
 
+    def say(self, sentence: str) -> None:
+        """Print a sentence above the bar."""
+        self._bar.console.print(sentence, markup=False, highlight=False, soft_wrap=True)
+
     def _say(self) -> None:
         """One line: share, count, time that has passed and that is left."""
         self._line_s, task = self._clock(), self._bar.tasks[0]

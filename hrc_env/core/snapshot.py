@@ -70,6 +70,17 @@ def inherited() -> Snapshot:
         return _STATE.inherited
 
 
+def inherit(snapshot: Snapshot) -> None:
+    """Take the registrations of a process on another machine as inherited."""
+    with _LOCK:
+        _STATE.source, _STATE.inherited = "", snapshot
+
+
+def current() -> Snapshot:
+    """Return the registrations that child processes find."""
+    return _STATE.written or inherited()
+
+
 def write(snapshot: Snapshot) -> None:
     """Replace this process's file, atomically; a warning if that is impossible."""
     from hrc_env.core.results import write_whole  # takes time to import

@@ -4,19 +4,37 @@ import json
 import os
 import shutil
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from hrc_env.core.errors import ConfigError
+from hrc_env.core.machine import n_cores
 from hrc_env.core.results import write_whole
+from hrc_env.engines.engine import Done, Engine
+from hrc_env.engines.local import Processes, Serial
 
 Progress = Callable[[float, str], None]
 """Told by how much the share that is done grew, and what is being done; shares sum to 1."""
 PartProgress = Callable[[float], None]
 """Told by how much the share of a part that is done grew."""
 LABEL = "experiment.json"
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """What is played at once, and kept."""
+
+    label: str
+    """Its name, which is also its file's."""
+    make: Callable[[PartProgress], dict[str, Any]]
+    """Makes it, and reports its progress; for engines in other processes it can be pickled."""
+    key: str | None = None
+    """Key of what it is made from; the cache's own if it is not given."""
+    notes: Mapping[str, float] = field(default_factory=dict)
+    """Numbers that are kept beside it, for a study whose labels do not say all that is needed to
+    make it again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +47,8 @@ class PartCache:
     n_parts: float
     """A part is one of so many in the progress."""
     progress: Progress
+    engine: Engine | None = None
+    """Where parts are made; None: where it is fastest on this machine."""
 
     def part(
         self,
@@ -37,40 +57,62 @@ class PartCache:
         key: str | None = None,
         notes: Mapping[str, float] | None = None,
     ) -> dict[str, Any]:
-        """Return the part that is there, if its key is the same, or make it.
+        """Return the part that is there, if its key is the same, or make it in this process.
 
         Args:
-            label: the part's name, which is also its file's.
-            make: makes the part, and reports its progress.
-            key: the key of what it is made from; the cache's own if it is not given.
-            notes: numbers that are kept beside the part, for a study whose labels do not say
-                all that is needed to make it again.
+            label: here and below: as of `Part`.
         """
-        key, told = key or self.key, 0.0
+        return self._parts([Part(label, make, key, notes or {})], Serial())[0]
 
-        def tick(share: float) -> None:
-            nonlocal told
-            told += share
-            self.progress(share / self.n_parts, label)
+    def parts(self, parts: Sequence[Part], one_core: bool = False) -> list[dict[str, Any]]:
+        """Return parts, of which the engine makes those that are not there; each is kept as soon as
+        it is done.
 
-        part = self._load(label, key)
-        if part is None:
-            tick(0.0)
-            started_s = time.monotonic()
-            part = make(tick)
-            took_s = round(time.monotonic() - started_s, 2)
-            content = {"key": key, "seconds": took_s, "notes": dict(notes or {}), "part": part}
-            write_whole(self.folder / f"{label}.json", json.dumps(content))
-        tick(max(1.0 - told, 0.0))
-        return part
+        Args:
+            parts: none needs another.
+            one_core: whether making one keeps one core busy only; where no engine is chosen,
+                several processes then make them.
+        """
+        engine = self.engine or (Processes() if one_core and n_cores() > 1 else Serial())
+        return self._parts(parts, engine)
 
-    def _load(self, label: str, key: str) -> dict[str, Any] | None:
-        path = self.folder / f"{label}.json"
+    def _parts(self, parts: Sequence[Part], engine: Engine) -> list[dict[str, Any]]:
+        found = {k: kept for k, each in enumerate(parts) if (kept := self._load(each)) is not None}
+        for k in found:
+            self.progress(1 / self.n_parts, parts[k].label)
+        missing = [k for k in range(len(parts)) if k not in found]
+        told = dict.fromkeys(missing, 0.0)
+
+        def tick(number: int, share: float) -> None:
+            k = missing[number]
+            told[k] += share
+            self.progress(share / self.n_parts, parts[k].label)
+
+        if missing:
+            self.progress(0.0, parts[missing[0]].label)
+        for done in engine.run([parts[k].make for k in missing], tick):
+            k = missing[done.k]
+            found[k] = done.result
+            self._keep(parts[k], done)
+            tick(done.k, max(1.0 - told[k], 0.0))
+        return [found[k] for k in range(len(parts))]
+
+    def _keep(self, part: Part, done: Done) -> None:
+        content = {
+            "key": part.key or self.key,
+            "seconds": round(done.seconds, 2),
+            "notes": dict(part.notes),
+            "part": done.result,
+        }
+        write_whole(self.folder / f"{part.label}.json", json.dumps(content))
+
+    def _load(self, part: Part) -> dict[str, Any] | None:
+        path = self.folder / f"{part.label}.json"
         try:
             content: Mapping[str, Any] = json.loads(path.read_text())
         except (FileNotFoundError, json.JSONDecodeError):
             return None
-        if content.get("key") != key:
+        if content.get("key") != (part.key or self.key):
             return None
         os.utime(path, ns=(time.time_ns(), path.stat().st_mtime_ns))  # used, not made, now
         return content["part"]

@@ -7,6 +7,7 @@ from typing import Any, Protocol, TypeVar
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric
+from hrc_env.engines.engine import Engine
 from hrc_env.experiments.cache import PartCache, Progress, own_folder
 from hrc_env.experiments.report import Report
 from hrc_env.experiments.versions import key_of
@@ -67,10 +68,12 @@ def settings_of(experiment: Experiment[Any]) -> dict[str, Any]:
     return {"experiment": experiment.name, **experiment.settings()}
 
 
-def cache_of(experiment: Experiment[Any], parts: Path, progress: Progress) -> PartCache:
+def cache_of(
+    experiment: Experiment[Any], parts: Path, progress: Progress, engine: Engine | None = None
+) -> PartCache:
     """Return the cache of an experiment's parts in a folder."""
     key = key_of(settings_of(experiment), experiment.depends)
-    return PartCache(parts, key, experiment.n_parts, progress)
+    return PartCache(parts, key, experiment.n_parts, progress, engine)
 
 
 def run_experiment(
@@ -78,6 +81,7 @@ def run_experiment(
     out: Path,
     progress: Progress = lambda share, label: None,
     overwrite: bool = False,
+    engine: Engine | None = None,
 ) -> dict[str, Metric]:
     """Run an experiment, and write results.json, figures/, report.html and report.md.
 
@@ -87,6 +91,8 @@ def run_experiment(
             and versions finished there are not played again.
         progress: called with the growth of the share that is done, and its part.
         overwrite: delete the results of something else in the folder.
+        engine: where parts are played, which changes none of them; None: where it is fastest on
+            this machine.
 
     Returns:
         Every number by its name.
@@ -95,7 +101,7 @@ def run_experiment(
         ConfigError: the folder holds the results of something else.
     """
     own_folder(out, experiment.name, overwrite)
-    played = experiment.play(cache_of(experiment, out / "parts", progress))
+    played = experiment.play(cache_of(experiment, out / "parts", progress, engine))
     metrics = experiment.metrics(played)
     report = experiment.report(played, metrics, out / "figures")
     report = replace(report, quick=getattr(experiment, "quick_note", ""))

@@ -26,9 +26,10 @@ import numpy as np
 from hrc_env.core.errors import ConfigError, check_names, unknown
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Ints
+from hrc_env.engines.files import carried
 from hrc_env.evaluation.episodes import play_episodes
 from hrc_env.experiments.agents import AgentChoice, check_choice, described, maker_of
-from hrc_env.experiments.cache import PartCache, PartProgress
+from hrc_env.experiments.cache import Part, PartCache, PartProgress
 from hrc_env.experiments.columns import Column
 from hrc_env.experiments.report import Metrics, Report, Table, quick_words
 from hrc_env.experiments.rigs import DT_S
@@ -254,16 +255,22 @@ class Study:
 
     def play(self, cache: PartCache) -> Played:
         """Return the episodes of every row, each part of them from the cache or anew."""
-        return {name: self._play_row(name, cache) for name in self.rows}
-
-    def _play_row(self, name: str, cache: PartCache) -> list[dict[str, float]]:
-        row, found = self.rows[name], list[dict[str, float]]()
-        for first_seed, n_episodes in shards_of(row, self.first_seed):
-            made_of = {"row": row.settings(), "first_seed": first_seed, "n": n_episodes}
-            make = partial(play_shard, row, first_seed, n_episodes, self.threads)
-            label = f"{name.replace('/', '.')}.{first_seed}"
-            found += cache.part(label, make, key_of(made_of, self.depends))["episodes"]
+        rows = [(name, shard) for name, row in self.rows.items()
+                for shard in shards_of(row, self.first_seed)]  # fmt: skip
+        drawn = [self.rows[name].setup.level == "pixels" for name, _ in rows]
+        parts = [self._part(name, *shard) for name, shard in rows]
+        found: dict[str, list[dict[str, float]]] = {name: [] for name in self.rows}
+        for (name, _), part in zip(rows, cache.parts(parts, one_core=all(drawn)), strict=True):
+            found[name] += part["episodes"]
         return found
+
+    def _part(self, name: str, first_seed: int, n_episodes: int) -> Part:
+        row = self.rows[name]
+        made_of = {"row": row.settings(), "first_seed": first_seed, "n": n_episodes}
+        travels = replace(row, agent=carried(row.agent)) if isinstance(row.agent, str) else row
+        make = partial(play_shard, travels, first_seed, n_episodes, self.threads)
+        label = f"{name.replace('/', '.')}.{first_seed}"
+        return Part(label, make, key_of(made_of, self.depends))
 
     def metrics(self, played: Played) -> dict[str, Metric]:
         """Return every number, as "ROW.NAME"."""

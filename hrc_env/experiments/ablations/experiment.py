@@ -21,7 +21,7 @@ from hrc_env.experiments.ablations.questions.faults import CALIBRATION, LATENCY
 from hrc_env.experiments.ablations.questions.filters import ALGORITHM_1, FILTER, KINEMATICS
 from hrc_env.experiments.ablations.questions.rigs import CAMERAS, OCCLUSION, WORKERS
 from hrc_env.experiments.ablations.report import report
-from hrc_env.experiments.cache import PartCache, PartProgress
+from hrc_env.experiments.cache import Part, PartCache, PartProgress
 from hrc_env.experiments.report import Metrics, Report, quick_words
 from hrc_env.experiments.rigs import DT_S, WARM_UP_S
 from hrc_env.experiments.runner import at_least_one, changed
@@ -95,12 +95,16 @@ class Ablations:
             ((ablation.name, setting) for ablation in self.asked for setting in ablation.settings),
             key=lambda each: (each[1].scene, each[1].n_workers),
         )
+        made = cache.parts([self._part(*each) for each in order], one_core=True)
         played: dict[str, dict[str, Sums]] = {ablation.name: {} for ablation in self.asked}
-        for name, setting in order:
-            made_of = self.settings() | {"setting": asdict(setting) | {"words": ""}}
-            key, make = key_of(made_of, self.depends), partial(part, self, setting)
-            played[name][setting.name] = cache.part(f"{name}.{setting.name}", make, key)
+        for (name, setting), sums in zip(order, made, strict=True):
+            played[name][setting.name] = sums
         return played
+
+    def _part(self, name: str, setting: Setting) -> Part:
+        made_of = self.settings() | {"setting": asdict(setting) | {"words": ""}}
+        key = key_of(made_of, self.depends)
+        return Part(f"{name}.{setting.name}", partial(part, self, setting), key)
 
     def metrics(self, played: Played) -> dict[str, Metric]:
         """Return every number."""

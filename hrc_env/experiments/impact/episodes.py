@@ -5,7 +5,8 @@ Distances are between true capsules, as in the cost; directed speeds and contact
 """
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from functools import partial
 from typing import Any
 
@@ -18,6 +19,7 @@ from hrc_env.core.typing import Ints
 from hrc_env.evaluation.counts import ERRORS_M, GAPS_M, SPEEDS_MPS
 from hrc_env.evaluation.rollout import rollout
 from hrc_env.experiments.cache import PartProgress
+from hrc_env.experiments.setups import PerceptionSetup
 from hrc_env.experiments.stage import Endless, Rows, Stage
 from hrc_env.geometry import chains
 from hrc_env.geometry.distances import least_separation
@@ -65,6 +67,26 @@ def play(
         return sums_of(steps, infos, margin_m, env.first.config.ctrl_dt, env.first.task.achieved)
 
     return stage.play(seeds, play_block, tick)
+
+
+def play_row(
+    setup: PerceptionSetup,
+    made_with: Mapping[str, Any],
+    seeds: Sequence[int],
+    n_steps: int,
+    make_agent: MakeAgent,
+    margin_m: float,
+    tick: PartProgress,
+) -> Rows:
+    """Return what `play` does, in environments of its own.
+
+    Args:
+        setup: what the robot sees with.
+        made_with: other arguments of the environments.
+        seeds: here and below: as of `play`.
+    """
+    with closing(Stage(setup, setup.turns, made_with)) as stage:
+        return play(stage, seeds, n_steps, make_agent, margin_m, tick)
 
 
 def run(

@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
@@ -11,8 +10,8 @@ from typing import Any
 from hrc_env.core.errors import ConfigError, HRCError, check_names
 from hrc_env.core.results import Metric
 from hrc_env.experiments.agents import check_choice, labels_of
-from hrc_env.experiments.cache import PartCache
-from hrc_env.experiments.impact.episodes import play
+from hrc_env.experiments.cache import Part, PartCache
+from hrc_env.experiments.impact.episodes import play_row
 from hrc_env.experiments.impact.metrics import Played, metrics_of
 from hrc_env.experiments.impact.policies import (
     POLICIES,
@@ -37,7 +36,7 @@ from hrc_env.experiments.setups import (
     setup_called,
     usual_setups,
 )
-from hrc_env.experiments.stage import PEOPLE, Stage
+from hrc_env.experiments.stage import N_TOGETHER, PEOPLE
 from hrc_env.experiments.versions import key_of, source_digest
 from hrc_env.safety.shield import shield_called
 from hrc_env.tasks import DEFAULT
@@ -157,43 +156,55 @@ class Impact:
             learnt = {"task": self.task, "people": PEOPLE, "learning_steps": n}
             key = key_of(learnt, self.depends)
             ppo = trained(cache, n, checkpoint, key, self.task)
+        rows: list[tuple[str, str]] = []
+        parts: list[Part] = []
         for setup, policies in self.rows():
-            for control, those in self._by_control(policies).items():
-                made_with: dict[str, Any] = {"task": self.task, "shield": self.shield}
-                made_with |= {} if control is None else {"control": control}
-                with closing(Stage(setup, setup.turns, made_with)) as stage:
-                    for policy in those:
-                        key = self._key(setup, control, policy, ppo)
-                        table[policy.label, setup.name] = cache.part(
-                            f"{policy.label}.{setup.name}",
-                            partial(
-                                play,
-                                stage,
-                                self.seeds_at(setup.level),
-                                self.n_steps,
-                                maker(policy, checkpoint, self.trust),
-                                policy.margin_m,
-                            ),
-                            key,
-                        )
+            for policy in policies:
+                made = self._parts(setup, policy, checkpoint, ppo)
+                rows += [(policy.label, setup.name)] * len(made)
+                parts += made
+        for row, sums in zip(rows, cache.parts(parts), strict=True):
+            for name, values in sums.items():
+                table.setdefault(row, {}).setdefault(name, []).extend(values)
         check_walks(table)
         return table
 
-    def _by_control(self, policies: Sequence[Policy]) -> dict[str | None, list[Policy]]:
-        """Return policies by their control, which is an argument of the environment."""
-        found: dict[str | None, list[Policy]] = {}
-        for policy in policies:
-            found.setdefault(control_for(policy, self.control), []).append(policy)
-        return found
+    def _parts(
+        self, setup: PerceptionSetup, policy: Policy, checkpoint: Path, ppo: str
+    ) -> list[Part]:
+        """Return the parts of a row, of at most `N_TOGETHER` episodes each."""
+        control = control_for(policy, self.control)
+        made_with: dict[str, Any] = {"task": self.task, "shield": self.shield}
+        made_with |= {} if control is None else {"control": control}
+        seeds, name = self.seeds_at(setup.level), f"{policy.label}.{setup.name}"
+        shards = [seeds[k : k + N_TOGETHER] for k in range(0, len(seeds), N_TOGETHER)]
+        return [
+            Part(
+                name if len(shards) == 1 else f"{name}.{shard[0]}",
+                partial(
+                    play_row, setup, made_with, shard, self.n_steps,
+                    maker(policy, checkpoint, self.trust), policy.margin_m,
+                ),
+                self._key(setup, control, policy, ppo, shard),
+            )
+            for shard in shards
+        ]  # fmt: skip
 
-    def _key(self, setup: PerceptionSetup, control: str | None, policy: Policy, ppo: str) -> str:
-        """Return the key of a row."""
+    def _key(
+        self,
+        setup: PerceptionSetup,
+        control: str | None,
+        policy: Policy,
+        ppo: str,
+        seeds: Sequence[int],
+    ) -> str:
+        """Return the key of a part of a row."""
         shared = {
             "people": PEOPLE,
             "task": self.task,
             **({} if self.shield is None else {"shield": self.shield}),
             **({} if control is None else {"control": control}),
-            "seeds": self.seeds_at(setup.level),
+            "seeds": list(seeds),
             "n_steps": self.n_steps,
             "setup": asdict(setup),
             "estimator": source_digest(estimator_called(setup.estimator).make),

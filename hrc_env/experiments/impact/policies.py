@@ -8,11 +8,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from hrc_env.agents.env_info import env_info
+from hrc_env.agents.env_info import Agent, env_info
 from hrc_env.agents.experts import expert
 from hrc_env.agents.registry import control_of, make_agent
 from hrc_env.agents.scripted import Yielding
 from hrc_env.core.machine import n_cores
+from hrc_env.engines.files import carried
 from hrc_env.experiments.agents import described, label_of
 from hrc_env.experiments.cache import PartCache, PartProgress
 from hrc_env.experiments.impact.episodes import SLOW_M, STOP_M, MakeAgent
@@ -78,17 +79,20 @@ def control_for(policy: Policy, control: str | None) -> str | None:
 
 
 def maker(policy: Policy, checkpoint: Path, trust: bool = False) -> MakeAgent:
-    """What makes the agent for a robot."""
+    """What makes the agent for a robot, on any machine."""
+    if policy.name == SLOWED:
+        return partial(_slowed, policy.margin_m)
+    name = str(checkpoint) if policy.name == PPO else policy.name
+    return partial(_agent, carried(name), trust)
 
-    def make(part: Simulation) -> Any:
-        known = env_info(part)
-        if policy.name == SLOWED:
-            limits_m = STOP_M + policy.margin_m, SLOW_M + policy.margin_m
-            return expert(known, Yielding(*limits_m))
-        name = str(checkpoint) if policy.name == PPO else policy.name
-        return make_agent(name, known, trust=trust)
 
-    return make
+def _slowed(margin_m: float, part: Simulation) -> Agent:
+    """Return the scripted agent that keeps so much more than by itself."""
+    return expert(env_info(part), Yielding(STOP_M + margin_m, SLOW_M + margin_m))
+
+
+def _agent(name: str, trust: bool, part: Simulation) -> Agent:
+    return make_agent(name, env_info(part), trust=trust)
 
 
 def trained(cache: PartCache, n_steps: int, path: Path, key: str, task: str = DEFAULT) -> str:

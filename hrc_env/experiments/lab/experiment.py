@@ -13,7 +13,7 @@ from hrc_env.config import HRCConfig
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.evaluation.intervals import paired, quantile_of, quantile_over, ratio_over
-from hrc_env.experiments.cache import PartCache, PartProgress
+from hrc_env.experiments.cache import Part, PartCache, PartProgress
 from hrc_env.experiments.lab.motions import MOTIONS, play
 from hrc_env.experiments.lab.report import ALL, COLUMNS, ESTIMATORS, WARM_UP, report
 from hrc_env.experiments.lab.sides import MISSED_SHARE, away_from_cameras, missed_by_camera
@@ -77,11 +77,11 @@ class Lab:
 
     def play(self, cache: PartCache) -> Films:
         """Return every film."""
-        return {
-            (motion, seed): cache.part(f"{motion}.{seed}", partial(film, self, motion, seed))
-            for seed in self.seeds
-            for motion in MOTIONS
-        }
+        asked = [(motion, seed) for seed in self.seeds for motion in MOTIONS]
+        parts = [
+            Part(f"{motion}.{seed}", partial(film, self, motion, seed)) for motion, seed in asked
+        ]
+        return dict(zip(asked, cache.parts(parts, one_core=True), strict=True))
 
     def metrics(self, played: Films) -> dict[str, Metric]:
         """Return every number of results.json."""

@@ -16,6 +16,7 @@ from hrc_env.core.results import Metric
 from hrc_env.core.skeleton import JOINT
 from hrc_env.core.typing import Floats
 from hrc_env.evaluation.intervals import mean_over, paired, rmse_of, rmse_over
+from hrc_env.experiments.cache import Part as CachedPart
 from hrc_env.experiments.cache import PartCache, PartProgress
 from hrc_env.experiments.recording import Recording, record, replay
 from hrc_env.experiments.report import Metrics, Report, quick_words
@@ -92,14 +93,18 @@ class Site:
 
     def play(self, cache: PartCache) -> "Played":
         """Return all walks, filmed once for everybody; some again with everybody's own crops."""
-        films = {seed: cache.part(f"film.{seed}", partial(film, self, seed)) for seed in self.seeds}
-        closed: dict[str, dict[int, Part]] = {}
-        for name, row in product(self.estimators, ROWS):
-            for seed in self.seeds[: self.n_closed]:
-                make = partial(closed_loop, self, name, row, seed)
-                part = cache.part(f"closed.{name}.{row}.{seed}", make)
-                closed.setdefault(f"{name}.{row}", {})[seed] = part
-        return films, closed
+        films = [CachedPart(f"film.{seed}", partial(film, self, seed)) for seed in self.seeds]
+        rows = [*product(self.estimators, ROWS, self.seeds[: self.n_closed])]
+        parts = [
+            CachedPart(f"closed.{name}.{row}.{seed}", partial(closed_loop, self, name, row, seed))
+            for name, row, seed in rows
+        ]
+        made = cache.parts([*films, *parts], one_core=True)
+        closed: dict[str, dict[int, Mapping[str, Any]]] = {}
+        for (name, row, seed), part in zip(rows, made[len(films) :], strict=True):
+            closed.setdefault(f"{name}.{row}", {})[seed] = part
+        filmed = dict(zip(self.seeds, made[: len(films)], strict=True))
+        return filmed, closed
 
     def metrics(self, played: "Played") -> dict[str, Metric]:
         """Return every number of results.json."""

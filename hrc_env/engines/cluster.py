@@ -1,0 +1,216 @@
+"""A cluster of Ray: one that is there, or one on this machine; and what its machines lack."""
+
+import os
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from hrc_env import __version__
+from hrc_env.core.errors import ConfigError, HRCError, MissingExtraError
+from hrc_env.core.machine import CORES, n_cores
+from hrc_env.engines.registrations import Registrations, pack
+
+try:
+    import ray
+    from ray.exceptions import AuthenticationError, RayError, RayTaskError
+    from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
+except ModuleNotFoundError as missing:
+    raise MissingExtraError(
+        f"The engine ray needs {missing.name}, which is not installed. Type: "
+        'pip install "hrc_env[ray]"  (in a checkout: pip install -c constraints.txt -e ".[ray]")'
+    ) from missing
+
+START_S = "300"
+"""How long a machine under load may take to start Ray [s]; its own limit is 30."""
+ANSWER_S = 10.0
+"""How long a cluster may take to answer at all [s]."""
+STORE_BYTES = 500_000_000
+"""Shared memory of a cluster on this machine."""
+Note = Callable[[str], None]
+"""Told a sentence that somebody should read."""
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """A machine of a cluster."""
+
+    id: str
+    address: str
+    n_cores: float
+
+
+@contextmanager
+def connected(
+    address: str | None, note: Note = print, dashboard: bool = False
+) -> Iterator[list[Machine]]:
+    """Be connected to a cluster; yield its machines.
+
+    Args:
+        address: of a cluster: "auto" on one of its machines, "HOST:6379", or "ray://HOST:10001";
+            None: one is started on this machine, and stopped at the end.
+        note: told what is worth knowing of it.
+        dashboard: whether a cluster on this machine has Ray's dashboard.
+
+    Raises:
+        ConfigError: there is no cluster, it is of another Ray or Python, or wants a token.
+    """
+    os.environ.setdefault("RAY_raylet_start_wait_time_s", START_S)
+    os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
+    is_ours = not ray.is_initialized()
+    if is_ours:
+        options: dict[str, Any] = {"log_to_driver": False, "logging_level": "ERROR"}
+        if address is None:
+            options |= {"num_cpus": n_cores(), "include_dashboard": dashboard}
+            options["object_store_memory"] = STORE_BYTES
+        if address is not None and address != "auto":
+            _check_answers(address)
+        try:
+            context = ray.init(address=address or "local", **options)
+        except AuthenticationError as error:
+            raise _refused(address, error, "it wants a token: RAY_AUTH_TOKEN=...") from error
+        except (ConnectionError, RuntimeError, ValueError, RayError) as error:
+            raise _refused(address, error, _remedy(str(error))) from error
+        if dashboard and (url := getattr(context, "dashboard_url", "")):
+            note(f"Ray's dashboard: http://{url}")
+    try:
+        yield list_machines()
+    finally:
+        if is_ours:
+            ray.shutdown()
+
+
+def _check_answers(address: str) -> None:
+    """Raise `ConfigError` if nothing listens there; Ray itself would try for minutes."""
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    if not (host and port.isdigit()):
+        raise ConfigError(f"--address must be auto, HOST:PORT or ray://HOST:PORT, got {address!r}.")
+    try:
+        socket.create_connection((host, int(port)), timeout=ANSWER_S).close()
+    except (OSError, OverflowError) as error:
+        raise _refused(address, error, _remedy("")) from error
+
+
+def _refused(address: str | None, error: Exception, remedy: str) -> ConfigError:
+    """Return the error of a cluster that cannot be used."""
+    where = "on this machine" if address is None else f"at {address!r}"
+    said = " ".join(str(error).split())[:400]
+    return ConfigError(f"No cluster of Ray {where}: {remedy}. ({said})")
+
+
+def _remedy(said: str) -> str:
+    """Return what helps against what Ray says."""
+    if "ersion mismatch" in said:
+        return "all machines must have the same versions of Ray and of Python"
+    if "oken" in said:
+        return "it wants a token: RAY_AUTH_TOKEN=..., or a file named by RAY_AUTH_TOKEN_PATH"
+    return (
+        "start one with `ray start --head`, join it from other machines with "
+        "`ray start --address=HOST:6379`, and name it as auto, HOST:6379 or ray://HOST:10001"
+    )
+
+
+def list_machines() -> list[Machine]:
+    """Return the machines of the cluster that live and have cores."""
+    return [
+        Machine(each["NodeID"], each["NodeManagerAddress"], each["Resources"]["CPU"])
+        for each in ray.nodes()
+        if each["Alive"] and each["Resources"].get("CPU", 0) > 0
+    ]
+
+
+def share_of(workers: int, machines: list[Machine], note: Note = print) -> float:
+    """Return the share of a core that each worker counts as, so that all find a place.
+
+    Args:
+        workers: how many there will be.
+        machines: of the cluster.
+        note: told if there are more workers than cores.
+    """
+    n = sum(each.n_cores for each in machines)
+    if workers <= n:
+        return 1.0
+    note(f"{workers} workers on {n:g} cores: they take turns, and nothing is faster.")
+    least = min(each.n_cores / -(-workers * each.n_cores // n) for each in machines)
+    return int(least * 1000) / 1000
+
+
+def check_machines(
+    machines: list[Machine], works: Callable[[], None] | None = None, note: Note = print
+) -> None:
+    """Raise `ConfigError` for a machine that has no package, another version of it, or that lacks
+    what `works` needs, which is called on each; it is waited for while kernels are compiled.
+
+    Args:
+        machines: of the cluster.
+        works: raises an `HRCError` for what is missing.
+        note: told what is waited for.
+    """
+    registrations = pack()
+    asked = {
+        _on(each).remote(registrations, works): each for each in machines
+    }  # one task a machine
+    waiting = [*asked]
+    while waiting:
+        done, waiting = ray.wait(waiting, timeout=20)
+        if not done:
+            where = ", ".join(sorted({asked[each].address for each in waiting}))
+            note(f"Waiting for {where}: kernels are compiled there, once. {SETUP}")
+        for each in done:
+            _check_answer(each, asked[each])
+
+
+SETUP = "`python -m hrc_env setup` on each machine, or in their image, does so before."
+
+
+def _on(machine: Machine) -> Any:
+    """Return the task that describes a machine, to be run there."""
+    where = NodeAffinitySchedulingStrategy(machine.id, soft=False)
+    return ray.remote(_describe).options(scheduling_strategy=where, num_cpus=0, max_retries=1)
+
+
+def _describe(registrations: Registrations, works: Callable[[], None] | None) -> str:
+    """Return the version of this package on this machine."""
+    registrations.unpack()
+    if works is not None:
+        works()
+    return __version__
+
+
+def _check_answer(answer: Any, machine: Machine) -> None:
+    """Raise `ConfigError` for a machine that cannot work."""
+    try:
+        theirs = ray.get(answer)
+    except RayError as error:
+        raise ConfigError(f"Machine {machine.address} cannot work: {reason_of(error)}") from error
+    if theirs != __version__:
+        raise ConfigError(
+            f"Machine {machine.address} has hrc_env {theirs}, and this one {__version__}: all must "
+            "have the same."
+        )
+
+
+def reason_of(error: BaseException) -> str:
+    """Return in words what a worker died of, or raised."""
+    cause: Any = getattr(error, "cause", None) if isinstance(error, RayTaskError) else None
+    found = cause if isinstance(cause, BaseException) else error
+    while isinstance(found, RayTaskError) and isinstance(found.cause, BaseException):
+        found = found.cause
+    said = str(found).strip()
+    missing = "No module named "
+    if missing in said:
+        name = said.rpartition(missing)[2].split("'")[1]
+        package = name.partition(".")[0]
+        remedy = (
+            f'pip install "hrc_env[ray]=={__version__}" there, in the same Python'
+            if package == "hrc_env"
+            else "install it there; or name a Python file with --import, which travels"
+        )
+        return f"it cannot import {name!r}: {remedy}."
+    return said if isinstance(found, HRCError) else f"{type(found).__name__}: {said[-600:]}"
+
+
+def one_core() -> None:
+    """Let this process, a worker's, compute on one core."""
+    os.environ[CORES] = "1"

@@ -1,0 +1,116 @@
+"""Engines on this machine."""
+
+import multiprocessing
+import os
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from hrc_env.core.errors import HRCError
+from hrc_env.core.machine import CORES, n_cores
+from hrc_env.engines.engine import Call, Done
+
+ATTEMPTS = 3
+"""A call in whose process something dies is computed again, so often in all."""
+SINGLE = {CORES: "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+"""Environment variables of a process that computes on one core."""
+
+
+@dataclass(frozen=True, slots=True)
+class Serial:
+    """One call after the other, in this process."""
+
+    is_parallel = False
+
+    def run(self, calls: Sequence[Call], tick: Callable[[int, float], None]) -> Iterator[Done]:
+        """As of `Engine`."""
+        for k, call in enumerate(calls):
+            started_s = time.monotonic()
+            result = call(partial(tick, k))
+            yield Done(k, result, time.monotonic() - started_s)
+
+
+@dataclass(frozen=True, slots=True)
+class Processes:
+    """Processes on this machine, each of which computes on one core."""
+
+    workers: int | None = None
+    """How many; None: as many as there are cores."""
+    is_parallel = True
+
+    def run(self, calls: Sequence[Call], tick: Callable[[int, float], None]) -> Iterator[Done]:
+        """As of `Engine`; what a process has not finished that died is computed again."""
+        left, deaths = dict(enumerate(calls)), 0
+        while left:
+            try:
+                for done in self._run_once(left):
+                    del left[done.k]
+                    tick(done.k, 1.0)
+                    yield done
+            except BrokenProcessPool as error:
+                deaths += 1
+                if deaths == ATTEMPTS:
+                    raise HRCError(
+                        f"Worker processes died {deaths} times before call "
+                        f"{min(left) + 1} of {len(calls)} was done: killed, or out of memory. "
+                        "What is finished is kept; fewer --workers need less memory."
+                    ) from error
+
+    def _run_once(self, calls: dict[int, Call]) -> Iterator[Done]:
+        """Compute calls with one pool; yield those that are done before a process dies."""
+        n = min(self.workers or n_cores(), len(calls))
+        context = multiprocessing.get_context("spawn")
+        with _variables(SINGLE), ProcessPoolExecutor(n, mp_context=context) as pool:
+            running: dict[Future[Any], int] = {
+                pool.submit(call_pickled, pickled(call)): k for k, call in calls.items()
+            }
+            try:
+                while running:
+                    finished, _ = wait(running, return_when=FIRST_COMPLETED)
+                    for future in finished:
+                        k = running.pop(future)
+                        yield Done(k, *future.result())
+            finally:
+                pool.shutdown(wait=False, cancel_futures=True)
+
+
+def call_pickled(call: bytes) -> tuple[Any, float]:
+    """Return what a pickled call returns, and how long it took [s]."""
+    import cloudpickle
+
+    import hrc_env  # noqa: F401  # adopts the registrations of the process that started this one
+
+    started_s = time.monotonic()
+    result = cloudpickle.loads(call)(ignore)
+    return result, time.monotonic() - started_s
+
+
+def ignore(share: float) -> None:
+    """Tell nobody of progress."""
+
+
+def pickled(call: Call) -> bytes:
+    """Pickle a call, of a script or a notebook by value."""
+    import cloudpickle  # takes time to import
+
+    return cloudpickle.dumps(call)
+
+
+@contextmanager
+def _variables(values: dict[str, str]) -> Iterator[None]:
+    """Set environment variables for processes that are started inside."""
+    before = {name: os.environ.get(name) for name in values}
+    os.environ.update(values)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value

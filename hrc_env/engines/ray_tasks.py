@@ -1,0 +1,69 @@
+"""The engine ray: every call is a task of a cluster."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from hrc_env.core.errors import HRCError
+from hrc_env.engines import cluster  # first: it says how Ray is installed where it is missing
+from hrc_env.engines.engine import Call, Done
+from hrc_env.engines.local import ATTEMPTS, call_pickled, pickled
+from hrc_env.engines.registrations import Registrations, pack
+
+import ray  # isort: skip
+from ray.exceptions import RayError, RayTaskError  # isort: skip
+
+
+@dataclass(frozen=True, slots=True)
+class RayTasks:
+    """Tasks of one core each; Ray starts those again whose worker or machine died."""
+
+    workers: int | None = None
+    """Calls that are computed at once; None: as many as the cluster has cores."""
+    address: str | None = None
+    """Of the cluster, as of `cluster.connected`."""
+    note: Callable[[str], None] = print
+    """Told what is worth knowing of it."""
+    is_parallel = True
+
+    def run(self, calls: Sequence[Call], tick: Callable[[int, float], None]) -> Iterator[Done]:
+        """As of `Engine`."""
+        with cluster.connected(self.address, self.note) as machines:
+            cluster.check_machines(machines, None, self.note)
+            n = self.workers or int(sum(each.n_cores for each in machines)) or 1
+            share = cluster.share_of(n, machines, self.note)
+            task = ray.remote(_compute).options(num_cpus=share, max_retries=ATTEMPTS - 1)
+            registered, waiting = ray.put(pack()), [*enumerate(calls)]
+            running: dict[Any, int] = {}
+            while waiting or running:
+                while waiting and len(running) < n:
+                    k, call = waiting.pop(0)
+                    running[task.remote(registered, pickled(call))] = k
+                finished, _ = ray.wait([*running])
+                for each in finished:
+                    k = running.pop(each)
+                    result, seconds = _got(each, k)
+                    tick(k, 1.0)
+                    yield Done(k, result, seconds)
+
+
+def _compute(registrations: Registrations, call: bytes) -> tuple[Any, float]:
+    """Return what a pickled call returns, and how long it took [s]."""
+    cluster.one_core()
+    registrations.unpack()
+    return call_pickled(call)
+
+
+def _got(answer: Any, k: int) -> tuple[Any, float]:
+    """Return the result of a call; what it raised of ours is raised again."""
+    try:
+        return ray.get(answer)
+    except RayTaskError as error:
+        if isinstance(error.cause, HRCError):
+            raise error.cause from error
+        raise HRCError(f"A worker of Ray failed: {cluster.reason_of(error)}") from error
+    except RayError as error:
+        raise HRCError(
+            f"The worker of call {k + 1} died {ATTEMPTS} times: {cluster.reason_of(error)} What is "
+            "finished is kept."
+        ) from error

@@ -1,0 +1,63 @@
+"""Registrations of this process on their way to machines that share no files with it."""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from hrc_env.core import snapshot
+from hrc_env.core.errors import HRCError
+from hrc_env.core.registry import share
+from hrc_env.core.snapshot import Snapshot
+from hrc_env.engines.files import carried_to
+from hrc_env.registration import IMPORT, adopt, import_files
+
+
+@dataclass(frozen=True, slots=True)
+class Registrations:
+    """What was registered, and the Python files that do so, whole."""
+
+    registered: Snapshot
+    sources: Mapping[str, bytes]
+    """Contents of files by their paths here."""
+    imported: tuple[str, ...] = ()
+    """Those of `--import` and of the environment variable `IMPORT`."""
+
+    def unpack(self) -> None:
+        """Make them known in this process.
+
+        Files that are not here, or otherwise, are written to a folder of this user, and imported
+        from there.
+
+        Raises:
+            HRCError: a file cannot be imported here, as it imports what is not installed.
+        """
+        here = {path: str(carried_to(path, text)) for path, text in self.sources.items()}
+        for path in self.imported:
+            try:
+                import_files(here[path])
+            except Exception as error:  # of somebody's file
+                raise HRCError(
+                    f"{path} cannot be imported on this worker ({type(error).__name__}: {error}). "
+                    "Only the file itself travels: what it imports must be installed there."
+                ) from error
+        entries = {
+            kind: {
+                name: replace(each, file=here.get(each.file, each.file))
+                for name, each in found.items()
+            }
+            for kind, found in self.registered.entries.items()
+        }
+        files = tuple(here.get(path, path) for path in self.registered.files)
+        snapshot.inherit(Snapshot(entries, files))
+        adopt()
+
+
+def pack() -> Registrations:
+    """Return the registrations of this process."""
+    share()
+    registered = snapshot.current()
+    imported = tuple(each for each in os.environ.get(IMPORT, "").split(os.pathsep) if each)
+    imported = tuple(str(Path(each).resolve()) for each in imported)
+    paths = dict.fromkeys((*imported, *registered.files))
+    return Registrations(registered, {path: Path(path).read_bytes() for path in paths}, imported)
