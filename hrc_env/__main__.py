@@ -37,6 +37,11 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
         "hrc_env.cli.play", "Play",
         "Play episodes of an environment with an agent; say how they went.",
     ),
+    "evaluate": (
+        "hrc_env.cli.evaluate", "Evaluate",
+        "Score an agent over whole episodes with fixed seeds: goals, contacts, cost, on one "
+        "machine or on a cluster.",
+    ),
     "train": (
         "hrc_env.cli.train", "Train",
         "Train a policy, evaluate it on fixed seeds, draw its curve, film it.",

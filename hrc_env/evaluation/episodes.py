@@ -12,7 +12,11 @@ import numpy as np
 
 from hrc_env.agents.env_info import Agent, env_info
 from hrc_env.core.errors import ConfigError, whole
+from hrc_env.core.machine import n_cores
 from hrc_env.core.results import Metric
+from hrc_env.engines.engine import Engine, Tick, engine_called
+from hrc_env.engines.files import carried
+from hrc_env.engines.local import Processes, Serial
 from hrc_env.env import HRCEnv
 from hrc_env.evaluation.intervals import goals_over, mean_over, rate_of
 from hrc_env.evaluation.rollout import Transition, rollout
@@ -23,6 +27,8 @@ from hrc_env.vector.member import info_of
 
 EVALUATION_SEED = 1_000_000
 """First seed of evaluations, far from those that training uses."""
+TOGETHER, DRAWN_TOGETHER = 64, 4
+"""Episodes of a shard, and at level `pixels`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +59,9 @@ def evaluate(
     make: str | Callable[[Any], Agent],
     n_episodes: int = 64,
     seed: int = EVALUATION_SEED,
+    *,
+    engine: str | Engine | None = None,
+    tick: Callable[[float], None] = lambda share: None,
     **kwargs: Any,
 ) -> Score:
     """Return the score of an agent over whole episodes with fixed seeds.
@@ -62,22 +71,70 @@ def evaluate(
             file or "module:function".
         n_episodes: how many episodes; the k-th begins with `reset(seed=seed + k)`.
         seed: of the first.
+        engine: where they are played, which changes nothing: "serial", "processes", or "ray" (the
+            cluster that this process is connected to, or one on this machine); None: what is
+            fastest on this machine.
+        tick: called with the share that was done since the last call.
         kwargs: the environment's, as of `HRCVectorEnv`: task, perception, estimator, ...
 
     Raises:
-        ConfigError: no such agent, or no episode.
+        ConfigError: no such agent, engine, or no episode.
     """
     whole("n_episodes", n_episodes, 1, 10**9)
+    if isinstance(engine, str):
+        engine = engine_called(engine)
     if isinstance(make, str):
         registry = import_module("hrc_env.agents.registry")  # here: it reads learners' files
         registry.check_agent(make)
-        make = partial(registry.make_agent, make)
+        make = partial(registry.make_agent, carried(make))
     if not callable(make):
         raise ConfigError(
             "evaluate wants a function that makes an agent for an EnvInfo, or an agent as "
             f"make_agent takes it, got {type(make).__name__}."
         )
-    return summarize(play_episodes(make, n_episodes, seed, **kwargs))
+    return summarize(play_shards(make, n_episodes, seed, engine, tick, **kwargs))
+
+
+def play_shards(
+    make: Callable[[Any], Agent],
+    n_episodes: int,
+    seed: int = EVALUATION_SEED,
+    engine: Engine | None = None,
+    tick: Callable[[float], None] = lambda share: None,
+    **kwargs: Any,
+) -> list[dict[str, float]]:
+    """Return what `play_episodes` does, of shards that an engine plays.
+
+    Shards are the same for every engine, so that a network of an agent, whose sums may depend on
+    how many observations it is given at once, gives the same actions.
+
+    Args:
+        make: builds the agent for an `EnvInfo`.
+        n_episodes: their number.
+        seed: of the first.
+        engine: None: several processes at level pixels, else this one.
+        tick: called with the share that was done since the last call.
+        kwargs: as of `play_episodes`.
+    """
+    is_drawn = kwargs.get("perception") == "pixels"
+    together = DRAWN_TOGETHER if is_drawn else TOGETHER
+    firsts = range(0, n_episodes, together)
+    sizes = [min(together, n_episodes - first) for first in firsts]
+    calls = [
+        partial(_play_shard, make, n, seed + first, kwargs)
+        for first, n in zip(firsts, sizes, strict=True)
+    ]
+    engine = engine or (Processes() if is_drawn and min(len(calls), n_cores()) > 1 else Serial())
+    shards: list[list[dict[str, float]]] = [[] for _ in calls]
+    for done in engine.run(calls, lambda k, share: tick(share * sizes[k] / n_episodes)):
+        shards[done.k] = done.result
+    return [each for shard in shards for each in shard]
+
+
+def _play_shard(
+    make: Callable[[Any], Agent], n: int, seed: int, kwargs: dict[str, Any], tick: Tick
+) -> list[dict[str, float]]:
+    return play_episodes(make, n, seed, tick, **kwargs)
 
 
 def play_episodes(
