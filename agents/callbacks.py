@@ -27,6 +27,8 @@ from .ppo_lagrangian import PPOLagrangian
 
 RECENT_EPISODES = 64
 """Number of finished episodes over which curves average."""
+SAVE_EVERY_S = 60.0
+"""Between checkpoints [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,71 +108,101 @@ LEAST_STEPS = 2048
 """Environment steps."""
 
 
+class TrainingLog:
+    """The curve of a run, its checkpoints, and what is shown of it while it goes on.
+
+    Args:
+        learner: its logger writes for TensorBoard.
+        folder: of the run.
+        facts: what the checkpoint was made for.
+        curve: of what was learnt before; it grows.
+        meter: shows the progress.
+    """
+
+    def __init__(
+        self, learner: Any, folder: Path, facts: dict[str, Any], curve: Curve, meter: Meter
+    ) -> None:
+        self.learner, self.folder, self.facts = learner, folder, facts
+        self.curve, self.meter = curve, meter
+        self.recent: deque[dict[str, float]] = deque(maxlen=RECENT_EPISODES)
+        self.before_s = curve[-1]["wall_s"] if curve else 0.0
+        self.begin()
+
+    def begin(self) -> None:
+        """Count time from now on."""
+        self.started_s = self.saved_s = time.monotonic()
+
+    def note(self, weights: dict[str, float]) -> None:
+        """Add a point to the curve, if an episode has ended; show it.
+
+        Args:
+            weights: what was in force, by name.
+        """
+        n_steps, note = self.learner.num_timesteps, ""
+        if self.recent:
+            score = asdict(summarize(list(self.recent)))
+            wall_s = self.before_s + time.monotonic() - self.started_s
+            self.curve.append({"steps": float(n_steps), "wall_s": wall_s, **weights, **score})
+            for name, value in score.items():
+                self.learner.logger.record(f"episode/{name}", value)
+            contacts = score["contacts_per_episode"]
+            note = f"attempts {score['success_rate']:.0%}, is_success {score['is_success']:.0%}"
+            note += f", contacts {contacts:.2f}"
+        self.meter.show(n_steps, note=note)
+
+    @property
+    def is_due(self) -> bool:
+        """Whether the last checkpoint is older than `SAVE_EVERY_S`."""
+        return time.monotonic() - self.saved_s > SAVE_EVERY_S
+
+    def save(self) -> None:
+        """Write checkpoint and curve."""
+        self.saved_s = time.monotonic()
+        checkpoints.save(self.learner, self.folder / "policy.zip", self.facts)
+        write_whole(self.folder / "curve.json", json.dumps(self.curve, indent=1))
+
+
 class TrainingMonitor(BaseCallback):
-    """Keeps the curve, shows the progress, saves a checkpoint every minute and at the end.
+    """Keeps the log of a run of Stable-Baselines3: a checkpoint every minute and at the end.
 
     Where it is interrupted it ends the training at the next step, as if that had been the last.
     """
 
-    def __init__(
-        self,
-        folder: Path,
-        facts: dict[str, Any],
-        curve: Curve,
-        care: Curriculum,
-        interrupt: Interrupt,
-        meter: Meter,
-    ) -> None:
+    def __init__(self, log: TrainingLog, care: Curriculum, interrupt: Interrupt) -> None:
         super().__init__()
-        self.folder, self.facts, self.curve, self.care = folder, facts, curve, care
-        self.interrupt, self.meter = interrupt, meter
-        self.recent: deque[dict[str, float]] = deque(maxlen=RECENT_EPISODES)
-        self.before_s = curve[-1]["wall_s"] if curve else 0.0
+        self.log, self.care, self.interrupt = log, care, interrupt
 
     def _on_training_start(self) -> None:
-        self.started_s = self.saved_s = time.monotonic()
+        self.log.begin()
         self.interrupt.listen()
 
     def _on_step(self) -> bool:
-        self.recent.extend(each["episode"] for each in self.locals["infos"] if "episode" in each)
+        ended = (each["episode"] for each in self.locals["infos"] if "episode" in each)
+        self.log.recent.extend(ended)
         return not self.interrupt.asked
 
     def _on_rollout_end(self) -> None:
         if isinstance(self.model, OffPolicyAlgorithm):
-            noted = self.curve[-1]["steps"] if self.curve else 0
+            noted = self.log.curve[-1]["steps"] if self.log.curve else 0
             if self.num_timesteps - noted < LEAST_STEPS:
                 return
         self._note()
-        if time.monotonic() - self.saved_s > 60:
-            self._save()
+        if self.log.is_due:
+            self.log.save()
 
     def _on_training_end(self) -> None:
         self._note()
-        self._save()
+        self.log.save()
 
     def _note(self) -> None:
-        note = ""
-        if self.recent:
-            score = asdict(summarize(list(self.recent)))
-            wall_s = self.before_s + time.monotonic() - self.started_s
-            share = self.care.ramp.at(self.num_timesteps)
-            point = {"steps": float(self.num_timesteps), "wall_s": wall_s, "safety_share": share}
-            point["proximity"] = self.care.weight
-            if isinstance(self.model, PPOLagrangian):
-                held = self.model.multiplier
-                point |= {"cost": held.cost, "limit": held.limit, "multiplier": held.value}
-            self.curve.append(point | score)
-            for name, value in score.items():
-                self.logger.record(f"episode/{name}", value)
-            contacts = score["contacts_per_episode"]
-            note = f"attempts {score['success_rate']:.0%}, is_success {score['is_success']:.0%}"
-            note += f", contacts {contacts:.2f}"
-        self.meter.show(self.num_timesteps, note=note)
-
-    def _save(self) -> None:
-        self.saved_s = time.monotonic()
-        checkpoints.save(self.model, self.folder / "policy.zip", self.facts)  # type: ignore[arg-type]
-        write_whole(self.folder / "curve.json", json.dumps(self.curve, indent=1))
+        weights = {
+            "safety_share": self.care.ramp.at(self.num_timesteps),
+            "proximity": self.care.weight,
+        }
+        if isinstance(self.model, PPOLagrangian):
+            held = self.model.multiplier
+            weights |= {"cost": held.cost, "limit": held.limit, "multiplier": held.value}
+        self.log.note(weights)
 
 
 PANELS = {

@@ -32,11 +32,20 @@ class TrainingRequest(EnvironmentArguments):
     timesteps: int | None = None
     """Environment steps in all (with --resume: counted from the start); 0: it only imitates."""
     num_envs: int = 64
-    """Environments that step together."""
+    """Environments that step together; with --engine ray, in each worker."""
+    engine: str = "sb3"
+    """sb3: Stable-Baselines3, on this machine; ray: RLlib's PPO, whose workers step environments on
+    the machines of a cluster (docs/many_machines.md). Its policies are the same files."""
+    workers: int | None = None
+    """With --engine ray: processes that step environments; one for each core if not given."""
+    address: str | None = None
+    """With --engine ray: the cluster, as auto, HOST:6379 or ray://HOST:10001; one on this machine
+    if not given."""
     seed: int = 0
     """Seed of the environments and of the learner."""
     perception: str = "keypoints"
-    """What the robot learns on: keypoints (camera emulator), truth or none."""
+    """What the robot learns on: keypoints (camera emulator), truth or none; with --engine ray also
+    pixels, which wants many machines."""
     proximity: float | None = None
     """Weight of closeness to the estimated body in the reward; 0 trains without it. 2 if not given,
     but 0 with a limit, which then is all that keeps the robot away."""

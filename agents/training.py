@@ -3,6 +3,7 @@
 import json
 import shlex
 import time
+import warnings
 from contextlib import closing
 from dataclasses import asdict, fields, replace
 from functools import partial
@@ -27,6 +28,7 @@ from .callbacks import (
     Curve,
     Interrupt,
     Ramp,
+    TrainingLog,
     TrainingMonitor,
     plot_curve,
 )
@@ -49,7 +51,9 @@ SETTINGS: dict[str, tuple[Any, Any]] = {
 """By algorithm: of who begins with nothing, and of who begins with what an expert does."""
 DEMONSTRATION_SEED = 2_000_000
 """First seed of what is shown, far from those of learning and of evaluations."""
-ONLY_OF_A_RUN = ("out", "timesteps", "threads", "episodes", "film", "resume")
+ONLY_OF_A_RUN = (
+    "out", "timesteps", "threads", "episodes", "film", "resume", "engine", "workers", "address",
+)  # fmt: skip
 """Arguments that a resumed run does not take from the run that it goes on with."""
 SHARES = {"success_rate": ", of attempts", "is_success": ", of episodes"}
 """The whole of which two numbers of a score are shares."""
@@ -101,9 +105,7 @@ def judge(arguments: TrainingRequest, folder: Path, console: Console) -> Score:
     checkpoint = folder / "policy.zip"
     console.print(f"Evaluating {arguments.episodes} episodes on fixed seeds ...")
     score = evaluate(
-        lambda env_info: checkpoints.load(checkpoint, env_info),
-        arguments.episodes,
-        **arguments.keywords(),
+        partial(checkpoints.load, checkpoint), arguments.episodes, **arguments.keywords()
     )
     for name, value in asdict(score).items():
         console.print(f"  {name + SHARES.get(name, ''):28s} {value:.3f}", highlight=False)
@@ -173,8 +175,7 @@ def train(arguments: Run, folder: Path, console: Console) -> tuple[Curve, dict[s
     """
     kwargs = arguments.keywords()
     settings = SETTINGS[arguments.algorithm][arguments.demonstrations > 0]
-    vector = HRCVecEnv(arguments.num_envs, stagger=True, seed=arguments.seed, **kwargs)
-    with closing(vector) as env, Interrupt() as interrupt:
+    with closing(_vector(arguments)) as env, Interrupt() as interrupt:
         config = asdict(env.env.config)
         record = {"arguments": asdict(arguments), "config": config, **provenance()}
         _write(folder / "run.json", record)
@@ -183,16 +184,16 @@ def train(arguments: Run, folder: Path, console: Console) -> tuple[Curve, dict[s
         if arguments.resume is None and arguments.demonstrations:
             _clone(learner, arguments, env, console)
         facts = {"environment": kwargs, "settings": asdict(settings)}
-        ramp, total = Ramp(arguments.ramp), arguments.timesteps
+        total = arguments.timesteps
         with Meter(console, "training", total, "steps", learner.num_timesteps) as meter:
-            care = Curriculum(ramp, env)
-            monitor = TrainingMonitor(folder, facts, curve, care, interrupt, meter)
-            learner.learn(
-                total - learner.num_timesteps,
-                callback=[care, monitor],
-                reset_num_timesteps=arguments.resume is None,
-                tb_log_name=arguments.algorithm,
-            )
+            log = TrainingLog(learner, folder, facts, curve, meter)
+            if arguments.engine == "ray":
+                from .rllib import training as rllib  # here: Ray is an extra
+
+                whole = env.env.config.reward.proximity
+                rllib.learn(arguments, settings, whole, log, interrupt, console)
+            else:
+                _learn(arguments, env, log, interrupt)
     if not interrupt.asked:
         passed_s, worked_s = time.monotonic() - started_s, time.process_time() - busy_s
         return curve, {"training_s": passed_s, "processor_s": worked_s}
@@ -201,6 +202,28 @@ def train(arguments: Run, folder: Path, console: Console) -> tuple[Curve, dict[s
     said = f"Stopped at {learner.num_timesteps:,} steps, which are saved. Go on with: "
     console.print(said + shlex.join(words), markup=False, highlight=False, soft_wrap=True)
     return curve, None
+
+
+def _vector(arguments: Run) -> HRCVecEnv:
+    """The environments of this process: those that are learnt in, or with another engine, whose
+    workers have their own, those in which the agent that is imitated is seen."""
+    keywords, n = arguments.keywords(), arguments.num_envs
+    if arguments.engine == "ray":
+        n = n if arguments.demonstrations else 1
+        if arguments.perception == "pixels":
+            keywords["perception"] = "keypoints"  # of the same spaces
+    return HRCVecEnv(n, stagger=True, seed=arguments.seed, **keywords)
+
+
+def _learn(arguments: Run, env: HRCVecEnv, log: TrainingLog, interrupt: Interrupt) -> None:
+    """Learn by Stable-Baselines3, on what was learnt before."""
+    learner, care = log.learner, Curriculum(Ramp(arguments.ramp), env)
+    learner.learn(
+        arguments.timesteps - learner.num_timesteps,
+        callback=[care, TrainingMonitor(log, care, interrupt)],
+        reset_num_timesteps=arguments.resume is None,
+        tb_log_name=arguments.algorithm,
+    )
 
 
 def _learner(arguments: Run, folder: Path, env: HRCVecEnv, settings: Any) -> tuple[Any, Curve]:
@@ -213,7 +236,9 @@ def _learner(arguments: Run, folder: Path, env: HRCVecEnv, settings: Any) -> tup
         if limit is not None:
             length = env.env.max_episode_steps
             kind = partial(PPOLagrangian, limit=limit, episode_steps=length)
-        return ppo.make_learner(env, settings, seed, log, kind), []
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", ".*mini-batch size")  # of workers' rollouts
+            return ppo.make_learner(env, settings, seed, log, kind), []
     learner = checkpoints.resume(folder / "policy.zip", env, folder / "tensorboard")
     env.seed(arguments.seed + learner.num_timesteps)  # other episodes than the first ones
     path = folder / "curve.json"

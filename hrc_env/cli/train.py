@@ -8,6 +8,7 @@ from hrc_env.cli.checks import at_least, writable_folder
 from hrc_env.core.errors import ConfigError, check_names
 
 ALGORITHMS = ("ppo", "ppo_lagrangian", "sac")
+ENGINES = ("sb3", "ray")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,15 +37,32 @@ class Train(TrainingRequest):
                 f"--her judges what a replay buffer holds by other goals, and {mine.algorithm} has "
                 "no such buffer: --algorithm sac --her True, or leave it out."
             )
-        if self.perception == "pixels":
-            raise ConfigError(
-                "--perception pixels is too slow to learn on: learn on keypoints, which emulates "
-                "it, and play the policy on pixels."
-            )
+        self._check_engine(mine.algorithm)
         from hrc_env.agents import training  # here: it imports the learner
 
         writable_folder(self.resume or self.out, "--out" if self.resume is None else "--resume")
         return training.run(self)
+
+    def _check_engine(self, algorithm: str) -> None:
+        """Raise `ConfigError` for what the engine cannot do."""
+        check_names("engine", [self.engine], ENGINES)
+        if self.engine == "ray":
+            if algorithm != "ppo":
+                raise ConfigError(
+                    f"--engine ray learns by ppo, and {algorithm} by Stable-Baselines3 only: "
+                    "--algorithm ppo, or --engine sb3."
+                )
+            if self.workers is not None:
+                at_least("--workers", self.workers, 1)
+            return
+        for name in ("workers", "address"):
+            if getattr(self, name) is not None:
+                raise ConfigError(f"--{name} goes with --engine ray.")
+        if self.perception == "pixels":
+            raise ConfigError(
+                "--perception pixels is too slow to learn on with one machine: learn on keypoints, "
+                "which emulates it, and play the policy on pixels; or --engine ray."
+            )
 
 
 def _check_limit(limit: float | None, algorithm: str) -> None:

@@ -1,0 +1,1 @@
+"""PPO by RLlib: many processes and machines step environments, one learns."""

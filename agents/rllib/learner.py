@@ -1,0 +1,288 @@
+"""RLlib's PPO round the network of Stable-Baselines3."""
+
+import logging
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import ray
+import torch
+from gymnasium.wrappers.utils import RunningMeanStd
+from ray.rllib.algorithms.ppo import PPOConfig
+from ray.rllib.callbacks.callbacks import RLlibCallback
+from ray.rllib.core import DEFAULT_MODULE_ID
+from ray.rllib.core.rl_module.rl_module import RLModuleSpec
+from ray.rllib.env.env_runner import EnvRunner
+from ray.tune import register_env
+from stable_baselines3 import PPO
+from stable_baselines3.common.vec_env import VecNormalize
+
+from hrc_env.engines import cluster
+from hrc_env.engines.registrations import Registrations
+
+from ..learner_settings import PPOSettings
+from .policy_module import PolicyModule
+from .runner_env import RunnerEnv, make_envs
+
+ENVIRONMENT = "hrc_env"
+"""What RLlib calls our environments."""
+_LOGGER = logging.getLogger("ray.rllib")
+"""Of workers that fail; its lines would come between those of the progress."""
+SEEDS_OF_RUN = 100_000
+"""Numbers of runners that a run may have, between the seeds of runs."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunnerSettings:
+    """The processes that step environments."""
+
+    keywords: Mapping[str, Any]
+    """Of the environment, as of `gymnasium.make`, with the task."""
+    n: int
+    """How many."""
+    num_envs: int
+    """Environments of each."""
+    seed: int
+    """Of environments and of exploration."""
+    share: float
+    """Of a core that each counts as, where there are fewer cores."""
+    registrations: Registrations
+    """What is made known to them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sampled:
+    """What an update has learnt from."""
+
+    n_steps: int
+    """Environment steps."""
+    episodes: list[dict[str, float]]
+    """Statistics of those that ended."""
+    n_runners: int
+    """Runners that live."""
+    n_restarts: int
+    """Runners that died and were started anew, so far."""
+    sampling_s: float
+    learning_s: float
+
+    def facts(self) -> dict[str, float]:
+        """Return what TensorBoard and Ray's metrics show, by name."""
+        passed_s = max(self.sampling_s + self.learning_s, 1e-9)
+        return {
+            "steps_per_s": self.n_steps / passed_s,
+            "sampling_s": self.sampling_s,
+            "learning_s": self.learning_s,
+            "workers": self.n_runners,
+            "restarts": self.n_restarts,
+        }
+
+
+class RLlibPPO:
+    """Runners that step environments, and a learner on this machine.
+
+    Args:
+        policy: its network is learnt on; it keeps what it knows until `pull`.
+        settings: of PPO; a rollout has `n_steps` of every environment of every runner.
+        runners: who step environments.
+    """
+
+    def __init__(self, policy: PPO, settings: PPOSettings, runners: RunnerSettings) -> None:
+        self.policy, self.runners = policy, runners
+        self._errors = LastError()
+        self._told = ray.remote(Told).options(num_cpus=0).remote()
+        self._handlers = _LOGGER.handlers
+        _LOGGER.handlers = [self._errors]
+        n, num_envs = runners.n, runners.num_envs
+        register_env(ENVIRONMENT, make_runner_env)
+        made = settings.keywords()
+        config = (
+            PPOConfig()
+            .environment(
+                ENVIRONMENT,
+                env_config={
+                    "keywords": dict(runners.keywords),
+                    "gamma": settings.gamma,
+                    "registrations": runners.registrations,
+                    "errors": self._told,
+                },
+            )
+            .env_runners(
+                num_env_runners=n,
+                num_envs_per_env_runner=num_envs,
+                num_cpus_per_env_runner=runners.share,  # type: ignore[arg-type]  # a share is one, too
+                gym_env_vectorize_mode="vector_entry_point",
+                rollout_fragment_length=settings.n_steps,
+                create_env_on_local_worker=False,
+            )
+            .learners(num_learners=0)
+            .training(
+                train_batch_size_per_learner=n * num_envs * settings.n_steps,
+                minibatch_size=min(settings.batch_size, n * num_envs * settings.n_steps),
+                num_epochs=settings.n_epochs,
+                lr=settings.learning_rate,
+                gamma=settings.gamma,
+                lambda_=settings.gae_lambda,
+                clip_param=settings.clip_range,
+                vf_clip_param=float("inf"),
+                vf_loss_coeff=policy.vf_coef,
+                entropy_coeff=policy.ent_coef,
+                use_kl_loss=False,
+                grad_clip=policy.max_grad_norm,
+                grad_clip_by="global_norm",
+            )
+            .rl_module(
+                rl_module_spec=RLModuleSpec(
+                    PolicyModule, model_config={"policy": made["policy_kwargs"]}
+                )
+            )
+            .fault_tolerance(
+                restart_failed_env_runners=True, delay_between_env_runner_restarts_s=1.0
+            )
+            .callbacks(GoOn)
+            .debugging(seed=runners.seed * SEEDS_OF_RUN, log_level="ERROR")
+            .reporting(min_time_s_per_iteration=None)
+        )
+        # Actions are learnt as they are given to the environment, but for the clipping.
+        config.normalize_actions, config.clip_actions = False, True
+        self.algorithm: Any = config.build_algo()  # whose annotations are looser than what it does
+        self.push()
+
+    def push(self) -> None:
+        """Give learner and runners what the policy knows: network, Adam's moments, the scale of
+        rewards."""
+        known = self.policy.policy
+        weights, moments = known.state_dict(), known.optimizer.state_dict()
+
+        def take(learner: Any) -> None:
+            learner.module[DEFAULT_MODULE_ID].policy.load_state_dict(weights)
+            if moments["state"]:
+                learner.get_optimizer(DEFAULT_MODULE_ID).load_state_dict(moments)
+
+        self.algorithm.learner_group.foreach_learner(take)
+        self.algorithm.env_runner_group.foreach_env_runner(
+            lambda runner: runner.module.policy.load_state_dict(weights), local_env_runner=False
+        )  # RLlib's own `sync_weights` does nothing before the first update
+        ours, scale = self._normalised.ret_rms, RunningMeanStd()
+        scale.mean, scale.var, scale.count = ours.mean, ours.var, ours.count
+        self._each(lambda envs: envs.take_rewards_state(scale))
+
+    def pull(self) -> None:
+        """Give the policy what was learnt, and the scale of rewards."""
+
+        def give(learner: Any) -> Any:
+            module = learner.module[DEFAULT_MODULE_ID].policy
+            return module.state_dict(), learner.get_optimizer(DEFAULT_MODULE_ID).state_dict()
+
+        weights, moments = next(iter(self.algorithm.learner_group.foreach_learner(give))).get()
+        self.policy.policy.load_state_dict(weights)
+        self.policy.policy.optimizer.load_state_dict(moments)
+        for scale, _ in self._each(lambda envs: envs.rewards_state())[:1]:
+            ours = self._normalised.ret_rms  # each runner has its own, of as many steps
+            ours.mean, ours.var, ours.count = scale.mean, scale.var, scale.count
+
+    @property
+    def _normalised(self) -> VecNormalize:
+        found = self.policy.get_vec_normalize_env()
+        assert found is not None  # as `ppo.make_learner` makes it
+        return found
+
+    def _each(self, do: Callable[[RunnerEnv], Any]) -> list[Any]:
+        """Return what a function of each living runner's environments returns."""
+        return self.algorithm.env_runner_group.foreach_env_runner(
+            lambda runner: do(envs_of(runner)), local_env_runner=False
+        )
+
+    def update(self, proximity: float) -> Sampled:
+        """Step all environments `n_steps` times and learn from that.
+
+        Args:
+            proximity: weight of the term of that name.
+        """
+        self._each(lambda envs: envs.weigh_proximity(proximity))
+        result = self.algorithm.train()
+        finished = self._each(lambda envs: envs.take_finished())
+        kept, timers = result.get("fault_tolerance", {}), result.get("timers", {})
+        return Sampled(
+            n_steps=int(result.get("env_runners", {}).get("num_env_steps_sampled", 0)),
+            episodes=[each for some in finished for each in some],
+            n_runners=int(kept.get("num_healthy_workers", self.runners.n)),
+            n_restarts=int(kept.get("num_remote_worker_restarts", 0)),
+            sampling_s=float(timers.get("env_runner_sampling_timer", 0.0)),
+            learning_s=float(timers.get("learner_update_timer", 0.0)),
+        )
+
+    def last_error(self) -> str:
+        """Return the last error of a worker: its own, or what RLlib says of one that died."""
+        return ray.get(self._told.last.remote()) or self._errors.said or "none was said"
+
+    def close(self) -> None:
+        """Stop the runners."""
+        self.algorithm.stop()
+        _LOGGER.handlers = self._handlers
+
+
+def make_runner_env(context: Mapping[str, Any]) -> RunnerEnv:
+    """Return the environments of a runner; RLlib adds how many."""
+    cluster.one_core()
+    torch.set_num_threads(1)
+    context["registrations"].unpack()
+    envs, errors = make_envs(context["num_envs"], context["keywords"]), context["errors"]
+    return RunnerEnv(envs, context["gamma"], lambda said: ray.get(errors.tell.remote(said)))
+
+
+def envs_of(runner: EnvRunner) -> RunnerEnv:
+    """Return a runner's environments without RLlib's wrappers."""
+    env: Any = runner.env  # type: ignore[attr-defined]  # of every runner of ours
+    while not isinstance(env, RunnerEnv):
+        env = env.env
+    return env
+
+
+class GoOn(RLlibCallback):
+    """Gives runners that were started anew the scale and the weight of rewards of one that
+    lives."""
+
+    def on_env_runners_recreated(
+        self, *, env_runner_group: Any, env_runner_indices: list[int], **kwargs: Any
+    ) -> None:
+        """Do so before they step."""
+        living = set(env_runner_group.healthy_env_runner_ids()) - set(env_runner_indices)
+        if not living:
+            return
+        (known,) = env_runner_group.foreach_env_runner(
+            lambda runner: envs_of(runner).rewards_state(),
+            local_env_runner=False, remote_worker_ids=[min(living)],
+        )  # fmt: skip
+        env_runner_group.foreach_env_runner(
+            lambda runner: envs_of(runner).take_rewards_state(*known),
+            local_env_runner=False, remote_worker_ids=env_runner_indices,
+        )  # fmt: skip
+
+
+class Told:
+    """What workers say before they fail; an actor of Ray."""
+
+    def __init__(self) -> None:
+        self.said = ""
+
+    def tell(self, said: str) -> None:
+        """Keep it."""
+        self.said = said
+
+    def last(self) -> str:
+        """Return the last of it; "" if nothing was said."""
+        return self.said
+
+
+class LastError(logging.Handler):
+    """Keeps the last error of a log."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.ERROR)
+        self.said = ""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep it."""
+        said = [line.strip() for line in record.getMessage().splitlines() if line.strip()]
+        if said and said[-1] != "NoneType: None":  # of `logger.exception` without one
+            self.said = said[-1][:400]

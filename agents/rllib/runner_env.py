@@ -1,0 +1,142 @@
+"""The environments of one of RLlib's runners: in all phases of an episode, rewards scaled."""
+
+from collections.abc import Callable, Mapping
+from contextlib import closing
+from dataclasses import replace
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import VectorEnv, VectorWrapper
+from gymnasium.wrappers.utils import RunningMeanStd
+from numpy.typing import NDArray
+
+from hrc_env.core.typing import Floats
+from hrc_env.evaluation.sums import EpisodeSums
+from hrc_env.simulation import Simulation
+from hrc_env.vector.env import HRCVectorEnv
+from hrc_env.vector.member import info_of
+
+LARGEST_REWARD = 10.0
+"""Scaled rewards are clipped to this, as by Stable-Baselines3's `VecNormalize`."""
+
+
+def make_envs(num_envs: int, keywords: Mapping[str, Any]) -> VectorEnv[Any, Any, Any]:
+    """Return environments that step together, on one thread.
+
+    Args:
+        num_envs: how many.
+        keywords: as of `gymnasium.make`, with the task. At level `pixels`, which has no batched
+            form, they are stepped one after the other.
+    """
+    known = {name: value for name, value in keywords.items() if name != "num_threads"}
+    if known.get("perception") != "pixels":
+        return HRCVectorEnv(num_envs, num_threads=1, **known)
+    task = known.pop("task")
+    id_ = task if isinstance(task, str) else task.id
+    return gymnasium.make_vec(id_, num_envs, vectorization_mode="sync", **known)
+
+
+def try_environment(keywords: Mapping[str, Any]) -> None:
+    """Make an environment and step it; an `HRCError` says what this machine lacks."""
+    with closing(make_envs(1, keywords)) as env:
+        env.reset(seed=0)
+        env.step(env.action_space.sample())
+
+
+class RunnerEnv(VectorWrapper[Any, Any, Any, Any, Any]):
+    """What PPO learns in: `env` with scaled rewards, without infos; finished episodes are kept.
+
+    A running estimate of the discounted return's variance scales rewards, as `VecNormalize` of
+    Stable-Baselines3 does. First episodes end early at random times, so that a short rollout sees
+    all phases of an episode, where `env` is an `HRCVectorEnv`.
+
+    Args:
+        env: starts environments anew in the step after an episode's end.
+        gamma: discount per step.
+        tell: told an error of a step in words, before it is raised.
+    """
+
+    def __init__(
+        self,
+        env: VectorEnv[Any, Any, Any],
+        gamma: float,
+        tell: Callable[[str], object] = lambda said: None,
+    ) -> None:
+        super().__init__(env)
+        self.gamma, self.tell = gamma, tell
+        self.scale = RunningMeanStd()
+        """Of discounted returns so far."""
+        self.proximity: float | None = None
+        """The weight that was set last; None: the configuration's."""
+        self.finished: list[dict[str, float]] = []
+        """Statistics of episodes since `take_finished`."""
+        self._sums = EpisodeSums(self.num_envs)
+        self._returns: Floats = np.zeros(self.num_envs)
+        self._ended = np.zeros(self.num_envs, np.bool_)
+
+    @property
+    def simulation(self) -> Simulation:
+        """Of the environments; of several, the first."""
+        if isinstance(self.env, HRCVectorEnv):
+            return self.env.simulation
+        return self.env.get_attr("simulation")[0]  # type: ignore[attr-defined]  # SyncVectorEnv
+
+    def reset(self, *, seed: Any = None, options: Any = None) -> tuple[Any, dict[str, Any]]:
+        """Start all episodes.
+
+        Args:
+            seed: of the runner, with which its environments count up: k has seed * num_envs + k.
+            options: none.
+        """
+        first_seed = None if seed is None else seed * self.num_envs
+        if isinstance(self.env, HRCVectorEnv):
+            limit, phases = self.env.max_episode_steps, np.random.default_rng(first_seed)
+            options = {"elapsed_steps": phases.integers(limit, size=self.num_envs)}
+        observation, _ = self.env.reset(seed=first_seed, options=options)
+        self._ended[:], self._returns[:] = False, 0.0
+        self._sums.begin(np.arange(self.num_envs))
+        return observation, {}
+
+    def step(self, actions: NDArray[Any]) -> tuple[Any, Floats, Any, Any, dict[str, Any]]:
+        """Step all environments; those that had ended start anew instead."""
+        try:
+            observation, reward, terminated, truncated, infos = self.env.step(actions)
+        except Exception as error:  # also of somebody's task or estimator
+            self.tell(f"{type(error).__name__}: {error}")
+            raise
+        self._sums.add(reward, infos)
+        self._sums.begin(np.flatnonzero(self._ended))
+        self._returns = np.where(self._ended, 0.0, self._returns * self.gamma + reward)
+        if not self._ended.all():  # their step was a reset
+            self.scale.update(self._returns[~self._ended])
+        scaled = np.clip(reward / np.sqrt(self.scale.var + 1e-8), -LARGEST_REWARD, LARGEST_REWARD)
+        self._ended = np.logical_or(terminated, truncated)
+        for b in np.flatnonzero(self._ended).tolist():
+            task, dt_s = self.simulation.task, self.simulation.config.ctrl_dt
+            self.finished.append(self._sums.summarize(b, info_of(infos, b), task, dt_s))
+        return observation, scaled, terminated, truncated, {}
+
+    def take_finished(self) -> list[dict[str, float]]:
+        """Return the statistics of episodes that ended since the last call."""
+        taken, self.finished = self.finished, []
+        return taken
+
+    def weigh_proximity(self, weight: float) -> None:
+        """Set the weight of closeness to the estimated body from the next step on."""
+        self.proximity = weight
+        weights = replace(self.simulation.config.reward, proximity=weight)
+        if isinstance(self.env, HRCVectorEnv):
+            self.env.set_reward(weights)
+        else:
+            self.env.call("set_reward", weights)  # type: ignore[attr-defined]  # SyncVectorEnv
+
+    def rewards_state(self) -> tuple[RunningMeanStd, float | None]:
+        """Return the scale of rewards, and the weight that was set."""
+        return self.scale, self.proximity
+
+    def take_rewards_state(self, scale: RunningMeanStd, proximity: float | None = None) -> None:
+        """Go on with the scale of rewards, and the weight if it was set, of another runner."""
+        self.scale = scale
+        if proximity is not None:
+            self.weigh_proximity(proximity)

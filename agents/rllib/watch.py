@@ -1,0 +1,43 @@
+"""Metrics of a run for Ray's dashboard and Grafana: gauges and counters."""
+
+from ray.util.metrics import Counter, Gauge
+
+from .learner import Sampled
+
+
+class Watch:
+    """Ray's metrics of a run, which machines export as `ray_hrc_env_...`.
+
+    Args:
+        task: the environment's id, which they are tagged with.
+    """
+
+    def __init__(self, task: str) -> None:
+        tags = {"tag_keys": ("task",)}
+        self._rates = {
+            "steps_per_s": Gauge("hrc_env_steps_per_s", "Environment steps a second.", **tags),
+            "workers": Gauge("hrc_env_workers", "Workers that step environments.", **tags),
+        }
+        self._sums = {
+            "steps": Counter("hrc_env_steps", "Environment steps.", **tags),
+            "episodes": Counter("hrc_env_episodes", "Episodes that ended.", **tags),
+            "contacts": Counter("hrc_env_contacts", "Contacts with the true worker.", **tags),
+            "goals": Counter("hrc_env_goals", "Goals reached.", **tags),
+        }
+        for each in (*self._rates.values(), *self._sums.values()):
+            each.set_default_tags({"task": task})
+
+    def show(self, sampled: Sampled) -> None:
+        """Take what an update has learnt from."""
+        facts = sampled.facts()
+        for name, gauge in self._rates.items():
+            gauge.set(facts[name])
+        sums = {
+            "steps": float(sampled.n_steps),
+            "episodes": float(len(sampled.episodes)),
+            "contacts": sum(each["contacts"] for each in sampled.episodes),
+            "goals": sum(each["goals_reached"] for each in sampled.episodes),
+        }
+        for name, value in sums.items():
+            if value > 0:
+                self._sums[name].inc(value)
