@@ -1,0 +1,242 @@
+"""What workers of RLlib are worth: python -m benchmarks.cluster [--quick] [--out DIR].
+
+One and two workers take turns on this machine: how long 64 of their environments take for a
+rollout of 64 steps, and how long PPO learns from it. From one worker follows a model: workers step
+at the same time, and one core learns from what all have seen; so n workers take the time of one
+rollout and n times the time of learning from it. It is held against two workers, and says what
+more of them would give.
+"""
+
+import sys
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import cloudpickle
+import numpy as np
+
+from benchmarks.command import Arguments
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.machine import n_cores
+from hrc_env.core.results import Metric, over
+from hrc_env.experiments.cache import PartCache, PartProgress
+from hrc_env.experiments.columns import Column
+from hrc_env.experiments.report import Metrics, Report, Table
+from hrc_env.experiments.runner import run_experiment
+
+KEYWORDS: Mapping[str, Any] = {"task": "HRCReach-v0", "perception": "keypoints"}
+NUM_ENVS = 64
+MEASURED = (1, 2)
+MODELLED = (10, 100, 1000)
+"""Workers."""
+GBIT_BYTES_S = 125e6
+"""What a network of 1 Gbit/s carries [bytes/s]."""
+Played = Mapping[str, list[float]]
+
+TABLE = Table(
+    name="cluster",
+    title="Steps a second of training, by workers of one core each",
+    rows={
+        "1": ("1", "measured"),
+        "2": ("2", "measured"),
+        "2_predicted": ("2", "predicted from one"),
+        **{str(n): (f"{n:,}", "model") for n in MODELLED},
+    },
+    heads=("workers", ""),
+    columns=(
+        Column("sampling_s.{}", "sampling [s]", digits=2),
+        Column("learning_s.{}", "learning [s]", digits=2),
+        Column("steps_per_s.{}", "steps/s", digits=0),
+        Column("speedup.{}", "times one worker", digits=2),
+    ),
+    note="{n[update_s.1]} rounds in turns of 64 environments, 64 steps each, a worker. One step of "
+    "64 environments on one thread takes {step_ms} ms. A step is {bytes} bytes, so that 1 Gbit/s "
+    "carries the steps of {carried} workers.",
+    numbers={
+        "step_ms": Column("step_s", digits=1, scale=1e3, plain=True),
+        "bytes": Column("bytes_per_step", digits=0, plain=True),
+        "carried": Column("workers_per_gbit", digits=0, plain=True),
+        "most": Column("steps_per_s.most", digits=0, plain=True),
+        "half": Column("workers_of_half", digits=0, plain=True),
+        "two": Column("speedup.2", digits=2),
+        "predicted": Column("speedup.2_predicted", digits=2),
+    },
+)
+
+
+@dataclass(frozen=True, slots=True)
+class ClusterBench:
+    """The bench, and how much is run."""
+
+    name = "cluster"
+    depends = ("env", "tracker", "emulator", "motion", "agents")
+    n_rounds: int = 12
+    """In which one and two workers have a turn."""
+
+    @property
+    def seeds(self) -> Sequence[int]:
+        """Of the workers."""
+        return (0,)
+
+    @property
+    def n_parts(self) -> int:
+        """All of it."""
+        return 1
+
+    @property
+    def quick_note(self) -> str:
+        """The warning of a short run; "" of others."""
+        is_short = self.n_rounds < ClusterBench().n_rounds
+        return f"Quick run, {self.n_rounds} rounds: too few to compare." if is_short else ""
+
+    def settings(self) -> dict[str, Any]:
+        """Return what its numbers depend on."""
+        return {**asdict(self), "environment": dict(KEYWORDS), "num_envs": NUM_ENVS}
+
+    def play(self, cache: PartCache) -> Played:
+        """Return the times of every round."""
+        return cache.part("times", self._times)
+
+    def _times(self, tick: PartProgress) -> Played:
+        with _workers() as learners:
+            found: dict[str, list[float]] = {}
+            for k in range(-1, self.n_rounds):  # the first one warms up
+                for n, learner in learners.items():
+                    sampled_s, updated_s, n_steps, n_bytes = _turn(learner)
+                    if k >= 0:
+                        found.setdefault(f"sample_s.{n}", []).append(sampled_s)
+                        found.setdefault(f"update_s.{n}", []).append(updated_s)
+                        found.setdefault(f"steps.{n}", []).append(n_steps)
+                        found.setdefault("bytes_per_step", []).append(n_bytes / n_steps)
+                found.setdefault("step_s", []).append(_step_s())
+                tick(1 / (self.n_rounds + 1))
+        return found
+
+    def metrics(self, played: Played) -> dict[str, Metric]:
+        """Return every number."""
+        return metrics_of(played)
+
+    def shown_tables(self) -> tuple[Table, ...]:
+        """Return the table of the documentation."""
+        return (TABLE,)
+
+    def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
+        """Return the table."""
+        about = (__doc__ or "").partition("\n")[2].strip()
+        return Report("Workers of RLlib", about, [TABLE.markdown(metrics)], "95 % intervals")
+
+
+@contextmanager
+def _workers() -> Iterator[dict[int, Any]]:
+    """Yield learners with one worker and with two, which wait while others have their turn."""
+    from hrc_env.agents import ppo  # here and below: learner and Ray take seconds to import
+    from hrc_env.agents.learner_settings import PPOSettings
+    from hrc_env.agents.rllib.learner import RLlibPPO, RunnerSettings
+    from hrc_env.engines import cluster
+    from hrc_env.engines.registrations import pack
+    from hrc_env.sb3 import HRCVecEnv
+
+    if n_cores() < max(MEASURED):
+        raise ConfigError(f"Two workers want two cores, and this machine has {n_cores()}.")
+    with cluster.connected(None):
+        made: dict[int, Any] = {}
+        try:
+            for n in MEASURED:
+                policy = ppo.make_learner(HRCVecEnv(1, **KEYWORDS), PPOSettings(), 0)
+                share = 1 / len(MEASURED)  # all are there at once, and one of them works
+                runners = RunnerSettings(KEYWORDS, n, NUM_ENVS, 0, share, pack())
+                made[n] = RLlibPPO(policy, PPOSettings(), runners)
+            yield made
+        finally:
+            for each in made.values():
+                each.close()
+
+
+def _turn(learner: Any) -> tuple[float, float, int, int]:
+    """Return the times of a rollout alone, and of a rollout with learning [s]; its steps, and the
+    bytes of one worker's rollout times the workers."""
+    group = learner.algorithm.env_runner_group
+    started_s = time.monotonic()
+    samples = group.foreach_env_runner(lambda runner: runner.sample(), local_env_runner=False)
+    sampled_s = time.monotonic() - started_s
+    n_bytes = len(cloudpickle.dumps(samples))
+    started_s = time.monotonic()
+    sampled = learner.update(1.0)
+    return sampled_s, time.monotonic() - started_s, sampled.n_steps, n_bytes
+
+
+def _step_s(n_steps: int = 50) -> float:
+    """Return the time of a step of the environments alone, on one thread [s]."""
+    from hrc_env.agents.rllib.runner_env import make_envs
+
+    with closing(make_envs(NUM_ENVS, KEYWORDS)) as env:
+        env.reset(seed=0)
+        action = np.zeros(env.action_space.shape, np.float32)  # type: ignore[arg-type]
+        started_s = time.monotonic()
+        for _ in range(n_steps):
+            env.step(action)
+        return (time.monotonic() - started_s) / n_steps
+
+
+def metrics_of(played: Played) -> dict[str, Metric]:
+    """Return every number, of the rounds' times and of the model."""
+    found = {name: over(played[name], "s") for name in ("step_s", "update_s.1", "update_s.2")}
+    found["bytes_per_step"] = over(played["bytes_per_step"], "byte")
+    times = {name: np.array(values) for name, values in played.items()}
+    rate = {n: times[f"steps.{n}"] / times[f"update_s.{n}"] for n in MEASURED}
+    for n in MEASURED:
+        learning_s = times[f"update_s.{n}"] - times[f"sample_s.{n}"]
+        found[f"sampling_s.{n}"] = over(times[f"sample_s.{n}"].tolist(), "s")
+        found[f"learning_s.{n}"] = over(learning_s.tolist(), "s")
+        found[f"steps_per_s.{n}"] = over(rate[n].tolist(), "1/s")
+        found[f"speedup.{n}"] = over((rate[n] / rate[1]).tolist(), "ratio")
+    n_steps = float(np.median(times["steps.1"]))
+    sampling_s, learning_s = found["sampling_s.1"].value, found["learning_s.1"].value
+    own = n_steps / (sampling_s + learning_s)
+    for name, n in {"2_predicted": 2, **{str(n): n for n in MODELLED}}.items():
+        modelled = n * n_steps / (sampling_s + n * learning_s)
+        found[f"sampling_s.{name}"] = _exact(sampling_s, "s")
+        found[f"learning_s.{name}"] = _exact(n * learning_s, "s")
+        found[f"steps_per_s.{name}"] = _exact(modelled, "1/s")
+        found[f"speedup.{name}"] = _exact(modelled / own, "ratio")
+    found["steps_per_s.most"] = _exact(n_steps / learning_s, "1/s")
+    found["workers_of_half"] = _exact(sampling_s / learning_s, "1")
+    sent = found["bytes_per_step"].value * own
+    found["workers_per_gbit"] = _exact(GBIT_BYTES_S / sent, "1")
+    return found
+
+
+def _exact(value: float, unit: str) -> Metric:
+    """Return a number of the model, which has no interval."""
+    return Metric(value, value, value, unit, 1)
+
+
+def make_study(quick: bool = False) -> ClusterBench:
+    """Return the bench."""
+    return ClusterBench(2) if quick else ClusterBench()
+
+
+def main() -> int:
+    """Run it as the process's words ask; return the exit status."""
+    import tyro
+
+    from hrc_env.cli.entry import show_errors
+    from hrc_env.cli.options import understood
+    from hrc_env.cli.show import show
+
+    def run_asked() -> int:
+        words = understood(Arguments, sys.argv[1:], "python -m benchmarks.cluster")
+        asked = tyro.cli(
+            Arguments, args=words, default=Arguments(Path("out/cluster")), description=__doc__
+        )
+        return show(partial(run_experiment, make_study(asked.quick)), asked.out, "cluster")
+
+    return show_errors(run_asked)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
