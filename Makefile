@@ -2,6 +2,7 @@
 # make test         the proof, in minutes
 # make test-all     all of it: pixels at length, processes, experiments end to end
 # make test-stock   all of it in a fresh environment with the packages that everybody gets
+# make test-ray     engines and training on a cluster of Ray, in a fresh environment
 # make test-long    what a release needs: that, and what takes longest
 # make train-quick  a policy
 # make results      all numbers and pictures of the documentation made at older versions (hours)
@@ -10,6 +11,7 @@
 PYTHON ?= python3
 VENV ?= .venv
 STOCK := out/stock
+RAY := out/ray
 RUN := $(VENV)/bin/python
 # What is installed: the environment; with its learner; with what develops it. Each has the former.
 CORE := $(VENV)/.core
@@ -17,7 +19,7 @@ TRAIN := $(VENV)/.train
 DEV := $(VENV)/.dev
 PYTEST := $(RUN) -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
-.PHONY: demo test test-all test-stock test-long behaviour check bench train-quick results clean
+.PHONY: demo test test-all test-stock test-ray test-long behaviour check bench train-quick results clean
 .DEFAULT_GOAL := demo
 
 $(CORE): NEEDED := .
@@ -53,6 +55,13 @@ test-stock:
 	mkdir -p $(STOCK)/home
 	env -i HOME="$(CURDIR)/$(STOCK)/home" PATH="$$PATH" MAKEFLAGS="$(MAKEFLAGS)" \
 		$(MAKE) test-all VENV="$(STOCK)/venv" PYTHON="$(PYTHON)"
+
+test-ray:
+	rm -rf $(RAY)
+	$(PYTHON) -m venv $(RAY)
+	$(RAY)/bin/python -m pip install --quiet -c constraints.txt -e ".[ray]" "pytest>=8"
+	$(RAY)/bin/python -m hrc_env setup
+	$(RAY)/bin/python -m pytest tests/engines
 
 behaviour: $(DEV)
 	$(RUN) -m tests.behaviour

@@ -15,6 +15,7 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
+from urllib.request import urlopen
 
 import cloudpickle
 import numpy as np
@@ -25,7 +26,8 @@ from hrc_env.core.machine import n_cores
 from hrc_env.core.results import Metric, over
 from hrc_env.experiments.cache import PartCache, PartProgress
 from hrc_env.experiments.columns import Column
-from hrc_env.experiments.report import Metrics, Report, Table
+from hrc_env.experiments.plots import label, new_figure, save
+from hrc_env.experiments.report import Metrics, Report, Table, picture
 from hrc_env.experiments.runner import run_experiment
 
 KEYWORDS: Mapping[str, Any] = {"task": "HRCReach-v0", "perception": "keypoints"}
@@ -35,6 +37,14 @@ MODELLED = (10, 100, 1000)
 """Workers."""
 GBIT_BYTES_S = 125e6
 """What a network of 1 Gbit/s carries [bytes/s]."""
+PREFIX = "ray_hrc_env_"
+SHOWN = {
+    f"{PREFIX}steps_per_s": "steps/s",
+    f"{PREFIX}episodes_total": "episodes",
+    f"{PREFIX}goals_total": "goals",
+    f"{PREFIX}contacts_total": "contacts",
+}
+"""Metrics of Ray that are drawn, and their axes."""
 Played = Mapping[str, list[float]]
 
 TABLE = Table(
@@ -76,6 +86,8 @@ class ClusterBench:
     depends = ("env", "tracker", "emulator", "motion", "agents")
     n_rounds: int = 12
     """In which one and two workers have a turn."""
+    n_watched: int = 60
+    """Updates of two workers whose metrics are read from Ray."""
 
     @property
     def seeds(self) -> Sequence[int]:
@@ -84,8 +96,8 @@ class ClusterBench:
 
     @property
     def n_parts(self) -> int:
-        """All of it."""
-        return 1
+        """Times, and what Ray shows."""
+        return 2
 
     @property
     def quick_note(self) -> str:
@@ -98,8 +110,9 @@ class ClusterBench:
         return {**asdict(self), "environment": dict(KEYWORDS), "num_envs": NUM_ENVS}
 
     def play(self, cache: PartCache) -> Played:
-        """Return the times of every round."""
-        return cache.part("times", self._times)
+        """Return the times of every round, and what Ray's metrics showed of a run."""
+        times = cache.part("times", self._times)
+        return times | cache.part("watched", self._watched)
 
     def _times(self, tick: PartProgress) -> Played:
         with _workers() as learners:
@@ -116,6 +129,20 @@ class ClusterBench:
                 tick(1 / (self.n_rounds + 1))
         return found
 
+    def _watched(self, tick: PartProgress) -> Played:
+        from hrc_env.agents.rllib.watch import Watch
+
+        with _workers((2,)) as learners:
+            watch, found, began_s = Watch(str(KEYWORDS["task"])), {}, time.monotonic()
+            for k in range(self.n_watched):
+                watch.show(learners[2].update(2.0 * k / self.n_watched))
+                shown = _exported()
+                for name in SHOWN:
+                    found.setdefault(name, []).append(shown.get(name, 0.0))
+                found.setdefault("watched_s", []).append(time.monotonic() - began_s)
+                tick(1 / self.n_watched)
+        return found
+
     def metrics(self, played: Played) -> dict[str, Metric]:
         """Return every number."""
         return metrics_of(played)
@@ -125,14 +152,16 @@ class ClusterBench:
         return (TABLE,)
 
     def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
-        """Return the table."""
+        """Draw what Ray showed; return the table beside it."""
+        drawn = _draw(played, figures / "metrics.png")
         about = (__doc__ or "").partition("\n")[2].strip()
-        return Report("Workers of RLlib", about, [TABLE.markdown(metrics)], "95 % intervals")
+        parts = [TABLE.markdown(metrics), picture(drawn, "A run of two workers, as Ray exports it")]
+        return Report("Workers of RLlib", about, parts, "smallest and largest rounds")
 
 
 @contextmanager
-def _workers() -> Iterator[dict[int, Any]]:
-    """Yield learners with one worker and with two, which wait while others have their turn."""
+def _workers(numbers: Sequence[int] = MEASURED) -> Iterator[dict[int, Any]]:
+    """Yield learners by their numbers of workers, which wait while others have their turn."""
     from hrc_env.agents import ppo  # here and below: learner and Ray take seconds to import
     from hrc_env.agents.learner_settings import PPOSettings
     from hrc_env.agents.rllib.learner import RLlibPPO, RunnerSettings
@@ -145,9 +174,9 @@ def _workers() -> Iterator[dict[int, Any]]:
     with cluster.connected(None):
         made: dict[int, Any] = {}
         try:
-            for n in MEASURED:
+            for n in numbers:
                 policy = ppo.make_learner(HRCVecEnv(1, **KEYWORDS), PPOSettings(), 0)
-                share = 1 / len(MEASURED)  # all are there at once, and one of them works
+                share = 1 / len(numbers)  # all are there at once, and one of them works
                 runners = RunnerSettings(KEYWORDS, n, NUM_ENVS, 0, share, pack())
                 made[n] = RLlibPPO(policy, PPOSettings(), runners)
             yield made
@@ -167,6 +196,30 @@ def _turn(learner: Any) -> tuple[float, float, int, int]:
     started_s = time.monotonic()
     sampled = learner.update(1.0)
     return sampled_s, time.monotonic() - started_s, sampled.n_steps, n_bytes
+
+
+def _exported() -> dict[str, float]:
+    """Return our metrics as this machine exports them, by name."""
+    import ray
+
+    (node,) = ray.nodes()
+    url = f"http://{node['NodeManagerAddress']}:{node['MetricsExportPort']}/metrics"
+    with urlopen(url, timeout=20) as page:
+        lines = page.read().decode().splitlines()
+    ours = [line for line in lines if line.startswith(PREFIX)]
+    return {line.partition("{")[0]: float(line.rpartition(" ")[2]) for line in ours}
+
+
+def _draw(played: Played, path: Path) -> Path:
+    """Draw what Ray showed over the time of the run."""
+    figure = new_figure(9, 6)
+    panels = figure.subplots(2, 2, sharex=True).ravel()
+    for axis, (name, words) in zip(panels, SHOWN.items(), strict=True):
+        axis.plot(played["watched_s"], played[name], drawstyle="steps-post")
+        label(axis, "time [s]", words)
+        axis.set_ylim(bottom=0)
+    save(figure, path)
+    return path
 
 
 def _step_s(n_steps: int = 50) -> float:
@@ -217,7 +270,7 @@ def _exact(value: float, unit: str) -> Metric:
 
 def make_study(quick: bool = False) -> ClusterBench:
     """Return the bench."""
-    return ClusterBench(2) if quick else ClusterBench()
+    return ClusterBench(2, 6) if quick else ClusterBench()
 
 
 def main() -> int:
