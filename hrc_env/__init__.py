@@ -6,6 +6,7 @@ when they are first asked for. Everything else may change without notice.
 """
 
 import difflib
+import sys
 from importlib import import_module
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
@@ -86,6 +87,7 @@ if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
     from hrc_env.rewards import RewardTerm as RewardTerm
     from hrc_env.safety.config import ShieldConfig as ShieldConfig
     from hrc_env.safety.shield import Shield as Shield
+    from hrc_env.sb3 import HRCSubprocVecEnv as HRCSubprocVecEnv
     from hrc_env.sb3 import HRCVecEnv as HRCVecEnv
     from hrc_env.scene.camera_images import ImageConfig as ImageConfig
     from hrc_env.scene.domain_randomization import AppearanceConfig as AppearanceConfig
@@ -125,6 +127,7 @@ PUBLIC = {
     "FaultConfig": "hrc_env.perception.faults.fault",
     "HRCConfig": "hrc_env.config",
     "HRCEnv": "hrc_env.env",
+    "HRCSubprocVecEnv": "hrc_env.sb3",
     "HRCVecEnv": "hrc_env.sb3",
     "HRCVectorEnv": "hrc_env.vector.env",
     "IDS": "hrc_env.registration",
@@ -238,7 +241,7 @@ RENAMED = {
     "sample_window": "crop_window",
 }
 """Former public names, and the present ones."""
-EXTRAS = {"HRCVecEnv": "stable_baselines3"}
+EXTRAS = {"HRCSubprocVecEnv": "stable_baselines3", "HRCVecEnv": "stable_baselines3"}
 """Public names that need a package which an extra installs."""
 
 
@@ -246,19 +249,36 @@ def __getattr__(name: str) -> Any:
     """Import a public name when it is first asked for (PEP 562).
 
     Raises:
-        AttributeError: there is no such name, with the nearest one.
-        ImportError: the name is a former one, with the present one. An `AttributeError` would not
-            be shown by `from hrc_env import ...`.
+        AttributeError: there is no such name, with the nearest one, or it is a former one, with the
+            present one.
     """
     if name in PUBLIC:
         value = globals()[name] = getattr(import_module(PUBLIC[name]), name)
         return value
     if name in RENAMED:
-        raise ImportError(f"hrc_env.{name} is called hrc_env.{RENAMED[name]} now.")
+        raise AttributeError(_said_of(name))
     lower = {each.lower(): each for each in PUBLIC}
     near = difflib.get_close_matches(name.lower(), lower, n=1)
     hint = f" Did you mean {lower[near[0]]!r}?" if near else ""
     raise AttributeError(f"hrc_env has no attribute {name!r}.{hint} Public names: dir(hrc_env).")
+
+
+class FormerNames:
+    """A finder of `sys.meta_path`: lets `from hrc_env import FORMER` show the present name.
+
+    Python asks it for a module of that name, and would not show an `AttributeError`.
+    """
+
+    @staticmethod
+    def find_spec(fullname: str, path: object = None, target: object = None) -> None:
+        """Raise the `ImportError` of a former name; find no module of any other."""
+        package, _, name = fullname.partition(".")
+        if package == __name__ and name in RENAMED:
+            raise ImportError(_said_of(name), name=fullname)
+
+
+def _said_of(former: str) -> str:
+    return f"hrc_env.{former} is called hrc_env.{RENAMED[former]} now."
 
 
 def __dir__() -> list[str]:
@@ -270,6 +290,7 @@ def __dir__() -> list[str]:
 if not TYPE_CHECKING:  # type checkers read the imports above
     __all__ = __dir__()
 
+sys.meta_path.append(FormerNames)
 for _id, _task in BUILT_IN.items():
     register_environment(_id, _task.max_episode_steps)
 import_files()

@@ -4,6 +4,7 @@ import gymnasium, hrc_env
 env = gymnasium.make("HRCReach-v0", perception="keypoints")
 """
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from inspect import Parameter
@@ -27,7 +28,7 @@ from hrc_env.infos import words_of
 from hrc_env.registration import HasSpec
 from hrc_env.render.marks import OVERLAYS
 from hrc_env.render.views import CameraChoice, Views, picture_size
-from hrc_env.reset_options import ResetOptions, lasting_options, named_options
+from hrc_env.reset_options import Fixed, ResetOptions, lasting_options, named_options
 from hrc_env.rewards import RewardConfig
 from hrc_env.settings import Settings, settle
 from hrc_env.simulation import Simulation
@@ -165,9 +166,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
             ConfigError: an option that cannot be; nothing has begun then.
         """
         self.refuse_closed()
-        given = {**self._options, **self._next_options, **_named(options)}
-        steps_left = _steps_left(given)
-        fixed = [self.simulation.fix(given)] if given else []
+        steps_left, fixed = self._fixed_by(options)
         self._next_options = {}
         super().reset(seed=seed)
         self._begun, self._steps_left = True, steps_left
@@ -241,6 +240,44 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         self.simulation.fix(given)
         self._options = given
 
+    def check_options(
+        self, options: Mapping[str, Any] | ResetOptions | None = None, lasting: bool = False
+    ) -> None:
+        """Raise the error that `reset` with these options would raise; nothing begins.
+
+        Args:
+            options: as of `reset`.
+            lasting: they are meant for `set_options`, in place of those before.
+
+        Raises:
+            ConfigError: an option that cannot be.
+        """
+        with warnings.catch_warnings():  # the reset itself warns
+            warnings.simplefilter("ignore")
+            if lasting:
+                self.simulation.fix(lasting_options({**self._next_options, **_named(options)}))
+            else:
+                self._fixed_by(options)
+
+    def attempt(self, method: str, *args: Any, **kwargs: Any) -> Any:
+        """Call a method, and return its `ConfigError` where it raises one.
+
+        A process that raises is closed by the vector environment which it is part of; this lets
+        the error reach the user.
+
+        Args:
+            method: its name.
+            args: of the method.
+            kwargs: of the method.
+
+        Returns:
+            What the method returns, or the error.
+        """
+        try:
+            return getattr(self, method)(*args, **kwargs)
+        except ConfigError as error:
+            return error
+
     def set_reward(
         self, weights: RewardConfig | None = None, factors: Mapping[str, float] | None = None
     ) -> None:
@@ -283,6 +320,14 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
 
     def _reward_factor(self, term: str) -> float:
         return self.simulation.reward_factors.get(term, 1.0)
+
+    def _fixed_by(
+        self, options: Mapping[str, Any] | ResetOptions | None
+    ) -> tuple[int, list[Fixed]]:
+        """Steps that the next episode has left, and what is fixed of it, by options of a reset and
+        those that were set before."""
+        given = {**self._options, **self._next_options, **_named(options)}
+        return _steps_left(given), [self.simulation.fix(given)] if given else []
 
     def close(self) -> None:
         """Release threads and graphics contexts."""

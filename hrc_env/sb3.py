@@ -27,12 +27,13 @@ from hrc_env.step_result import Observation
 from hrc_env.tasks.goal import TERM
 from hrc_env.vector.env import HRCVectorEnv
 from hrc_env.vector.infos import chosen_infos
+from hrc_env.vector.make import REFUSING, without_refusal
 from hrc_env.vector.member import TOGETHER, Member, info_of
 from hrc_env.vector.options import ALONE, steps_behind
 
 with learner():
     from stable_baselines3.common.monitor import Monitor
-    from stable_baselines3.common.vec_env import VecEnv
+    from stable_baselines3.common.vec_env import SubprocVecEnv, VecEnv
 
 REPLACED = (Monitor, OrderEnforcing)
 """Wrappers of one environment that this `VecEnv` replaces, with a time limit `TimeLimit` too."""
@@ -117,8 +118,7 @@ class HRCVecEnv(VecEnv):
             ConfigError: an unknown option, a value that cannot work, or a list of another
                 length.
         """
-        each = options if isinstance(options, (list, tuple)) else [options] * self.num_envs
-        check_shape("options", (len(each),), (self.num_envs,), "a mapping for each environment")
+        each = _one_each(options, self.num_envs)
         for k, one in enumerate(each):
             self.env.check_options(k, one)
         super().set_options([dict(named_options(one, *ALONE)) for one in each])
@@ -261,6 +261,59 @@ class HRCVecEnv(VecEnv):
         self._sums.begin(np.array([k]))
         self.costs = np.where(np.arange(self.num_envs) == k, 0.0, self.costs)
         self.reset_infos[k] = info
+
+
+class HRCSubprocVecEnv(SubprocVecEnv):
+    """SB3's `SubprocVecEnv` in which a process that refuses options says why, and goes on.
+
+    PPO("MlpPolicy", make_vec_env("HRCReach-v0", 4, env_kwargs={"perception": "pixels"},
+        vec_env_cls=HRCSubprocVecEnv))
+
+    For perception="pixels", which cannot be batched; `HRCVecEnv` is faster at other levels. Of
+    SB3's own class the process would end, and the error be an `EOFError`.
+    """
+
+    def set_options(self, options: Any = None) -> None:
+        """Take options for the next reset; for all resets to come:
+        `env_method("set_options", options)`.
+
+        Args:
+            options: of one environment each; one mapping for all environments or a list of them.
+
+        Raises:
+            ConfigError: an option that cannot be, or a list of another length.
+        """
+        each = [named_options(one) for one in _one_each(options, self.num_envs)]
+        for k, one in enumerate(each):
+            self.env_method("check_options", one, indices=k)
+        super().set_options(each)
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Set an attribute of the outermost wrapper, as SB3 does, but "options" of the environment:
+        these are of all resets to come."""
+        if attr_name == "options":
+            self.env_method("set_options", value, indices=indices)
+        else:
+            super().set_attr(attr_name, value, indices)
+
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any
+    ) -> list[Any]:
+        """Call a method of each environment and return the results.
+
+        Raises:
+            ConfigError: an environment refuses what it was given.
+        """
+        attempt = ("attempt",) if method_name in REFUSING else ()
+        name, *args = *attempt, method_name, *method_args
+        return [*without_refusal(super().env_method(name, *args, indices=indices, **method_kwargs))]
+
+
+def _one_each(options: Any, num_envs: int) -> Sequence[Any]:
+    """Options of each environment, from one for all or a list."""
+    each = options if isinstance(options, (list, tuple)) else [options] * num_envs
+    check_shape("options", (len(each),), (num_envs,), "a mapping for each environment")
+    return each
 
 
 class Past(NamedTuple):

@@ -100,7 +100,7 @@ def test_a_star_imports_all_that_needs_no_extra():
         "print(*(name for name in hrc_env.PUBLIC if name not in dir(hrc_env)))"
     )
     said = subprocess.check_output([sys.executable, "-c", code], text=True)
-    assert said.split() == ["HRCVecEnv", "HRCVecEnv"]
+    assert said.split() == ["HRCSubprocVecEnv", "HRCVecEnv"] * 2
 
 
 # Names
@@ -137,6 +137,9 @@ def test_a_former_name_is_answered_with_the_present_one(old):
     """An import would hide the words of an `AttributeError`."""
     assert RENAMED[old] in PUBLIC
     assert old not in PUBLIC
+    assert not hasattr(hrc_env, old)
+    with pytest.raises(AttributeError, match=f"hrc_env.{old} is called hrc_env.{RENAMED[old]}"):
+        getattr(hrc_env, old)
     with pytest.raises(ImportError, match=f"hrc_env.{old} is called hrc_env.{RENAMED[old]} now"):
         exec(f"from hrc_env import {old}")
 

@@ -91,7 +91,8 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         if arguments["perception"] == "pixels":
             raise ConfigError(
                 'perception="pixels" has no batched form: gymnasium.make_vec makes it with a '
-                'process for each environment. perception="keypoints" emulates it, batched.'
+                "process for each environment, and SB3's make_vec_env with vec_env_cls="
+                'hrc_env.HRCSubprocVecEnv. perception="keypoints" emulates it, batched.'
             )
         settings = settle(**arguments)
         self._open(settings)

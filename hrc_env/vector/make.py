@@ -1,6 +1,6 @@
 """Making of vector environments: one batch, or at level "pixels" a process for each environment."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -22,30 +22,85 @@ from hrc_env.vector.options import options_of_each
 
 PROCESSES_PER_CORE = 2
 """More processes that render and run networks only wait for each other."""
+REFUSING = ("check_options", "set_options", "set_reward")
+"""Methods of `HRCEnv` that refuse arguments."""
+
+
+def without_refusal(results: Iterable[Any]) -> tuple[Any, ...]:
+    """Return what processes attempted (`HRCEnv.attempt`); raise the first error among it."""
+    told = tuple(results)
+    for each in told:
+        if isinstance(each, ConfigError):
+            raise each
+    return told
 
 
 class PixelVectorEnv(HasSpec, AsyncVectorEnv):  # type: ignore[misc]  # `spec` is a property
-    """Environments at level "pixels", a process for each."""
+    """Environments at level "pixels", a process for each.
+
+    What a process would refuse of options and rewards is raised here, and the process goes on.
+    """
 
     def reset_async(self, seed: int | list[int | None] | None = None, options: Any = None) -> None:
         """Ask for resets, each environment's with options of its own, as of `HRCVectorEnv`."""
         given = named_options(options, "reset_mask", "each")
         mask = {name: given.pop(name) for name in ("reset_mask",) if name in given}
-        each = options_of_each(given, self.num_envs)
-        if any(of_one is not each[0] for of_one in each):
+        if given:
+            each = options_of_each(given, self.num_envs)
             chosen = mask.get("reset_mask", [True] * self.num_envs)
             asked = zip(each, chosen, strict=True)
-            self.set_attr("next_options", [of_one if go else {} for of_one, go in asked])
-            each = [{}]
-        super().reset_async(seed, {**each[0], **mask} or None)
+            self._offer([of_one if goes else {} for of_one, goes in asked])
+        super().reset_async(seed, mask or None)
 
     def set_options(self, options: Mapping[str, Any] | ResetOptions | None = None) -> None:
         """Fix something of all episodes to come, as `HRCVectorEnv.set_options` does."""
         self.set_attr("options", options_of_each(lasting_options(options, "each"), self.num_envs))
 
+    def set_attr(self, name: str, values: Any) -> None:
+        """Set an attribute of every environment, "options" among them.
+
+        Args:
+            name: of the attribute.
+            values: one for all environments, or a list or tuple of one for each.
+
+        Raises:
+            ConfigError: options that cannot be; they are then as they were in every environment.
+        """
+        if name == "options":
+            each = values if isinstance(values, (list, tuple)) else [values] * self.num_envs
+            self._offer([lasting_options(of_one) for of_one in each], lasting=True)
+            super().set_attr("next_options", None)
+        super().set_attr(name, values)
+
+    def call_async(self, name: str, /, *args: Any, **kwargs: Any) -> None:
+        """Ask every environment for a call; `call_wait` raises what they refuse."""
+        attempt = ("attempt",) if name in REFUSING else ()
+        super().call_async(*attempt, name, *args, **kwargs)
+
+    def call_wait(self, timeout: float | None = None) -> tuple[Any, ...]:
+        """Return the results of calls.
+
+        Args:
+            timeout: after which it is a `TimeoutError` [s]; None: none.
+
+        Raises:
+            ConfigError: an environment refuses what it was given.
+        """
+        return without_refusal(super().call_wait(timeout))
+
     def words(self, infos: Mapping[str, Any]) -> dict[str, NDArray[np.object_]]:
         """Return in words what infos say, as `HRCVectorEnv.words` does."""
         return words_of_infos(infos, self.num_envs, self.get_attr("body_names")[0])
+
+    def _offer(self, each: Sequence[Mapping[str, Any]], lasting: bool = False) -> None:
+        """Give every environment options of its next reset, and take them back if one cannot have
+        them."""
+        super().set_attr("next_options", list(each))
+        try:
+            self.call("check_options", lasting=lasting)
+        except ConfigError:
+            super().set_attr("next_options", None)
+            raise
 
 
 def make_vector(
