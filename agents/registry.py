@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from hrc_env.core.brought import function_called
+from hrc_env.core.brought import check_arguments, function_called
 from hrc_env.core.errors import ConfigError, unknown
 
 from . import experts, policies, random
@@ -106,6 +106,7 @@ def function_of(name: str) -> Callable[..., Any]:
     made = function_called("agent", name, meaning)
     if not callable(made):
         raise ConfigError(f"{name} must be a function of an EnvInfo, got {type(made).__name__}.")
+    check_arguments(name, made, "env_info")
     return made
 
 
@@ -124,4 +125,5 @@ def _made_by(name: str, env_info: EnvInfo) -> Agent:
         raise ConfigError(
             f"{name} made {type(agent).__name__}, which has no act(observation) -> actions."
         )
+    check_arguments(f"{name}: act", agent.act, "observation")
     return agent

@@ -26,6 +26,7 @@ from hrc_env.env_config import signature_of_env
 from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.infos import words_of
 from hrc_env.registration import HasSpec
+from hrc_env.rehearsal import rehearse
 from hrc_env.render.marks import OVERLAYS
 from hrc_env.render.views import CameraChoice, Views, picture_size
 from hrc_env.reset_options import Fixed, ResetOptions, lasting_options, named_options
@@ -143,6 +144,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
     def __init__(self, task: str | TaskType = DEFAULT, **arguments: Any) -> None:
         settings = settle(task=task, **arguments)
         self._open(settings)
+        rehearse(settings)
         self.simulation = Simulation(1, settings)
         self.views = Views(self.simulation)
         """Pictures of the scene for people, at any time and of any size."""

@@ -17,6 +17,7 @@ from hrc_env.belief import (
     deviation_towards_robot_m,
     standard_deviation_m,
 )
+from hrc_env.core.brought import check_arguments
 from hrc_env.core.errors import check_shape, needed
 from hrc_env.core.kernels import kernel
 from hrc_env.core.mapping import answer_unknown_fields
@@ -78,6 +79,10 @@ class ObservationTerm:
     """A sentence for the environment's page."""
     function: Callable[[Belief], Floats]
     """Belief -> (B, ...), flattened per environment; not asked where it has no entries."""
+
+    def __post_init__(self) -> None:
+        """Raise `ConfigError` for a function that does not take one argument."""
+        check_arguments(f"The observation term {self.name!r}", self.function, "belief")
 
 
 def _nearest_direction(now: Belief) -> Floats:

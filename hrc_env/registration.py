@@ -41,32 +41,15 @@ def register_task(task: "TaskType") -> None:
     Raises:
         ConfigError: here and below: the name is taken, or something is missing or of a wrong kind.
     """
-    from hrc_env.tasks.check import check_task  # in functions: kernels take time to import
+    from hrc_env.rehearsal import play_briefly  # in functions: kernels take time to import
+    from hrc_env.settings import settle
+    from hrc_env.tasks.check import check_task
     from hrc_env.tasks.task import TASKS
 
     check_task(task)
-    _play_briefly(task)
+    play_briefly(settle(task=task, perception="none"))
     _add(TASKS, task.id, task)
     register_environment(task.id, task.max_episode_steps)
-
-
-def _play_briefly(task: "TaskType") -> None:
-    """Play two steps of a task without cameras, so that what is wrong is said at registration."""
-    import numpy as np
-
-    from hrc_env.settings import settle
-    from hrc_env.simulation import Simulation
-    from hrc_env.tasks.check import check_counts
-
-    simulation = Simulation(2, settle(task=task, perception="none"))
-    try:
-        simulation.reset(np.arange(2), [np.random.default_rng(seed) for seed in range(2)])
-        for _ in range(2):
-            result = simulation.step(np.zeros((2, simulation.n_actions)))
-            check_counts(simulation.task, result.info)
-        simulation.markers(0)
-    finally:
-        simulation.close()
 
 
 def register_estimator(spec: "EstimatorSpec") -> None:
@@ -108,15 +91,20 @@ def register_detector(name: str, make: "Callable[[], KeypointFunction]") -> None
             confidence in [0, 1] of `JOINTS`, NaN, NaN, 0 of one that was not found; or None where
             nobody is.
     """
+    from hrc_env.core.brought import check_arguments
     from hrc_env.perception.detector import DETECTORS
 
+    if callable(make):
+        check_arguments(f"{name}: make", make)
     _add(DETECTORS, name, make, is_function=True)
 
 
 def register_shield(name: str, shield: "Shield") -> None:
     """Make a shield, a function as `hrc_env.Shield`, known: `shield=name` of every environment."""
-    from hrc_env.safety.shield import SHIELDS
+    from hrc_env.safety.shield import SHIELDS, check_shield
 
+    if callable(shield):
+        check_shield(name, shield)
     _add(SHIELDS, name, shield, is_function=True)
 
 

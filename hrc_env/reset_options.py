@@ -27,6 +27,7 @@ from hrc_env.scene.rig import select
 from hrc_env.scene.rig_distribution import RigDistribution, draw_rig
 from hrc_env.scene.rigs import findings
 from hrc_env.settings import rig_of
+from hrc_env.tasks.hooks import check_places
 from hrc_env.tasks.task import Task
 
 
@@ -195,6 +196,7 @@ def _goal(goal: Any, room: Room) -> Floats | None:
     except (TypeError, ValueError) as error:
         raise ConfigError(f'options["goal"] must be numbers, got {goal!r}.') from error
     targets = room.task.goal_targets(place)
+    check_places(f"{room.task.id}: goal_targets", targets)
     check_reach(room.task.id, room.scene.robot.name, room.chain, targets)
     return place
 

@@ -5,12 +5,12 @@ Of people terms read the estimate only; what a step brought for the task is judg
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from inspect import signature
 from typing import Any
 
 import numpy as np
 
 from hrc_env.belief import Belief
+from hrc_env.core.brought import check_arguments
 from hrc_env.core.errors import ConfigError, check_fields, check_names, check_shape
 from hrc_env.core.kernels import kernel
 from hrc_env.core.mapping import answer_unknown_fields
@@ -67,15 +67,8 @@ class RewardTerm:
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for a function that does not take four arguments."""
-        try:
-            signature(self.function).bind(*range(4))
-        except TypeError as error:
-            raise ConfigError(
-                f"The function of the reward term {self.name!r} must take (belief, step, previous "
-                f"action, weights): {error}."
-            ) from error
-        except ValueError:  # a builtin has no signature
-            return
+        what = f"The function of the reward term {self.name!r}"
+        check_arguments(what, self.function, "belief", "step", "previous_action", "weights")
 
 
 def check_kind(config: Any) -> None:

@@ -274,8 +274,9 @@ class HRCSubprocVecEnv(SubprocVecEnv):
     """
 
     def set_options(self, options: Any = None) -> None:
-        """Take options for the next reset; for all resets to come:
-        `env_method("set_options", options)`.
+        """Take options for the next reset.
+
+        For all resets to come: `env_method("set_options", options)`.
 
         Args:
             options: of one environment each; one mapping for all environments or a list of them.
@@ -289,8 +290,13 @@ class HRCSubprocVecEnv(SubprocVecEnv):
         super().set_options(each)
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Set an attribute of the outermost wrapper, as SB3 does, but "options" of the environment:
-        these are of all resets to come."""
+        """Set an attribute, as SB3 does, of the outermost wrapper.
+
+        Args:
+            attr_name: of the attribute; "options", of all resets to come, are the environment's.
+            value: of it.
+            indices: of the environments; None: all.
+        """
         if attr_name == "options":
             self.env_method("set_options", value, indices=indices)
         else:

@@ -19,7 +19,8 @@ from hrc_env.scene.rig_distribution import RigDistribution
 from hrc_env.scene.rigs import RIGS
 from hrc_env.scene.robot import DEFAULT as DEFAULT_ROBOT
 from hrc_env.scene.robot import ROBOTS, Robot, robot_called
-from hrc_env.tasks.task import Task, find_task
+from hrc_env.tasks.check import check_parts
+from hrc_env.tasks.task import Task, find_task, is_known
 from hrc_env.tracking.estimators import EstimatorSpec, estimator_called
 
 PARTS = {
@@ -76,6 +77,8 @@ def make_settings(asked: EnvConfig) -> Settings:
         ConfigError: a value that cannot be, with those that can.
     """
     task, estimator = find_task(asked.task), estimator_called(asked.estimator)
+    if not is_known(task):
+        check_parts(task)
     config, cameras = resolve(asked.config, task, estimator), asked.cameras
     if isinstance(cameras, np.ndarray):
         cameras = cameras.tolist()

@@ -138,7 +138,8 @@ def check_kind(what: str, value: object, *kinds: type | None) -> None:
     """Raise `ConfigError` for a value that is of none of these kinds; None stands for None."""
     if not any(value is None if kind is None else isinstance(value, kind) for kind in kinds):
         names = " or ".join("None" if kind is None else kind.__name__ for kind in kinds)
-        raise ConfigError(f"{what} must be a {names}, got {described(value)}.")
+        article = "an" if names[0] in "AEIOaeio" else "a"
+        raise ConfigError(f"{what} must be {article} {names}, got {described(value)}.")
 
 
 def check_kinds(what: str, values: object, *kinds: type) -> None:

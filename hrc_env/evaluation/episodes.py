@@ -11,6 +11,7 @@ import gymnasium
 import numpy as np
 
 from hrc_env.agents.env_info import Agent, env_info
+from hrc_env.core.brought import check_arguments, described
 from hrc_env.core.errors import ConfigError, whole
 from hrc_env.core.machine import n_cores
 from hrc_env.core.results import Metric
@@ -159,7 +160,7 @@ def play_episodes(
         return play_one_by_one(make, n_episodes, seed, tick, **kwargs)
     with closing(HRCVectorEnv(n_episodes, **kwargs)) as env:
         inner = env.shards.first
-        agent, sums = make(env_info(inner)), EpisodeSums(n_episodes)
+        agent, sums = _made(make, env_info(inner)), EpisodeSums(n_episodes)
         episodes: list[dict[str, float]] = [{} for _ in range(n_episodes)]
         for step in rollout(env, agent, env.reset(seed=seed)[0]):
             sums.add(step.reward, step.info)
@@ -180,7 +181,7 @@ def play_one_by_one(
     """Return what `play_episodes` does, played in the single environment."""
     with closing(gymnasium.make(kwargs.pop("task", DEFAULT), **kwargs)) as env:
         inner: HRCEnv = env.unwrapped  # type: ignore[assignment]  # as every id of ours
-        agent, done = make(env_info(inner.simulation)), []
+        agent, done = _made(make, env_info(inner.simulation)), []
         for k in range(n_episodes):
             sums, last = EpisodeSums(1), {}
             for step in rollout(env, agent, env.reset(seed=seed + k)[0]):
@@ -189,6 +190,18 @@ def play_one_by_one(
             done.append(sums.summarize(0, last, inner.simulation.task, inner.config.ctrl_dt))
             tick(1 / n_episodes)
         return done
+
+
+def _made(make: Callable[[Any], Agent], info: Any) -> Agent:
+    """Return the agent of a function; `ConfigError` for other arguments, or what is no agent."""
+    check_arguments("What makes an agent", make, "env_info")
+    agent = make(info)
+    if not callable(getattr(agent, "act", None)):
+        raise ConfigError(
+            f"An agent must have act(observation) -> actions, got {described(agent)}."
+        )
+    check_arguments("act", agent.act, "observation")
+    return agent
 
 
 def _as_batch(step: Transition) -> dict[str, Any]:

@@ -46,8 +46,13 @@ def shield_called(shield: ShieldChoice) -> Shield | None:
             f"got {shield!r}."
         )
     if shield is not None:
-        check_arguments("A shield", shield, "belief", "velocities", "dt_s")
+        check_shield("A shield", shield)
     return shield
+
+
+def check_shield(what: str, shield: Callable[..., Any]) -> None:
+    """Raise `ConfigError` for a function that takes other arguments than a shield does."""
+    check_arguments(what, shield, "belief", "velocities", "dt_s")
 
 
 def shielded(

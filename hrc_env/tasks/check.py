@@ -10,11 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError, check_shape
+from hrc_env.core.brought import check_kind
+from hrc_env.core.errors import ConfigError, check_shape, whole
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm
 from hrc_env.tasks.goal import Goal
+from hrc_env.tasks.hooks import check_places
 from hrc_env.tasks.task import Task, TaskType
+from hrc_env.world import TaskScene
 
 _ID = re.compile(r"[A-Za-z]\w*-v\d+")
 REQUIRED = ("make_state", "reset", "advance", "view", "info")
@@ -40,7 +43,13 @@ def check_task(task: TaskType) -> None:
         )
     if not isinstance(task.id, str) or not _ID.fullmatch(task.id):
         raise ConfigError(f"A task's id must be like 'Name-v0', got {task.id!r}.")
+    check_parts(task)
+
+
+def check_parts(task: TaskType) -> None:
+    """Raise `ConfigError` for what is missing or wrong in a class, whatever its id."""
     _check_names(task)
+    _check_attributes(task)
     _check_methods(task)
     config_type = getattr(task, "config_type", None)
     if not (isinstance(config_type, type) and is_dataclass(config_type)):
@@ -52,6 +61,8 @@ def check_task(task: TaskType) -> None:
     if task.goal is not None and not isinstance(task.goal, Goal):
         raise ConfigError(f"{task.id}: goal must be a Goal, got {type(task.goal).__name__}.")
     _check_terms(made)
+    check_kind(f"{task.id}: make_scene", made.make_scene(), TaskScene)
+    check_places(f"{task.id}: reach_targets", made.reach_targets())
     _check_state(made)
 
 
@@ -76,6 +87,17 @@ def _check_names(task: TaskType) -> None:
                 f"{task.id}: {name} is never called. Is {meant[0]} meant? A method that is your "
                 f"own needs a name that is farther from it."
             )
+
+
+def _check_attributes(task: TaskType) -> None:
+    """Refuse attributes of the class that are of a wrong kind."""
+    for name in ("starts", "ends", "scene", "viewpoint"):
+        check_kind(f"{task.id}: {name}", getattr(task, name), str)
+    check_kind(f"{task.id}: robot", task.robot, str, None)
+    check_kind(f"{task.id}: defaults", task.defaults, Mapping)
+    for name in ("needs_gripper", "needs_mobile_base"):
+        check_kind(f"{task.id}: {name}", getattr(task, name), bool)
+    whole(f"{task.id}: max_episode_steps", task.max_episode_steps, 1, 2**62)
 
 
 def _check_methods(task: TaskType) -> None:
@@ -124,7 +146,9 @@ def _check_state(task: Task[Any, Any]) -> None:
         )
     for name, part in parts.items():
         check_shape(f"{task.id}: {name}", np.shape(part)[:1], (2,), "a row an environment")
-    _check_info(task, task.info(state), 2)
+    info = task.info(state)
+    check_kind(f"{task.id}: info", info, Mapping)
+    _check_info(task, info, 2)
 
 
 def _check_info(task: Task[Any, Any], info: Any, batch: int) -> None:

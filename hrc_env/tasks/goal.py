@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hrc_env.belief import Belief
+from hrc_env.core.brought import check_arguments
 from hrc_env.core.errors import ConfigError, check_shape
 from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.typing import Bools, Floats, Tensor
@@ -44,6 +45,12 @@ class Goal:
     """(achieved (..., size), desired (..., size), the task's settings) -> (...)."""
     doc: str
     """A sentence: what the reward is."""
+
+    def __post_init__(self) -> None:
+        """Raise `ConfigError` for functions that take other arguments."""
+        for name in ("achieved", "desired"):
+            check_arguments(f"Goal.{name}", getattr(self, name), "belief")
+        check_arguments("Goal.reward", self.reward, "achieved", "desired", "settings")
 
 
 def parts(goal: Goal, now: Belief) -> dict[str, Tensor]:

@@ -279,6 +279,13 @@ def find_task(task: str | TaskType) -> TaskType:
     return TASKS[task]
 
 
+def is_known(task: TaskType) -> bool:
+    """Return whether a class is a task of the package, or registered."""
+    if task.id in BUILT_IN and find_task(task.id) is task:
+        return True
+    return TASKS.name_of(task) is not None
+
+
 def with_rewards(task: str | TaskType, *terms: RewardTerm, id: str) -> TaskType:
     """Return a task that is rewarded for more than another one, and is else the same.
 

@@ -5,15 +5,22 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.core.brought import described, flags_of, numbers_of
+from hrc_env.core.brought import check_arguments, described, flags_of, numbers_of
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import JOINTS, N_JOINTS
 from hrc_env.core.typing import Floats, Ints, Rngs
 from hrc_env.tracking.config import TrackerConfig
 
-METHODS = ("init", "reset", "predict", "update", "estimate", "forecast")
-"""What `estimators.Estimator` asks for."""
+METHODS = {
+    "init": ("batch", "n_workers"),
+    "reset": ("state", "ids", "rngs"),
+    "predict": ("state", "dt_s", "rngs"),
+    "update": ("state", "keypoints", "rngs"),
+    "estimate": ("state",),
+    "forecast": ("state", "horizon_s"),
+}
+"""What `estimators.Estimator` asks for, with the arguments."""
 OFF_M2 = 1e-9
 """A covariance is symmetric up to this [m^2]."""
 
@@ -29,6 +36,8 @@ class CheckedEstimator:
                 f"{name}: the estimator lacks {', '.join(missing)}; "
                 "hrc_env.tracking.estimators.Estimator says what each does."
             )
+        for method, arguments in METHODS.items():
+            check_arguments(f"{name}: {method}", getattr(inner, method), *arguments)
         if not isinstance(getattr(inner, "config", None), TrackerConfig):
             raise ConfigError(
                 f"{name}: the estimator must have its settings, a TrackerConfig, as `config`; got "

@@ -24,6 +24,7 @@ from hrc_env.core.errors import ConfigError, check_shape, whole
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.env import RENDER_MODES, EnvBase, spaces
 from hrc_env.env_config import check_keywords
+from hrc_env.rehearsal import rehearse
 from hrc_env.render.views import CameraChoice
 from hrc_env.reset_options import Fixed, ResetOptions, lasting_options, named_options
 from hrc_env.rewards import RewardConfig
@@ -103,6 +104,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         self.num_envs = whole("num_envs", num_envs, 1, MAX_ENVS)
         self.autoreset_mode = autoreset_of(autoreset_mode)
         self.metadata["autoreset_mode"] = self.autoreset_mode
+        rehearse(settings)
         n_shards = min(threads_of(num_threads), self.num_envs)
         self.shards = Shards(self.num_envs, n_shards, partial(Simulation, settings=settings))
         self.pictures = Pictures(self.shards, self.render_mode, self._size, self._shown)

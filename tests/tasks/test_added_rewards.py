@@ -82,7 +82,7 @@ def test_agents_do_not_act_in_a_task_that_shows_something_else(monkeypatch):
 
 
 def test_a_term_of_other_arguments_is_refused_when_it_is_made():
-    with pytest.raises(hrc_env.ConfigError, match=r"must take \(belief, step, previous action"):
+    with pytest.raises(hrc_env.ConfigError, match=r"of \(belief, step, previous_action"):
         hrc_env.RewardTerm("odd", "", lambda belief: belief.action[:, 0])
 
 
