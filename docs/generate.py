@@ -26,6 +26,7 @@ REFERENCE: dict[Path, Callable[[], str]] = {
     DOCS / "reference" / "environment.md": reference.environment,
     **{DOCS / "reference" / f"{each}.md": partial(reference.task_page, each) for each in BUILT_IN},
     DOCS / "reference" / "config.md": reference.config,
+    DOCS / "reference" / "hooks.md": reference.hooks,
     DOCS / "reference" / "infos.md": reference.infos,
     DOCS / "reference" / "command_line.md": reference.command_line,
     DOCS / "reference" / "recordings.md": reference.recordings,

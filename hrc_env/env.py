@@ -25,6 +25,7 @@ from hrc_env.core.typing import Floats
 from hrc_env.env_config import signature_of_env
 from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.infos import words_of
+from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.registration import HasSpec
 from hrc_env.rehearsal import rehearse
 from hrc_env.render.marks import OVERLAYS
@@ -206,6 +207,12 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
     def rig(self) -> tuple[CameraConfig, ...]:
         """The cameras of this episode, as the estimator knows them."""
         return self.simulation.rig_of(0)
+
+    @property
+    def faults(self) -> tuple[FaultConfig, ...]:
+        """The faults of this episode's cameras, each with the amount that was drawn; no robot knows
+        them."""
+        return self.simulation.cameras.faults_of(0)
 
     @property
     def options(self) -> dict[str, Any]:

@@ -8,7 +8,6 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -20,32 +19,30 @@ from hrc_env.core.batching import State, Stateful, picked, rows, write_rows
 from hrc_env.core.errors import ConfigError, check_shape, needed
 from hrc_env.core.infos import Info
 from hrc_env.core.records import PoseEstimate, WorkerMotion, WorkerTruth
-from hrc_env.core.streams import aside, children
+from hrc_env.core.streams import children
 from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, JointVelocities, Points3, Records
+from hrc_env.episode_cameras import NOTHING_GIVEN, EpisodeCameras
 from hrc_env.geometry import chains
 from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.geometry.reach import check_reach
 from hrc_env.motion import fit, generator, starts
 from hrc_env.motion.activities.pieces import NoRoomError
-from hrc_env.pipeline.episodic import CameraSetup, EpisodicPipeline, EpisodicState
-from hrc_env.pipeline.levels import CAMERA_LEVELS, PipelineOfEpisode, make_pipeline, prepare
+from hrc_env.pipeline.levels import CAMERA_LEVELS, prepare
 from hrc_env.pipeline.observed_images import Images, ObservedImages
 from hrc_env.pipeline.sensor_input import SensorInput, TrueSensorInput
-from hrc_env.reset_options import Fixed, Options, Room, faults_of, fix
+from hrc_env.pipeline.tracking import PerceptionPipeline
+from hrc_env.reset_options import Fixed, Options, Room, fix
 from hrc_env.rewards import RewardConfig
 from hrc_env.safety import cost as costs
 from hrc_env.safety import incidents
 from hrc_env.safety.incidents import IncidentMonitor, Paths
 from hrc_env.safety.shield import shielded
 from hrc_env.scene import handling
-from hrc_env.scene.build import Scene, all_grounds, build, with_rig
-from hrc_env.scene.domain_randomization import AS_BUILT, AppearanceConfig, Look, draw_look
+from hrc_env.scene.build import Scene, all_grounds, build
+from hrc_env.scene.domain_randomization import Look
 from hrc_env.scene.limits import object_targets, robot_model
 from hrc_env.scene.physics import Physics
-from hrc_env.scene.rig import make_cameras
-from hrc_env.scene.rig_distribution import STREAM as RIG_STREAM
-from hrc_env.scene.rig_distribution import draw_rig
 from hrc_env.scene.rigs import findings
 from hrc_env.settings import Settings
 from hrc_env.step_result import Observation, StepResult, agreed
@@ -60,8 +57,6 @@ CLOSING_M_S = 8.0
 STREAMS = ("robot", "motion", "sensor", "tracker", "task")
 """Who draws numbers, each from a generator of its own, in the order in which these are handed out:
 the worker's walk does not depend on who looks at it."""
-ALL_DRAWN = Fixed()
-NOTHING_GIVEN: Mapping[int, Fixed] = MappingProxyType({})
 MEASURING = "objects"
 """And who measures loose objects, where there are any: from a child of the task's."""
 
@@ -98,7 +93,7 @@ class Simulation(Stateful):
     """`batch` environments of the same settings that step together."""
 
     CHANGES = (
-        "physics", "pipeline", "motion", "task_state", "streams", "action", "episode_cost",
+        "physics", "cameras", "motion", "task_state", "streams", "action", "episode_cost",
         "monitor", "separation_m", "estimates", "reward_weights", "identities", "measured",
         "shield_change",
     )  # fmt: skip
@@ -108,7 +103,6 @@ class Simulation(Stateful):
         prepare(perception, config.detector)
         self.batch, self.config, self.control = batch, config, settings.asked.control
         self.perception, self.shield, self.task = perception, settings.shield, settings.task
-        self._estimator = settings.estimator
         self.bodies = stack(pool(config.worker))
         self._make_people_and_scene(settings)
         if perception in CAMERA_LEVELS:
@@ -135,29 +129,12 @@ class Simulation(Stateful):
             batch, self.scene.n_workers, self.bodies.capsule_names, self.model, config.ctrl_dt
         )
         self.physics = Physics(self.scene, batch)
-        images, estimator = settings.images, settings.estimator
-        self.pipeline = make_pipeline(
-            perception, estimator, self.scene, batch, config, shows_images=images is not None
-        )
-        if images is not None and settings.rigs is not None and perception not in CAMERA_LEVELS:
-            raise ConfigError(
-                f"cameras=RigDistribution(...) is of a perception level with cameras, and at "
-                f"perception={perception!r} no rig is drawn, which images would show: use "
-                f"{' or '.join(map(repr, CAMERA_LEVELS))}, or give one rig."
-            )
-        bends = settings.rigs is not None and settings.rigs.bends
-        self.images = None if images is None else ObservedImages(self.scene, images, bends)
-        """Draws the images of observations; None: they hold none."""
-        self._looks: dict[int, tuple[np.random.Generator, Look]] = {}
+        self.cameras = EpisodeCameras(batch, settings, self.scene)
+        """Of every environment's episode."""
         self.task_state = self.task.make_state(batch)
         self._everyone, self.reward_weights = np.arange(batch), config.reward
         self.reward_factors: dict[str, float] = {}
         """On terms of the reward by name; 1 on those that are not named."""
-        self._rigs = settings.rigs if perception in CAMERA_LEVELS else None
-        if settings.rigs is not None:
-            settings.rigs.counts(len(self.scene.cameras))
-        if self._rigs is not None:  # refused here rather than at the first reset
-            draw_rig(self._rigs, self.scene, np.random.default_rng(0))
         self.action, self.shield_change = (np.zeros((batch, n)) for n in (self.n_actions, n_joints))
         self.episode_cost, self.separation_m = np.zeros(batch), np.zeros(batch)
         made = (batch, self.scene.n_workers, config.tracker)
@@ -178,7 +155,7 @@ class Simulation(Stateful):
         """
         given = {b: each for b, each in zip(ids.tolist(), fixed, strict=False) if each is not None}
         self._hand_out(ids, rngs)
-        self._hang_cameras(ids, given)
+        self.cameras.hang(ids, given, self.streams["sensor"])
         truth = self._begin(ids, given)
         belief = self._perceive(truth)
         return self._open(truth, belief)
@@ -226,13 +203,11 @@ class Simulation(Stateful):
 
     def rig_of(self, b: int) -> tuple[CameraConfig, ...]:
         """Return the cameras of environment b in its episode."""
-        own = self._cameras_own(b)
-        return self.scene.rig if own is None else own.rig
+        return self.cameras.rig_of(b)
 
     def cameras_of(self, b: int) -> tuple[PinholeCamera, ...]:
         """Return the same with their matrices."""
-        rig = self.rig_of(b)
-        return self.scene.cameras if rig == self.scene.rig else make_cameras(rig)
+        return self.cameras.cameras_of(b)
 
     def get_state(self) -> State:
         """A copy of everything that changes, generators included, and the settings."""
@@ -248,36 +223,30 @@ class Simulation(Stateful):
                     f"The state was taken with {name}={taken!r}; "
                     f"here {name} is {value!r}. Make the environment with the same arguments."
                 )
-        if isinstance(state["pipeline"], EpisodicState):
-            self._let_cameras_differ()
         super().set_state(state)
         self.reward_factors = dict(state.get("reward_factors", {}))
 
     def draw_images(self) -> Images:
         """Return the images of the moment that the sensors were shown last."""
-        if self.images is None:
-            return {}
-        now = self.pipeline.sensor.now
-        ids = now.ids.tolist()
-        rigs = [self.cameras_of(b) for b in ids]
-        return self.images.draw(now, [self.look_of(b) for b in ids], rigs)
+        return self.cameras.draw_images(self.streams["sensor"])
 
     def look_of(self, b: int) -> Look | None:
         """How environment `b` looks in its episode (for images); None: as it was built."""
-        worn, stream = self.pipeline.look_of(b), self.streams["sensor"][b]
-        appearance = self._appearance_of(b)
-        if worn is not None or appearance == AS_BUILT:
-            return worn
-        if b not in self._looks or self._looks[b][0] is not stream:  # it follows from the stream
-            look = draw_look(appearance, self.scene.n_workers, stream)
-            self._looks[b] = stream, look
-        return self._looks[b][1]
+        return self.cameras.look_of(b, self.streams["sensor"][b])
 
     def close(self) -> None:
         """Release threads and graphics contexts."""
-        self.pipeline.close()
-        if self.images is not None:
-            self.images.close()
+        self.cameras.close()
+
+    @property
+    def pipeline(self) -> PerceptionPipeline:
+        """What finds workers in the episodes' cameras."""
+        return self.cameras.pipeline
+
+    @property
+    def images(self) -> ObservedImages | None:
+        """Draws the images of observations; None: they hold none."""
+        return self.cameras.images
 
     @property
     def estimate(self) -> PoseEstimate:
@@ -307,14 +276,6 @@ class Simulation(Stateful):
         view = self.task.view(self.task_state, np.array([b]))
         return self.task.markers(view)[0]
 
-    def _cameras_own(self, b: int) -> CameraSetup | None:
-        """The cameras of environment b's episode; None: those that all were made with."""
-        return self.pipeline.setup_of(b) if isinstance(self.pipeline, EpisodicPipeline) else None
-
-    def _appearance_of(self, b: int) -> AppearanceConfig:
-        own = self._cameras_own(b)
-        return self.config.appearance if own is None else own.appearance
-
     def _make_people_and_scene(self, settings: Settings) -> None:
         config, (fewest, most) = settings.config, settings.n_workers
         scene_for = partial(
@@ -342,39 +303,6 @@ class Simulation(Stateful):
             if self.measured is not None:
                 self.streams[MEASURING][b] = self.streams["task"][b].spawn(1)[0]
 
-    def _let_cameras_differ(self) -> EpisodicPipeline:
-        """Let environments have cameras of their own, if they cannot yet."""
-        if not isinstance(self.pipeline, EpisodicPipeline):
-            made = self.perception, self._estimator, self.scene, self.config
-            make = PipelineOfEpisode(*made, self.images is not None)
-            self.pipeline = EpisodicPipeline(self.pipeline, self.settings["cameras"], make)
-        return self.pipeline
-
-    def _hang_cameras(self, ids: Ints, given: Mapping[int, Fixed]) -> None:
-        """Give environments `ids` the cameras of the episodes that begin."""
-        differ = self._rigs is not None or any(each.changes_cameras for each in given.values())
-        if not differ and not isinstance(self.pipeline, EpisodicPipeline):
-            return
-        pipeline = self._let_cameras_differ()
-        for b in ids.tolist():
-            pipeline.assign(b, self._cameras_of_episode(b, given.get(b, ALL_DRAWN)))
-
-    def _cameras_of_episode(self, b: int, fixed: Fixed) -> CameraSetup | None:
-        """The cameras of environment b's next episode; None: those it was made with."""
-        rigs = self._rigs if fixed.rig is None else fixed.rigs
-        if not fixed.changes_cameras and rigs is None:
-            return None
-        rig, config = self.scene.rig if fixed.rig is None else fixed.rig, self.config
-        if rigs is not None:
-            rng = aside(self.streams["sensor"][b], RIG_STREAM)
-            rig = draw_rig(rigs, with_rig(self.scene, rig), rng)
-        faults = config.faults if fixed.faults is None else fixed.faults
-        return CameraSetup(
-            rig,
-            faults_of(faults, self.settings["cameras"], rig),
-            config.appearance if fixed.appearance is None else fixed.appearance,
-        )
-
     def _begin(self, ids: Ints, given: Mapping[int, Fixed]) -> Truth:
         """Put workers, robots and objects of environments `ids` where episodes begin."""
         self.action[ids], self.episode_cost[ids], self.separation_m[ids] = 0.0, 0.0, 0.0
@@ -399,7 +327,7 @@ class Simulation(Stateful):
                 f"{self.task.id}: object_poses", np.shape(poses), expected, "of each object"
             )
         self.physics.reset(ids, q, self.motion.workers["body"][ids], poses)
-        self.pipeline.reset(ids, self.streams["sensor"], self.streams["tracker"])
+        self.cameras.reset(ids, self.streams["sensor"], self.streams["tracker"])
         world = handling.world_of(self.physics, ids, robot)
         motion = generator.current(self.motion, ids)
         return Truth(ids, world, motion, worker_truth(self.bodies, motion))
@@ -566,7 +494,11 @@ class Simulation(Stateful):
         if apart is None and self.images is None:
             return flat
         goals = {} if apart is None else goal.parts(apart, belief)
-        return {**goals, **self.draw_images(), observations.FLAT: flat}
+        return {
+            **goals,
+            **self.cameras.draw_images(self.streams["sensor"]),
+            observations.FLAT: flat,
+        }
 
     def _reward_terms(self, command: Command, truth: Truth, belief: Belief) -> dict[str, Floats]:
         """Return every term (B,) of the reward: the task's, then those that all tasks share."""
@@ -588,4 +520,5 @@ class Simulation(Stateful):
             **{name: value[ids] for name, value in tally.items()},
             **infos.worker_info(activity[ids], body[ids], happened),
             **infos.perception_info(cameras, seen.suspected(ids), seen.vacancy(ids)),
+            **self.cameras.info(ids),
         }

@@ -37,6 +37,9 @@ Words = dict[str, tuple[str, ...]]
 _WORKER = re.compile(r"^worker_\d+/")
 MISCALIBRATED = "perception/miscalibrated"
 MORE_PEOPLE = "perception/more_people"
+N_CAMERAS, MOVED, TURNED = "episode/n_cameras", "episode/moved_m", "episode/turned_rad"
+DELAY, LIGHT, FAULT = "episode/delay_s", "episode/light", "episode/fault_"
+"""What was drawn for an episode."""
 
 
 class Entry(NamedTuple):
@@ -168,6 +171,11 @@ ENTRIES: dict[str, Entry] = {
         "0 or 1", "cameras detect more people than there are slots for workers, which makes all "
         "slots unknown; at `pixels` and `keypoints`",
     ),
+    N_CAMERAS: Entry("-", "drawn: cameras that hang in this episode; at `pixels` and `keypoints`"),
+    MOVED: Entry("m", "drawn: how far one hangs at most from where it was when made; likewise"),
+    TURNED: Entry("rad", "drawn: how far one is turned at most; likewise"),
+    DELAY: Entry("s", "drawn: how late images come at most, in whole control steps; likewise"),
+    LIGHT: Entry("-", "drawn: strength of the light, 1 as built; likewise"),
 }  # fmt: skip
 """By name; the reward's terms, workers' and cameras' own are not among them."""
 OF_WORKERS: dict[str, str] = {
@@ -180,7 +188,7 @@ OF_WORKERS: dict[str, str] = {
 """Meanings of `worker_N/NAME`, N from 0."""
 OWN = Entry("-", "", 0.0)
 """A number that a task or shield of one's own gives."""
-ALWAYS = ("reward/", "worker_", "cost_", f"{MISCALIBRATED}_")
+ALWAYS = ("reward/", "worker_", "cost_", f"{MISCALIBRATED}_", FAULT)
 """Names that begin so always have a value."""
 
 OF_BELIEF = ("reward/", "shield/", "perception/")

@@ -134,6 +134,15 @@ class EmulatorPipeline(PoseTracking):
         """Return (B, C) the cameras whose images have come and are not blank."""
         return super().looked(ids, age_s) & ~self.cameras.blank[ids]
 
+    def schedule_of(self, b: int) -> Schedule:
+        """What the cameras of environment b do in its episode."""
+        recent = self.cameras.recent
+        return self.cameras.schedule if recent is None else recent.schedule_of(b)
+
+    def light_of(self, b: int) -> float:
+        """Return the strength of the light in environment b's episode."""
+        return float(self.cameras.light[b])
+
     def detect(self, ids: Ints, expected: PoseEstimate, sensor_rngs: Generators) -> Keypoints:
         """What the emulated cameras report of the environments that they were shown."""
         return self.cameras.keypoints(expected, sensor_rngs)

@@ -17,6 +17,7 @@ from hrc_env.core.typing import Bools, Image, Ints
 from hrc_env.core.vacancy import Coverage, Vacancy
 from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.perception.faults.fault import FaultConfig
+from hrc_env.perception.faults.schedule import Schedule
 from hrc_env.pipeline.sensor_input import Generators, Sensor, SensorInput, Windows
 from hrc_env.pipeline.tracking import PerceptionPipeline
 from hrc_env.scene.domain_randomization import AppearanceConfig, Look
@@ -139,6 +140,16 @@ class EpisodicPipeline(PerceptionPipeline):
         """How environment `b` looks in its episode; None: as it was built."""
         pipeline, b = self._of(b)
         return pipeline.look_of(b)
+
+    def schedule_of(self, b: int) -> Schedule | None:
+        """What the cameras of environment `b` do in its episode."""
+        pipeline, b = self._of(b)
+        return pipeline.schedule_of(b)
+
+    def light_of(self, b: int) -> float:
+        """Return the strength of the light in environment `b`'s episode."""
+        pipeline, b = self._of(b)
+        return pipeline.light_of(b)
 
     def suspected(self, ids: Ints) -> Bools:
         """(B, C) which cameras are thought to be miscalibrated, by `names`; those that do not hang

@@ -89,6 +89,15 @@ class PixelPipeline(ImageTracking):
         """How environment b looks in its episode."""
         return self.cameras.worn[b]
 
+    def schedule_of(self, b: int) -> Schedule:
+        """What the cameras of environment b do in its episode."""
+        return self.cameras.recent.schedule_of(b)
+
+    def light_of(self, b: int) -> float:
+        """Return the strength of the light in environment b's episode."""
+        look = self.cameras.worn[b]
+        return 1.0 if look is None else look.light
+
     def close(self) -> None:
         """Stop the detector's threads and free the graphics context, unless they are borrowed."""
         if self._borrows:

@@ -14,6 +14,7 @@ from hrc_env.core.typing import Bools, Floats, Image, Ints
 from hrc_env.core.vacancy import Coverage, Others, Vacancy, no_others
 from hrc_env.geometry.cameras import PinholeCamera, projections
 from hrc_env.perception.calibration import Calibration, read_calibration
+from hrc_env.perception.faults.schedule import Schedule
 from hrc_env.perception.lensed import pinhole_keypoints
 from hrc_env.perception.noise import our_joints
 from hrc_env.pipeline.sensor_input import Generators, Sensor, Windows
@@ -69,6 +70,14 @@ class PerceptionPipeline(Stateful):
     def look_of(self, b: int) -> Look | None:
         """How environment `b` looks in its episode (for pictures); None: as it was built."""
         return None
+
+    def schedule_of(self, b: int) -> Schedule | None:
+        """What the cameras of environment `b` do in its episode; None without cameras."""
+        return None
+
+    def light_of(self, b: int) -> float:
+        """Return the strength of the light in environment `b`'s episode; 1: as it was built."""
+        return 1.0
 
     def suspected(self, ids: Ints) -> Bools:
         """(B, C) which cameras of environments `ids` are thought to be miscalibrated."""

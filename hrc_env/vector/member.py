@@ -17,6 +17,7 @@ from hrc_env.core.mapping import plain
 from hrc_env.core.typing import Floats
 from hrc_env.env import ENDLESS, HRCEnv
 from hrc_env.geometry.camera_config import CameraConfig
+from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.render.views import CameraChoice
 from hrc_env.reset_options import ResetOptions
 from hrc_env.step_result import Observation
@@ -67,6 +68,12 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
         """The cameras of this environment's episode."""
         simulation, b = self._vector.shards.where(self._k)
         return simulation.rig_of(b)
+
+    @property
+    def faults(self) -> tuple[FaultConfig, ...]:
+        """The faults of this environment's cameras in its episode, as `HRCEnv.faults`."""
+        simulation, b = self._vector.shards.where(self._k)
+        return simulation.cameras.faults_of(b)
 
     @property
     def options(self) -> dict[str, Any]:

@@ -447,8 +447,9 @@ FLAGS_OF = {name: entry.flag for name, entry in ENTRIES.items() if entry.flag}
 
 
 def _is_plain(name: str) -> bool:
-    """Return whether a number stands neither for a word nor for the presence of another number."""
-    words = name.startswith("worker_") or name.startswith("perception/miscalibrated")
+    """Return whether a number stands neither for a word nor for the presence of another number, nor
+    for what was drawn, of which all others tell."""
+    words = name.startswith(("worker_", "perception/miscalibrated", "episode/"))
     return not words and name not in FLAGS_OF.values()
 
 

@@ -1,0 +1,225 @@
+"""The cameras of every environment's episode: drawn, hung and looked through, and what was drawn.
+
+Most environments share one pipeline; one whose episode has cameras of its own gets another
+(`pipeline.episodic`).
+"""
+
+from collections.abc import Mapping
+from functools import lru_cache
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from hrc_env.core.errors import ConfigError
+from hrc_env.core.infos import DELAY, FAULT, LIGHT, MOVED, N_CAMERAS, TURNED, Info
+from hrc_env.core.streams import aside
+from hrc_env.core.typing import Ints
+from hrc_env.geometry.camera_config import CameraConfig, axes_of
+from hrc_env.geometry.cameras import PinholeCamera
+from hrc_env.perception.faults.fault import IMAGE, KINDS, FaultConfig
+from hrc_env.pipeline.episodic import CameraSetup, EpisodicPipeline, EpisodicState
+from hrc_env.pipeline.levels import CAMERA_LEVELS, EMULATED, PipelineOfEpisode, make_pipeline
+from hrc_env.pipeline.observed_images import Images, ObservedImages
+from hrc_env.pipeline.sensor_input import Generators
+from hrc_env.reset_options import Fixed, faults_of
+from hrc_env.scene.build import Scene, with_rig
+from hrc_env.scene.domain_randomization import AS_BUILT, AppearanceConfig, Look, draw_look
+from hrc_env.scene.rig import make_cameras
+from hrc_env.scene.rig_distribution import STREAM as RIG_STREAM
+from hrc_env.scene.rig_distribution import draw_rig
+from hrc_env.settings import Settings
+
+ALL_DRAWN = Fixed()
+NOTHING_GIVEN: Mapping[int, Fixed] = MappingProxyType({})
+NEUTRAL = {"darkness": 1.0}
+"""The amounts that are as good as no fault, where that is not 0."""
+
+
+class EpisodeCameras:
+    """The cameras of a batch of environments.
+
+    Args:
+        batch: number of environments.
+        settings: of all of them.
+        scene: with the rig that they are made with.
+    """
+
+    def __init__(self, batch: int, settings: Settings, scene: Scene) -> None:
+        self.scene, self.config, self._settings = scene, settings.config, settings
+        self.names = tuple(camera.name for camera in scene.cameras)
+        images, level = settings.images, settings.asked.perception
+        has_cameras = level in CAMERA_LEVELS
+        self.pipeline = make_pipeline(
+            level, settings.estimator, scene, batch, self.config, shows_images=images is not None
+        )
+        if images is not None and settings.rigs is not None and not has_cameras:
+            raise ConfigError(
+                f"cameras=RigDistribution(...) is of a perception level with cameras, and at "
+                f"perception={level!r} no rig is drawn, which images would show: use "
+                f"{' or '.join(map(repr, CAMERA_LEVELS))}, or give one rig."
+            )
+        bends = settings.rigs is not None and settings.rigs.bends
+        self.images = None if images is None else ObservedImages(scene, images, bends)
+        """Draws the images of observations; None: they hold none."""
+        self._looks: dict[int, tuple[np.random.Generator, Look]] = {}
+        self._rigs = settings.rigs if has_cameras else None
+        if settings.rigs is not None:
+            settings.rigs.counts(len(scene.cameras))
+        if self._rigs is not None:  # refused here rather than at the first reset
+            draw_rig(self._rigs, scene, np.random.default_rng(0))
+        known = [k for k, each in KINDS.items() if each.group != IMAGE or k in EMULATED]
+        self._kinds = tuple(known if level == "keypoints" else KINDS)
+        names = (N_CAMERAS, MOVED, TURNED, DELAY, LIGHT, *(f"{FAULT}{k}" for k in self._kinds))
+        self._drawn = {name: np.zeros(batch) for name in names} if has_cameras else {}
+
+    def hang(self, ids: Ints, given: Mapping[int, Fixed], sensor_rngs: Generators) -> None:
+        """Give environments `ids` the cameras of the episodes that begin.
+
+        Args:
+            ids: the environments.
+            given: what is fixed of each one's episode.
+            sensor_rngs: a generator for each environment of the batch.
+        """
+        differ = self._rigs is not None or any(each.changes_cameras for each in given.values())
+        if not differ and not isinstance(self.pipeline, EpisodicPipeline):
+            return
+        pipeline = self._let_differ()
+        for b in ids.tolist():
+            setup = self._setup_of_episode(given.get(b, ALL_DRAWN), sensor_rngs[b])
+            pipeline.assign(b, setup)
+
+    def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
+        """Forget what cameras showed in environments `ids`, and note what is drawn of them."""
+        self.pipeline.reset(ids, sensor_rngs, tracker_rngs)
+        self._note(ids)
+
+    def info(self, ids: Ints) -> Info:
+        """Return what was drawn for the episodes of environments `ids`; nothing without cameras."""
+        return {name: values[ids] for name, values in self._drawn.items()}
+
+    def rig_of(self, b: int) -> tuple[CameraConfig, ...]:
+        """Return the cameras of environment b in its episode."""
+        own = self._own(b)
+        return self.scene.rig if own is None else own.rig
+
+    def cameras_of(self, b: int) -> tuple[PinholeCamera, ...]:
+        """Return the same with their matrices."""
+        rig = self.rig_of(b)
+        return self.scene.cameras if rig == self.scene.rig else make_cameras(rig)
+
+    def faults_of(self, b: int) -> tuple[FaultConfig, ...]:
+        """Return the faults of environment b's cameras, each with the amount of its episode."""
+        schedule = self.pipeline.schedule_of(b)
+        return () if schedule is None else schedule.faults
+
+    def draw_images(self, sensor_rngs: Generators) -> Images:
+        """Return the images of the moment that the sensors were shown last."""
+        if self.images is None:
+            return {}
+        now = self.pipeline.sensor.now
+        ids = now.ids.tolist()
+        rigs = [self.cameras_of(b) for b in ids]
+        return self.images.draw(now, [self.look_of(b, sensor_rngs[b]) for b in ids], rigs)
+
+    def look_of(self, b: int, sensor_rng: np.random.Generator) -> Look | None:
+        """How environment `b` looks in its episode (for images); None: as it was built."""
+        worn, appearance = self.pipeline.look_of(b), self._appearance_of(b)
+        if worn is not None or appearance == AS_BUILT:
+            return worn
+        if b not in self._looks or self._looks[b][0] is not sensor_rng:  # it follows from this
+            self._looks[b] = sensor_rng, draw_look(appearance, self.scene.n_workers, sensor_rng)
+        return self._looks[b][1]
+
+    def get_state(self) -> Any:
+        """A copy of everything that changes."""
+        return self.pipeline.get_state()
+
+    def set_state(self, state: Any) -> None:
+        """Continue from a state, also of environments with cameras of their own."""
+        if isinstance(state, EpisodicState):
+            self._let_differ()
+        self.pipeline.set_state(state)
+        if self._drawn:
+            self._note(np.arange(len(self._drawn[N_CAMERAS])))
+
+    def close(self) -> None:
+        """Release threads and graphics contexts."""
+        self.pipeline.close()
+        if self.images is not None:
+            self.images.close()
+
+    def _own(self, b: int) -> CameraSetup | None:
+        """The cameras of environment b's episode; None: those that all were made with."""
+        return self.pipeline.setup_of(b) if isinstance(self.pipeline, EpisodicPipeline) else None
+
+    def _appearance_of(self, b: int) -> AppearanceConfig:
+        own = self._own(b)
+        return self.config.appearance if own is None else own.appearance
+
+    def _let_differ(self) -> EpisodicPipeline:
+        """Let environments have cameras of their own, if they cannot yet."""
+        if not isinstance(self.pipeline, EpisodicPipeline):
+            level, estimator = self._settings.asked.perception, self._settings.estimator
+            made = level, estimator, self.scene, self.config
+            make = PipelineOfEpisode(*made, self.images is not None)
+            self.pipeline = EpisodicPipeline(self.pipeline, self.names, make)
+        return self.pipeline
+
+    def _setup_of_episode(
+        self, fixed: Fixed, sensor_rng: np.random.Generator
+    ) -> CameraSetup | None:
+        """The cameras of an environment's next episode; None: those it was made with."""
+        rigs = self._rigs if fixed.rig is None else fixed.rigs
+        if not fixed.changes_cameras and rigs is None:
+            return None
+        rig, config = self.scene.rig if fixed.rig is None else fixed.rig, self.config
+        if rigs is not None:
+            rig = draw_rig(rigs, with_rig(self.scene, rig), aside(sensor_rng, RIG_STREAM))
+        faults = config.faults if fixed.faults is None else fixed.faults
+        return CameraSetup(
+            rig,
+            faults_of(faults, self.names, rig),
+            config.appearance if fixed.appearance is None else fixed.appearance,
+        )
+
+    def _note(self, ids: Ints) -> None:
+        """Write down what is drawn for the episodes of environments `ids`."""
+        if not self._drawn:
+            return
+        for b in ids.tolist():
+            schedule = self.pipeline.schedule_of(b)
+            delay_s = 0.0 if schedule is None else schedule.longest_delay_s
+            drawn = {DELAY: delay_s, LIGHT: self.pipeline.light_of(b)}
+            drawn |= _difference(self.rig_of(b), self.scene.rig)
+            drawn |= _amounts(self.faults_of(b), self._kinds)
+            for name, value in drawn.items():
+                self._drawn[name][b] = value
+
+
+@lru_cache(maxsize=256)
+def _difference(
+    rig: tuple[CameraConfig, ...], usual: tuple[CameraConfig, ...]
+) -> Mapping[str, float]:
+    """How many cameras a rig has, and how far they hang and look from those of another."""
+    if rig == usual:
+        return {N_CAMERAS: len(rig), MOVED: 0.0, TURNED: 0.0}
+    named, moved_m, turned_rad = {camera.name: camera for camera in usual}, 0.0, 0.0
+    for camera in rig:
+        was = named[camera.name]
+        moved_m = max(moved_m, float(np.linalg.norm(np.subtract(camera.eye_world, was.eye_world))))
+        R = axes_of(was).T @ axes_of(camera)
+        turned_rad = max(turned_rad, float(np.arccos(np.clip((np.trace(R) - 1) / 2, -1, 1))))
+    return {N_CAMERAS: len(rig), MOVED: moved_m, TURNED: turned_rad}
+
+
+@lru_cache(maxsize=256)
+def _amounts(faults: tuple[FaultConfig, ...], kinds: tuple[str, ...]) -> Mapping[str, float]:
+    """The amount of each kind of fault, of several the one that changes most."""
+    most = {kind: NEUTRAL.get(kind, 0.0) for kind in kinds}
+    for fault in faults:
+        none = NEUTRAL.get(fault.kind, 0.0)
+        amount = 1.0 if KINDS[fault.kind].bounds == (0.0, 0.0) else fault.how_much
+        if abs(amount - none) > abs(most[fault.kind] - none):
+            most[fault.kind] = amount
+    return {f"{FAULT}{kind}": amount for kind, amount in most.items()}
