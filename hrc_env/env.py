@@ -30,7 +30,7 @@ from hrc_env.registration import HasSpec
 from hrc_env.rehearsal import rehearse
 from hrc_env.render.marks import OVERLAYS
 from hrc_env.render.views import CameraChoice, Views, picture_size
-from hrc_env.reset_options import Fixed, ResetOptions, lasting_options, named_options
+from hrc_env.reset_options import ResetOptions, lasting_options, named_options
 from hrc_env.rewards import RewardConfig
 from hrc_env.settings import Settings, settle
 from hrc_env.simulation import Simulation
@@ -169,7 +169,9 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
             ConfigError: an option that cannot be; nothing has begun then.
         """
         self.refuse_closed()
-        steps_left, fixed = self._fixed_by(options)
+        given = self._with_lasting(options)
+        steps_left = _steps_left(given)
+        fixed = [self.simulation.fix(given)] if given else []
         self._next_options = {}
         super().reset(seed=seed)
         self._begun, self._steps_left = True, steps_left
@@ -266,7 +268,9 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
             if lasting:
                 self.simulation.fix(lasting_options({**self._next_options, **_named(options)}))
             else:
-                self._fixed_by(options)
+                given = self._with_lasting(options)
+                _steps_left(given)
+                self.simulation.fix(given)
 
     def attempt(self, method: str, *args: Any, **kwargs: Any) -> Any:
         """Call a method, and return its `ConfigError` where it raises one.
@@ -330,13 +334,9 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
     def _reward_factor(self, term: str) -> float:
         return self.simulation.reward_factors.get(term, 1.0)
 
-    def _fixed_by(
-        self, options: Mapping[str, Any] | ResetOptions | None
-    ) -> tuple[int, list[Fixed]]:
-        """Steps that the next episode has left, and what is fixed of it, by options of a reset and
-        those that were set before."""
-        given = {**self._options, **self._next_options, **_named(options)}
-        return _steps_left(given), [self.simulation.fix(given)] if given else []
+    def _with_lasting(self, options: Mapping[str, Any] | ResetOptions | None) -> dict[str, Any]:
+        """Options of a reset by name, with those that were set before."""
+        return {**self._options, **self._next_options, **_named(options)}
 
     def close(self) -> None:
         """Release threads and graphics contexts."""

@@ -147,6 +147,8 @@ class Room:
     """Returns the name of an obstacle at joint angles; None: none is touched."""
     images: ObservedImages | None = None
     """Draws the images of observations; None: they hold none."""
+    wants_pairs: str = ""
+    """The name of an estimator that makes nothing of one camera alone; "": it does."""
 
 
 def fix(options: Options, room: Room) -> Fixed:
@@ -305,7 +307,7 @@ def _rig(
                 f"{camera.name!r}. Make the environment with cameras= of all of them."
             )
     if rigs is None and room.level in CAMERA_LEVELS:
-        for finding in findings(with_rig(room.scene, rig)):
+        for finding in findings(with_rig(room.scene, rig), room.wants_pairs):
             warnings.warn(finding, stacklevel=5)
     return rig, rigs
 

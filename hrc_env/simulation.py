@@ -103,10 +103,13 @@ class Simulation(Stateful):
         prepare(perception, config.detector)
         self.batch, self.config, self.control = batch, config, settings.asked.control
         self.perception, self.shield, self.task = perception, settings.shield, settings.task
+        self._wants_pairs = settings.estimator.wants_pairs
         self.bodies = stack(pool(config.worker))
         self._make_people_and_scene(settings)
         if perception in CAMERA_LEVELS:
-            for finding in findings(self.scene):
+            n, rigs = len(self.scene.cameras), settings.rigs
+            fewest = n if rigs is None else rigs.counts(n)[0]
+            for finding in findings(self.scene, self._wants_pairs, fewest):
                 warnings.warn(finding, stacklevel=3)
         self.settings = settings.recorded(batch, self.scene)
         self.chain, n_joints = self.scene.chain, self.scene.chain.n_joints
@@ -173,7 +176,7 @@ class Simulation(Stateful):
         camera_sees = self.config.faults, self.config.appearance
         room = Room(
             self.task, self.scene, self.chain, self.perception, *camera_sees, self.bodies.names,
-            self.motion.mind, self.physics.touched_at, self.images,
+            self.motion.mind, self.physics.touched_at, self.images, self._wants_pairs,
         )  # fmt: skip
         return fix(options, room)
 

@@ -107,19 +107,37 @@ def sees(cameras: tuple[PinholeCamera, ...], still: Floats, points_world: Points
     return seen
 
 
-def findings(scene: Scene) -> list[str]:
-    """What is poor about a scene's rig, in sentences: nothing for a good one, as its own is."""
+def findings(scene: Scene, wants_pairs: str = "", fewest: int | None = None) -> list[str]:
+    """What is poor about a scene's rig, in sentences: nothing for a good one, as its own is.
+
+    Args:
+        scene: with the rig.
+        wants_pairs: the name of an estimator that makes nothing of one camera alone; "": it does.
+        fewest: cameras of an episode, where their number is drawn; None: the rig's.
+    """
+    if fewest == 1 and len(scene.cameras) > 1 and wants_pairs:
+        return [*findings(scene), f"Rigs of one camera are drawn. {_depth_alone(wants_pairs)}"]
     if scene.config.cameras == RIGS.get(scene.name) and len(scene.cameras) > 1:
         return []
     seen = _shares_seen(scene)
     said = poor_cameras(scene)
     if len(scene.cameras) == 1:
         said.append(
-            f"One camera, {scene.cameras[0].name!r}, sees {100 * seen[0]:.0f} % of the "
-            "workspace: depth then rests on the body's known size, what it does not see is "
-            "unknown, and triangulation has nothing to work with."
+            f"There is one camera, {scene.cameras[0].name!r}, which sees {100 * seen[0]:.0f} % of "
+            f"the workspace; what it does not see is unknown. {_depth_alone(wants_pairs)}"
         )
     return said
+
+
+def _depth_alone(wants_pairs: str) -> str:
+    """What an estimator makes of one camera, in a sentence."""
+    if not wants_pairs:
+        return "How far people are follows from their bodies' usual size."
+    return (
+        f"The estimator {wants_pairs!r} needs two that see a person at once (needs_pairs), and "
+        "finds nobody: add a camera, or use estimator='particle', which takes the distance from "
+        "the body's usual size."
+    )
 
 
 def poor_cameras(scene: Scene) -> list[str]:

@@ -138,6 +138,11 @@ class EstimatorSpec:
     does, round any estimator, by going back and replaying what came since. True: `update` gets
     frames as they arrive, once a control step, with their times in `Keypoints.time_s`."""
 
+    @property
+    def wants_pairs(self) -> str:
+        """Its name, if one camera alone tells it nothing; else ""."""
+        return self.name if self.needs_pairs else ""
+
     def __reduce__(self) -> tuple[Any, ...]:
         """A spec that is known by its name is pickled as that."""
         if ESTIMATORS.get(self.name) is self:

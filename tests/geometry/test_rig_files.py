@@ -110,7 +110,7 @@ def test_a_wide_lens_is_tracked_as_well_as_a_pinhole():
 
 
 def test_one_camera_works_and_it_is_said_what_is_lost():
-    with pytest.warns(UserWarning, match="One camera, 'camera_2'.*depth"):
+    with pytest.warns(UserWarning, match="one camera, 'camera_2'.*usual size"):
         env = HRCEnv(perception="keypoints", cameras=["camera_2"])
     env.reset(seed=0)
     assert "tracking/lost" in [env.step(np.zeros(6)) for _ in range(10)][-1][4]
@@ -127,6 +127,18 @@ def test_a_poorly_hung_camera_is_told_what_it_sees(eye, target, said):
     poor = CameraConfig("poor", eye, target)
     with pytest.warns(UserWarning, match=said):
         HRCEnv(perception="keypoints", cameras=[poor, (-2.0, 2.0, 2.3)])
+
+
+@pytest.mark.parametrize("cameras", [["camera_2"], RigDistribution(n_cameras=(1, 3))])
+def test_who_needs_pairs_is_told_of_rigs_of_one_camera(cameras):
+    with pytest.warns(UserWarning, match="'triangulation' needs two .*finds nobody: add a camera"):
+        HRCEnv(perception="keypoints", cameras=cameras, estimator="triangulation")
+
+
+def test_who_needs_no_pairs_is_told_nothing_of_drawn_rigs():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        HRCEnv(perception="keypoints", cameras=RigDistribution(n_cameras=(1, 3)))
 
 
 def test_the_scenes_own_rigs_see_their_workspace():
