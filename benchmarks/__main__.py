@@ -71,9 +71,9 @@ class TrackingArguments(BenchArguments):
                 "--baselines do not run: leave one of them out."
             )
         if self.baselines:
-            from benchmarks.tracking.baselines.bench import BaselinesBench
+            from benchmarks.tracking.baselines.bench import N_QUICK, BaselinesBench
 
-            n_seeds = self.seeds or (1 if self.quick else 5)
+            n_seeds = self.seeds or (N_QUICK if self.quick else 5)
             return self._beside("_baselines").show(BaselinesBench(n_seeds))
         if self.real:
             from benchmarks.recorded.bench import RecordedBench

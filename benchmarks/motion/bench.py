@@ -13,7 +13,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric, over
 from hrc_env.experiments.cache import PartCache
 from hrc_env.experiments.report import Metrics, Report, quick_words
-from hrc_env.experiments.runner import at_least_one
+from hrc_env.experiments.runner import at_least_one, is_as_short
 from hrc_env.motion import state as st
 from hrc_env.motion.repertoire import SCENES, Film, alone, perform
 from hrc_env.worker.body import Body, load_body, worker_names
@@ -45,12 +45,6 @@ class MotionBench:
         """One a film of each worker."""
         return list(range(self.n_seeds))
 
-    @property
-    def quick_note(self) -> str:
-        """The warning on tables and figures of a short run; "" if it is long enough."""
-        is_short = self.n_seeds <= QUICK.n_seeds
-        return quick_words(self.n_seeds) if is_short else ""
-
     def settings(self) -> dict[str, Any]:
         """Return what all numbers depend on."""
         return {"bench": asdict(self)}
@@ -69,7 +63,10 @@ class MotionBench:
 
     def report(self, played: dict[str, Metric], metrics: Metrics, figures: Path) -> Report:
         """Return the tables."""
-        return report(metrics)
+        seconds = [each.value for name, each in metrics.items() if name.endswith(".seconds")]
+        lasting = min(seconds), max(seconds)
+        short = quick_words(self.n_seeds, lasting) if is_as_short(self, QUICK) else ""
+        return replace(report(metrics), quick=short)
 
 
 QUICK = MotionBench(n_seeds=2, bodies=("worker_1",))

@@ -24,7 +24,7 @@ from hrc_env.core.results import Metric
 from hrc_env.experiments.cache import PartCache, PartProgress
 from hrc_env.experiments.report import Metrics, Report, quick_words
 from hrc_env.experiments.rigs import DT_S
-from hrc_env.experiments.runner import at_least_one
+from hrc_env.experiments.runner import at_least_one, is_as_short
 from hrc_env.perception import vino
 from hrc_env.perception.faults.fault import IMAGE, KINDS, FaultConfig
 from hrc_env.scene.build import SCENES, Scene, SceneConfig, build
@@ -100,7 +100,7 @@ class PerceptionBench:
     @property
     def quick_note(self) -> str:
         """The warning on tables and figures of a short run; "" if it is long enough."""
-        is_short = self.n_emulated <= QUICK.n_emulated or self.n_steps <= QUICK.n_steps
+        is_short = is_as_short(self, QUICK)
         return quick_words(self.n_emulated, self.n_steps * DT_S) if is_short else ""
 
     def settings(self) -> dict[str, Any]:

@@ -17,11 +17,12 @@ from benchmarks.speed.contenders import OURS, PEER, Contender, Single, Starts, V
 from benchmarks.speed.organs import Organs
 from benchmarks.speed.report import REACHER, SINGLE, report
 from benchmarks.speed.tasks import Tasks, shares
+from hrc_env.config import HRCConfig
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric, over
 from hrc_env.experiments.cache import PartCache, Progress
-from hrc_env.experiments.report import Metrics, Report
-from hrc_env.experiments.runner import at_least_one
+from hrc_env.experiments.report import Metrics, Report, quick_words
+from hrc_env.experiments.runner import at_least_one, is_as_short
 from hrc_env.safety.shield import shield_called
 from hrc_env.tasks.task import find_task
 
@@ -80,8 +81,8 @@ class SpeedBench:
     @property
     def quick_note(self) -> str:
         """The warning on tables and figures of a short run; "" if it is long enough."""
-        is_short = self.n_rounds <= QUICK.n_rounds
-        return f"Quick run, {self.n_rounds} round: too few to compare anything." if is_short else ""
+        seconds = HRCConfig().ctrl_dt * self.least_steps
+        return quick_words(self.n_rounds, seconds, "round") if is_as_short(self, QUICK) else ""
 
     def settings(self) -> dict[str, Any]:
         """Return what all numbers depend on."""

@@ -19,12 +19,12 @@ from benchmarks.tracking.metrics import TIMING, Parts, metrics_of
 from benchmarks.tracking.names import DEFAULT, SMOOTHER, Selection
 from benchmarks.tracking.report import report
 from benchmarks.tracking.rigs import RIGS, SIGMA_PX, Rig, make_rig
-from benchmarks.tracking.sequences import MATCHED, Sequences, make_sequences
+from benchmarks.tracking.sequences import MATCHED, Sequences, lasting, make_sequences
 from benchmarks.tracking.timing import BATCH, time_estimator
 from hrc_env.core.results import Metric
 from hrc_env.experiments.cache import PartCache, PartProgress
 from hrc_env.experiments.report import Metrics, Report, quick_words
-from hrc_env.experiments.runner import at_least_one
+from hrc_env.experiments.runner import at_least_one, is_as_short
 from hrc_env.experiments.versions import key_of, source_digest
 from hrc_env.tracking.estimators import ESTIMATORS
 
@@ -77,8 +77,7 @@ class TrackingBench:
     @property
     def quick_note(self) -> str:
         """The warning on tables and figures of a short run; "" if it is long enough."""
-        is_short = self.n_seeds <= QUICK.n_seeds
-        return quick_words(self.n_seeds) if is_short else ""
+        return quick_words(self.n_seeds, lasting()) if is_as_short(self, QUICK) else ""
 
     def settings(self) -> dict[str, Any]:
         """Return what all numbers depend on."""

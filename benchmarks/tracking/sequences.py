@@ -13,7 +13,7 @@ from benchmarks.tracking.couples import couples, detect_couples, shuffles
 from benchmarks.tracking.detections import CONDITIONS, SURPRISES, Damage, detect
 from benchmarks.tracking.env_sequences import ENV, ENV_CONDITIONS, ENV_FRAMES, record
 from benchmarks.tracking.matched import draw, matched_model
-from benchmarks.tracking.rigs import SIGMA_PX, Rig
+from benchmarks.tracking.rigs import DT_S, SIGMA_PX, Rig
 from benchmarks.tracking.walks import walk
 from benchmarks.tracking.workers import fall_and_get_up, run_to_and_fro
 from hrc_env.core.records import Keypoints
@@ -45,6 +45,13 @@ N_FRAMES = {
     "one_camera": 175, LATE: 175, TWO_WORKERS: 125, MATCHED: 40, "mirrored_start": 50,
     **dict.fromkeys(MOTIONS, 200),
 }  # fmt: skip
+
+
+def lasting() -> tuple[float, float]:
+    """Return how long the shortest and the longest sequences last [s]."""
+    return DT_S * min(N_FRAMES.values()), DT_S * max(N_FRAMES.values())
+
+
 _ALONE = {
     "one_camera_half_second": (25, 38),
     "one_camera_one_second": (25, 50),

@@ -120,16 +120,23 @@ class Report:
         write_whole(out / "report.html", page)
 
 
-def quick_words(n_seeds: int, seconds: float | None = None) -> str:
+def quick_words(
+    n: int,
+    seconds: float | tuple[float, float],
+    what: str = "seed",
+    why: str = "too few to compare anything",
+) -> str:
     """Return the warning in the report of a short run.
 
     Args:
-        n_seeds: of its rows, at most.
-        seconds: that an episode takes [s]; None: episodes differ.
+        n: how many of its seeds, or of what else is repeated, at most.
+        seconds: that one lasts [s]; (least, most) where they differ.
+        what: is repeated.
+        why: what follows from it.
     """
-    seeds = f"{n_seeds} seed{'' if n_seeds == 1 else 's'}"
-    lasting = "" if seconds is None else f" of {seconds:g} s"
-    return f"Quick run, {seeds}{lasting}: too few to compare anything."
+    least, most = seconds if isinstance(seconds, tuple) else (seconds, seconds)
+    lasting = f"{least:.3g} s" if least == most else f"{least:.3g} to {most:.3g} s"
+    return f"Quick run, {n} {what}{'' if n == 1 else 's'} of {lasting}: {why}."
 
 
 _FIGURE = re.compile(r"\]\(figures/([^)]+)\)")

@@ -1,7 +1,7 @@
 """Runs an experiment: plays the parts that are not there yet, then writes numbers and report."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
@@ -57,8 +57,8 @@ class Experiment(Protocol[PlayedT]):
     def report(self, played: PlayedT, metrics: dict[str, Metric], figures: Path) -> Report:
         """Draw the figures into a folder; return the report.
 
-        An experiment that may be too short to compare anything says so by `quick_note`, as of
-        `Report.quick`.
+        An experiment that may be too short to compare anything says so here, as `Report.quick`,
+        or by `quick_note`.
         """
         ...
 
@@ -104,9 +104,30 @@ def run_experiment(
     played = experiment.play(cache_of(experiment, out / "parts", progress, engine))
     metrics = experiment.metrics(played)
     report = experiment.report(played, metrics, out / "figures")
-    report = replace(report, quick=getattr(experiment, "quick_note", ""))
+    report = replace(report, quick=getattr(experiment, "quick_note", report.quick))
     report.write(out, settings_of(experiment), experiment.seeds, metrics)
     return metrics
+
+
+def is_as_short(config: Any, quick: Any) -> bool:
+    """Return whether a number in the settings of an experiment is no greater than in its short
+    form, of those that this makes smaller.
+
+    Args:
+        config: the settings, a dataclass of which every field has a default.
+        quick: its short form.
+    """
+    usual = type(quick)()
+    names = [each.name for each in fields(quick)]
+    values = [(getattr(usual, n), getattr(quick, n), getattr(config, n)) for n in names]
+    return any(_size(now) <= _size(short) < _size(most) for most, short, now in values)
+
+
+def _size(value: Any) -> float:
+    """A number, or how many a list holds; of anything else 0."""
+    if isinstance(value, tuple | list):
+        return len(value)
+    return float(value) if isinstance(value, int | float) else 0.0
 
 
 def changed(record: RecordT, **values: Any) -> RecordT:

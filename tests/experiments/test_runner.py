@@ -295,7 +295,8 @@ def test_a_quick_report_says_so_at_every_table_and_figure_and_marks_nothing(tmp_
 
 
 def test_seeds_of_a_quick_run_are_counted_in_words():
-    assert report.quick_words(1) == "Quick run, 1 seed: too few to compare anything."
+    one = report.quick_words(1, (2.0, 7.25), "round")
+    assert one == "Quick run, 1 round of 2 to 7.25 s: too few to compare anything."
 
 
 def test_a_table_of_nothing_is_not_printed():

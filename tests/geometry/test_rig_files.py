@@ -1,5 +1,6 @@
 """Rigs in files, by name and by coordinates."""
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCEnv
 from hrc_env.geometry.camera_config import CameraConfig, read_rig, write_rig
 from hrc_env.scene.build import SceneConfig, build
+from hrc_env.scene.rig_distribution import RigDistribution
 from hrc_env.scene.rigs import RIGS, findings, sees, workspace
 from hrc_env.settings import settle
 

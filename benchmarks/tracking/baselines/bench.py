@@ -29,11 +29,11 @@ from benchmarks.common import cell
 from benchmarks.tracking.cells import beliefs
 from benchmarks.tracking.names import DEFAULT, DLT
 from benchmarks.tracking.rigs import RIGS, Rig, make_rig
-from benchmarks.tracking.sequences import Sequences, make_sequences
+from benchmarks.tracking.sequences import Sequences, lasting, make_sequences
 from hrc_env.core.results import Metric, over
 from hrc_env.core.typing import Floats, Points2, Points3
 from hrc_env.experiments.cache import PartCache, PartProgress
-from hrc_env.experiments.report import Metrics, Report, table
+from hrc_env.experiments.report import Metrics, Report, quick_words, table
 from hrc_env.experiments.runner import at_least_one
 
 LIBRARIES = ("aniposelib", "particles", "filterpy")
@@ -41,6 +41,8 @@ INSTALL = 'pip install -c constraints.txt -e ".[baselines]"'
 CONDITIONS = ("clean", "occluded", "hard", "one_camera")
 ROWS = (*CONDITIONS, "after_return")
 OURS = (DEFAULT, DLT)
+N_QUICK = 1
+"""Sequences per rig and condition of the short form."""
 Played = Mapping[tuple[str, str], list[dict[str, float]]]
 """(rig and window, name) to what each sequence gave."""
 
@@ -69,6 +71,11 @@ class BaselinesBench:
     def n_parts(self) -> int:
         """Sequences of everybody."""
         return len(RIGS) * len(CONDITIONS) * len(names()) * self.n_seeds
+
+    @property
+    def quick_note(self) -> str:
+        """The warning on tables of a short run; "" if it is long enough."""
+        return quick_words(self.n_seeds, lasting()) if self.n_seeds <= N_QUICK else ""
 
     def settings(self) -> dict[str, Any]:
         """Return what all numbers depend on."""

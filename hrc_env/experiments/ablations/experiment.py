@@ -24,7 +24,7 @@ from hrc_env.experiments.ablations.report import report
 from hrc_env.experiments.cache import Part, PartCache, PartProgress
 from hrc_env.experiments.report import Metrics, Report, quick_words
 from hrc_env.experiments.rigs import DT_S, WARM_UP_S
-from hrc_env.experiments.runner import at_least_one, changed
+from hrc_env.experiments.runner import at_least_one, changed, is_as_short
 from hrc_env.experiments.versions import key_of
 
 ABLATIONS: dict[str, Ablation] = {
@@ -82,7 +82,7 @@ class Ablations:
     @property
     def quick_note(self) -> str:
         """The warning on tables and figures of a short run; "" if it is long enough."""
-        is_short = self.n_seeds <= QUICK.n_seeds or self.seconds <= QUICK.seconds
+        is_short = is_as_short(self, QUICK)
         return quick_words(self.n_seeds, self.seconds) if is_short else ""
 
     def settings(self) -> dict[str, Any]:

@@ -108,7 +108,7 @@ class Impact:
     def is_quick(self) -> bool:
         """Whether the episodes or the learning are too few to compare anything."""
         is_short = PPO in self.policies and self.learning_steps <= QUICK["learning_steps"]
-        return self.n_seeds <= QUICK["n_seeds"] or is_short
+        return any(getattr(self, n) <= QUICK[n] for n in ("n_seeds", "n_steps")) or is_short
 
     @property
     def quick_note(self) -> str:

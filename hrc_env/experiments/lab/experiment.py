@@ -20,7 +20,7 @@ from hrc_env.experiments.lab.sides import MISSED_SHARE, away_from_cameras, misse
 from hrc_env.experiments.recording import Recording, record, replay
 from hrc_env.experiments.report import Metrics, Report, quick_words
 from hrc_env.experiments.rigs import CHOICES, DT_S, MULTI
-from hrc_env.experiments.runner import at_least_one, changed
+from hrc_env.experiments.runner import at_least_one, changed, is_as_short
 from hrc_env.perception.detector import DetectorConfig
 from hrc_env.scene.build import Scene, SceneConfig, build
 from hrc_env.scene.rigs import RIGS
@@ -68,7 +68,7 @@ class Lab:
     @property
     def quick_note(self) -> str:
         """The warning on tables and figures of a short run; "" if it is long enough."""
-        is_short = self.n_seeds <= QUICK.n_seeds or self.max_frames <= QUICK.max_frames
+        is_short = is_as_short(self, QUICK)
         return quick_words(self.n_seeds, self.max_frames * DT_S) if is_short else ""
 
     def settings(self) -> dict[str, Any]:

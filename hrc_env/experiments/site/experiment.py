@@ -21,7 +21,7 @@ from hrc_env.experiments.cache import PartCache, PartProgress
 from hrc_env.experiments.recording import Recording, record, replay
 from hrc_env.experiments.report import Metrics, Report, quick_words
 from hrc_env.experiments.rigs import CHOICES, DT_S, MULTI, N_WARM_UP, left_of
-from hrc_env.experiments.runner import at_least_one, changed
+from hrc_env.experiments.runner import at_least_one, changed, is_as_short
 from hrc_env.experiments.site.report import report, site
 from hrc_env.experiments.site.walk import walk
 from hrc_env.tracking.config import TrackerConfig
@@ -84,7 +84,7 @@ class Site:
     @property
     def quick_note(self) -> str:
         """The warning on tables and figures of a short run; "" if it is long enough."""
-        is_short = self.n_seeds <= QUICK.n_seeds or self.seconds <= QUICK.seconds
+        is_short = is_as_short(self, QUICK)
         return quick_words(self.n_seeds, self.seconds) if is_short else ""
 
     def settings(self) -> dict[str, Any]:
