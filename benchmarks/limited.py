@@ -25,7 +25,7 @@ from hrc_env.agents.callbacks import Curve
 from hrc_env.cli.entry import show_errors
 from hrc_env.core.results import Metric, over
 from hrc_env.evaluation.episodes import EVALUATION_SEED
-from hrc_env.evaluation.sums import ACHIEVED
+from hrc_env.evaluation.sums import ACHIEVED, COST_UNIT
 from hrc_env.experiments.columns import Column, mean, per_minute, rate
 from hrc_env.experiments.report import Metrics, Table
 from hrc_env.experiments.study import Row, Study
@@ -147,7 +147,7 @@ def judge_curve(curve: Curve, limit: float, n_windows: int = N_WINDOWS) -> dict[
     furthest = max(abs(cost / limit - 1) for cost in costs)
     return {
         "learning.reached_at_steps": exactly(reached, "1"),
-        "learning.cost": over(costs, "1"),
+        "learning.cost": over(costs, COST_UNIT),
         "learning.furthest": exactly(furthest, "share", len(costs)),
         "learning.goals_per_minute": exactly(float(np.mean(goals)), "1/min"),
     }

@@ -21,7 +21,7 @@ from hrc_env.engines.local import Processes, Serial
 from hrc_env.env import HRCEnv
 from hrc_env.evaluation.intervals import goals_over, mean_over, rate_of
 from hrc_env.evaluation.rollout import Transition, rollout
-from hrc_env.evaluation.sums import ACHIEVED, FAILED, EpisodeSums
+from hrc_env.evaluation.sums import ACHIEVED, COST_UNIT, FAILED, EpisodeSums
 from hrc_env.tasks import DEFAULT
 from hrc_env.vector.env import HRCVectorEnv
 from hrc_env.vector.member import info_of
@@ -246,6 +246,6 @@ def measure(episodes: list[dict[str, float]]) -> dict[str, Metric]:
     return {
         "return": mean_over(column["r"], "1"),
         "goals_per_minute": goals_over(column["goals_reached"], minutes),
-        "cost_per_episode": mean_over(column["cost"], "1"),
+        "cost_per_episode": mean_over(column["cost"], COST_UNIT),
         "contacts_per_episode": rate_of(column["contacts"], len(episodes), "1"),
     }

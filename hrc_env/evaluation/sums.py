@@ -23,6 +23,12 @@ STATISTICS = (
     *(f"contacts_{kind}" for kind in KINDS), ACHIEVED, FAILED, "success", "min_separation_m",
 )  # fmt: skip
 """What an episode comes to, by name (`EpisodeSums.summarize`)."""
+COST_UNIT = "control steps"
+UNITS = {
+    "cost": COST_UNIT, "cost_steps": COST_UNIT, "l": "control steps", "seconds": "s",
+    "min_separation_m": "m",
+}  # fmt: skip
+"""Of statistics that are no numbers of something, by name; "1" is that of the others."""
 
 
 class EpisodeSums:

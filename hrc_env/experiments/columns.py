@@ -14,7 +14,7 @@ from hrc_env.core.errors import check_names
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats
 from hrc_env.evaluation import intervals
-from hrc_env.evaluation.sums import ACHIEVED, FAILED, STATISTICS
+from hrc_env.evaluation.sums import ACHIEVED, FAILED, STATISTICS, UNITS
 
 Episodes = Sequence[Mapping[str, float]]
 """Statistics of episodes (`hrc_env.evaluation.sums`), in the order of their seeds."""
@@ -59,7 +59,11 @@ class Shown(TypedDict, total=False):
 
 
 def mean(
-    statistic: str, heading: str = "", name: str = "", unit: str = "1", **shown: Unpack[Shown]
+    statistic: str,
+    heading: str = "",
+    name: str = "",
+    unit: str | None = None,
+    **shown: Unpack[Shown],
 ) -> Column:
     """Return the column of a mean over episodes.
 
@@ -67,20 +71,25 @@ def mean(
         statistic: one of `STATISTICS`.
         heading: of the column; "": it is not shown.
         name: of the metric; the statistic's own if not given.
-        unit: of the metric.
+        unit: of the metric; None: the statistic's own.
         shown: fields of `Column`.
     """
     check_names("statistic", [statistic], STATISTICS)
+    counted_in = UNITS.get(statistic, "1") if unit is None else unit
     return _column(
         name or statistic,
         heading,
-        lambda own, _: intervals.mean_over(_values(own, statistic), unit),
+        lambda own, _: intervals.mean_over(_values(own, statistic), counted_in),
         **shown,
     )
 
 
 def per_minute(
-    statistic: str, heading: str = "", name: str = "", unit: str = "1/min", **shown: Unpack[Shown]
+    statistic: str,
+    heading: str = "",
+    name: str = "",
+    unit: str | None = None,
+    **shown: Unpack[Shown],
 ) -> Column:
     """Return the column of a sum over episodes, by the minutes that they took.
 
@@ -90,10 +99,11 @@ def per_minute(
     """
     check_names("statistic", [statistic], STATISTICS)
     over = intervals.goals_over if statistic == ACHIEVED else None
+    counted_in = f"{UNITS.get(statistic, '1')}/min" if unit is None else unit
 
     def measure(own: Episodes, _: Episodes) -> Metric:
         values, minutes = _values(own, statistic), _values(own, "seconds") / 60
-        return over(values, minutes) if over else intervals.ratio_over(values, minutes, unit)
+        return over(values, minutes) if over else intervals.ratio_over(values, minutes, counted_in)
 
     return _column(name or f"{statistic}_per_minute", heading, measure, **shown)
 

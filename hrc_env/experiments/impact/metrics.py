@@ -20,6 +20,7 @@ from hrc_env.core.typing import Floats, Ints
 from hrc_env.evaluation import intervals
 from hrc_env.evaluation.counts import ERRORS_M, GAPS_M, SPEEDS_MPS
 from hrc_env.evaluation.intervals import paired, rate_of, ratio_of, ratio_over
+from hrc_env.evaluation.sums import COST_UNIT
 from hrc_env.experiments.impact.policies import SLOWED, Policy
 from hrc_env.experiments.report import Metrics
 from hrc_env.experiments.setups import LATE, REFERENCE, PerceptionSetup, setup_called
@@ -39,7 +40,7 @@ PER_1000 = (
     "called_slowings", "approaches",
 )  # fmt: skip
 """What is counted in a thousand control steps; `called_slowings`: somebody is near."""
-AN_EPISODE = {"cost": "per episode", "cost_towards": "per episode"}
+AN_EPISODE = dict.fromkeys(("cost", "cost_towards"), f"{COST_UNIT} per episode")
 """What is counted in an episode, and its unit."""
 QUANTILES = {
     "z_d_m": (ERRORS_M, "error", 0.95, "m"),

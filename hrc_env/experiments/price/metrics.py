@@ -12,6 +12,7 @@ import numpy as np
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats
 from hrc_env.evaluation.intervals import crossing, goals_over, rate_of, ratio_over
+from hrc_env.evaluation.sums import COST_UNIT
 from hrc_env.experiments.price.episodes import CONTACTS
 from hrc_env.experiments.price.eyes import ELSEWHERE, FOUR, ONE, TRUTH
 from hrc_env.experiments.price.search import Tried, draws, falling
@@ -138,7 +139,7 @@ def _rates(rows: Rows) -> Metrics:
     return {
         **contacts,
         "goals_per_min": goals_over(rows["achieved"], rows["minutes"]),
-        "cost": ratio_over(rows["cost"], 1000 * per, "per episode of 10 s"),
+        "cost": ratio_over(rows["cost"], 1000 * per, f"{COST_UNIT} per episode of 10 s"),
     }
 
 
