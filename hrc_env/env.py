@@ -135,7 +135,10 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         ConfigError: a name, index or value that is not valid, with those that are.
     """
 
-    CHANGES = ("simulation", "_np_random", "_np_random_seed", "_begun", "_steps_left")
+    CHANGES = (
+        "simulation", "_np_random", "_np_random_seed", "_begun", "_steps_left", "_options",
+        "_next_options",
+    )  # fmt: skip
     metadata = {"render_modes": list(RENDER_MODES), "render_fps": 25}  # noqa: RUF012
 
     __signature__ = signature_of_env(
@@ -238,7 +241,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
     def set_options(self, options: Mapping[str, Any] | ResetOptions | None = None) -> None:
         """Fix something of all episodes to come, until this is called again: a curriculum.
 
-        `get_state` does not hold it.
+        `get_state` holds it, so that a state goes on with the same episodes.
 
         Args:
             options: as of `reset`, in place of those before; what `reset` is given goes before

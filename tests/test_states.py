@@ -136,3 +136,40 @@ def test_a_closed_environment_says_so():
     for call in (env.reset, lambda: env.step(np.zeros(6))):
         with pytest.raises(ConfigError, match="closed"):
             call()
+
+
+LASTING = {"goal": (0.5, 0.3, 1.1), "n_workers": 0}
+
+
+@pytest.mark.parametrize("again", ["set_state", "pickle"])
+def test_a_state_holds_options_of_all_resets(again):
+    env, other = (HRCEnv(perception="truth", n_workers=(0, 1)) for _ in range(2))
+    env.set_options(LASTING)
+    env.next_options = {"n_workers": 1}
+    env.reset(seed=3)
+    env.next_options = {"n_workers": 1}
+    if again == "pickle":
+        other = pickle.loads(pickle.dumps(env))
+    else:
+        other.set_options({"n_workers": 1})
+        other.set_state(env.get_state())
+    assert (other.options, other.next_options) == (LASTING, {"n_workers": 1})
+    for _ in range(2):
+        assert same(env.reset(), other.reset())
+        assert same(env.step(np.ones(6, np.float32)), other.step(np.ones(6, np.float32)))
+
+
+def test_a_state_of_a_vector_holds_options_of_each_environment():
+    envs, other = (
+        HRCVectorEnv(3, perception="truth", n_workers=(0, 1), num_threads=1, max_episode_steps=4)
+        for _ in range(2)
+    )
+    envs.set_options({"each": [LASTING, None, {"n_workers": 1}]})
+    envs.reset(seed=3)
+    other.set_options({"n_workers": 0})
+    other.set_state(envs.get_state())
+    actions = np.ones((3, 6), np.float32)
+    for _ in range(10):
+        assert same(envs.step(actions), other.step(actions))
+    other.set_options(None)
+    assert envs.options_of(0) == LASTING

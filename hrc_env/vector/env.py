@@ -19,7 +19,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from hrc_env.control import checked_action
-from hrc_env.core.batching import copied, mapped, one, write_rows
+from hrc_env.core.batching import State, copied, mapped, one, write_rows
 from hrc_env.core.errors import ConfigError, check_shape, whole
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.env import RENDER_MODES, EnvBase, spaces
@@ -218,6 +218,15 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         everyone = np.arange(self.num_envs)
         fixed = _fixed_each(self.shards.first, everyone, nothing, each)
         self._options, self._fixed = each, fixed
+
+    def get_state(self) -> State:
+        """Return a copy of everything that changes, options of `set_options` included."""
+        return {**super().get_state(), "options": copied(self._options)}
+
+    def set_state(self, state: State) -> None:
+        """Continue from a state that was taken with the same arguments, bit for bit."""
+        super().set_state(state)
+        self.set_options({"each": copied(state["options"])})
 
     def check_options(self, k: int, options: Mapping[str, Any] | ResetOptions | None) -> None:
         """Raise the `ConfigError` that a reset of environment `k` with these options raises."""
