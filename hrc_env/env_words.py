@@ -15,14 +15,19 @@ from hrc_env.env_config import EnvConfig
 FAULT = """'{"kind": "late", "cameras": ["camera_1"], "amount": 0.2}'"""
 
 
-def cameras_named(words: Sequence[str]) -> str | list[int | str]:
-    """A rig's name or file, or a list of cameras' names and numbers."""
+def cameras_named(words: Sequence[str]) -> Any:
+    """A rig's name or file, the mapping of a distribution of rigs, or a list of cameras: names,
+    numbers and mappings."""
     if len(words) == 1:
-        from hrc_env.scene.rigs import RIGS  # here: it imports the simulator
+        from hrc_env.scene.rig_distribution import RigDistribution  # here: it imports the simulator
+        from hrc_env.scene.rigs import RIGS
 
         if words[0].endswith(".toml") or words[0] in RIGS:
             return words[0]
-    return [int(word) if word.isdigit() else word for word in words]
+        value = read_word(words[0])
+        if isinstance(value, dict) and value.keys() <= {f.name for f in fields(RigDistribution)}:
+            return value
+    return [int(word) if word.isdigit() else read_word(word) for word in words]
 
 
 def read_config(words: Sequence[str]) -> dict[str, Any]:
@@ -82,6 +87,7 @@ AGENTS_OWN = ("control",)
 """Arguments that are an agent's own if they are not given."""
 ON_THE_COMMAND_LINE = {
     "faults": "Each is a JSON object.",
+    "cameras": "A RigDistribution is a JSON object.",
     "observe_images": "Here: HEIGHT WIDTH, or a JSON object.",
     "people": "--config motion.people.FIELD=VALUE changes one thing.",
     "appearance": "--config appearance.FIELD=VALUE changes one thing.",

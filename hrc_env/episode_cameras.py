@@ -14,7 +14,7 @@ import numpy as np
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.infos import DELAY, FAULT, LIGHT, MOVED, N_CAMERAS, TURNED, Info
 from hrc_env.core.streams import aside
-from hrc_env.core.typing import Ints
+from hrc_env.core.typing import Floats, Ints
 from hrc_env.geometry.camera_config import CameraConfig, axes_of
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.perception.faults.fault import IMAGE, KINDS, FaultConfig
@@ -107,6 +107,21 @@ class EpisodeCameras:
         """Return the same with their matrices."""
         rig = self.rig_of(b)
         return self.scene.cameras if rig == self.scene.rig else make_cameras(rig)
+
+    @property
+    def are_drawn(self) -> bool:
+        """Whether every episode has a rig of its own."""
+        return self._rigs is not None
+
+    def projections(self) -> Floats:
+        """Return (B, C, 3, 4) the projections of every environment's episode, from the world [m]
+        to pixels; NaN of a camera that does not hang in it."""
+        batch = len(self._drawn[N_CAMERAS])
+        P = np.full((batch, len(self.names), 3, 4), np.nan)
+        for b in range(batch):
+            for camera in self.cameras_of(b):
+                P[b, self.names.index(camera.name)] = camera.P
+        return P
 
     def faults_of(self, b: int) -> tuple[FaultConfig, ...]:
         """Return the faults of environment b's cameras, each with the amount of its episode."""

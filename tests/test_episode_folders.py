@@ -94,6 +94,57 @@ def test_images_are_what_the_cameras_see(tmp_path, pixels):
     assert (first != second).any()
 
 
+DRAWN = '{"place_m": 0.2, "turn_rad": 0.05, "n_cameras": [2, 3]}'
+
+
+def test_drawn_rigs_are_kept_with_their_keypoints(tmp_path):
+    """Frames at once and late, of each episode as its own cameras saw them."""
+    late = '{"kind": "late", "cameras": ["camera_1"], "amount": [0.1, 0.2]}'
+    words = ["--cameras", DRAWN, "--faults", late, "--keypoints", "--poses"]
+    done = record(tmp_path / "set", *words, "--infos", "episode/*", task="HRCReach-v0")
+    assert done.returncode == 0, done.stderr
+    episodes = hrc_env.load_episodes(tmp_path / "set")
+    env = gymnasium.make("HRCReach-v0", **episodes.metadata["environment"])
+    for episode in episodes:
+        hung = np.isfinite(episode.P).all((1, 2))
+        env.reset(seed=episode.seed)
+        rig = env.unwrapped.rig
+        assert hung.sum() == len(rig) == episode.truth["episode/n_cameras"][0]
+        assert np.isnan(episode.keypoints.px[:, ~hung]).all()
+        assert np.isnan(episode.keypoints.time_s[:, ~hung]).all()
+        assert (episode.keypoints.confidence[:, ~hung] == 0).all()
+        P = np.stack([each.P for each in hrc_env.make_cameras(rig)])
+        np.testing.assert_array_equal(episode.P[hung], P)
+        joints = episode.truth["joints_world"][50, 0]
+        seen = episode.P[hung] @ np.c_[joints, np.ones(15)].T
+        px = (seen[:, :2] / seen[:, 2:]).swapaxes(1, 2)
+        off_px = np.abs(px - episode.keypoints.px[50, hung, 0])
+        assert np.nanmax(episode.keypoints.time_s[50, hung]) == pytest.approx(51 * 0.04)
+        assert np.nanmedian(off_px) < 15
+    assert len({each.P.tobytes() for each in episodes}) == len(episodes)
+
+
+def test_drawn_rigs_differ_between_environments_of_a_batch():
+    """Each sees what it sees alone."""
+    faults = [{"kind": "late", "cameras": ["camera_1"], "amount": [0.1, 0.2]}]
+    options = [{}, {"cameras": ["camera_3", "camera_1"]}, {"faults": faults}]
+    envs = hrc_env.HRCVectorEnv(3, num_threads=1)
+    envs.reset(seed=1, options={"each": options})
+    envs.step(np.zeros((3, 6), np.float32))
+    together = envs.simulation.pipeline.given
+    for b, each in enumerate(options):
+        env = hrc_env.HRCEnv(perception="keypoints")
+        env.reset(seed=1 + b, options=each)
+        env.step(np.zeros(6, np.float32))
+        alone = env.simulation.pipeline.given
+        np.testing.assert_array_equal(together.px[b], alone.px[0])
+        np.testing.assert_array_equal(together.sigma_px[b], alone.sigma_px[0])
+        if alone.time_s is not None:
+            np.testing.assert_array_equal(together.time_s[b], alone.time_s[0])
+    assert np.isnan(together.time_s[1, [1, 3]]).all()
+    np.testing.assert_allclose(together.time_s[1, [0, 2]], 2 * 0.04)
+
+
 def test_what_is_finished_when_it_is_killed_is_not_played_again(tmp_path, monkeypatch):
     once, plays = recording._played, []
 

@@ -149,3 +149,22 @@ def test_the_environment_comes_back_with_its_arguments():
     assert isinstance(env, gymnasium.Env)
     simulation = env.unwrapped.simulation
     assert (simulation.control, simulation.settings["n_workers"]) == ("tool", 2)
+
+
+def test_images_and_drawn_rigs_load_back(root, pixels):
+    """What each episode's cameras see, where they hang in it, beside the goals."""
+    rigs = '{"place_m": 0.2, "n_cameras": [2, 3]}'
+    words = ["--perception", "keypoints", "--cameras", rigs, "--observe-images", "24", "32"]
+    words += ["--keypoints", "--num-envs", "1", "--episodes", "2"]
+    assert record("HRCReachGoal-v0", *words) == 0
+    found = minari.load_dataset(NAME)
+    env = found.recover_environment()
+    assert env.observation_space == found.observation_space
+    for k, episode in enumerate(found.iterate_episodes()):
+        seen, _ = env.reset(seed=k)
+        for name, value in seen.items():
+            np.testing.assert_array_equal(episode.observations[name][0], value)
+        hung = np.isfinite(episode.infos["keypoints"]["P"][0]).all((1, 2))
+        dark = [not episode.observations[f"image_camera_{c + 1}"].any() for c in range(4)]
+        np.testing.assert_array_equal(hung, np.logical_not(dark))
+    env.close()

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from hrc_env.core.errors import ConfigError, HRCError, whole
 from hrc_env.core.records import Keypoints
+from hrc_env.evaluation.moments import PROJECTIONS
 
 ABOUT = "dataset.json"
 """The file of a folder's metadata."""
@@ -55,8 +56,12 @@ class Episode:
     With poses "joints_world" (T + 1, W, J, 3) [m] and "present" (T + 1, W); who is not there has
     NaN."""
     keypoints: Keypoints | None = None
-    """(T + 1, C, W, J) as the estimator was given them, pixels of `metadata["cameras"]`'s
-    projections; None: they were not recorded."""
+    """(T + 1, C, W, J) as the estimator was given them, pixels of the projections `P`; None: they
+    were not recorded."""
+    P: NDArray[np.float64] | None = None
+    """(C, 3, 4) projections of this episode's cameras, from the world [m] to pixels, beside
+    keypoints where rigs are drawn; NaN of one that did not hang. None: those of
+    `metadata["cameras"]`."""
 
     def __len__(self) -> int:
         """Return the number of steps T."""
@@ -154,9 +159,11 @@ def within(arrays: Arrays, folder: str) -> dict[str, NDArray[Any]]:
 def _episode(arrays: Arrays) -> Episode:
     seen, found = within(arrays, "observations"), within(arrays, "keypoints")
     names = ("actions", "rewards", "terminations", "truncations")
+    projections = found.pop(PROJECTIONS, None)
     return Episode(
         seed=int(arrays["seed"]), observations=seen.get("", seen),
         **{name: arrays[name] for name in names},
         belief=within(arrays, "belief"), truth=within(arrays, "truth"),
         keypoints=Keypoints(**found) if found else None,
+        P=None if projections is None else projections[0],
     )  # fmt: skip

@@ -13,6 +13,8 @@ from hrc_env.simulation import Simulation
 from hrc_env.vector.env import HRCVectorEnv
 from hrc_env.worker.body import worker_truth
 
+PROJECTIONS = "P"
+"""Name of the projections of cameras beside keypoints, where every episode's rig is drawn."""
 Moment = dict[str, NDArray[Any]]
 """Arrays (B, ...) by name; belief and truth have names of their own, "belief/..." and so on."""
 
@@ -44,6 +46,8 @@ class Kept:
             for name in ("px", "confidence", "sigma_px", "time_s"):
                 if (value := getattr(found, name)) is not None:
                     yield f"keypoints/{name}", value.copy()
+            if part.cameras.are_drawn:
+                yield f"keypoints/{PROJECTIONS}", part.cameras.projections()
 
 
 def grouped(name: str) -> str:

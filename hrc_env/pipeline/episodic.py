@@ -11,9 +11,10 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
-from hrc_env.core.batching import mapped, rows, write_rows
+from hrc_env.core.batching import mapped, one, rows, write_rows
+from hrc_env.core.errors import needed
 from hrc_env.core.records import Keypoints, PoseEstimate
-from hrc_env.core.typing import Bools, Image, Ints
+from hrc_env.core.typing import Bools, Floats, Image, Ints
 from hrc_env.core.vacancy import Coverage, Vacancy
 from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.perception.faults.fault import FaultConfig
@@ -131,6 +132,20 @@ class EpisodicPipeline(PerceptionPipeline):
         pipeline, b = self._of(b)
         return pipeline.last_detections(b)
 
+    @property
+    def given(self) -> Keypoints:
+        """The keypoints (B, C, W, J) that estimators were given last, by `names`: a camera that
+        does not hang in an episode finds nothing at no time."""
+        shared = self.shared.given
+        whole = replace(mapped(shared, np.copy), time_s=self._times_s(self.shared, shared))
+        for b, own in self._own.items():
+            seen, columns = own.pipeline.given, self._columns(own)
+            seen = replace(seen, time_s=self._times_s(own.pipeline, seen))
+            whole.px[b], whole.confidence[b], whole.sigma_px[b] = np.nan, 0.0, np.inf
+            needed(whole.time_s, "Times of frames")[b] = np.nan
+            write_rows(one(whole, b), columns, one(seen, 0))
+        return whole
+
     def crops(self, b: int) -> list[Image | None]:
         """Return the crops of `b`'s first worker that the network was given, one a camera."""
         pipeline, b = self._of(b)
@@ -227,9 +242,19 @@ class EpisodicPipeline(PerceptionPipeline):
         parts = [_Part(self.shared, shared, ids[shared], everything)] if len(shared) else []
         for row in np.flatnonzero(mine).tolist():
             own = self._own[int(ids[row])]
-            columns = np.array([self.names.index(camera.name) for camera in own.setup.rig])
-            parts.append(_Part(own.pipeline, np.array([row]), np.array([0]), columns))
+            parts.append(_Part(own.pipeline, np.array([row]), np.array([0]), self._columns(own)))
         return parts
+
+    def _columns(self, own: _Own) -> Ints:
+        """The rig's cameras among `names`."""
+        return np.array([self.names.index(camera.name) for camera in own.setup.rig])
+
+    @staticmethod
+    def _times_s(pipeline: PerceptionPipeline, seen: Keypoints) -> Floats:
+        """(B, C) when frames were taken [s]; where a pipeline tells no times, all were now."""
+        if seen.time_s is not None:
+            return seen.time_s.copy()
+        return np.repeat(pipeline.now_s[:, None], seen.px.shape[1], axis=1)
 
     def _gathered(self, ids: Ints, find: Callable[[_Part], PoseEstimate]) -> PoseEstimate:
         return _joined(len(ids), [(part, find(part)) for part in self._parts(ids)])

@@ -63,6 +63,11 @@ class PerceptionPipeline(Stateful):
         cameras."""
         raise ConfigError("Keypoints are of cameras, and this perception level has none.")
 
+    @property
+    def now_s(self) -> Floats:
+        """(B,) the present moment by the clock of `Keypoints.time_s` [s]; as `given`."""
+        raise ConfigError("Frames are of cameras, and this perception level has none.")
+
     def crops(self, b: int) -> list[Image | None]:
         """What the network was given of `b`'s first worker, one a camera (for pictures)."""
         return []
@@ -251,6 +256,11 @@ class PoseTracking(PerceptionPipeline):
     def given(self) -> Keypoints:
         """The keypoints (B, C, W, J) that the estimator was given last."""
         return self.keypoints
+
+    @property
+    def now_s(self) -> Floats:
+        """(B,) the present moment by the clock of `Keypoints.time_s` [s]."""
+        return self.steps * self.setup.dt_s
 
     def last_detections(self, b: int) -> tuple[Keypoints | None, Windows]:
         """The keypoints of environment `b`."""
