@@ -278,8 +278,8 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
     def attempt(self, method: str, *args: Any, **kwargs: Any) -> Any:
         """Call a method, and return its `ConfigError` where it raises one.
 
-        A process that raises is closed by the vector environment which it is part of; this lets
-        the error reach the user.
+        A process that raises is closed by its vector environment; this lets the error reach the
+        user.
 
         Args:
             method: its name.
@@ -287,7 +287,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
             kwargs: of the method.
 
         Returns:
-            What the method returns, or the error.
+            The result of the method, or the error.
         """
         try:
             return getattr(self, method)(*args, **kwargs)

@@ -1,4 +1,4 @@
-"""The cameras of every environment's episode: drawn, hung and looked through, and what was drawn.
+"""The cameras of every environment's episode, and the draws that they come from.
 
 Most environments share one pipeline; one whose episode has cameras of its own gets another
 (`pipeline.episodic`).
@@ -78,7 +78,7 @@ class EpisodeCameras:
 
         Args:
             ids: the environments.
-            given: what is fixed of each one's episode.
+            given: the fixed parts of each one's episode.
             sensor_rngs: a generator for each environment of the batch.
         """
         differ = self._rigs is not None or any(each.changes_cameras for each in given.values())
@@ -90,12 +90,12 @@ class EpisodeCameras:
             pipeline.assign(b, setup)
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
-        """Forget what cameras showed in environments `ids`, and note what is drawn of them."""
+        """Forget the images of environments `ids`, and note the draws of their episodes."""
         self.pipeline.reset(ids, sensor_rngs, tracker_rngs)
         self._note(ids)
 
     def info(self, ids: Ints) -> Info:
-        """Return what was drawn for the episodes of environments `ids`; nothing without cameras."""
+        """Return the draws of the episodes of environments `ids`; none without cameras."""
         return {name: values[ids] for name, values in self._drawn.items()}
 
     def rig_of(self, b: int) -> tuple[CameraConfig, ...]:
@@ -199,7 +199,7 @@ class EpisodeCameras:
         )
 
     def _note(self, ids: Ints) -> None:
-        """Write down what is drawn for the episodes of environments `ids`."""
+        """Write down the draws of the episodes of environments `ids`."""
         if not self._drawn:
             return
         for b in ids.tolist():

@@ -1,4 +1,4 @@
-"""Two steps with what a user brings, so that what is wrong is said before an episode begins."""
+"""Two steps with a user's own parts, so that errors come before an episode begins."""
 
 import warnings
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ from hrc_env.tasks.task import is_known
 from hrc_env.tracking.estimators import BUILT_IN, ESTIMATORS
 
 _PLAYED: list[tuple[Any, ...]] = []
-"""What was found to be right, and need not be played again."""
+"""Parts that have passed, and need not be played again."""
 _KEPT = 32
 """So many at most are remembered."""
 
@@ -30,7 +30,7 @@ def rehearse(settings: Settings) -> None:
     environment is made of them.
 
     Raises:
-        ConfigError: one of their functions returns what it must not.
+        ConfigError: one of their functions returns a wrong kind, shape or value.
     """
     task = None if is_known(type(settings.task)) else type(settings.task)
     own = task, _own_estimator(settings), _own_shield(settings)
@@ -42,7 +42,7 @@ def rehearse(settings: Settings) -> None:
 
 
 def play_briefly(settings: Settings) -> None:
-    """Play two steps of two environments without images, and check all that is brought along.
+    """Play two steps of two environments without images, and check every result of hooks.
 
     There are no cameras unless the estimator is a user's own.
     """
@@ -70,7 +70,7 @@ def play_briefly(settings: Settings) -> None:
 
 
 def _own_estimator(settings: Settings) -> Any:
-    """What makes an estimator of a user's own, if cameras are there for it."""
+    """The function that makes an estimator of a user's own, if there are cameras for it."""
     spec = settings.estimator
     known = spec in BUILT_IN or ESTIMATORS.name_of(spec) is not None
     return None if known or settings.asked.perception not in CAMERA_LEVELS else spec.make

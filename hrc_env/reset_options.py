@@ -148,7 +148,7 @@ class Room:
     images: ObservedImages | None = None
     """Draws the images of observations; None: they hold none."""
     wants_pairs: str = ""
-    """The name of an estimator that makes nothing of one camera alone; "": it does."""
+    """The name of an estimator that needs two cameras; "": it does not."""
 
 
 def fix(options: Options, room: Room) -> Fixed:

@@ -264,7 +264,7 @@ class HRCVecEnv(VecEnv):
 
 
 class HRCSubprocVecEnv(SubprocVecEnv):
-    """SB3's `SubprocVecEnv` in which a process that refuses options says why, and goes on.
+    """SB3's `SubprocVecEnv`, in which errors of options are raised here and processes go on.
 
     PPO("MlpPolicy", make_vec_env("HRCReach-v0", 4, env_kwargs={"perception": "pixels"},
         vec_env_cls=HRCSubprocVecEnv))
@@ -308,7 +308,7 @@ class HRCSubprocVecEnv(SubprocVecEnv):
         """Call a method of each environment and return the results.
 
         Raises:
-            ConfigError: an environment refuses what it was given.
+            ConfigError: an environment refuses the arguments.
         """
         attempt = ("attempt",) if method_name in REFUSING else ()
         name, *args = *attempt, method_name, *method_args

@@ -243,7 +243,7 @@ class Simulation(Stateful):
 
     @property
     def pipeline(self) -> PerceptionPipeline:
-        """What finds workers in the episodes' cameras."""
+        """The perception of the episodes' cameras."""
         return self.cameras.pipeline
 
     @property

@@ -39,7 +39,7 @@ MISCALIBRATED = "perception/miscalibrated"
 MORE_PEOPLE = "perception/more_people"
 N_CAMERAS, MOVED, TURNED = "episode/n_cameras", "episode/moved_m", "episode/turned_rad"
 DELAY, LIGHT, FAULT = "episode/delay_s", "episode/light", "episode/fault_"
-"""What was drawn for an episode."""
+"""Draws of an episode."""
 
 
 class Entry(NamedTuple):

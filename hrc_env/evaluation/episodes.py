@@ -193,7 +193,7 @@ def play_one_by_one(
 
 
 def _made(make: Callable[[Any], Agent], info: Any) -> Agent:
-    """Return the agent of a function; `ConfigError` for other arguments, or what is no agent."""
+    """Return the agent of a function; `ConfigError` for other arguments or results."""
     check_arguments("What makes an agent", make, "env_info")
     agent = make(info)
     if not callable(getattr(agent, "act", None)):

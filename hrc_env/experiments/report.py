@@ -129,10 +129,10 @@ def quick_words(
     """Return the warning in the report of a short run.
 
     Args:
-        n: how many of its seeds, or of what else is repeated, at most.
+        n: number of seeds or other repetitions, at most.
         seconds: that one lasts [s]; (least, most) where they differ.
-        what: is repeated.
-        why: what follows from it.
+        what: name of a repetition.
+        why: the consequence, for the reader.
     """
     least, most = seconds if isinstance(seconds, tuple) else (seconds, seconds)
     lasting = f"{least:.3g} s" if least == most else f"{least:.3g} to {most:.3g} s"

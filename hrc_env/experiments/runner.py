@@ -57,7 +57,7 @@ class Experiment(Protocol[PlayedT]):
     def report(self, played: PlayedT, metrics: dict[str, Metric], figures: Path) -> Report:
         """Draw the figures into a folder; return the report.
 
-        An experiment that may be too short to compare anything says so here, as `Report.quick`,
+        An experiment that may be too short to compare anything warns here, as `Report.quick`,
         or by `quick_note`.
         """
         ...

@@ -135,7 +135,7 @@ class EmulatorPipeline(PoseTracking):
         return super().looked(ids, age_s) & ~self.cameras.blank[ids]
 
     def schedule_of(self, b: int) -> Schedule:
-        """What the cameras of environment b do in its episode."""
+        """Return the schedule of environment b's cameras in its episode."""
         recent = self.cameras.recent
         return self.cameras.schedule if recent is None else recent.schedule_of(b)
 

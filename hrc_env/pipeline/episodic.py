@@ -157,7 +157,7 @@ class EpisodicPipeline(PerceptionPipeline):
         return pipeline.look_of(b)
 
     def schedule_of(self, b: int) -> Schedule | None:
-        """What the cameras of environment `b` do in its episode."""
+        """Return the schedule of environment `b`'s cameras in its episode."""
         pipeline, b = self._of(b)
         return pipeline.schedule_of(b)
 

@@ -90,7 +90,7 @@ class PixelPipeline(ImageTracking):
         return self.cameras.worn[b]
 
     def schedule_of(self, b: int) -> Schedule:
-        """What the cameras of environment b do in its episode."""
+        """Return the schedule of environment b's cameras in its episode."""
         return self.cameras.recent.schedule_of(b)
 
     def light_of(self, b: int) -> float:

@@ -77,7 +77,7 @@ class PerceptionPipeline(Stateful):
         return None
 
     def schedule_of(self, b: int) -> Schedule | None:
-        """What the cameras of environment `b` do in its episode; None without cameras."""
+        """Return the schedule of environment `b`'s cameras in its episode; None without cameras."""
         return None
 
     def light_of(self, b: int) -> float:

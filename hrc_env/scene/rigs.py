@@ -112,7 +112,7 @@ def findings(scene: Scene, wants_pairs: str = "", fewest: int | None = None) -> 
 
     Args:
         scene: with the rig.
-        wants_pairs: the name of an estimator that makes nothing of one camera alone; "": it does.
+        wants_pairs: the name of an estimator that needs two cameras; "": it does not.
         fewest: cameras of an episode, where their number is drawn; None: the rig's.
     """
     if fewest == 1 and len(scene.cameras) > 1 and wants_pairs:
@@ -130,7 +130,7 @@ def findings(scene: Scene, wants_pairs: str = "", fewest: int | None = None) -> 
 
 
 def _depth_alone(wants_pairs: str) -> str:
-    """What an estimator makes of one camera, in a sentence."""
+    """Describe in a sentence how an estimator does with one camera."""
     if not wants_pairs:
         return "How far people are follows from their bodies' usual size."
     return (

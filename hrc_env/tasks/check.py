@@ -47,7 +47,7 @@ def check_task(task: TaskType) -> None:
 
 
 def check_parts(task: TaskType) -> None:
-    """Raise `ConfigError` for what is missing or wrong in a class, whatever its id."""
+    """Raise `ConfigError` for missing or wrong parts of a class, regardless of its id."""
     _check_names(task)
     _check_attributes(task)
     _check_methods(task)

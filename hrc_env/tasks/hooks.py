@@ -1,4 +1,4 @@
-"""A task whose hooks are checked: for the steps that are played before anybody uses it."""
+"""A task whose hooks are checked: for the steps that are played when it is registered."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from hrc_env.world import Effects, WorkerSignal
 
 @dataclass(slots=True)
 class Sizes:
-    """Lengths of axes of what hooks return."""
+    """Lengths of axes of results."""
 
     batch: int
     """Environments."""
@@ -28,12 +28,12 @@ class Sizes:
 
 
 Check = Callable[[str, Any, Sizes], None]
-"""(what it is, what a hook returned, sizes); raises `ConfigError`."""
+"""(name, result of a hook, sizes); raises `ConfigError`."""
 
 
 def with_checks(task: Task[Any, Any], sizes: Sizes) -> Task[Any, Any]:
-    """Return a task that does the same, and whose hooks raise `ConfigError` for what they must not
-    return: another kind, another shape, no numbers."""
+    """Return a task that does the same, and whose hooks raise `ConfigError` for results of another
+    kind or shape, or that are no numbers."""
     kind = type(task)
     hooks = {name: _checked(kind, name, check, sizes) for name, check in CHECKS.items()}
     watched = type(kind.__name__, (kind,), {**hooks, "__doc__": kind.__doc__})
@@ -42,7 +42,7 @@ def with_checks(task: Task[Any, Any], sizes: Sizes) -> Task[Any, Any]:
 
 
 def check_places(what: str, targets: Any) -> None:
-    """Raise `ConfigError` for what are no `ReachTarget`s."""
+    """Raise `ConfigError` unless these are `ReachTarget`s."""
     if not isinstance(targets, Sequence) or isinstance(targets, str):
         raise ConfigError(f"{what} must be a list of ReachTarget, got {described(targets)}.")
     for k, target in enumerate(targets):
@@ -124,4 +124,4 @@ CHECKS: dict[str, Check] = {
     "markers": _points,
     "signal": _signal,
 }
-"""What hooks must return, by name."""
+"""Checks of results, by hook."""

@@ -20,7 +20,7 @@ METHODS = {
     "estimate": ("state",),
     "forecast": ("state", "horizon_s"),
 }
-"""What `estimators.Estimator` asks for, with the arguments."""
+"""Methods of `estimators.Estimator`, with their arguments."""
 OFF_M2 = 1e-9
 """A covariance is symmetric up to this [m^2]."""
 

@@ -140,7 +140,7 @@ class EstimatorSpec:
 
     @property
     def wants_pairs(self) -> str:
-        """Its name, if one camera alone tells it nothing; else ""."""
+        """Its name, if it needs two cameras; else ""."""
         return self.name if self.needs_pairs else ""
 
     def __reduce__(self) -> tuple[Any, ...]:

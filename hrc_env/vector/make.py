@@ -27,7 +27,7 @@ REFUSING = ("check_options", "set_options", "set_reward")
 
 
 def without_refusal(results: Iterable[Any]) -> tuple[Any, ...]:
-    """Return what processes attempted (`HRCEnv.attempt`); raise the first error among it."""
+    """Return results of `HRCEnv.attempt`; raise the first error among them."""
     told = tuple(results)
     for each in told:
         if isinstance(each, ConfigError):
@@ -38,7 +38,7 @@ def without_refusal(results: Iterable[Any]) -> tuple[Any, ...]:
 class PixelVectorEnv(HasSpec, AsyncVectorEnv):  # type: ignore[misc]  # `spec` is a property
     """Environments at level "pixels", a process for each.
 
-    What a process would refuse of options and rewards is raised here, and the process goes on.
+    Errors of options and rewards are raised here, and processes go on.
     """
 
     def reset_async(self, seed: int | list[int | None] | None = None, options: Any = None) -> None:
@@ -73,7 +73,7 @@ class PixelVectorEnv(HasSpec, AsyncVectorEnv):  # type: ignore[misc]  # `spec` i
         super().set_attr(name, values)
 
     def call_async(self, name: str, /, *args: Any, **kwargs: Any) -> None:
-        """Ask every environment for a call; `call_wait` raises what they refuse."""
+        """Start a call of every environment; `call_wait` raises their errors."""
         attempt = ("attempt",) if name in REFUSING else ()
         super().call_async(*attempt, name, *args, **kwargs)
 
@@ -84,7 +84,7 @@ class PixelVectorEnv(HasSpec, AsyncVectorEnv):  # type: ignore[misc]  # `spec` i
             timeout: after which it is a `TimeoutError` [s]; None: none.
 
         Raises:
-            ConfigError: an environment refuses what it was given.
+            ConfigError: an environment refuses the arguments.
         """
         return without_refusal(super().call_wait(timeout))
 
