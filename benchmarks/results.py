@@ -1,10 +1,10 @@
 """Every number and picture of the documentation again: make results, python -m benchmarks.results
 
 Runs the studies that are older than the subsystems they depend on (`behaviour.toml`), one after the
-other; puts their numbers into `docs/results/`, their pictures into `docs/pictures/`, both into the
-pages, and a summary of every part into `docs/results/parts/`, by which `benchmarks.verify` replays
-some. What is finished of a study stays in `out/results/`: a run that was stopped goes on. Numbers
-come from a clean commit; changes in `docs/` do not count.
+other; puts their numbers into `docs/results/whole/`, their pictures into `docs/pictures/`, both
+into the pages, and a summary of every part into `docs/results/parts/`, by which `benchmarks.verify`
+replays some. What is finished of a study stays in `out/results/`: a run that was stopped goes on.
+Numbers come from a clean commit; changes in `docs/` do not count.
 
     python -m benchmarks.results --list            # what is stale, why, and how long it would take
     python -m benchmarks.results --only site lab
@@ -93,7 +93,7 @@ def main(arguments: Arguments) -> int:
             publish(name)
         else:
             console.print(f"{name} is not finished; the same command goes on there.")
-    generate.main([])
+    generate.main()
     return 0
 
 
@@ -247,13 +247,8 @@ def publish(name: str) -> None:
         metric |= {end: float(f"{metric[end]:.6g}") for end in ("value", "low", "high")}
     WHOLE.mkdir(exist_ok=True)
     kept = WHOLE / f"{name}.json"
-    kept.write_text(tables.written(content))
+    kept.write_text(written(content))
     records.write(name, mark["depends"], out / "parts", mark["began_s"])
-    for each in command.tables:
-        path = tables.RESULTS / f"{each}.json"
-        if path.exists():  # else the experiment declares it, and the page reads its numbers
-            table = tables.renewed(tables.read(each), kept) | {"command": command.command}
-            path.write_text(tables.written(table))
     for picture, figure in command.pictures.items():
         drawn = out / "figures" / figure
         if picture.endswith(".png"):
@@ -261,6 +256,22 @@ def publish(name: str) -> None:
         else:
             quality = [cv2.IMWRITE_JPEG_QUALITY, 88]
             cv2.imwrite(str(PICTURES / picture), cv2.imread(str(drawn)), quality)
+
+
+def written(content: Mapping[str, Any]) -> str:
+    """Return the text of a file of `docs/results/whole/`: a line for each metric."""
+    parts = []
+    for name, value in content.items():
+        text = json.dumps(value, ensure_ascii=False)
+        if isinstance(value, list):
+            text = "[\n  " + ",\n  ".join(json.dumps(each) for each in value) + "\n ]"
+        elif isinstance(value, dict):
+            pairs = (
+                f"{json.dumps(k)}: {json.dumps(v, ensure_ascii=False)}" for k, v in value.items()
+            )
+            text = "{\n  " + ",\n  ".join(pairs) + "\n }"
+        parts.append(f" {json.dumps(name)}: {text}")
+    return "{\n" + ",\n".join(parts) + "\n}\n"
 
 
 def try_out(console: Console, name: str) -> int:

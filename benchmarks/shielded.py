@@ -56,7 +56,7 @@ STUDY = Study(
     },
     heads=("eyes",),
     columns=(
-        Column("{}.share", "episodes", 0, is_n=True),
+        Column("{}.share", "episodes", 0, shows="n"),
         share_of_baseline(ACHIEVED, "throughput [%]", scale=100),
         *(rate(f"contacts_{kind}", f"{kind} [in 1,000]", kind, "1000 episodes")
           for kind in ("towards", "standing", "fleeing")),

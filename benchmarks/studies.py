@@ -52,7 +52,7 @@ class Command:
     depends: tuple[str, ...]
     """Subsystems that its numbers depend on (`behaviour.toml`)."""
     tables: tuple[str, ...] = ()
-    """Tables of the documentation: declared by its experiment, or files in `docs/results/`."""
+    """Tables of the documentation: those of its experiment that it fills."""
     pictures: Mapping[str, str] = field(default_factory=dict)
     """Of `docs/pictures/`, and from which file of the command's folder `figures`."""
     quick: str = "--quick"
@@ -61,6 +61,8 @@ class Command:
     """Whether it keeps what is finished when it is stopped."""
     made: Made | None = None
     """Its experiment; None: it is none."""
+    tables_in: str = ""
+    """Module whose `TABLES` it fills, if it is no experiment."""
     is_release: bool = False
     """Whether it is called for a release only, as it trains policies for hours."""
 
@@ -70,11 +72,11 @@ class Command:
 
     @property
     def declared_tables(self) -> Mapping[str, Table]:
-        """The tables that its experiment declares, by name."""
-        if self.made is None:
-            return {}
-        declared = getattr(self.made.make(Path()), "shown_tables", tuple)()
-        return {each.name: each for each in declared}
+        """The tables that are declared for it, by name."""
+        found = import_module(self.tables_in).TABLES if self.tables_in else ()
+        if self.made is not None:
+            found = getattr(self.made.make(Path()), "shown_tables", tuple)()
+        return {each.name: each for each in found}
 
 
 KEYPOINTS = ("env", "tracker", "emulator", "motion")
@@ -172,6 +174,7 @@ STUDIES: dict[str, Study] = {
         ),
         "trueness": Command(
             "python -m assets.emulator.holdout", 8, PIXELS, ("trueness",), quick="--rounds 1",
+            tables_in="assets.emulator.holdout",
         ),
     }),
     "tasks": Study({

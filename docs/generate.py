@@ -1,16 +1,12 @@
 """Write what is generated of the documentation: python -m docs.generate
 
 The reference (`docs/reference/`) comes from the code, tables of measurements in README.md and
-`docs/*.md` from `docs/results/*.json`. After a run of a benchmark
-
-    python -m docs.generate --renew site out/site/results.json
-
-puts its numbers into the table of that name first. Tables that experiments declare have no file;
-their numbers are those of `docs/results/whole/`.
+`docs/*.md` from the studies, which declare them, and from what they found last, in
+`docs/results/whole/`.
 """
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -37,17 +33,8 @@ REFERENCE: dict[Path, Callable[[], str]] = {
 """Generated whole."""
 
 
-def main(words: Sequence[str]) -> None:
-    """Renew a table if asked, then write every page that has changed."""
-    if words:
-        option, name, path = words
-        if option != "--renew":
-            sys.exit(__doc__)
-        file = tables.RESULTS / f"{name}.json"
-        if not file.exists():
-            sys.exit(f"There is no docs/results/{name}.json to renew: it is unknown, or its "
-                     "experiment declares it, and `make results` renews it.")  # fmt: skip
-        file.write_text(tables.written(tables.renewed(tables.read(name), Path(path))))
+def main() -> None:
+    """Write every page that has changed."""
     for path in PAGES:
         _write(path, tables.filled(path.read_text()))
     for path, page in REFERENCE.items():
@@ -61,4 +48,4 @@ def _write(path: Path, text: str) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

@@ -2,10 +2,10 @@
 
 import importlib.util
 import io
-import math
 import pydoc
 import re
 from contextlib import redirect_stdout, suppress
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -66,89 +66,51 @@ def test_the_baselines_are_in_the_readme_and_in_learning():
         assert tables.filled(text.replace("| `random` |", "| `other` |")) == text
 
 
-FILES = sorted(path.stem for path in tables.RESULTS.glob("*.json"))
-"""Tables whose columns stand beside their numbers; of the others experiments declare them."""
+NO_NUMBERS = re.compile(r'"(?:columns|heads|heading|digits|beside|title|note)":')
+"""Keys of a table that is declared."""
 
 
-def results_of(name: str, path: Path) -> Path:
-    """A results.json with all that a file needs."""
-    metric = {"value": 1.0, "low": 0.5, "high": 2.0, "unit": "1", "n": 3}
-    metrics = dict.fromkeys(tables.asked(name), metric)
-    content = {"hrc_env": "0.2.0", "depends": {"env": 3}, "machine": {"cores": 2}}
-    path.write_text(tables.written({**content, "metrics": metrics}))
-    return path
+def test_results_are_numbers_and_no_second_declaration_of_tables():
+    """If this fails: a table is declared in its study, and here are the numbers that it found."""
+    paths = [*tables.RESULTS.rglob("*.json")]
+    assert len(paths) > 30
+    assert {path.parent.name for path in paths} == {"whole", "parts", "leaderboard"}
+    assert [path for path in paths if NO_NUMBERS.search(path.read_text())] == []
 
 
-@pytest.mark.parametrize("name", FILES)
-def test_a_file_is_renewed_from_what_its_command_wrote(name, tmp_path):
-    table = tables.read(name)
-    renewed = tables.renewed(table, results_of(name, tmp_path / "results.json"))
-    assert (renewed["version"], renewed["depends"]) == ("0.2.0", {"env": 3})
-    old, new = ([sum(cell is None for cell in row) for row in each["rows"]] for each in
-                (table, renewed))  # fmt: skip
-    assert old == new
-    numbers = [each["value"] for each in renewed.get("numbers", {}).values()]
-    cells = [cell for row in renewed["rows"] for cell in row if isinstance(cell, list)]
-    for value, low, high in cells + [each for each in numbers if isinstance(each, list)]:
-        assert low <= value <= high
-        assert {abs(value)} <= {1.0, 100.0, 1000.0} or name == "site"
-
-
-@pytest.mark.parametrize("name", FILES)
-def test_every_number_of_a_file_has_its_metric(name):
-    """What is not measured is a text, or stands in a row without a key."""
-    table = tables.read(name)
-    keys = table.get("keys", [()] * len(table["rows"]))
-    by_hand = [
-        (column["name"], cell)
-        for key, row in zip(keys, table["rows"], strict=True)
-        for column, cell in zip(table["columns"], row, strict=True)
-        if key is not None and "metric" not in column and isinstance(cell, int | float | list)
+def test_a_table_is_declared_once():
+    found = [
+        (name, each)
+        for command in results.COMMANDS.values()
+        for name, each in command.declared_tables.items()
+        if name in command.tables
     ]
-    assert by_hand == []
-    assert all("metric" in number for number in table.get("numbers", {}).values())
+    assert sorted(name for name, _ in found) == tables.names()
+    for name, table in found:
+        shown = [(each.metric, each.shows, each.beside) for each in table.columns]
+        assert len(set(shown)) == len(shown), name
 
 
-def test_a_metric_that_a_command_does_not_write_is_missed(tmp_path):
-    path = results_of("lab", tmp_path / "results.json")
-    path.write_text(path.read_text().replace("error_m.particle.multi.all.median", "other"))
-    with pytest.raises(KeyError, match=r"error_m\.particle\.multi\.all\.median"):
-        tables.renewed(tables.read("lab"), path)
+@pytest.mark.parametrize("name", tables.names())
+def test_a_table_finds_a_number_for_every_column(name):
+    result = tables.read(name)
+    result.table.check(result.metrics)
+    unknown = {each.metric for each in result.table.numbers.values()} - result.metrics.keys()
+    assert unknown == set()
+    assert result.table.printed.keys().isdisjoint(result.metrics)
 
 
-def test_a_table_that_an_experiment_declares_has_the_numbers_of_its_last_run():
-    table, whole = tables.read("shielded"), results.whole("shielded")
-    assert not (tables.RESULTS / "shielded.json").exists()
-    assert [cell for row in table["rows"] for cell in row[2:]].count(None) == 0
+def test_a_table_shows_the_numbers_of_the_last_run():
+    result, whole = tables.read("shielded"), results.whole("shielded")
     four = whole["metrics"]["four.share"]
-    assert table["rows"][1][1] == four["n"]
-    assert table["rows"][1][2][0] == pytest.approx(100 * four["value"], abs=1e-3)
-    assert table["depends"] == whole["depends"]
+    line = next(each for each in result.table.markdown(result.metrics).splitlines()
+                if each.startswith("| four cameras |"))  # fmt: skip
+    assert f"| four cameras | {four['n']:,} | {100 * four['value']:.1f} (" in line
+    assert " - " not in line
+    assert result.depends == whole["depends"]
     assert "four.share" in tables.asked("shielded")
-    with pytest.raises(KeyError, match="no experiment declares 'shields'"):
+    with pytest.raises(KeyError, match="No study declares the table 'shields'"):
         tables.read("shields")
-    with pytest.raises(SystemExit, match=r"no docs/results/shielded.json to renew"):
-        generate.main(["--renew", "shielded", "out/shielded/results.json"])
-
-
-def test_cells_are_intervals_counts_and_pairs():
-    metrics = {"a": {"value": 0.25, "low": 0.2, "high": 0.5, "n": 8},
-               "b": {"value": math.nan, "low": 0.0, "high": 0.0, "n": 0}}  # fmt: skip
-    columns = [
-        {"name": "interval", "digits": 1, "metric": "a", "factor": 100},
-        {"name": "plain", "digits": 2, "metric": "{0}", "plain": True},
-        {"name": "less", "digits": 1, "metric": "a", "factor": -1},
-        {"name": "count", "metric": "a", "form": "count"},
-        {"name": "n", "metric": "a", "form": "n"},
-        {"name": "pair", "metric": "a", "beside": "a", "factor": 100},
-        {"name": "unknown", "metric": "b"},
-    ]
-    row = [tables._measured(metrics, column, 0.0, ["a"]) for column in columns]
-    assert row[:3] == [[25.0, 20.0, 50.0], [0.25, 0.2, 0.5], [-0.25, -0.5, -0.2]]
-    assert row[3:] == ["2 of 8", 8, "25 (25)", None]
-    table = {"title": "T", "columns": columns, "rows": [row]}
-    shown = "| 25.0 (20.0 to 50.0) | 0.25 | -0.2 (-0.5 to -0.2) | 2 of 8 | 8 | 25 (25) |  |"
-    assert shown in tables.markdown(table)
 
 
 INTERVAL = re.compile(r"\((-?[\d,.]+)(?: to |-)(-?[\d,.]+)\)")
@@ -163,17 +125,20 @@ def test_no_interval_has_no_width(page):
 
 
 def test_counts_stand_with_their_intervals():
-    counted = [
-        (name, column, cell)
-        for name in tables.names()
-        for k, column in enumerate(tables.read(name)["columns"])
-        for cell in (row[k] for row in tables.read(name)["rows"])
-        if "contact" in column["name"] or column.get("unit") == "in 1,000"
-    ]
-    assert len({name for name, _, _ in counted}) >= 7
-    for name, column, cell in counted:
-        assert column["counted"], (name, column)
-        assert INTERVAL.search(tables._cell(cell, column, intervals=False)), (name, cell)
+    """Also where a page shows no other intervals."""
+    known = set()
+    for name in tables.names():
+        result = tables.read(name)
+        for column in result.table.columns:
+            if "contact" in column.heading or "[in 1,000]" in column.heading:
+                assert column.counted, (name, column)
+                one = replace(result.table, columns=[column], numbers={}, note="")
+                text = one.markdown(result.metrics, intervals=False)
+                cells = [line.split("|")[-2] for line in text.splitlines()[4:]]
+                assert cells, (name, column)
+                assert all(INTERVAL.search(each) for each in cells if each != " - "), (name, column)
+                known.add(name)
+    assert len(known) >= 6
 
 
 def test_the_leaderboard_shows_no_count_without_its_interval():
@@ -181,20 +146,6 @@ def test_the_leaderboard_shows_no_count_without_its_interval():
     assert len(rows) > 30
     for row in rows:
         assert all(INTERVAL.search(cell) for cell in row.split("|")[-3:-1]), row
-
-
-@pytest.mark.parametrize("name", FILES)
-def test_a_file_holds_what_its_study_found_last(name):
-    """If this fails: a number was changed by hand, or the study's are newer; make results."""
-    owners = [key for key, each in results.COMMANDS.items() if name in each.tables]
-    assert len(owners) == 1, f"{name}: name it in one of STUDIES, benchmarks/studies.py"
-    study = owners[0]
-    table, found = tables.read(name), results.whole(study)
-    if found:
-        assert table["command"] == found["command"]
-        renewed = tables.renewed(table, results.WHOLE / f"{study}.json")
-        for part in ("rows", "numbers", "commit"):
-            assert table.get(part) == renewed.get(part), part
 
 
 def test_every_picture_is_made_by_a_command():
@@ -372,6 +323,7 @@ def test_numbers_that_look_measured_are_found():
 
 def test_a_number_of_a_sentence_is_filled_in():
     page = "<!-- number: speed_organs.reset_one -->99<!-- end --> ms a reset"
-    table = tables.read("speed_organs")
-    assert tables.filled(page) == page.replace("99", tables.said(table, "reset_one"))
-    assert table["numbers"]["reset_one"]["metric"] == "reset_ms.1_of_1"
+    result = tables.read("speed_organs")
+    said = result.table.number("reset_one", result.metrics)
+    assert said == f"{result.metrics['reset_ms.1_of_1'].value:.1f}"
+    assert tables.filled(page) == page.replace("99", said)

@@ -16,13 +16,14 @@ import numpy as np
 from assets.emulator.validate import error_ratios
 from benchmarks.perception import episodes, speed
 from benchmarks.perception.crops import Looker, instants
+from benchmarks.perception.declaration import TABLES
 from benchmarks.perception.metrics import EMULATED, NO_FAULT, PIXELS, metrics_of
 from benchmarks.perception.report import report
 from benchmarks.perception.views import PLAIN, View, in_turns
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric
 from hrc_env.experiments.cache import PartCache, PartProgress
-from hrc_env.experiments.report import Metrics, Report, quick_words
+from hrc_env.experiments.report import Metrics, Report, Table, quick_words
 from hrc_env.experiments.rigs import DT_S
 from hrc_env.experiments.runner import at_least_one, is_as_short
 from hrc_env.perception import vino
@@ -119,6 +120,10 @@ class PerceptionBench:
     def metrics(self, played: Parts) -> dict[str, Metric]:
         """Return every number."""
         return metrics_of(played, self.n_faults, self.fault_steps)
+
+    def shown_tables(self) -> tuple[Table, ...]:
+        """Return the tables of the documentation."""
+        return TABLES
 
     def report(self, played: Parts, metrics: Metrics, figures: Path) -> Report:
         """Return the tables."""

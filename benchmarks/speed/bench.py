@@ -14,14 +14,15 @@ from typing import Any
 
 from benchmarks.common import keys
 from benchmarks.speed.contenders import OURS, PEER, Contender, Single, Starts, Vector
+from benchmarks.speed.declaration import REACHER, SHOWN, SINGLE, TASKS, organs_of, steps_of
 from benchmarks.speed.organs import Organs
-from benchmarks.speed.report import REACHER, SINGLE, report
+from benchmarks.speed.report import report
 from benchmarks.speed.tasks import Tasks, shares
 from hrc_env.config import HRCConfig
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric, over
 from hrc_env.experiments.cache import PartCache, Progress
-from hrc_env.experiments.report import Metrics, Report, quick_words
+from hrc_env.experiments.report import Metrics, Report, Table, quick_words
 from hrc_env.experiments.runner import at_least_one, is_as_short
 from hrc_env.safety.shield import shield_called
 from hrc_env.tasks.task import find_task
@@ -105,6 +106,16 @@ class SpeedBench:
         """Return every number."""
         return metrics_of(played)
 
+    @property
+    def vectors(self) -> list[tuple[int, int]]:
+        """Numbers of environments and of threads of every vector."""
+        return [(n, k) for n in self.sizes for k in self.threads if k <= n]
+
+    def shown_tables(self) -> tuple[Table, ...]:
+        """Return the tables of the documentation."""
+        configurations = (SINGLE, *(f"{size}.{threads}" for size, threads in self.vectors))
+        return (steps_of(self.levels, configurations), organs_of(SHOWN), TASKS)
+
     def report(self, played: Measured, metrics: Metrics, figures: Path) -> Report:
         """Draw the figure; return the tables beside it."""
         return report(metrics, figures)
@@ -171,9 +182,7 @@ def _take(turn: Turn, measured: Measured, organs: Organs) -> None:
 
 def _turns(config: SpeedBench, exits: ExitStack, progress: Progress) -> Iterator[Turn]:
     """Make everybody, ready to run, to be closed in the end."""
-    known = [
-        (size, threads) for size in config.sizes for threads in config.threads if threads <= size
-    ]
+    known = config.vectors
     n_contenders = len(config.levels) * (1 + len(known)) + 2
 
     def turn(level: str, configuration: str, threads: int, contender: Contender) -> Turn:

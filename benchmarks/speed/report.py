@@ -6,24 +6,14 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from benchmarks.common import keys
+from benchmarks.speed.declaration import ASKED, REACHER, SINGLE, TASKS, organs_of, steps_of, title
 from benchmarks.speed.organs import ORGANS, REST, TOTAL
-from hrc_env.experiments.columns import Column
 from hrc_env.experiments.plots import label, new_figure, save
-from hrc_env.experiments.report import Metrics, Report, picture, table_of
+from hrc_env.experiments.report import Metrics, Report, picture
 
-SINGLE = "single"
-"""The environment that `gymnasium.make` gives, as opposed to a vector of one."""
-REACHER = "reacher"
-"""Gymnasium's Reacher where levels are named."""
 _COLOURS = (*(f"C{k}" for k in range(7)), "gold", "C9", "0.75")
 """Of the organs, of resets and of the rest."""
-_BY_TASK = "## Every id: 64 on 2 threads, level `keypoints`, one worker each"
-_ABOUT_TASKS = "Random actions, resets inside, every info read; all take turns."
 SPREAD = "the smallest and the largest of all rounds"
-TASK_COLUMNS = (
-    Column("task_steps_per_s.{}", "steps a second", 0),
-    Column("task_share.{}", "of HRCReach-v0's [%]", 1, 100.0),
-)
 _ABOUT_THE_ORGANS = """\
 Taken in runs of their own with a stopwatch round each organ's functions, which itself costs about
 half a microsecond a call. With two threads an organ's time is divided by two: columns are time on
@@ -33,49 +23,25 @@ bodies, `reward` the task, `reset` all organs' work in resets, `rest` everything
 
 
 def report(metrics: Metrics, figures: Path) -> Report:
-    """What is to be read; organs.png is drawn into `figures`."""
-    tasks = {name: name for name in keys(metrics, "task_share.")}
-    by_task = (_BY_TASK, table_of("", tasks, TASK_COLUMNS, metrics)) if tasks else ()
+    """Draw organs.png; return the tables beside it.
+
+    Args:
+        metrics: of the bench.
+        figures: folder.
+    """
+    tasks = TASKS.markdown(metrics)
     if f"env_steps_per_s.{REACHER}.{SINGLE}" not in metrics:
-        return Report("Speed of every id", _ABOUT_TASKS, by_task, SPREAD)
+        return Report("Speed of every id", ASKED, [tasks], SPREAD)
     plot_organs(figures / "organs.png", metrics)
     pairs = [name.split(".", 1) for name in keys(metrics, "env_steps_per_s.")]
-    levels = dict.fromkeys(level for level, _ in pairs)
+    levels = dict.fromkeys(level for level, _ in pairs if level != REACHER)
     sizes = sorted({configuration for _, configuration in pairs}, key=_size)
-    rows = {each: title(each) for each in sizes}
-    timed = {each: title(each) for each in keys(metrics, f"us_per_env_step.{TOTAL}.")}
-    organs = [Column(f"us_per_env_step.{name}.{{}}", name) for name in (*ORGANS, REST, TOTAL)]
-    resets = {name: name.replace("_", " ") for name in keys(metrics, "reset_ms.")}
-    steps = [Column(f"env_steps_per_s.{level}.{{}}", level, 0) for level in levels]
-
-    return Report("Speed bench", _lead(metrics), (
-        "## Environment steps a second",
-        table_of("", rows, steps, metrics),
-        "## Microseconds per environment and step, level `keypoints`",
-        table_of("", timed, organs, metrics), _ABOUT_THE_ORGANS,
+    return Report("Speed bench", ASKED, (
+        steps_of([*levels], sizes).markdown(metrics),
+        organs_of(keys(metrics, f"us_per_env_step.{TOTAL}.")).markdown(metrics), _ABOUT_THE_ORGANS,
         picture(figures / "organs.png", "What a step costs, level `keypoints` (on the wall)."),
-        "## Milliseconds of a reset, level `keypoints`",
-        table_of("", resets, [Column("reset_ms.{}", "ms", 2)], metrics),
-        *by_task,
+        tasks,
     ), SPREAD)  # fmt: skip
-
-
-def _lead(metrics: Metrics) -> str:
-    n_rounds = metrics[f"env_steps_per_s.{REACHER}.{SINGLE}"].n
-    return (
-        "Random actions for whole episodes, resets inside, every info read. Medians of "
-        f"{n_rounds} rounds in which everybody takes turns, in brackets the smallest and the "
-        f"largest. `{SINGLE}` is `gymnasium.make`, the others are `gymnasium.make_vec`; "
-        f"`{REACHER}` is Gymnasium's Reacher-v5 (64 of it: its SyncVectorEnv)."
-    )
-
-
-def title(configuration: str) -> str:
-    """A configuration as people say it."""
-    if configuration == SINGLE:
-        return SINGLE
-    size, threads = configuration.split(".")
-    return f"{size} on {threads} thread{'s' if threads != '1' else ''}"
 
 
 def _size(configuration: str) -> tuple[int, str]:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.tracking.cells import run_cell
+from benchmarks.tracking.declaration import BENCH, times
 from benchmarks.tracking.detections import CONDITIONS
 from benchmarks.tracking.env_sequences import ENV, make_env_rig
 from benchmarks.tracking.metrics import TIMING, Parts, metrics_of
@@ -23,7 +24,7 @@ from benchmarks.tracking.sequences import MATCHED, Sequences, lasting, make_sequ
 from benchmarks.tracking.timing import BATCH, time_estimator
 from hrc_env.core.results import Metric
 from hrc_env.experiments.cache import PartCache, PartProgress
-from hrc_env.experiments.report import Metrics, Report, quick_words
+from hrc_env.experiments.report import Metrics, Report, Table, quick_words
 from hrc_env.experiments.runner import at_least_one, is_as_short
 from hrc_env.experiments.versions import key_of, source_digest
 from hrc_env.tracking.estimators import ESTIMATORS
@@ -118,6 +119,10 @@ class TrackingBench:
     def metrics(self, played: Parts) -> dict[str, Metric]:
         """Return every number."""
         return metrics_of(played, self.selection)
+
+    def shown_tables(self) -> tuple[Table, ...]:
+        """Return the tables of the documentation."""
+        return (BENCH, times(self.selection.timed()))
 
     def report(self, played: Parts, metrics: Metrics, figures: Path) -> Report:
         """Return the tables."""

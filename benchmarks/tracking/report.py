@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from itertools import product
 
 from benchmarks.common import cell
+from benchmarks.tracking.declaration import BENCH, KINDS, table_of_kind, times
 from benchmarks.tracking.env_sequences import ENV
 from benchmarks.tracking.names import DEFAULT, DLT, EVERYTHING, SMOOTHER, Selection
 from benchmarks.tracking.sequences import MATCHED, TWO_WORKERS
@@ -22,15 +23,6 @@ _ABOUT_THE_BOUND = """\
 `matched` bodies move as the estimators' motion model says, without bones; estimators are told so
 (no outliers, no exchanged sides, detections as good as they say, nothing known of bone lengths),
 and still learn the joints' places on the body. The bound is that of each sequence, averaged."""
-_TABLES: dict[str, tuple[str, int]] = {
-    "rmse_m": ("RMSE in cm", 100),
-    "median_m": ("Median error in cm", 100),
-    "coverage95": ("Coverage of the reported 95 % region", 1),
-    "std_over_rmse": ("Reported standard deviation / RMSE", 1),
-    "facing_wrong": ("Percent of frames in which the torso faces the wrong way", 100),
-}
-"""Title and scale of every table with a row a window."""
-_BATCHES = {"1": "batch 1", "64": "batch 64", "hard_64": "batch 64, mean over hard"}
 
 
 def report(metrics: Metrics, selection: Selection = EVERYTHING) -> Report:
@@ -42,17 +34,16 @@ def report(metrics: Metrics, selection: Selection = EVERYTHING) -> Report:
     if rigs := selection.rigs_of(MATCHED):
         bound = f"{_bound(metrics, selection, rigs)}\n\n{_ABOUT_THE_BOUND}"
         sections.append(("RMSE / posterior Cramer-Rao bound", bound))
-    sections.append(("Microseconds per worker and update, one core", _cost(metrics, selection)))
-    sections += [
-        (title, _by_row(metrics, selection, kind, scale))
-        for kind, (title, scale) in _TABLES.items()
-    ]
     if rigs := selection.rigs_of(TWO_WORKERS):
         title = "Two workers: changes of identity per 100 sequences"
         sections.append((title, _by_rig(metrics, with_names, rigs, swaps)))
     parts = [part for title, text in sections if text for part in (f"## {title}", text)]
+    names = list(dict.fromkeys(n for _, c in selection.conditions() for n in selection.names_of(c)))
+    shown = [times(selection.timed()).markdown(metrics)]
+    for each in (BENCH, *(table_of_kind(kind, names, selection) for kind in KINDS)):
+        shown.append(each.markdown(metrics, intervals=False))
     spread = "95 % intervals over seeds, times with the smallest and the largest"
-    return Report("Tracking bench", _LEAD, parts, spread)
+    return Report("Tracking bench", _LEAD, [*parts, *filter(None, shown)], spread)
 
 
 def _lead(metrics: Metrics, selection: Selection) -> str:
@@ -79,18 +70,6 @@ def _lead(metrics: Metrics, selection: Selection) -> str:
     return table(header, lines)
 
 
-def _by_row(metrics: Metrics, selection: Selection, kind: str, scale: int) -> str:
-    """One row per rig and window, one column per estimator; what is not known is left empty."""
-    names = list(dict.fromkeys(n for _, c in selection.conditions() for n in selection.names_of(c)))
-    digits = 2 if scale == 100 else 3
-    lines = [
-        [f"{rig} {window}"]
-        + [cell(metrics.get(f"{kind}.{rig}.{window}.{name}"), scale, digits) for name in names]
-        for rig, _, window in selection.rows()
-    ]
-    return table(["", *names], lines)
-
-
 def _by_rig(
     metrics: Metrics,
     names: Sequence[str],
@@ -115,12 +94,3 @@ def _bound(metrics: Metrics, selection: Selection, rigs: Sequence[str]) -> str:
         ": coverage": f"coverage95.{{rig}}.{MATCHED}.{{name}}",
     }
     return _by_rig(metrics, names, rigs, kinds, *([both] if len(rigs) > 1 else []))
-
-
-def _cost(metrics: Metrics, selection: Selection) -> str:
-    names = selection.timed()
-    lines = [
-        [title, *(cell(metrics[f"update_us.{name}.{batch}"], 1, 1, True) for name in names)]
-        for batch, title in _BATCHES.items()
-    ]
-    return table(["", *names], lines)

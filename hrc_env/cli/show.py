@@ -35,7 +35,7 @@ def print_report(console: Console, text: str) -> None:
 
 def align_tables(text: str) -> str:
     """Return Markdown whose tables have cells of one width in each column."""
-    blocks = groupby(text.splitlines(), key=lambda line: line.startswith("| "))
+    blocks = groupby(text.splitlines(), key=lambda line: line.startswith("|"))
     return "\n".join(
         line for is_table, lines in blocks for line in (_aligned([*lines]) if is_table else lines)
     )
@@ -45,11 +45,14 @@ def _aligned(lines: list[str]) -> list[str]:
     rows = [[cell.strip() for cell in line.strip().strip("|").split("|")] for line in lines]
     if len({len(row) for row in rows}) > 1:  # a cell with a bar in it
         return lines
+    if len(rows) < 2:
+        return lines
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return [f"| {' | '.join(map(_filled, row, widths, range(len(row))))} |" for row in rows]
+    is_right = [cell.endswith(":") for cell in rows[1]]
+    return [f"| {' | '.join(map(_filled, row, widths, is_right))} |" for row in rows]
 
 
-def _filled(cell: str, width: int, k: int) -> str:
-    if set(cell) <= {"-", ":"} and cell:
-        return ("-" * width) if k == 0 else "-" * (width - 1) + ":"
-    return cell.ljust(width) if k == 0 else cell.rjust(width)
+def _filled(cell: str, width: int, is_right: bool) -> str:
+    if set(cell) <= {"-", ":"} and len(cell) > 2:  # a dash alone is a number that is not known
+        return "-" * (width - 1) + ":" if is_right else "-" * width
+    return cell.rjust(width) if is_right else cell.ljust(width)

@@ -6,7 +6,7 @@ called `ROW.cost` in results.json. All intervals are 95 % (`hrc_env.evaluation.i
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypedDict, Unpack
+from typing import Literal, TypedDict, Unpack
 
 import numpy as np
 
@@ -18,6 +18,8 @@ from hrc_env.evaluation.sums import ACHIEVED, FAILED, STATISTICS, UNITS
 
 Episodes = Sequence[Mapping[str, float]]
 """Statistics of episodes (`hrc_env.evaluation.sums`), in the order of their seeds."""
+Key = str | tuple[str, ...]
+"""Of a row: what stands in the names of its metrics in place of `{}`, or of `{0}` and `{1}`."""
 Measure = Callable[[Episodes, Episodes], Metric]
 """A number of a row's episodes; beside them those of its baseline on the same seeds."""
 
@@ -27,7 +29,7 @@ class Column:
     """A column of a table."""
 
     metric: str
-    """Name of the metric, with `{}` in place of the row's."""
+    """Name of the metric, with `{}` in place of the row's key, or `{0}` and `{1}` of its two."""
     heading: str = ""
     """With its unit, as "cost [1/min]"; "" of a number that results.json alone has."""
     digits: int = 1
@@ -41,12 +43,23 @@ class Column:
     """Whether it counts rare events, so that its interval is always shown."""
     plain: bool = False
     """Whether its interval is never shown."""
-    is_n: bool = False
-    """Whether the number of observations is shown in place of the value."""
+    shows: Literal["value", "n", "count"] = "value"
+    """The value; or the number of observations; or a share of them as "8 of 9"."""
+    beside: str = ""
+    """Name of another metric, whose value stands behind in brackets in place of an interval."""
     measure: Measure | None = None
     """How it is counted; None: the study counts it by itself, or another column does."""
     is_paired: bool = False
     """Whether `measure` compares the row with its baseline."""
+
+    def names(self, row: Key) -> list[str]:
+        """Return the metrics of a row: that of the column, and the one beside it.
+
+        Args:
+            row: key of the row.
+        """
+        keys = (row,) if isinstance(row, str) else row
+        return [each.format(*keys) for each in (self.metric, self.beside) if each]
 
 
 class Shown(TypedDict, total=False):

@@ -2,10 +2,11 @@
 
 import base64
 import html
+import math
 import re
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,71 +14,105 @@ from markdown_it import MarkdownIt
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric, provenance, write_results, write_whole
-from hrc_env.experiments.columns import Column
+from hrc_env.experiments.columns import Column, Key
 from hrc_env.experiments.plots import stamp
 
 Metrics = Mapping[str, Metric]
+Cells = tuple[str, ...]
+Rows = Mapping[str, Cells] | Mapping[tuple[str, ...], Cells] | Mapping[Key, Cells]
+"""Cells before the numbers of each row, by its key."""
 _STYLE = """
 body { font: 17px/1.55 system-ui, sans-serif; color: #1c2430; max-width: 66rem;
        margin: 2.5rem auto; padding: 0 1.2rem; }
 h2 { margin-top: 2.6rem; } img { max-width: 100%; height: auto; }
 table { border-collapse: collapse; display: block; overflow-x: auto; font-size: .92rem;
         font-variant-numeric: tabular-nums; }
-th, td { padding: .25rem .55rem; border-bottom: 1px solid #d8dde6; text-align: right; }
-td { white-space: nowrap; } td:first-child, th:first-child { text-align: left; }
+th, td { padding: .25rem .55rem; border-bottom: 1px solid #d8dde6; text-align: left; }
+td { white-space: nowrap; }
 code { background: #f0f2f6; padding: .1rem .3rem; border-radius: 3px; }
 """
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Rows of numbers under one title."""
+    """Rows of numbers under one title, in a report and in the documentation."""
 
     name: str
     """By which a page of the documentation asks for it."""
     title: str
-    rows: Mapping[str, tuple[str, ...]]
-    """Cells before the numbers, by row."""
+    rows: Rows
+    """Cells before the numbers, by key."""
     columns: Sequence[Column]
     heads: tuple[str, ...] = ("",)
     """Headings of the cells before the numbers."""
     note: str = ""
-    """What stands below; `{n[METRIC]}` is how many observations a metric is made of."""
+    """What stands below; `{n[METRIC]}` is how many observations a metric is made of, `{NAME}` one
+    of `numbers`."""
+    numbers: Mapping[str, Column] = field(default_factory=dict)
+    """By name: numbers in the note, and in sentences of the documentation."""
+    printed: Mapping[str, float] = field(default_factory=dict)
+    """Numbers that others report, by names of metrics."""
 
     def check(self, known: Collection[str]) -> None:
-        """Raise `ConfigError` for a row that has another number of cells than there are heads, and
-        for a column of which no row has a metric."""
+        """Raise `ConfigError` for a row that has another number of cells than there are heads, for
+        a column of which no row has a metric, and for one of `numbers` that has none.
+
+        Args:
+            known: names of metrics.
+        """
         for row, cells in self.rows.items():
             if len(cells) != len(self.heads):
                 raise ConfigError(
                     f"Table {self.name!r}: row {row!r} must have a cell for each of the heads "
                     f"{self.heads}, got {cells}."
                 )
-        for column in self.columns:
-            names = [column.metric.format(row) for row in self.rows]
-            if not any(name in known for name in names):
+        shown = [(each.metric, [each.names(row) for row in self.rows]) for each in self.columns]
+        shown += [(each.metric, [each.names(())]) for each in self.numbers.values()]
+        for metric, names in shown:
+            if not any({*each} <= {*known, *self.printed} for each in names):
                 raise ConfigError(
-                    f"Table {self.name!r}: no row has the metric {column.metric!r}; a row has "
+                    f"Table {self.name!r}: no row has the metric {metric!r}; a row has "
                     f"{', '.join(sorted({name.rpartition('.')[2] for name in known}))}."
                 )
 
+    def asked(self) -> set[str]:
+        """Return the names of all metrics that it can show."""
+        found = {name for row in self.rows for each in self.columns for name in each.names(row)}
+        return (found | {each.metric for each in self.numbers.values()}) - self.printed.keys()
+
+    def number(self, name: str, metrics: Metrics) -> str:
+        """Return one of `numbers` as sentences have it.
+
+        Args:
+            name: of the number.
+            metrics: by name.
+        """
+        return cell(self.numbers[name], metrics, ())
+
     def note_of(self, metrics: Metrics) -> str:
         """Return the note with its numbers; 0 where rows were left out."""
-        return self.note.format(n=defaultdict(int, {k: each.n for k, each in metrics.items()}))
+        n = defaultdict(int, {name: each.n for name, each in metrics.items()})
+        return self.note.format(n=n, **{name: self.number(name, metrics) for name in self.numbers})
 
-    def markdown(self, metrics: Metrics) -> str:
+    def markdown(self, metrics: Metrics, intervals: bool = True) -> str:
         """Return the table with its title and note, without rows of which there is no number; "" if
-        there are none."""
-        lines = [
-            (*cells, *(cell(each, metrics, row) for each in self.columns))
-            for row, cells in self.rows.items()
-            if any(each.metric.format(row) in metrics for each in self.columns)
-        ]
+        there are none.
+
+        Args:
+            metrics: by name.
+            intervals: whether those are shown that do not count rare events.
+        """
+        known = {name: Metric(value, value, value, "", 1) for name, value in self.printed.items()}
+        known |= metrics
+        columns = (
+            self.columns if intervals else [replace(c, plain=not c.counted) for c in self.columns]
+        )
+        lines = lines_of(self.rows, columns, known)
         if not lines:
             return ""
-        heads = (*self.heads, *(each.heading for each in self.columns))
-        parts = (f"**{self.title}**", table(heads, lines), self.note_of(metrics))
-        return "\n\n".join(filter(None, parts))
+        heads = (*self.heads, *(each.heading for each in columns))
+        shown = table(heads, lines, len(self.heads))
+        return "\n\n".join(filter(None, (f"**{self.title}**", shown, self.note_of(metrics))))
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +175,7 @@ def quick_words(
 
 
 _FIGURE = re.compile(r"\]\(figures/([^)]+)\)")
-_TABLE = re.compile(r"^\| ---", re.M)
+_TABLE = re.compile(r"^\|---", re.M)
 _DOT = " ●"
 """Behind a difference whose interval leaves out zero."""
 
@@ -157,48 +192,90 @@ def picture(path: Path, caption: str) -> str:
     return f"![{caption}](figures/{path.name})\n\n*{caption}*"
 
 
-def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table in Markdown, whose first column names the rows."""
-    lines = [header, ("---", *("---:" for _ in header[1:])), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+def table(header: Sequence[str], rows: Iterable[Sequence[str]], n_heads: int = 1) -> str:
+    """Return a table in Markdown.
+
+    Args:
+        header: headings of the columns.
+        rows: cells.
+        n_heads: how many columns, the first ones, name the rows.
+    """
+    lines = [" | ".join(line) for line in (header, *rows)]
+    rule = "---|" * n_heads + "---:|" * (len(header) - n_heads)
+    return "\n".join([f"| {lines[0]} |", f"|{rule}", *(f"| {line} |" for line in lines[1:])])
 
 
 def table_of(
     name: str, rows: Mapping[str, str], columns: Sequence[Column], metrics: Metrics
 ) -> str:
-    """A table of metrics, "" if there are none; `rows` by the part of their keys in place of `{}`,
-    with their words."""
-    lines = [
-        (words, *(cell(each, metrics, row) for each in columns)) for row, words in rows.items()
+    """Return a table of metrics, "" if there are none.
+
+    Args:
+        name: heading of the rows.
+        rows: by key, with their words.
+        columns: of the metrics.
+        metrics: by name.
+    """
+    lines = lines_of({row: (words,) for row, words in rows.items()}, columns, metrics)
+    return table((name, *(each.heading for each in columns)), lines) if lines else ""
+
+
+def lines_of(rows: Rows, columns: Sequence[Column], metrics: Metrics) -> list[tuple[str, ...]]:
+    """Return the cells of the rows of which there is any number.
+
+    Args:
+        rows: cells before the numbers, by key.
+        columns: of the metrics.
+        metrics: by name.
+    """
+    return [
+        (*cells, *(cell(each, metrics, row) for each in columns))
+        for row, cells in rows.items()
+        if any(each.names(row)[0] in metrics for each in columns)
     ]
-    if not any(each.metric.format(row) in metrics for each in columns for row in rows):
-        return ""
-    return table((name, *(each.heading for each in columns)), lines)
 
 
-def cell(column: Column, metrics: Metrics, row: str) -> str:
-    """Return the number of a row with its interval; a dash where there is none."""
-    metric = metrics.get(column.metric.format(row))
-    if metric is None:
+def cell(column: Column, metrics: Metrics, row: Key) -> str:
+    """Return the number of a row as its column shows it; a dash where there is none.
+
+    Args:
+        column: which number, and how it is shown.
+        metrics: by name.
+        row: key of the row.
+    """
+    names = column.names(row)
+    if not metrics.keys() >= {*names}:
         return "-"
-    if column.is_n:
+    metric, *others = (metrics[name] for name in names)
+    if column.shows == "n":
         return f"{metric.n:,}"
-    if column.plain:
-        metric = replace(metric, low=metric.value, high=metric.value)
-    is_told_apart = column.signed and (metric.low > 0 or metric.high < 0)
-    dot = _DOT if column.marked and is_told_apart else ""
-    return format_metric(metric, column.scale, column.digits, column.signed) + dot
+    if column.shows == "count":
+        return f"{round(metric.value * metric.n)} of {metric.n}"
+    is_plain = column.plain or bool(others)
+    shown = replace(metric, low=metric.value, high=metric.value) if is_plain else metric
+    text = format_metric(shown, column.scale, column.digits, column.signed)
+    for other in others:
+        text += f" ({column.scale * other.value:,.{column.digits}f})"
+    is_told_apart = column.signed and (shown.low > 0 or shown.high < 0)
+    return text + (_DOT if column.marked and is_told_apart else "")
 
 
 def format_metric(metric: Metric, scale: float = 1.0, digits: int = 1, signed: bool = False) -> str:
-    """Return a number with its interval, as tables show it; a dash where it is not known."""
-    if metric.value != metric.value:
+    """Return a number with its interval, as tables show it; a dash where it is not known.
+
+    Args:
+        metric: the number.
+        scale: factor from its unit to the shown one.
+        digits: how many stand behind the point.
+        signed: whether a positive one has its sign.
+    """
+    if not math.isfinite(metric.value):
         return "-"
-    three = [scale * each for each in (metric.value, metric.low, metric.high)]
-    return with_interval(three, digits, *(("+", " to ") if signed else ()))
+    low, high = sorted((scale * metric.low, scale * metric.high))
+    return with_interval((scale * metric.value, low, high), digits, "+" if signed else "")
 
 
-def with_interval(three: Sequence[float], digits: int, sign: str = "", to: str = "-") -> str:
+def with_interval(three: Sequence[float], digits: int, sign: str = "") -> str:
     """Return a value with the ends of its interval in brackets, which are left out where the digits
     show no width: such an interval would say more than it knows.
 
@@ -206,10 +283,9 @@ def with_interval(three: Sequence[float], digits: int, sign: str = "", to: str =
         three: value, low end, high end.
         digits: how many stand behind the point.
         sign: "+" puts one before positive numbers, too.
-        to: stands between the ends.
     """
     value, low, high = (f"{each:{sign}z,.{digits}f}" for each in three)
-    return value if value == low == high else f"{value} ({low}{to}{high})"
+    return value if value == low == high else f"{value} ({low} to {high})"
 
 
 def _embedded(out: Path, source: str) -> str:

@@ -13,7 +13,7 @@ import pytest
 from recorded_stored import calibration
 
 from benchmarks.recorded import detections, fetch
-from benchmarks.recorded.bench import COLUMNS, report
+from benchmarks.recorded.bench import FOOTAGE, report
 from benchmarks.recorded.calibration import read_calibration
 from benchmarks.recorded.detections import detections_of
 from benchmarks.recorded.films import Films
@@ -159,7 +159,7 @@ def test_detections_are_made_once_and_stored_whole(films, tmp_path, monkeypatch)
 
 
 def test_the_table_has_a_row_for_every_estimator():
-    columns = {column.metric.format(name) for column in COLUMNS for name in NAMES}
+    columns = {column.metric.format(name) for column in FOOTAGE.columns for name in NAMES}
     assert tables.asked("footage") <= columns
     (table,) = report({key: Metric(0.5, 0.4, 0.6, "-", 3) for key in columns}).parts
     assert table.count("\n| ") - 1 == len(NAMES)  # behind the head and its rule

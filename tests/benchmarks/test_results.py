@@ -4,6 +4,7 @@ import json
 import os
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 from rich.console import Console
@@ -15,6 +16,8 @@ from benchmarks.results import COMMANDS, STUDIES, Arguments, Command, main, why_
 from benchmarks.studies import Study, commands_of
 from docs import tables
 from hrc_env.core.errors import ConfigError
+from hrc_env.experiments.columns import Column
+from hrc_env.experiments.report import Table
 
 WRITES = """
 import json, sys, time
@@ -25,7 +28,7 @@ out = Path(sys.argv[sys.argv.index("--out") + 1])
 with open(out / "begun", "a") as begun:
     begun.write("x")
 time.sleep(SECONDS)
-metric = {"value": 0.25, "low": 0.2, "high": 0.3, "n": 8}
+metric = {"value": 0.25, "low": 0.2, "high": 0.3, "unit": "share", "n": 8}
 content = {"hrc_env": "0.2.0", "machine": {"cores": 2}, "metrics": {"found.lab": metric}}
 content["config"] = {"asked": 1}
 (out / "parts").mkdir(exist_ok=True)
@@ -33,13 +36,7 @@ part = {"key": "k", "seconds": 1.0, "notes": {}, "part": {"x": [1.0, 2.0]}}
 (out / "parts" / "lab.1.json").write_text(json.dumps(part))
 (out / "results.json").write_text(json.dumps(content))
 """
-TABLE = {
-    "title": "Found", "command": "python made.py", "version": "", "depends": {}, "date": "",
-    "machine": "",
-    "columns": [{"name": "scene"}, {"name": "found", "unit": "%", "metric": "found.{0}",
-                                    "factor": 100}],
-    "keys": [["lab"]], "rows": [["lab", 1]],
-}  # fmt: skip
+TABLE = Table("found", "Found", {"lab": ("lab",)}, [Column("found.{}", "found [%]", 0, 100)])
 
 
 def declare(monkeypatch, command):
@@ -59,15 +56,17 @@ def desk(tmp_path, monkeypatch):
     }.items():  # fmt: skip
         monkeypatch.setattr(results, name, value)
     monkeypatch.setattr(tables, "RESULTS", tmp_path)
-    monkeypatch.setattr(results.generate, "main", lambda words: None)
+    monkeypatch.setattr(results.generate, "main", lambda: None)
     monkeypatch.setattr(results, "provenance", lambda: {"git": "abc1234"})
     monkeypatch.setattr(results, "versions_of", lambda names: dict.fromkeys(names, 1))
-    (tmp_path / "found.json").write_text(json.dumps(TABLE))
+    monkeypatch.setitem(sys.modules, "made_tables", SimpleNamespace(TABLES=[TABLE]))
+    tables.declared.cache_clear()
 
     def study(seconds=0.0, **changes):
         script = tmp_path / "made.py"
         script.write_text(WRITES.replace("SECONDS", str(seconds)))
-        made = Command(f"python {script}", 0.1, ("env",), ("found",), {"shown.png": "a.png"})
+        made = Command(f"python {script}", 0.1, ("env",), ("found",), {"shown.png": "a.png"},
+                       tables_in="made_tables")  # fmt: skip
         declare(monkeypatch, replace(made, **changes))
         return tmp_path
 
@@ -82,15 +81,15 @@ def n_runs(folder):
 def test_numbers_pictures_and_what_they_depend_on_reach_the_documentation(desk):
     folder = desk()
     assert main(Arguments()) == 0
-    table = json.loads((folder / "found.json").read_text())
-    assert table["rows"] == [["lab", [25.0, 20.0, 30.0]]]
-    assert (table["version"], table["machine"]) == ("0.2.0", "2 cores, no GPU")
+    result = tables.read("found")
+    assert "| lab | 25 (20 to 30) |" in result.table.markdown(result.metrics)
+    assert (result.version, result.machine) == ("0.2.0", "2 cores, no GPU")
     whole = json.loads((folder / "whole" / "one.json").read_text())
-    assert table["depends"] == whole["depends"] == {"env": 1}
+    assert result.depends == whole["depends"] == {"env": 1}
     assert (folder / "shown.png").read_bytes() == b"picture"
     assert tables.provenance(["found"]) == (
-        f'*Measured on 2 cores, no GPU, at 0.2.0 (env 1): "Found" by `{table["command"]}` '
-        f"({table['date']}).*"
+        f'*Measured on 2 cores, no GPU, at 0.2.0 (env 1): "Found" by `{result.command}` '
+        f"({result.date}).*"
     )
 
 
@@ -226,9 +225,11 @@ def test_numbers_of_a_tree_with_changes_are_refused_or_marked(desk, monkeypatch,
 
 
 def test_a_short_form_says_which_metrics_are_missing(desk, capsys):
-    folder = desk(quick="--quick")
+    desk(quick="--quick")
     assert main(Arguments(quick=True)) == 0
-    (folder / "found.json").write_text(json.dumps(TABLE | {"keys": [["site"]]}))
+    other = replace(TABLE, rows={"site": ("site",)})
+    sys.modules["made_tables"].TABLES = [other]
+    tables.declared.cache_clear()
     assert main(Arguments(quick=True)) == 1
     assert "missing ['found.site']" in capsys.readouterr().out
 
@@ -253,16 +254,13 @@ def test_every_study_can_be_replayed_or_keeps_no_parts():
     assert REPLAYS.keys() <= COMMANDS.keys()
 
 
-def test_every_file_of_results_is_one_studys():
-    files = {path.stem for path in tables.RESULTS.glob("*.json")}
-    for command in COMMANDS.values():
-        for name in command.tables:  # in one place, not in two
-            assert (name in files) != (name in command.declared_tables), name
-    assert files <= {name for command in COMMANDS.values() for name in command.tables}
-    recorded = {results.whole(name).get("command") for name in COMMANDS}
-    for name, command in COMMANDS.items():  # a table of an older command says so
-        known = {command.command, *recorded}
-        assert all(tables.read(each)["command"] in known for each in command.tables), name
+def test_every_table_is_one_studys_and_shows_its_last_run():
+    for name, command in COMMANDS.items():
+        assert {*command.tables} <= command.declared_tables.keys(), name
+        for each in command.tables:
+            assert tables.read(each).command == results.whole(name)["command"], name
+    whole = {path.stem for path in (tables.RESULTS / "whole").glob("*.json")}
+    assert whole <= COMMANDS.keys()
 
 
 def test_the_plan_names_every_study_and_sums_what_is_stale():

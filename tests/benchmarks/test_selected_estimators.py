@@ -90,7 +90,7 @@ def test_parts_are_the_same_whatever_else_is_run(tmp_path, monkeypatch):
     text = (tmp_path / "report.md").read_text()
     assert "Two workers" not in text
     assert "paper, cm" not in text
-    assert text.count("Quick run, 2 seeds") == text.count("\n| ---") + 1
+    assert text.count("Quick run, 2 seeds") == text.count("\n|---") + 1
 
 
 SPEC = """

@@ -48,7 +48,7 @@ def test_every_id_has_its_share_of_the_firsts_speed(end_to_end):
     for task in BUILT_IN:
         assert metrics[f"task_steps_per_s.{task}"].value > 0
     assert metrics["task_share.HRCReach-v0"].value == 1.0
-    assert "| HRCDrywall-v0 | " in (out / "report.md").read_text()
+    assert "| `HRCDrywall-v0` | " in (out / "report.md").read_text()
 
 
 def test_of_every_id_nothing_else_is_timed(tmp_path, monkeypatch):

@@ -46,3 +46,12 @@ def test_columns_are_aligned_and_nothing_else_is_touched():
         "| one    |  1.5 |",
         "| eleven |   22 |", "", "end",
     ]  # fmt: skip
+
+
+def test_columns_are_aligned_as_their_rule_says():
+    text = "| level | worker | x [mm] |\n|---|---|---:|\n| `pixels` | 45 degrees | - |"
+    assert align_tables(text).splitlines() == [
+        "| level    | worker     | x [mm] |",
+        "| -------- | ---------- | -----: |",
+        "| `pixels` | 45 degrees |      - |",
+    ]

@@ -189,7 +189,7 @@ def test_the_report_holds_its_picture_and_every_table(end_to_end):
     out, _ = end_to_end
     page, text = ((out / f"report.{kind}").read_text() for kind in ("html", "md"))
     assert page.count("data:image/png;base64,") == 1
-    assert text.count("\n| ---") == 2 * len(TINY.policies) + 1
+    assert text.count("\n|---") == 2 * len(TINY.policies) + 1
     assert "nan" not in text
 
 

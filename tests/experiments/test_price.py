@@ -13,6 +13,7 @@ from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats
 from hrc_env.experiments.cache import PartCache
 from hrc_env.experiments.price import experiment
+from hrc_env.experiments.price.declaration import QUESTIONS
 from hrc_env.experiments.price.episodes import STEP, Driver, Watched, sums_of
 from hrc_env.experiments.price.experiment import (
     Price,
@@ -21,7 +22,7 @@ from hrc_env.experiments.price.experiment import (
 )
 from hrc_env.experiments.price.eyes import ELSEWHERE, QUICK, all_eyes, eyes_called
 from hrc_env.experiments.price.metrics import CONTRASTS, Row, metrics_of, supposed_m
-from hrc_env.experiments.price.report import QUESTIONS, choose_bars
+from hrc_env.experiments.price.report import choose_bars
 from hrc_env.experiments.price.search import Tried, draws, searched
 from hrc_env.experiments.price.shield import Widened
 from hrc_env.experiments.runner import run_experiment
@@ -320,7 +321,7 @@ def test_ones_own_robot_has_a_price(tmp_path):
     metrics = run_experiment(config, tmp_path, silent)
     assert metrics["HRCReach-v0.unshielded.goals_per_min"].value == 0
     text = (tmp_path / "report.md").read_text()
-    assert "The robot is driven by the agent `random`" in text
+    assert "the robot that the agent `random` drives" in text
     assert "Quick run, 5 seeds of 0.32 s: too few to compare" in text
     settings = json.loads((tmp_path / "results.json").read_text())["config"]
     assert settings["agent"] == "random"

@@ -160,13 +160,13 @@ def test_one_rate_less_another_has_a_width_also_where_both_are_zero():
 @pytest.mark.parametrize("exposure", [1.0, 0.64])
 def test_a_zero_of_a_count_is_shown_with_its_bound(exposure):
     zero = intervals.rate_of([0] * 64, exposure, "1/h")
-    assert report.format_metric(zero) == f"0.0 (0.0-{3.6889 / exposure:.1f})"
+    assert report.format_metric(zero) == f"0.0 (0.0 to {3.6889 / exposure:.1f})"
     assert not report.format_metric(intervals.excess_of(zero, zero), signed=True).endswith("+0.0")
 
 
 def test_an_interval_without_a_visible_width_is_not_shown():
     assert report.with_interval([1.0, 0.999, 1.001], 2) == "1.00"
-    assert report.with_interval([-1e-9, -1.0, 1.0], 1, "+", " to ") == "+0.0 (-1.0 to +1.0)"
+    assert report.with_interval([-1e-9, -1.0, 1.0], 1, "+") == "+0.0 (-1.0 to +1.0)"
 
 
 def test_intervals_hold_the_truth_as_often_as_they_say():
@@ -258,7 +258,7 @@ def test_a_report_holds_its_pictures_its_origin_and_all_numbers(tmp_path):
     assert 'src="data:image/png;base64,' in html
     assert "a &lt; b" in html
     assert "<code>make</code>" in html
-    assert "| a < b | 12.3 (10.0-20.0) | -0.5 (-0.7 to -0.1) ● | - |" in text
+    assert "| a < b | 12.3 (10.0 to 20.0) | -0.5 (-0.7 to -0.1) ● | - |" in text
     assert "seeds 3 to 4" in text
     assert set(json.loads((tmp_path / "results.json").read_text())["metrics"]) == set(metrics)
 
@@ -297,6 +297,57 @@ def test_a_quick_report_says_so_at_every_table_and_figure_and_marks_nothing(tmp_
 def test_seeds_of_a_quick_run_are_counted_in_words():
     one = report.quick_words(1, (2.0, 7.25), "round")
     assert one == "Quick run, 1 round of 2 to 7.25 s: too few to compare anything."
+
+
+METRICS = {"a.x": Metric(0.25, 0.2, 0.5, "share", 8), "b.x": Metric(np.nan, 0.0, 0.0, "share", 0),
+           "x.a.b": Metric(1234.5, 1000.0, 2000.0, "m", 4)}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("column", "row", "shown"),
+    [
+        (Column("{}.x", scale=100), "a", "25.0 (20.0 to 50.0)"),
+        (Column("{}.x", digits=2, plain=True), "a", "0.25"),
+        (Column("{}.x", scale=-1), "a", "-0.2 (-0.5 to -0.2)"),
+        (Column("{}.x", shows="count"), "a", "2 of 8"),
+        (Column("{}.x", shows="n"), "a", "8"),
+        (Column("{}.x", beside="x.{0}.b", digits=0), "a", "0 (1,234)"),
+        (Column("x.{0}.{1}", beside="{0}.x", digits=0), ("a", "b"), "1,234 (0)"),
+        (Column("a.x", digits=2, plain=True), (), "0.25"),
+        (Column("{}.x"), "b", "-"),
+        (Column("{}.x"), "nobody", "-"),
+        (Column("{}.x", beside="{}.y"), "a", "-"),
+    ],
+)
+def test_a_cell_is_an_interval_a_count_or_a_pair(column, row, shown):
+    assert report.cell(column, METRICS, row) == shown
+
+
+TABLE = report.Table(
+    "t", "T", {"a": ("A",), "printed": ("a paper",), "nobody": ("N",)},
+    (Column("{}.x", "share [%]", 0, 100), Column("{}.x", "n", shows="n")),
+    note="{n[a.x]} seeds, {best} at best.", numbers={"best": Column("a.x", digits=2, plain=True)},
+    printed={"printed.x": 0.5},
+)  # fmt: skip
+
+
+def test_a_table_has_what_others_report_and_numbers_in_its_note():
+    lines = TABLE.markdown(METRICS).splitlines()
+    assert lines[-4:] == ["| A | 25 (20 to 50) | 8 |", "| a paper | 50 | 1 |", "",
+                          "8 seeds, 0.25 at best."]  # fmt: skip
+    assert "| A | 25 | 8 |" in TABLE.markdown(METRICS, intervals=False)
+    assert TABLE.asked() == {"a.x", "nobody.x"}
+
+
+def test_a_column_or_a_number_that_no_metric_has_is_refused():
+    TABLE.check(METRICS)
+    for wrong in (
+        replace(TABLE, columns=(Column("{}.y"),)),
+        replace(TABLE, columns=(Column("{}.x", beside="{}.y"),)),
+        replace(TABLE, numbers={"best": Column("a.y")}),
+    ):
+        with pytest.raises(ConfigError, match="no row has the metric"):
+            wrong.check(METRICS)
 
 
 def test_a_table_of_nothing_is_not_printed():

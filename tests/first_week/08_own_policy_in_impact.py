@@ -42,7 +42,7 @@ assert metrics["timid-make.truth.goals_per_min"]["value"] > 0
 assert not any(name.startswith(("ppo.", "scripted.")) for name in metrics)  # nothing else acts
 assert not list(Path("impact/parts").glob("ppo*"))  # and nothing learns
 report = Path("impact/report.md").read_text()
-tables = report.count("\n| ---")
+tables = report.count("\n|---")
 assert report.count("*Quick run, 3 seeds of 4 s: too few") >= tables + 1  # each says it is quick
 assert "●" not in report  # and marks nothing
 

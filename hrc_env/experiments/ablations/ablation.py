@@ -57,6 +57,12 @@ class Ablation:
     against: tuple[str, ...] = ()
     """Settings with which others of their scene are compared: each with the last before it."""
 
+    def setting(self, name: str) -> Setting:
+        """Return a setting by its name."""
+        known = {each.name: each for each in self.settings}
+        check_names(f"setting of {self.name!r}", [name], known)
+        return known[name]
+
     def reference(self, setting: Setting) -> str:
         """What a setting is compared with, walk by walk; "" if with nothing."""
         alike = [each for each in self.settings if each.scene == setting.scene]

@@ -16,24 +16,15 @@ from hrc_env.evaluation.intervals import counted_quantile_of as quantile_of
 from hrc_env.evaluation.intervals import counted_quantile_over as quantile_over
 from hrc_env.evaluation.intervals import mean_over, paired, rate_of, ratio_over, rmse_over
 from hrc_env.experiments.ablations.ablation import Ablation, Setting
+from hrc_env.experiments.ablations.declaration import ABLATIONS, shown
 from hrc_env.experiments.ablations.play import Sums, play, walks_of
-from hrc_env.experiments.ablations.questions.faults import CALIBRATION, LATENCY
-from hrc_env.experiments.ablations.questions.filters import ALGORITHM_1, FILTER, KINEMATICS
-from hrc_env.experiments.ablations.questions.rigs import CAMERAS, OCCLUSION, WORKERS
 from hrc_env.experiments.ablations.report import report
 from hrc_env.experiments.cache import Part, PartCache, PartProgress
-from hrc_env.experiments.report import Metrics, Report, quick_words
+from hrc_env.experiments.report import Metrics, Report, Table, quick_words
 from hrc_env.experiments.rigs import DT_S, WARM_UP_S
 from hrc_env.experiments.runner import at_least_one, changed, is_as_short
 from hrc_env.experiments.versions import key_of
 
-ABLATIONS: dict[str, Ablation] = {
-    ablation.name: ablation
-    for ablation in (
-        CAMERAS, ALGORITHM_1, LATENCY, CALIBRATION, OCCLUSION, WORKERS, FILTER, KINEMATICS,
-    )
-}  # fmt: skip
-"""By name, in the order of the report."""
 Played = Mapping[str, Mapping[str, Sums]]
 """Sums by question and setting."""
 
@@ -110,9 +101,13 @@ class Ablations:
         """Return every number."""
         return metrics_of(played)
 
+    def shown_tables(self) -> tuple[Table, ...]:
+        """Return the table of the documentation."""
+        return (shown(self.seconds),)
+
     def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
         """Draw a figure for each question; return the tables beside them."""
-        return report(figures, self.asked, metrics)
+        return report(figures, self.asked, self.shown_tables(), metrics)
 
 
 QUICK = Ablations(n_seeds=4, seconds=5.0)

@@ -11,6 +11,7 @@ from hrc_env.core.errors import ConfigError, HRCError, check_names
 from hrc_env.core.results import Metric
 from hrc_env.experiments.agents import check_choice, labels_of
 from hrc_env.experiments.cache import Part, PartCache
+from hrc_env.experiments.impact.declaration import LATENESS, documented
 from hrc_env.experiments.impact.episodes import play_row
 from hrc_env.experiments.impact.metrics import Played, metrics_of
 from hrc_env.experiments.impact.policies import (
@@ -24,7 +25,7 @@ from hrc_env.experiments.impact.policies import (
     maker,
     trained,
 )
-from hrc_env.experiments.impact.report import LATENESS, report
+from hrc_env.experiments.impact.report import report
 from hrc_env.experiments.report import Metrics, Report, Table, quick_words
 from hrc_env.experiments.rigs import DT_S
 from hrc_env.experiments.runner import at_least_one, changed
@@ -216,8 +217,8 @@ class Impact:
         return metrics_of(played, self.margins_m)
 
     def shown_tables(self) -> tuple[Table, ...]:
-        """Return the tables that the documentation shows as they are."""
-        return (LATENESS,)
+        """Return the tables of the documentation."""
+        return (documented(self.setups), LATENESS)
 
     def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
         """Draw the figure; return the tables beside it."""

@@ -5,63 +5,21 @@ from pathlib import Path
 
 from matplotlib.axes import Axes
 
-from hrc_env.experiments.columns import Column
-from hrc_env.experiments.impact.episodes import SLOW_M, STOP_M
-from hrc_env.experiments.impact.metrics import COMPARED, NOMINAL_MPS, Played
+from hrc_env.experiments.impact.declaration import (
+    ASKED,
+    LATENESS,
+    TITLE,
+    differences_of,
+    results_of,
+)
+from hrc_env.experiments.impact.metrics import Played
 from hrc_env.experiments.impact.policies import PPO, SCRIPTED
 from hrc_env.experiments.impact.policies import WORDS as ROBOTS
 from hrc_env.experiments.plots import ends, label, new_figure, save
-from hrc_env.experiments.report import Metrics, Report, Table, picture, table_of
-from hrc_env.experiments.setups import LATE, LATE_S, REFERENCE, setup_called
-from hrc_env.safety.incidents import MOVING_M_S
+from hrc_env.experiments.report import Metrics, Report, picture
+from hrc_env.experiments.setups import LATE_S, REFERENCE, setup_called
 from hrc_env.tracking.estimators import ESTIMATORS
 
-WORDS = {
-    "goals_per_min": ("goals / min", 1), "cost": ("true cost", 1),
-    "cost_towards": ("of it moving towards", 1), "called_slowings": ("near", 0),
-    "separation_min_m": ("least separation [m]", 3), "contacts_towards": ("contacts towards", 2),
-    "contacts_standing": ("standing arm pushed", 2), "contacts_fleeing": ("moving away", 2),
-    "approaches": ("approaches", 1), "missed_stops": ("missed stops", 1),
-    "false_stops": ("false stops", 1), "z_d_m": ("Z_d [m]", 3), "tax_m": ("tax [m]", 2),
-}  # fmt: skip
-ASKED = f"""\
-A robot keeps away from a worker whom it knows through cameras only. What is a better estimator, one
-more camera or a shorter delay worth, in goals reached and in safety? Only perception is exchanged;
-robots, goals and workers, who take no notice of the robot, are the same in every row, bit for bit.
-
-Counted is the truth. *True cost*: steps nearer than 0.15 m, and steps in touch, an episode; *of it
-moving towards*: while the robot moves towards the worker at more than {MOVING_M_S} m/s. The rest
-comes of workers who walk up to a robot that stands, and depends on where it stands. *Contacts* a
-minute, touches within half a second as one, are named by what the robot did in the step before:
-*towards* the worker, *standing arm pushed*, *moving away*. In 1,000 steps, *near*: nearer than
-{SLOW_M:g} m, the exposure; *approaches*: the robot moves towards a worker nearer than {STOP_M:g} m;
-*missed stops*: the true
-separation is below {STOP_M:g} m and the believed one is not; *false stops*: the other way round.
-*Z_d*: 95th percentile of the error of all joints, also where the track is lost. *Tax*: Z_d on time
-+ latency x (v_h + v_r), v_h = {NOMINAL_MPS} m/s, v_r the 95th percentile of the robot's speed
-towards the worker.
-
-Fewer than four cameras: the others fail after a second; which are left goes round. Late images say
-when they were taken, and the tracker predicts from there; untold ones claim to be new."""
-LATENESS = Table(
-    "lateness",
-    "What latency costs in separation",
-    {
-        each.name: (f"{1000 * each.latency_s:.0f} ms, {'told' if each.is_told else 'not told'}",)
-        for each in LATE
-    },
-    (
-        Column("lateness.{}.nominal_m", "nominal tax [m]", 3, plain=True),
-        Column("lateness.{}.speeds_here_m", "tax with measured speeds [m]", 3, plain=True),
-        Column("lateness.{}.squares_m", "squares added [m]", 3, plain=True),
-        Column("lateness.{}.belief_m", "measured in the belief [m]", 3),
-        Column("lateness.{}.margin_m", "measured in the loop [m]", 3),
-    ),
-    ("latency",),
-    f"Nominal tax: latency x ({NOMINAL_MPS} m/s + robot speed) on top of Z_d. Measured in the "
-    "belief: growth of the 95th percentile of believed less true gap. In the loop: margin that "
-    "`scripted_slowed` must add until it misses no greater share of stops than on time.",
-)
 LEAST_SHARE = 0.25
 """Of the best robot's goals: a trained policy that reaches fewer has not learnt the task."""
 COLOURS = {
@@ -100,31 +58,23 @@ def report(
             "that nothing can be said of its perception: it is left out here, and its numbers are "
             "in results.json only."
         )
-    title = f"What perception is worth in safety{', a quick run' if warning else ''}"
+    title = f"{TITLE}{', a quick run' if warning else ''}"
     if not policies:
         return Report(title, "\n\n".join(asked), ())
-    setups = {name: setup_called(name).words for _, name in table}
-    draw_tradeoff(figures / "tradeoff.png", metrics, policies, list(setups))
+    setups = [*dict.fromkeys(name for _, name in table)]
+    draw_tradeoff(figures / "tradeoff.png", metrics, policies, setups)
     caption = (
         "A point for each setup, placed by its paired difference from the reference, whose 95 % "
         "interval are the bars: up is more goals, left is safer. Below: approaches instead of "
         "cost, without setups that track nobody."
     )
     parts = [picture(figures / "tradeoff.png", caption)]
-    for policy in policies:
-        columns = [Column(f"{policy}.{{}}.{what}", *words) for what, words in WORDS.items()]
-        parts.append(table_of(policy, setups, columns, metrics))
+    parts += [results_of(policy, setups).markdown(metrics) for policy in policies]
     marks = "" if warning else "; a dot where the interval leaves out zero"
-    others = {name: words for name, words in setups.items() if name != REFERENCE}
+    others = [name for name in setups if name != REFERENCE]
     if others:
-        parts.append(f"Less {setups[REFERENCE]}, paired{marks}.")
-    for policy in policies if others else ():
-        key = f"difference.{policy}.{{}}."
-        columns = [
-            Column(key + what, *WORDS[what], signed=True, marked=not warning)
-            for what in (*COMPARED, "z_d_m")
-        ]
-        parts.append(table_of(policy, others, columns, metrics))
+        parts.append(f"Less {setup_called(REFERENCE).words}, paired{marks}.")
+    parts += [differences_of(policy, others, not warning).markdown(metrics) for policy in policies]
     parts.append(LATENESS.markdown(metrics))
     return Report(title, "\n\n".join(asked), [*filter(None, parts)])
 

@@ -14,12 +14,13 @@ from hrc_env.core.results import Metric
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.evaluation.intervals import paired, quantile_of, quantile_over, ratio_over
 from hrc_env.experiments.cache import Part, PartCache, PartProgress
+from hrc_env.experiments.lab.declaration import ALL, ERRORS, ESTIMATORS, SINGLE
 from hrc_env.experiments.lab.motions import MOTIONS, play
-from hrc_env.experiments.lab.report import ALL, COLUMNS, ESTIMATORS, WARM_UP, report
+from hrc_env.experiments.lab.report import WARM_UP, report
 from hrc_env.experiments.lab.sides import MISSED_SHARE, away_from_cameras, missed_by_camera
 from hrc_env.experiments.recording import Recording, record, replay
-from hrc_env.experiments.report import Metrics, Report, quick_words
-from hrc_env.experiments.rigs import CHOICES, DT_S, MULTI
+from hrc_env.experiments.report import Metrics, Report, Table, quick_words
+from hrc_env.experiments.rigs import CHOICES, DT_S, MULTI, SPOKEN
 from hrc_env.experiments.runner import at_least_one, changed, is_as_short
 from hrc_env.perception.detector import DetectorConfig
 from hrc_env.scene.build import Scene, SceneConfig, build
@@ -87,6 +88,10 @@ class Lab:
         """Return every number of results.json."""
         return metrics_of(played)
 
+    def shown_tables(self) -> tuple[Table, ...]:
+        """Return the table of the documentation."""
+        return (ERRORS,)
+
     def report(self, played: Films, metrics: Metrics, figures: Path) -> Report:
         """Draw the figure; return the tables beside it."""
         take = partial(taken, self, seed=self.seeds[0], tick=lambda share: None)
@@ -145,12 +150,12 @@ def metrics_of(played: Films) -> dict[str, Metric]:
     metrics: dict[str, Metric] = {}
     for motion in (*MOTIONS, ALL):
         films = [each for (name, _), each in played.items() if motion in (name, ALL)]
-        for key in (f"{name}.{column}" for name in ESTIMATORS for column in COLUMNS):
+        for key in (f"{name}.{column}" for name in ESTIMATORS for column in SPOKEN):
             errors = [_errors_m(each, key).ravel() for each in films]
             for word, q in QUANTILES.items():
                 metrics[f"error_m.{key}.{motion}.{word}"] = quantile_over(errors, q, "m")
         metrics |= _misses(films, motion)
-    for column in COLUMNS:
+    for column in SPOKEN:
         errors = [_errors_m(each, f"{ESTIMATORS[0]}.{column}") for each in played.values()]
         for other, (word, q) in product(ESTIMATORS[1:], QUANTILES.items()):
             theirs = [_errors_m(each, f"{other}.{column}") for each in played.values()]
@@ -163,7 +168,7 @@ def _misses(films: Sequence[Film], motion: str) -> dict[str, Metric]:
     """Shares of joints missed, on the far side apart, of which some are known with all cameras."""
     metrics = {}
     counted = np.array([_joints_counted(each) for each in films]).T
-    for column, (n, missed, away, far, back) in zip(COLUMNS[:4], counted, strict=True):
+    for column, (n, missed, away, far, back) in zip(SINGLE, counted, strict=True):
         for what, above, below in (
             ("missed", missed, n), ("missed_far", far, away), ("recovered_far", back, far),
         ):  # fmt: skip

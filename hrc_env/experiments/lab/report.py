@@ -11,82 +11,41 @@ from matplotlib.ticker import MultipleLocator
 from hrc_env.core.batching import one
 from hrc_env.core.skeleton import BONES
 from hrc_env.core.typing import Image, Points3
-from hrc_env.experiments.columns import Column
 from hrc_env.experiments.lab import sides
-from hrc_env.experiments.lab.motions import MOTIONS
+from hrc_env.experiments.lab.declaration import (
+    ASKED,
+    ERRORS,
+    ESTIMATORS,
+    FAR,
+    LESS,
+    TITLE,
+    errors_of,
+)
 from hrc_env.experiments.plots import new_figure, save
 from hrc_env.experiments.recording import Recording, replay
-from hrc_env.experiments.report import Metrics, Report, picture, table, table_of
-from hrc_env.experiments.rigs import SPOKEN
+from hrc_env.experiments.report import Metrics, Report, picture
 from hrc_env.geometry.cameras import image_from_pinhole
 from hrc_env.perception.lensed import Lensed
 from hrc_env.render import overlay
 from hrc_env.scene.render import CropRenderer
 
-ESTIMATORS = ("particle", "paper", "paper_restarts", "kalman")
-"""Who is given the films; misses are told of the first."""
-COLUMNS = tuple(SPOKEN)
-ALL = "all"
-"""All motions together."""
 WARM_UP = 12
 """At first everybody has all cameras, and is not judged [frames]."""
 SHOWN = (("standing", "(a) standing"), ("bending", "(b) bending"), ("lifting", "(c) lifting"))
 CROP_PX = 512
 TRUTH, SINGLE, MULTI = "#9aa3ad", "#e65100", "#1565c0"
-ASKED = f"""\
-A worker stands, walks, bends, lifts and carries in a room of 6.1 x 5.5 m before four lenses of
-118.2 x 69.5 degrees: what does one camera miss on the side turned away from it, and what do four
-know? All estimators are given the same detections (MediaPipe Pose on rendered images; crops follow
-the four-camera track), half a second of all cameras, which is not judged, and then those of one
-camera or of all.
-
-A camera has *missed* a joint whose visibility it reports below {sides.MISSED_CONFIDENCE}, or that
-it puts off by more than {sides.MISSED_SHARE:.0%} of the stature in the image; four cameras one
-whose estimate is further from the truth than that. A side is *turned away* when its shoulder and
-hip are further from the camera by 8 cm than the other's."""
 
 
 def report(figures: Path, take: Callable[[str], Recording], metrics: Metrics) -> Report:
-    """Draw the figure; the tables beside it."""
+    """Draw the figure; return the tables beside it."""
     draw_poses(figures / "figure_6.png", take)
-    motions = {motion: motion.replace("_", " ") for motion in (*MOTIONS, ALL)}
-    far = [
-        Column(f"{what}.{c}.{{}}", f"{word}, {SPOKEN[c]} [%]", 0, 100)
-        for what, word in (("missed_far", "missed"), ("recovered_far", "of these known with four"))
-        for c in COLUMNS[:4]
-    ]
-    far.append(Column("missed.multi.{}", "four miss, of all joints [%]", 1, 100))
-    less = [
-        Column(f"difference.error_m.{{}}.{c}.median", w, 1, 1000, signed=True)
-        for c, w in SPOKEN.items()
-    ]
-    others = {name: f"`{name}`" for name in ESTIMATORS[1:]}
     caption = (
         "The paper's figure 6: what one camera was shown and found, the body from that camera "
         "alone, and from four; grey is the truth. The frame in which that camera missed most."
     )
-    parts = (
-        picture(figures / "figure_6.png", caption),
-        *(_errors(name, motions, metrics) for name in ESTIMATORS),
-        "Median (95th percentile) of the error of all 15 joints.",
-        table_of(
-            f"`{ESTIMATORS[0]}` less others, film by film, median [mm]", others, less, metrics
-        ),
-        table_of("joints of the side turned away", motions, far, metrics),
-    )
-    return Report("What one camera does not see: the paper's laboratory, again", ASKED, parts)
-
-
-def _errors(estimator: str, motions: dict[str, str], metrics: Metrics) -> str:
-    """Median (95th percentile) in a cell."""
-
-    def cell(column: str, motion: str) -> str:
-        key = f"error_m.{estimator}.{column}.{motion}"
-        median, p95 = (1000 * metrics[f"{key}.{word}"].value for word in ("median", "p95"))
-        return f"{median:.0f} ({p95:.0f})"
-
-    rows = [(words, *(cell(c, motion) for c in COLUMNS)) for motion, words in motions.items()]
-    return table((f"`{estimator}` [mm]", *SPOKEN.values()), rows)
+    tables = (ERRORS, *(errors_of(name) for name in ESTIMATORS[1:]), LESS, FAR)
+    shown = (each.markdown(metrics) for each in tables)
+    return Report(TITLE, ASKED, (picture(figures / "figure_6.png", caption), *shown))
 
 
 def draw_poses(path: Path, take: Callable[[str], Recording]) -> None:

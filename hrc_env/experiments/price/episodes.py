@@ -53,6 +53,12 @@ class Driver:
     """Whether pickles in its checkpoint are read, as of `make_agent`."""
 
     @property
+    def words(self) -> str:
+        """As in reports."""
+        usual = self.agent == SCRIPTED
+        return "the scripted robot" if usual else f"the robot that the agent `{self.agent}` drives"
+
+    @property
     def given(self) -> dict[str, Any]:
         """The argument of the environment that follows from it."""
         control = control_of(self.agent) or self.control

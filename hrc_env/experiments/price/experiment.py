@@ -14,6 +14,8 @@ from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.core.results import Metric
 from hrc_env.experiments.agents import check_choice
 from hrc_env.experiments.cache import PartCache
+from hrc_env.experiments.columns import Column
+from hrc_env.experiments.price import declaration
 from hrc_env.experiments.price.episodes import SCRIPTED, Driver, Watched
 from hrc_env.experiments.price.eyes import (
     ELSEWHERE,
@@ -25,7 +27,7 @@ from hrc_env.experiments.price.eyes import (
     usual_eyes,
 )
 from hrc_env.experiments.price.metrics import PER, Played, Row, metrics_of, supposed_m
-from hrc_env.experiments.price.report import WORTH, report
+from hrc_env.experiments.price.report import report
 from hrc_env.experiments.price.search import searched
 from hrc_env.experiments.price.shield import SHIELD
 from hrc_env.experiments.report import Metrics, Report, Table, quick_words
@@ -88,12 +90,17 @@ class Price:
                 f"got {self.bracket_m} and {self.level}."
             )
         check_choice(self.driver.agent)
-        for task in (self.task, *self.others):
+        for task in self.tasks:
             _check_task(task, self.driver.agent)
+
+    @property
+    def tasks(self) -> tuple[str, ...]:
+        """The task with all eyes, then the others."""
+        return (self.task, *self.others)
 
     def pairs(self) -> Iterator[tuple[str, Eyes]]:
         """Every task with every pair of eyes."""
-        for name in (self.task, *self.others):
+        for name in self.tasks:
             for eyes in eyes_called(self.eyes if name == self.task else ELSEWHERE):
                 yield name, eyes
 
@@ -142,7 +149,7 @@ class Price:
     def play(self, cache: PartCache) -> Played:
         """Return what every search came to."""
         table: dict[str, dict[str, Row]] = {}
-        alone = {task: _unshielded(self, cache, task) for task in (self.task, *self.others)}
+        alone = {task: _unshielded(self, cache, task) for task in self.tasks}
         for task, eyes in self.pairs():
             table.setdefault(task, {})[eyes.name] = row = search_margin(self, cache, task, eyes)
             check_walks(task, alone[task], row)
@@ -153,8 +160,19 @@ class Price:
         return metrics_of(played.table, played.alone, played.pixels, self.level)
 
     def shown_tables(self) -> tuple[Table, ...]:
-        """Return the tables that the documentation shows as they are."""
-        return (WORTH,)
+        """Return the tables of the documentation."""
+        others = (declaration.elsewhere(self.tasks),) if self.others else ()
+        return (self.prices(), declaration.WORTH, *others)
+
+    def prices(self, more: Sequence[Column] = ()) -> Table:
+        """Return the table of all eyes.
+
+        Args:
+            more: columns besides those of the documentation.
+        """
+        return declaration.prices(
+            self.task, eyes_called(self.eyes), self.driver.words, self.n_seeds, self.level, more
+        )
 
     def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
         """Draw the figure; return the tables beside it."""

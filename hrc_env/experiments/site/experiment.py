@@ -19,13 +19,15 @@ from hrc_env.evaluation.intervals import mean_over, paired, rmse_of, rmse_over
 from hrc_env.experiments.cache import Part as CachedPart
 from hrc_env.experiments.cache import PartCache, PartProgress
 from hrc_env.experiments.recording import Recording, record, replay
-from hrc_env.experiments.report import Metrics, Report, quick_words
+from hrc_env.experiments.report import Metrics, Report, Table, quick_words
 from hrc_env.experiments.rigs import CHOICES, DT_S, MULTI, N_WARM_UP, left_of
 from hrc_env.experiments.runner import at_least_one, changed, is_as_short
+from hrc_env.experiments.site import declaration
+from hrc_env.experiments.site.declaration import ALSO, ESTIMATORS
 from hrc_env.experiments.site.report import report, site
 from hrc_env.experiments.site.walk import walk
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.estimators import ESTIMATORS
+from hrc_env.tracking.estimators import ESTIMATORS as KNOWN
 
 HEAD = JOINT["nose"]
 """The paper's "head"; MediaPipe has no joint of that name (judgement: the nose)."""
@@ -37,8 +39,6 @@ ALONE = "alone."
 """In keys: cameras that are alone from the first frame on, as the paper's were."""
 ROWS = tuple(CHOICES)
 """Each camera alone, and all four."""
-ALSO = ("kalman", "paper_restarts")
-"""These are given the film, too: single cameras get the best estimator that there is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class Site:
     """Seed of the first walk; the others count up."""
     seconds: float = 20.0
     """How long each is."""
-    estimators: tuple[str, ...] = ("particle", "paper")
+    estimators: tuple[str, ...] = ESTIMATORS
     """Those of the table, which also make crops of their own."""
     n_closed: int = 2
     """So many of the walks are filmed again for everybody's own crops, which costs most."""
@@ -62,8 +62,8 @@ class Site:
         """Raise `ConfigError` for what cannot work."""
         at_least_one(self, "n_seeds", "n_closed")
         if not self.estimators:
-            raise ConfigError(f"--estimator needs a name of {', '.join(ESTIMATORS)}.")
-        check_names("estimator", self.estimators, ESTIMATORS)
+            raise ConfigError(f"--estimator needs a name of {', '.join(KNOWN)}.")
+        check_names("estimator", self.estimators, KNOWN)
 
     @property
     def seeds(self) -> list[int]:
@@ -73,7 +73,7 @@ class Site:
     @property
     def everybody(self) -> tuple[str, ...]:
         """All who are given the film."""
-        return tuple(dict.fromkeys((*self.estimators, *ALSO)))
+        return declaration.everybody(self.estimators)
 
     @property
     def n_parts(self) -> int:
@@ -110,9 +110,14 @@ class Site:
         """Return every number of results.json."""
         return metrics_of(self, played)
 
+    def shown_tables(self) -> tuple[Table, ...]:
+        """Return the table of the documentation."""
+        return (declaration.errors(self.estimators, self.seconds),)
+
     def report(self, played: "Played", metrics: Metrics, figures: Path) -> Report:
         """Draw the figures; return the tables beside them."""
-        return report(figures, self.estimators, self.everybody, played[0], metrics)
+        tables = (*self.shown_tables(), *declaration.comparisons(self.estimators))
+        return report(figures, self.estimators, played[0], tables, metrics)
 
 
 QUICK = Site(n_seeds=2, seconds=6.0, n_closed=1)
@@ -120,7 +125,7 @@ QUICK = Site(n_seeds=2, seconds=6.0, n_closed=1)
 
 
 def make_experiment(
-    quick: bool = False, seeds: int | None = None, estimator: Sequence[str] = ("particle", "paper")
+    quick: bool = False, seeds: int | None = None, estimator: Sequence[str] = ESTIMATORS
 ) -> Site:
     """The settings that the command line asks for."""
     names = tuple(dict.fromkeys(estimator))

@@ -1,6 +1,6 @@
-"""The report of the site: the paper's figures 3 and 4 from our own data, and the table."""
+"""The report of the site: the paper's figures 3 and 4 from our own data, and the tables."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,30 +10,18 @@ from matplotlib.patches import Rectangle
 
 from hrc_env.config import HRCConfig
 from hrc_env.core.batching import one
-from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats
-from hrc_env.experiments.columns import Column
 from hrc_env.experiments.plots import label, new_figure, save
-from hrc_env.experiments.report import Metrics, Report, picture, table_of
+from hrc_env.experiments.report import Metrics, Report, Table, picture
 from hrc_env.experiments.rigs import MULTI, SPOKEN
+from hrc_env.experiments.site.declaration import ASKED, TITLE
 from hrc_env.experiments.site.walk import walk
 from hrc_env.geometry.cameras import pinhole, project
 from hrc_env.scene.build import Scene, build
 from hrc_env.scene.render import PictureRenderer
 
-PAPER_RMSE_M = {
-    "camera_1": 6.771, "camera_2": 3.763, "camera_3": 5.630, "camera_4": 12.814, MULTI: 0.133,
-}  # fmt: skip
-"""What the paper reports; its unit is not printed, metres are meant."""
 ABOVE_PX, VIEW_PX = (1100, 1100), (960, 540)
 LIMIT_M = 10.0
-ASKED = """\
-A worker walks over a construction site of 20 x 20 m, behind and past what stands there, before four
-cameras in the corners: how well is the head (the nose) known from one camera, and from four? All
-estimators are given the same detections (MediaPipe Pose on rendered images, crops follow the
-four-camera track): of one camera or four from the first frame on, as the paper has it, or of all
-for a second and then of some. Errors are of every frame after that second, also where the track is
-lost."""
 
 
 def site() -> Scene:
@@ -44,11 +32,19 @@ def site() -> Scene:
 def report(
     figures: Path,
     estimators: tuple[str, ...],
-    everybody: tuple[str, ...],
     films: Mapping[int, Mapping[str, Any]],
+    tables: Sequence[Table],
     metrics: Metrics,
 ) -> Report:
-    """Draw the figures; the tables beside them."""
+    """Draw the figures; return the tables beside them.
+
+    Args:
+        figures: folder.
+        estimators: whose paths are drawn.
+        films: by seed.
+        tables: of errors first.
+        metrics: of the study.
+    """
     seed, film = next(iter(films.items()))
     scene, truth = site(), np.asarray(film["truth"], float)
     draw_place(figures / "figure_3.png", scene, seed, truth)
@@ -59,32 +55,11 @@ def report(
         path = figures / f"figure_4_{name}.png"
         draw_paths(path, scene, name, truth, heads)
         paths.append(picture(path, f"The paper's figure 4: the first walk from above, `{name}`."))
-    names = {name: f"`{name}`" for name in estimators}
-    alone = {"as_printed": "the paper reports"} | names
-    printed = {
-        f"rmse_m.alone.as_printed.{c}": Metric(v, v, v, "m", 1) for c, v in PAPER_RMSE_M.items()
-    }
-    columns = [Column(f"rmse_m.{{}}.{c}", words, 3) for c, words in SPOKEN.items()]
-    ratios = [Column(f"over_multi.{{}}.{c}", w) for c, w in SPOKEN.items() if c != MULTI]
-    own = [Column(f"closed_rmse_m.{{}}.{c}", words, 3) for c, words in SPOKEN.items()]
-    rivals = {f"{start}{name}": f"{words}`{name}`" for name in everybody[1:]
-              for start, words in (("alone.", "from the first frame: "), ("", ""))}  # fmt: skip
-    less = [Column(f"difference.rmse_m.{{}}.{c}", w, 3, signed=True) for c, w in SPOKEN.items()]
-    parts = (
-        picture(figures / "figure_3.png", "The paper's figure 3: our site, and what cameras see."),
-        table_of("RMSE of the head [m], from the first frame on",
-                 {f"alone.{name}": words for name, words in alone.items()},
-                 columns, {**metrics, **printed}),
-        *paths,
-        table_of("RMSE of the head [m], of four cameras for a second, then",
-                 {name: f"`{name}`" for name in everybody}, columns, metrics),
-        table_of(f"RMSE [m] of `{everybody[0]}` less that of", rivals, less, metrics),
-        table_of("RMSE of one camera over that of four, walk by walk",
-                 {name: f"`{name}`" for name in everybody}, ratios, metrics),
-        table_of("RMSE [m] with crops that follow the estimator's own track, some walks only",
-                 names, own, metrics),
-    )  # fmt: skip
-    return Report("One camera or four: the paper's simulation, again", ASKED, parts)
+    first, *others = (each.markdown(metrics) for each in tables)
+    place = picture(
+        figures / "figure_3.png", "The paper's figure 3: our site, and what cameras see."
+    )
+    return Report(TITLE, ASKED, (place, first, *paths, *others))
 
 
 def draw_place(path: Path, scene: Scene, seed: int, path_world: Floats) -> None:

@@ -1,0 +1,83 @@
+"""The speed bench as it is declared: configurations, columns and tables."""
+
+from collections.abc import Iterable, Sequence
+
+from benchmarks.speed.organs import ORGANS, REST, TOTAL
+from hrc_env.experiments.columns import Column
+from hrc_env.experiments.report import Table
+from hrc_env.tasks import BUILT_IN, DEFAULT
+
+ASKED = "What does a step of an environment cost, alone and beside others, and where does it go?"
+SINGLE = "single"
+"""The environment that `gymnasium.make` gives, as opposed to a vector of one."""
+REACHER = "reacher"
+"""Gymnasium's Reacher where levels are named."""
+SHOWN = (SINGLE, "16.1", "64.1", "64.2")
+"""Configurations whose organs the documentation shows."""
+RESETS = {
+    "reset_one": Column("reset_ms.1_of_1", plain=True),
+    "reset_some": Column("reset_ms.8_of_64", plain=True),
+}
+TASKS = Table(
+    "speed_tasks",
+    "Speed of every task",
+    {task: (f"`{task}`",) for task in BUILT_IN},
+    (
+        Column("task_steps_per_s.{}", "environment steps [1/s]", 0),
+        Column("task_share.{}", f"of `{DEFAULT}` [%]", 0, 100),
+    ),
+    ("task",),
+    "`keypoints`, one worker, 64 environments on 2 threads, random actions; all take turns of 20 "
+    "steps. Median, smallest and largest of the rounds.",
+)
+
+
+def title(configuration: str) -> str:
+    """Return a configuration in words.
+
+    Args:
+        configuration: `SINGLE`, or "<num_envs>.<threads>".
+    """
+    if configuration == SINGLE:
+        return SINGLE
+    size, threads = configuration.split(".")
+    return f"{size} on {threads} thread{'s' if threads != '1' else ''}"
+
+
+def steps_of(levels: Sequence[str], configurations: Iterable[str]) -> Table:
+    """Return the table of steps a second.
+
+    Args:
+        levels: of perception.
+        configurations: in the order of the rows.
+    """
+    own = [Column(f"env_steps_per_s.{each}.{{}}", f"`{each}` [1/s]", 0) for each in levels]
+    return Table(
+        "speed",
+        "Environment steps a second",
+        {each: (title(each),) for each in configurations},
+        (Column(f"env_steps_per_s.{REACHER}.{{}}", "Gymnasium's Reacher-v5 [1/s]", 0), *own),
+        ("environments",),
+        "Random actions for whole episodes, resets included, every info read; median, smallest and "
+        f"largest of {{n[env_steps_per_s.{REACHER}.{SINGLE}]}} rounds in which all take turns. "
+        f"`{SINGLE}` is `gymnasium.make`. Compare ratios: the machine is shared.",
+    )
+
+
+def organs_of(configurations: Iterable[str]) -> Table:
+    """Return the table of the time of a step, by organ.
+
+    Args:
+        configurations: in the order of the columns.
+    """
+    return Table(
+        "speed_organs",
+        "Time of a step by organ, `keypoints`",
+        {each: (each,) for each in (*ORGANS, REST, TOTAL)},
+        [Column(f"us_per_env_step.{{}}.{each}", f"{title(each)} [us]") for each in configurations],
+        ("organ",),
+        "Per environment and step. With two threads an organ's time is divided by two, so that "
+        "columns are time on the wall. A reset takes {reset_one} ms, of 8 of 64 environments "
+        "{reset_some} ms.",
+        RESETS,
+    )

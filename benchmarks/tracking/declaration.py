@@ -1,0 +1,113 @@
+"""The tracking bench as it is declared: rows, kinds of numbers, and tables."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from benchmarks.tracking.names import DEFAULT, DLT, EVERYTHING, SMOOTHER, Selection
+from benchmarks.tracking.sequences import MATCHED
+from hrc_env.experiments.columns import Column
+from hrc_env.experiments.report import Cells, Table
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A kind of number that every estimator has in every row."""
+
+    title: str
+    digits: int
+    scale: float = 1.0
+
+    def column(self, metric: str, name: str, heading: str) -> Column:
+        """Return the column of an estimator.
+
+        Args:
+            metric: the kind's name.
+            name: of the estimator.
+            heading: of the column.
+        """
+        return Column(f"{metric}.{{}}.{name}", heading, self.digits, self.scale)
+
+
+KINDS = {
+    "rmse_m": Kind("RMSE in cm", 2, 100),
+    "median_m": Kind("Median error in cm", 2, 100),
+    "coverage95": Kind("Coverage of the reported 95 % region", 3),
+    "std_over_rmse": Kind("Reported standard deviation / RMSE", 2),
+    "facing_wrong": Kind("Percent of frames in which the torso faces the wrong way", 2, 100),
+}
+"""By their names in metrics: a table each, with a row a window and a column an estimator."""
+SHOWN = (
+    ("rmse_m", DEFAULT, f"`{DEFAULT}` [cm]"),
+    ("coverage95", DEFAULT, "coverage"),
+    ("std_over_rmse", DEFAULT, "std/RMSE"),
+    ("rmse_m", "kalman", "`kalman` [cm]"),
+    ("rmse_m", "paper_restarts", "`paper_restarts` [cm]"),
+    ("coverage95", "paper_restarts", "coverage"),
+    ("rmse_m", "ransac", "`ransac` [cm]"),
+    ("rmse_m", DLT, "DLT [cm]"),
+    ("rmse_m", SMOOTHER, f"`{SMOOTHER}` [cm]"),
+    ("coverage95", SMOOTHER, "coverage"),
+)
+"""Kinds, estimators and headings of the documentation."""
+WORDS = {
+    "one_camera_half_second": "one camera, first 0.5 s",
+    "one_camera_one_second": "one camera, first 1 s",
+    "one_camera_two_seconds": "one camera, first 2 s",
+    "one_camera": "one camera, 4 s",
+}
+"""Of windows whose names do not say it."""
+BATCHES = {"64": "batch of 64 [us]", "hard_64": "the same, `hard` walks [us]", "1": "alone [us]"}
+
+
+def rows_of(selection: Selection) -> dict[str, Cells]:
+    """Return the words of every row by its key."""
+    return {
+        f"{rig}.{window}": (f"{rig} {WORDS.get(window, window.replace('_', ' '))}",)
+        for rig, _, window in selection.rows()
+    }
+
+
+def table_of_kind(metric: str, names: Sequence[str], selection: Selection) -> Table:
+    """Return the table of one kind of number.
+
+    Args:
+        metric: one of `KINDS`.
+        names: of the estimators.
+        selection: the part of the bench that is run.
+    """
+    kind = KINDS[metric]
+    columns = [kind.column(metric, each, each) for each in names]
+    return Table(metric, kind.title, rows_of(selection), columns)
+
+
+def times(names: Sequence[str]) -> Table:
+    """Return the table of times.
+
+    Args:
+        names: of the estimators.
+    """
+    return Table(
+        "tracking_cost",
+        "Time of an update",
+        {name: (f"`{name}`",) for name in names},
+        [Column(f"update_us.{{}}.{batch}", words) for batch, words in BATCHES.items()],
+        ("estimator",),
+        "Per worker and update, four cameras, one core. `paper_restarts` has 1,000 particles a "
+        "joint.",
+    )
+
+
+BENCH = Table(
+    "tracking",
+    "Tracking bench",
+    {row: words for row, words in rows_of(EVERYTHING).items() if not str(row).endswith(MATCHED)},
+    [KINDS[metric].column(metric, name, heading) for metric, name, heading in SHOWN],
+    ("sequence",),
+    "RMSE of a joint, share of joints within the reported 95 % region, reported standard deviation "
+    f"over RMSE. {{n[coverage95.env.after_return.{DEFAULT}]}} sequences a row that nothing was "
+    f"chosen on (smoother, which is offline: {{n[coverage95.env.after_return.{SMOOTHER}]}}). `lab` "
+    "and `site`: the bench's walkers, white detection errors of 3 px; `env`: the environment's "
+    "worker through its emulator. `hard`: occlusion, 10 % gross errors, exchanged sides; "
+    "`drifting`: errors that last half a second; `late`: frames 40 to 200 ms old; `one camera`: "
+    "four cameras for 1 s, then one for 4 s. DLT: plain triangulation of each frame.",
+)

@@ -1,0 +1,86 @@
+"""The ablations as they are declared: questions, columns and the table of the documentation."""
+
+from hrc_env.experiments.ablations.ablation import Ablation
+from hrc_env.experiments.ablations.questions.faults import CALIBRATION, LATENCY
+from hrc_env.experiments.ablations.questions.filters import ALGORITHM_1, FILTER, KINEMATICS
+from hrc_env.experiments.ablations.questions.rigs import CAMERAS, OCCLUSION, WORKERS
+from hrc_env.experiments.columns import Column
+from hrc_env.experiments.report import Table
+
+TITLE = "Ablations of rigs, detections and estimators"
+ASKED = """\
+What the paper's two experiments leave open. Detections are those of the calibrated emulator
+(`perception="keypoints"`): these are questions about estimators and rigs. The estimator is the
+default, `particle`, unless a setting says otherwise; settings are changed one at a time. Workers of
+all bodies work beside an arm that rests, on the same walks in every setting of a scene.
+
+Every joint of every frame after the first second counts, also where the track is lost: the last
+word, or the prior, is then the answer. *Coverage*: the share of joints within the reported 95 %
+region; *lost*: the share of time without a track; *switches*: of a worker from one track to
+another, a minute, and *IDF1*: how well workers keep theirs (`hrc_env/tracking/metrics.py`);
+*less*: less the setting that was changed, walk by walk; a dot where the interval leaves out
+zero."""
+ABLATIONS: dict[str, Ablation] = {
+    ablation.name: ablation
+    for ablation in (
+        CAMERAS, ALGORITHM_1, LATENCY, CALIBRATION, OCCLUSION, WORKERS, FILTER, KINEMATICS,
+    )
+}  # fmt: skip
+"""By name, in the order of the report."""
+COLUMNS = (
+    Column("error_m.{}.median", "median [mm]", 1, 1000),
+    Column("error_m.{}.p95", "95 % [mm]", 0, 1000),
+)
+"""Of the documentation, and of the report."""
+MORE = (
+    Column("difference.error_m.{}.median", "less, median [mm]", 1, 1000, signed=True),
+    Column("difference.error_m.{}.p95", "less, 95 % [mm]", 0, 1000, signed=True),
+    Column("rmse_m.{}", "RMSE [mm]", 0, 1000),
+    Column("coverage95.{}", "coverage [%]", 1, 100),
+    Column("lost.{}", "lost [%]", 2, 100),
+)
+"""Of the report besides."""
+OF_SEVERAL = (
+    Column("id_switches.{}", "switches [1/min]", 2),
+    Column("idf1.{}", "IDF1 [%]", 1, 100),
+)
+"""Of questions with several workers."""
+_SHOWN = {
+    "cameras": "n1 n2 n3 n4 n8 corners walls low one_side two_neighbours two_opposite two_beside",
+    "algorithm1": "n1_m100 n1_m10000 sigma_1cm n1_m1000",
+    "latency": "told_120ms untold_120ms",
+    "calibration": "all_rotation_1deg site_all_rotation_1deg",
+    "occlusion": "lab_lost_1 lab_lost_2 lab_lost_3 dropped_60pct dropped_90pct",
+    "workers": "lab_2 lab_3",
+    "filter": "4cam_bones_of_any_length 4cam_no_outliers 4cam_noise_as_told "
+    "1cam_bones_of_any_length 1cam_no_floor 1cam_velocity_forgotten 1cam_mode_for_mean "
+    "1cam_no_turned_body",
+}
+"""Settings of the documentation's table."""
+
+
+def shown(seconds: float) -> Table:
+    """Return the table of the documentation.
+
+    Args:
+        seconds: length of an episode [s].
+    """
+    return Table(
+        "ablations",
+        "Ablations: error of a joint",
+        {
+            f"{study}.{name}": (f"`{study}`", ABLATIONS[study].setting(name).words)
+            for study, names in _SHOWN.items()
+            for name in names.split()
+        },
+        COLUMNS,
+        ("study", "setting"),
+        "Level `keypoints`, estimator `particle` where not said otherwise, "
+        f"{{n[error_m.cameras.n1.median]}} episodes of {seconds:g} s a setting on the same walks.",
+    )
+
+
+def columns_of(ablation: Ablation) -> tuple[Column, ...]:
+    """Return the columns of a question's table."""
+    several = any(setting.n_workers > 1 for setting in ablation.settings)
+    return (*COLUMNS, *MORE, *(OF_SEVERAL if several else ()))

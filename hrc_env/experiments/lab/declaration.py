@@ -1,0 +1,83 @@
+"""The laboratory's study as it is declared: question, estimators and tables."""
+
+from hrc_env.experiments.columns import Column
+from hrc_env.experiments.lab.motions import MOTIONS
+from hrc_env.experiments.lab.sides import MISSED_CONFIDENCE, MISSED_SHARE
+from hrc_env.experiments.report import Table
+from hrc_env.experiments.rigs import MULTI, SPOKEN
+
+TITLE = "What one camera does not see: the paper's laboratory, again"
+ASKED = f"""\
+A worker stands, walks, bends, lifts and carries in a room of 6.1 x 5.5 m before four lenses of
+118.2 x 69.5 degrees: what does one camera miss on the side turned away from it, and what do four
+know? All estimators are given the same detections (MediaPipe Pose on rendered images; crops follow
+the four-camera track), half a second of all cameras, which is not judged, and then those of one
+camera or of all.
+
+A camera has *missed* a joint whose visibility it reports below {MISSED_CONFIDENCE}, or that
+it puts off by more than {MISSED_SHARE:.0%} of the stature in the image; four cameras one
+whose estimate is further from the truth than that. A side is *turned away* when its shoulder and
+hip are further from the camera by 8 cm than the other's."""
+ESTIMATORS = ("particle", "paper", "paper_restarts", "kalman")
+"""Estimators that are given the films; misses are counted of the first."""
+SINGLE = tuple(camera for camera in SPOKEN if camera != MULTI)
+ALL = "all"
+"""All motions together."""
+SHOWN = "paper_restarts"
+"""The rival that the documentation shows, over all motions."""
+WORDS = {
+    **{motion: motion for motion in (*MOTIONS, ALL)},
+    "moving_board": "moving a board in both hands",
+    "moving_wood": "moving wood on the shoulder",
+}
+"""By motion."""
+COLUMNS = [
+    Column(
+        f"error_m.{{0}}.{c}.{{1}}.median", f"{words} [mm]", 0, 1000,
+        beside=f"error_m.{{0}}.{c}.{{1}}.p95",
+    )
+    for c, words in SPOKEN.items()
+]  # fmt: skip
+ERRORS = Table(
+    "lab",
+    "Laboratory: error of a joint, median (95th percentile)",
+    {
+        **{(ESTIMATORS[0], motion): (words,) for motion, words in WORDS.items()},
+        (SHOWN, ALL): (f"{WORDS[ALL]}, `{SHOWN}`",),
+    },
+    COLUMNS,
+    ("motion",),
+    f"{{n[missed.camera_1.standing]}} films of each of six motions, 15 joints, estimator "
+    f"`{ESTIMATORS[0]}` but in the last row.",
+)
+FAR = Table(
+    "lab_far",
+    "Joints of the side turned away",
+    {motion: (words,) for motion, words in WORDS.items()},
+    [
+        *(
+            Column(f"{what}.{c}.{{}}", f"{words}, {SPOKEN[c]} [%]", 0, 100)
+            for what, words in (
+                ("missed_far", "missed"), ("recovered_far", "of these known with four"),
+            )
+            for c in SINGLE
+        ),
+        Column("missed.multi.{}", "four miss, of all joints [%]", 1, 100),
+    ],
+    ("motion",),
+)  # fmt: skip
+LESS = Table(
+    "lab_less",
+    f"`{ESTIMATORS[0]}` less others, film by film, median [mm]",
+    {name: (f"`{name}`",) for name in ESTIMATORS[1:]},
+    [
+        Column(f"difference.error_m.{{}}.{c}.median", words, 1, 1000, signed=True)
+        for c, words in SPOKEN.items()
+    ],
+)
+
+
+def errors_of(estimator: str) -> Table:
+    """Return the table of errors of an estimator, motion by motion."""
+    rows = {(estimator, m): (words,) for m, words in WORDS.items()}
+    return Table("lab_errors", f"`{estimator}`", rows, COLUMNS, ("motion",))
