@@ -114,7 +114,7 @@ class ClusterBench:
         times = cache.part("times", self._times)
         return times | cache.part("watched", self._watched)
 
-    def _times(self, tick: PartProgress) -> Played:
+    def _times(self, tick: PartProgress) -> dict[str, Any]:
         with _workers() as learners:
             found: dict[str, list[float]] = {}
             for k in range(-1, self.n_rounds):  # the first one warms up
@@ -129,7 +129,7 @@ class ClusterBench:
                 tick(1 / (self.n_rounds + 1))
         return found
 
-    def _watched(self, tick: PartProgress) -> Played:
+    def _watched(self, tick: PartProgress) -> dict[str, Any]:
         from hrc_env.agents.rllib.watch import Watch
 
         with _workers((2,)) as learners:

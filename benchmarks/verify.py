@@ -38,7 +38,7 @@ from hrc_env.core.errors import (
     RenderingError,
 )
 from hrc_env.core.results import write_whole
-from hrc_env.experiments.cache import PartCache, PartProgress
+from hrc_env.experiments.cache import Part, PartCache, PartProgress
 
 CONFIDENCE = 0.95
 LACKING = (DownloadError, MissingExtraError, RenderingError)
@@ -134,7 +134,8 @@ class ReplayCache(PartCache):
         """
         del notes
         if label not in self.left:
-            kept = self._load(label, key or self.key) if self.is_training(label) else None
+            asked = Part(label, make, key)
+            kept = self._load(asked) if self.is_training(label) else None
             return Unplayed() if kept is None else kept
         recorded = self.drawn[label]
         if (key or self.key) == recorded.key:
@@ -148,6 +149,11 @@ class ReplayCache(PartCache):
         if not self.left:
             raise AllReplayed
         return part
+
+    def parts(self, parts: Sequence[Part], one_core: bool = False) -> list[dict[str, Any]]:
+        """Return what `part` does, one after the other."""
+        del one_core
+        return [self.part(each.label, each.make, each.key, each.notes) for each in parts]
 
 
 def _make(

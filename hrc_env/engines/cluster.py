@@ -5,9 +5,9 @@ import socket
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib.metadata import version
 from typing import Any
 
-from hrc_env import __version__
 from hrc_env.core.errors import ConfigError, HRCError, MissingExtraError
 from hrc_env.core.machine import CORES, n_cores
 from hrc_env.engines.registrations import Registrations, pack
@@ -22,6 +22,7 @@ except ModuleNotFoundError as missing:
         'pip install "hrc_env[ray]"  (in a checkout: pip install -c constraints.txt -e ".[ray]")'
     ) from missing
 
+VERSION = version("hrc_env")
 START_S = "300"
 """How long a machine under load may take to start Ray [s]; its own limit is 30."""
 ANSWER_S = 10.0
@@ -175,7 +176,7 @@ def _describe(registrations: Registrations, works: Callable[[], None] | None) ->
     registrations.unpack()
     if works is not None:
         works()
-    return __version__
+    return VERSION
 
 
 def _check_answer(answer: Any, machine: Machine) -> None:
@@ -184,9 +185,9 @@ def _check_answer(answer: Any, machine: Machine) -> None:
         theirs = ray.get(answer)
     except RayError as error:
         raise ConfigError(f"Machine {machine.address} cannot work: {reason_of(error)}") from error
-    if theirs != __version__:
+    if theirs != VERSION:
         raise ConfigError(
-            f"Machine {machine.address} has hrc_env {theirs}, and this one {__version__}: all must "
+            f"Machine {machine.address} has hrc_env {theirs}, and this one {VERSION}: all must "
             "have the same."
         )
 
@@ -203,7 +204,7 @@ def reason_of(error: BaseException) -> str:
         name = said.rpartition(missing)[2].split("'")[1]
         package = name.partition(".")[0]
         remedy = (
-            f'pip install "hrc_env[ray]=={__version__}" there, in the same Python'
+            f'pip install "hrc_env[ray]=={VERSION}" there, in the same Python'
             if package == "hrc_env"
             else "install it there; or name a Python file with --import, which travels"
         )

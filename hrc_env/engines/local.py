@@ -83,8 +83,6 @@ def call_pickled(call: bytes) -> tuple[Any, float]:
     """Return what a pickled call returns, and how long it took [s]."""
     import cloudpickle
 
-    import hrc_env  # noqa: F401  # adopts the registrations of the process that started this one
-
     started_s = time.monotonic()
     result = cloudpickle.loads(call)(ignore)
     return result, time.monotonic() - started_s

@@ -47,7 +47,7 @@ class PartCache:
     n_parts: float
     """A part is one of so many in the progress."""
     progress: Progress
-    engine: Engine | None = None
+    engine: Engine | None = field(default=None, kw_only=True)
     """Where parts are made; None: where it is fastest on this machine."""
 
     def part(

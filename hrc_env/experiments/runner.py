@@ -74,7 +74,7 @@ def cache_of(
 ) -> PartCache:
     """Return the cache of an experiment's parts in a folder."""
     key = key_of(settings_of(experiment), experiment.depends)
-    return PartCache(parts, key, experiment.n_parts, progress, engine)
+    return PartCache(parts, key, experiment.n_parts, progress, engine=engine)
 
 
 def run_experiment(

@@ -43,7 +43,7 @@ def test_scores_do_not_depend_on_the_engine():
 
 @pytest.mark.slow
 def test_processes_compute_on_one_core_each_and_what_dies_is_begun_again(tmp_path):
-    cache = PartCache(tmp_path, "key", 3, lambda share, label: None, Processes(2))
+    cache = PartCache(tmp_path, "key", 3, lambda share, label: None, engine=Processes(2))
     flag = tmp_path / "died"
     asked = [Part("one", cores), Part("dies", partial(die_once, flag)), Part("two", cores)]
     found = cache.parts(asked)
@@ -56,7 +56,7 @@ def test_processes_compute_on_one_core_each_and_what_dies_is_begun_again(tmp_pat
 
 @pytest.mark.slow
 def test_a_worker_that_dies_again_and_again_ends_it_and_what_is_done_is_kept(tmp_path):
-    cache = PartCache(tmp_path, "key", 2, lambda share, label: None, Processes(1))
+    cache = PartCache(tmp_path, "key", 2, lambda share, label: None, engine=Processes(1))
     with pytest.raises(HRCError, match=rf"died {ATTEMPTS} times before call 2 of 2"):
         cache.parts([Part("one", cores), Part("dies", die)])
     assert (tmp_path / "one.json").exists()
@@ -71,7 +71,9 @@ def test_errors_of_ours_come_back_as_they_are():
 
 def test_parts_that_are_there_are_not_played_again(tmp_path):
     shares = []
-    cache = PartCache(tmp_path, "key", 2, lambda share, label: shares.append(share), Serial())
+    cache = PartCache(
+        tmp_path, "key", 2, lambda share, label: shares.append(share), engine=Serial()
+    )
     first = cache.parts([Part("one", cores)])
     again = cache.parts([Part("one", fail), Part("two", cores)])
     assert again[0] == first[0]

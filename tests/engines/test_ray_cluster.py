@@ -253,7 +253,7 @@ def test_machines_that_cannot_work_are_named(cluster, monkeypatch):
         ray_cluster.check_machines(machines, lacks_weights)
     with pytest.raises(ConfigError, match=r"cannot import 'no_such_module'.*--import"):
         ray_cluster.check_machines(machines, lacks_a_module)
-    monkeypatch.setattr(ray_cluster, "__version__", "0.0.9")
+    monkeypatch.setattr(ray_cluster, "VERSION", "0.0.9")
     with pytest.raises(ConfigError, match=r"has hrc_env .*, and this one 0.0.9"):
         ray_cluster.check_machines(machines)
 
