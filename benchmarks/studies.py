@@ -134,6 +134,13 @@ STUDIES: dict[str, Study] = {
             made=Made("benchmarks.speed.bench", "SpeedBench", {"task": "every"}),
         ),
     }),
+    "cluster": Study({
+        "cluster": Command(
+            "python -m benchmarks.cluster", 8, (*KEYPOINTS, "agents"), ("cluster",),
+            {"ray_metrics.png": "metrics.png"}, goes_on=False,
+            made=Made("benchmarks.cluster"),
+        ),
+    }),
     "ablations": Study({
         "ablations": Command(
             EXPERIMENT + "ablations", 7, KEYPOINTS, ("ablations",),

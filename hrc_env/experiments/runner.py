@@ -58,8 +58,7 @@ class Experiment(Protocol[PlayedT]):
         """Draw the figures into a folder; return the report.
 
         An experiment that may be too short to compare anything warns here, as `Report.quick`,
-        or by `quick_note`. Tables that the documentation shows, too, are those of
-        `shown_tables`.
+        or by `quick_note`. Tables that the documentation shows, too, are those of `shown_tables`.
         """
         ...
 
