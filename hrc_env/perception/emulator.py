@@ -1,5 +1,32 @@
 """Keypoints without pixels: the projected truth with BlazePose's errors, drawn from a calibration
-that was fitted to what the network made of rendered workers (docs/emulator.md)."""
+that was fitted to what the network made of rendered workers (docs/emulator.md).
+
+A window of side s surrounds the worker in every camera, turned as the torso is, as the detector
+would choose it. In it, of joint j of kind k in camera c:
+
+    pixel = projection of (p_j + R (o_k + w_k far n)) + s T (b_k(view) + size whole m_j)
+
+R is the frame of the body: ahead, to the joint's own side, up; o and w an offset in space and its
+standard deviation (`offset_m`, `wander_m`); n is normal, shared by all cameras, and correlated
+along limbs and between hips and shoulders (`space_limb`); far = 1 + tail n.n / 3, so that now and
+then all cameras agree on a joint that is far off. In the image, b is the mean error from 8 views,
+mirrored for right joints (`bias`); size = exp(log size + spread z), z normal, of seen, hidden and
+outside joints (`size`, `spread`); whole a factor of all joints of a body in a camera, drawn from
+its measured quantiles (`body`); m = a cos(view) + b sin(view) drawn for the episode, a part that
+lasts and a part that is new, mixed with the next joint's towards the trunk (`shares`, `limb`); T
+the turn of the window.
+
+- n, z, whole and the lasting part of m are first-order autoregressions that keep
+  exp(-dt / `slow_s` - dt v / `slow_m`) a step, with v the mean speed of the joints.
+- The reported visibility is drawn from its measured quantiles (`confidence`) by a normal variable
+  that is correlated with the smallness of the errors (`follows`, `common`).
+- Tables are given for bodies that stand, walk, handle something, are folded, and kneel; the
+  posture is computed from the joints (`hrc_env/perception/outline.py`).
+- Occlusion is geometry: rays against scene, robot, bodies and things that are carried.
+- Left and right (of all joints, or of the legs) are exchanged, and a worker is missed, while a
+  slow normal variable is in its lower tail (`swap_share`, `miss_share`, `swap_s`, `miss_s`), so
+  that both last.
+"""
 
 import functools
 import math
