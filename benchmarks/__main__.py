@@ -11,11 +11,11 @@ import tyro
 from rich.console import Console
 
 from hrc_env.cli.checks import at_least, writable_folder
+from hrc_env.cli.engines import EngineArguments
 from hrc_env.cli.entry import import_first, run_command, show_errors
 from hrc_env.cli.estimators import estimators_named
 from hrc_env.cli.show import show
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.machine import n_cores
 from hrc_env.core.progress import progress_bar
 from hrc_env.experiments.runner import Experiment, changed, run_experiment
 
@@ -23,8 +23,9 @@ PROGRAM = "python -m benchmarks"
 
 
 @dataclass(frozen=True)
-class BenchArguments:
-    """What every bench is asked; one that was stopped goes on where it was in the same folder."""
+class BenchArguments(EngineArguments):
+    """What every bench is asked; one that was stopped goes on where it was in the same folder. What
+    takes times is always run here, alone."""
 
     out: Path
     """Folder for report.html, results.json, figures and the parts that are done."""
@@ -33,7 +34,7 @@ class BenchArguments:
 
     def show(self, experiment: Experiment[Any]) -> int:
         """Run an experiment, show its tables."""
-        return show(partial(run_experiment, experiment), self.out, "bench")
+        return show(partial(run_experiment, experiment, engine=self.chosen()), self.out, "bench")
 
 
 @dataclass(frozen=True)
@@ -44,9 +45,6 @@ class TrackingArguments(BenchArguments):
     """Folder; of --real and --baselines, which are parts of their own, with that word after it."""
     seeds: int | None = None
     """Sequences per rig and condition, instead of 70 (8 if quick)."""
-    processes: int | None = None
-    """Conditions that are run at once; as many as there are cores if not given. Times are taken
-    alone, at the end."""
     real: bool = False
     """On recorded films instead, which are fetched once (51 MB): four calibrated cameras."""
     estimators: tuple[str, ...] = ()
@@ -62,7 +60,6 @@ class TrackingArguments(BenchArguments):
     def run(self) -> int:
         """Run, show the tables."""
         at_least("--seeds", self.seeds, 1)
-        at_least("--processes", self.processes, 1)
         if self.real and self.baselines:
             raise ConfigError("--real and --baselines are two parts of the bench; choose one.")
         if (self.real or self.baselines) and (self.estimators or self.sequences):
@@ -82,16 +79,16 @@ class TrackingArguments(BenchArguments):
         from benchmarks.tracking.bench import QUICK, TrackingBench
 
         config = QUICK if self.quick else TrackingBench()
-        processes = self.processes or n_cores()
         names = estimators_named(self.estimators)
         sequences = tuple(dict.fromkeys(self.sequences))
-        config = changed(config, n_seeds=self.seeds, processes=processes)
+        config = changed(config, n_seeds=self.seeds)
         return self.show(changed(config, estimators=names, sequences=sequences))
 
     def _beside(self, ending: str) -> BenchArguments:
         """The same in a folder of its own, unless one was given."""
         is_usual = self.out == TrackingArguments.out
-        return BenchArguments(Path(f"{self.out}{ending}") if is_usual else self.out)
+        out = Path(f"{self.out}{ending}") if is_usual else self.out
+        return BenchArguments(out, engine=self.engine, workers=self.workers, address=self.address)
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from pathlib import Path
 import tyro
 
 from hrc_env.cli.checks import at_least
+from hrc_env.cli.engines import EngineArguments
 from hrc_env.cli.entry import show_errors
 from hrc_env.cli.options import understood
 from hrc_env.cli.show import show
@@ -17,7 +18,7 @@ from hrc_env.experiments.study import Study
 
 
 @dataclass(frozen=True)
-class Arguments:
+class Arguments(EngineArguments):
     """What every experiment is asked; one that was stopped goes on in the same folder."""
 
     out: Path
@@ -44,7 +45,8 @@ def run_study(study: Study, arguments: StudyArguments) -> int:
     """Run a study as it was asked, and show its report; return the exit status."""
     study = study.select(arguments.only) if arguments.only else study
     study = replace(study.quick() if arguments.quick else study, threads=arguments.threads)
-    return show(partial(run_experiment, study), arguments.out, study.name)
+    run = partial(run_experiment, study, engine=arguments.chosen())
+    return show(run, arguments.out, study.name)
 
 
 def main(make: Callable[[], Study], about: str | None) -> int:

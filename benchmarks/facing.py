@@ -34,7 +34,7 @@ from hrc_env.core.typing import Bools, Floats, Ints, Points3
 from hrc_env.evaluation.counts import ERRORS_M, Bins
 from hrc_env.evaluation.intervals import counted_quantile_over, ratio_over
 from hrc_env.experiments.ablations.play import BODIES, Walks, walks_of
-from hrc_env.experiments.cache import PartCache, PartProgress
+from hrc_env.experiments.cache import Part, PartCache, PartProgress
 from hrc_env.experiments.columns import Column
 from hrc_env.experiments.lab.sides import MISSED_CONFIDENCE, MISSED_SHARE
 from hrc_env.experiments.report import Metrics, Report, Table, quick_words
@@ -94,8 +94,11 @@ class Facing:
         """Return the numbers of both levels, each from the cache or anew."""
         key = key_of({"seconds": self.seconds, "seed": self.seed}, self.depends)
         metrics: dict[str, Metric] = {}
-        for level, n in zip(ESTIMATORS, self.episodes, strict=True):
-            part = cache.part(f"{level}.{n}", partial(self._measure, level, n), key)
+        parts = [
+            Part(f"{level}.{n}", partial(self._measure, level, n), key)
+            for level, n in zip(ESTIMATORS, self.episodes, strict=True)
+        ]
+        for part in cache.parts(parts, one_core=True):
             metrics |= {name: Metric(**each) for name, each in part.items()}
         return metrics
 
@@ -255,7 +258,8 @@ def main() -> int:
     """Follow, sort, write, show."""
     arguments = tyro.cli(Arguments, default=Arguments(Path("out/facing")), description=__doc__)
     facing = Facing(episodes=(12, 4)) if arguments.quick else Facing()
-    return show(partial(run_experiment, facing), arguments.out, "facing")
+    run = partial(run_experiment, facing, engine=arguments.chosen())
+    return show(run, arguments.out, "facing")
 
 
 if __name__ == "__main__":

@@ -22,7 +22,8 @@ from benchmarks.perception.report import report
 from benchmarks.perception.views import PLAIN, View, in_turns
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric
-from hrc_env.experiments.cache import PartCache, PartProgress
+from hrc_env.engines.local import Serial
+from hrc_env.experiments.cache import Part, PartCache, PartProgress
 from hrc_env.experiments.report import Metrics, Report, Table, quick_words
 from hrc_env.experiments.rigs import DT_S
 from hrc_env.experiments.runner import at_least_one, is_as_short
@@ -111,11 +112,15 @@ class PerceptionBench:
     def play(self, cache: PartCache) -> Parts:
         """Return all parts by their labels."""
         tasks = list(tasks_of(self, cache.folder.parent / "figures"))
-        total = sum(task.cost for task in tasks)
-        return {
-            task.label: replace(cache, n_parts=total / task.cost).part(task.label, task.make)
-            for task in tasks
-        }
+        cache = replace(cache, n_parts=sum(task.cost for task in tasks))
+        away = [task for task in tasks if not task.is_here]
+        parts = cache.parts([task.part for task in away], one_core=True)
+        played = {task.label: part for task, part in zip(away, parts, strict=True)}
+        here = replace(cache, engine=Serial())
+        for task in tasks:
+            if task.is_here:
+                (played[task.label],) = here.parts([task.part])
+        return played
 
     def metrics(self, played: Parts) -> dict[str, Metric]:
         """Return every number."""
@@ -145,6 +150,13 @@ class Task(NamedTuple):
     cost: float
     """How long it takes beside the others, roughly [s]."""
     make: Callable[[PartProgress], dict[str, Any]]
+    is_here: bool = False
+    """Whether it is made in this process, alone: it takes times, or draws."""
+
+    @property
+    def part(self) -> Part:
+        """The part of the study."""
+        return Part(self.label, self.make, weight=self.cost)
 
 
 def tasks_of(config: PerceptionBench, figures: Path | None = None) -> Iterator[Task]:
@@ -154,7 +166,7 @@ def tasks_of(config: PerceptionBench, figures: Path | None = None) -> Iterator[T
     yield from _faults(config)
     if config.emulator_rounds is not None:
         make = partial(_emulator, config.emulator_rounds, figures and figures / "emulator.png")
-        yield Task("emulator", 40.0 * max(2 * config.emulator_rounds, 1), make)
+        yield Task("emulator", 40.0 * max(2 * config.emulator_rounds, 1), make, is_here=True)
     yield from _speeds(config)
 
 
@@ -170,9 +182,10 @@ def _speeds(config: PerceptionBench) -> Iterator[Task]:
     for setting in settings:
         make = partial(speed.measure, setting, config.speed_steps, FIRST_SEED)
         cost = 2 + 0.02 * config.speed_steps * setting.cameras * setting.workers
-        yield Task(f"speed.{setting.name}", cost, make)
+        yield Task(f"speed.{setting.name}", cost, make, is_here=True)
     for runtime in runtimes:
-        yield Task(f"network.{runtime}", 3, partial(speed.network_ms, runtime))
+        make = partial(speed.network_ms, runtime)
+        yield Task(f"network.{runtime}", 3, make, is_here=True)
 
 
 def _episodes(config: PerceptionBench) -> Iterator[Task]:

@@ -5,10 +5,8 @@ that was stopped goes on where it was; parts made at other versions or settings 
 """
 
 import hashlib
-import multiprocessing
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, replace
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +21,7 @@ from benchmarks.tracking.rigs import RIGS, SIGMA_PX, Rig, make_rig
 from benchmarks.tracking.sequences import MATCHED, Sequences, lasting, make_sequences
 from benchmarks.tracking.timing import BATCH, time_estimator
 from hrc_env.core.results import Metric
-from hrc_env.experiments.cache import PartCache, PartProgress
+from hrc_env.experiments.cache import Part, PartCache, PartProgress
 from hrc_env.experiments.report import Metrics, Report, Table, quick_words
 from hrc_env.experiments.runner import at_least_one, is_as_short
 from hrc_env.experiments.versions import key_of, source_digest
@@ -47,8 +45,6 @@ class TrackingBench:
     """Sequences per rig and condition for the smoother, which is slow; the first ones."""
     timing_repeats: int = 7
     """How often the time per update is taken."""
-    processes: int = 1
-    """How many conditions are run at once; times are taken alone, at the end."""
     estimators: tuple[str, ...] = ()
     """Who is run beside the default, as of `Selection`."""
     sequences: tuple[str, ...] = ()
@@ -56,7 +52,7 @@ class TrackingBench:
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for numbers that cannot work."""
-        at_least_one(self, "n_seeds", "n_matched", "n_smoothed", "timing_repeats", "processes")
+        at_least_one(self, "n_seeds", "n_matched", "n_smoothed", "timing_repeats")
         self.selection.check()
 
     @property
@@ -82,7 +78,7 @@ class TrackingBench:
 
     def settings(self) -> dict[str, Any]:
         """Return what all numbers depend on."""
-        bench = {name: value for name, value in asdict(self).items() if name != "processes"}
+        bench = asdict(self)
         for name in ("estimators", "sequences"):
             if not bench[name]:
                 del bench[name]
@@ -95,25 +91,13 @@ class TrackingBench:
         }
 
     def play(self, cache: PartCache) -> Parts:
-        """Return every estimator on everything; several processes first fill the cache. Parts are
-        the same whatever else is run."""
+        """Return every estimator on everything, which is the same whatever else is run; times are
+        taken alone, at the end."""
         whole = {"experiment": self.name, **replace(self, estimators=(), sequences=()).settings()}
-        cache = replace(cache, key=key_of(whole, self.depends))
-        quiet, run = replace(cache, progress=_silent), self.selection
-        if self.processes > 1:
-            context = multiprocessing.get_context("spawn")
-            with ProcessPoolExecutor(self.processes, mp_context=context) as pool:
-                running = {
-                    pool.submit(play_condition, self, quiet, *each): each
-                    for each in run.conditions()
-                }
-                for done in as_completed(running):
-                    done.result()
-                    share = len(run.names_of(running[done][1])) / cache.n_parts
-                    cache.progress(share, ".".join(running[done]))
-        played: Parts = {}
-        for each in run.conditions():
-            played |= play_condition(self, quiet if self.processes > 1 else cache, *each)
+        cache, run = replace(cache, key=key_of(whole, self.depends)), self.selection
+        asked = [(*each, name) for each in run.conditions() for name in run.names_of(each[1])]
+        parts = [cell_of(self, *each, cache.key) for each in asked]
+        played: Parts = dict(zip(asked, cache.parts(parts, one_core=True), strict=True))
         return played | _timing(self, cache)
 
     def metrics(self, played: Parts) -> dict[str, Metric]:
@@ -133,26 +117,26 @@ QUICK = TrackingBench(n_seeds=8, n_matched=30, n_smoothed=2, timing_repeats=2)
 """Every number, from fewer sequences."""
 
 
-def play_condition(config: TrackingBench, parts: PartCache, rig_name: str, condition: str) -> Parts:
-    """Everybody on one rig and condition; the sequences are made if a part is missing."""
+def cell_of(config: TrackingBench, rig_name: str, condition: str, name: str, key: str) -> Part:
+    """Return the part of an estimator on one rig and condition."""
     seeds = seeds_of(config, condition)
+    n = min(config.n_smoothed, len(seeds)) if name == SMOOTHER else len(seeds)
+    make = partial(_run, rig_name, condition, tuple(seeds), n, name)
+    return Part(f"{rig_name}.{condition}.{name}", make, own_key(name, key))
 
-    @cache
-    def sequences() -> tuple[Rig, Sequences]:
-        rig = _rig(rig_name)
-        return rig, make_sequences(rig, condition, seeds)
 
-    def make(name: str, tick: PartProgress) -> dict[str, Any]:
-        rig, given = sequences()
-        n = min(config.n_smoothed, len(seeds)) if name == SMOOTHER else len(seeds)
-        return run_cell(name, rig, given.first(n), seeds[:n], tick)
+def _run(
+    rig_name: str, condition: str, seeds: tuple[int, ...], n: int, name: str, tick: PartProgress
+) -> dict[str, Any]:
+    rig, given = _made(rig_name, condition, seeds)
+    return run_cell(name, rig, given.first(n), list(seeds[:n]), tick)
 
-    return {
-        (rig_name, condition, name): parts.part(
-            f"{rig_name}.{condition}.{name}", partial(make, name), own_key(name, parts.key)
-        )
-        for name in config.selection.names_of(condition)
-    }
+
+@lru_cache(maxsize=1)
+def _made(rig_name: str, condition: str, seeds: tuple[int, ...]) -> tuple[Rig, Sequences]:
+    """Return the sequences of a condition, which its estimators share; the last ones are kept."""
+    rig = _rig(rig_name)
+    return rig, make_sequences(rig, condition, list(seeds))
 
 
 def own_key(name: str, key: str) -> str:
@@ -165,10 +149,6 @@ def seeds_of(config: TrackingBench, condition: str = "clean") -> list[int]:
     """Of a condition's sequences."""
     n = config.n_matched if condition == MATCHED else config.n_seeds
     return [config.first_seed + k for k in range(n)]
-
-
-def _silent(share: float, label: str) -> None:
-    """Say nothing."""
 
 
 def _rig(name: str) -> Rig:

@@ -35,6 +35,8 @@ class Part:
     notes: Mapping[str, float] = field(default_factory=dict)
     """Numbers that are kept beside it, for a study whose labels do not say all that is needed to
     make it again."""
+    weight: float = 1.0
+    """How much of the progress it is; all of a study sum to its `n_parts`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,14 +81,14 @@ class PartCache:
     def _parts(self, parts: Sequence[Part], engine: Engine) -> list[dict[str, Any]]:
         found = {k: kept for k, each in enumerate(parts) if (kept := self._load(each)) is not None}
         for k in found:
-            self.progress(1 / self.n_parts, parts[k].label)
+            self.progress(parts[k].weight / self.n_parts, parts[k].label)
         missing = [k for k in range(len(parts)) if k not in found]
         told = dict.fromkeys(missing, 0.0)
 
         def tick(number: int, share: float) -> None:
             k = missing[number]
             told[k] += share
-            self.progress(share / self.n_parts, parts[k].label)
+            self.progress(share * parts[k].weight / self.n_parts, parts[k].label)
 
         if missing:
             self.progress(0.0, parts[missing[0]].label)

@@ -46,7 +46,7 @@ def test_a_place_that_cannot_be_written_is_refused_before_the_work(script, words
     ("script", "words"),
     [
         (BENCHMARKS, ["motion", "--seeds", "0"]),
-        (BENCHMARKS, ["tracking", "--processes", "0"]),
+        (BENCHMARKS, ["tracking", "--engine", "processes", "--workers", "0"]),
         (BENCHMARKS, ["speed", "--rounds", "0"]),
         (CALIBRATE, ["--rounds", "-1"]),
     ],

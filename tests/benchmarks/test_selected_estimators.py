@@ -9,6 +9,7 @@ from benchmarks.tracking.bench import TrackingBench
 from benchmarks.tracking.names import DLT, EVERYTHING, SMOOTHER, Selection
 from hrc_env.cli.estimators import estimators_named
 from hrc_env.core.errors import ConfigError
+from hrc_env.engines.local import Serial
 from hrc_env.experiments import runner
 from hrc_env.experiments.cache import PartCache
 from hrc_env.experiments.runner import settings_of
@@ -76,13 +77,19 @@ def test_parts_are_the_same_whatever_else_is_run(tmp_path, monkeypatch):
     times = {"1": [2.0], "64": [1.0], "hard_64": [1.5]}
     monkeypatch.setattr(bench, "time_estimator", lambda *a: a[-1](1.0) or times)
     whole = PartCache(
-        tmp_path / "parts", key_of(settings_of(TINY), TINY.depends), 1, lambda *a: None
+        tmp_path / "parts",
+        key_of(settings_of(TINY), TINY.depends),
+        1,
+        lambda *a: None,
+        engine=Serial(),
     )
-    bench.play_condition(replace(TINY, estimators=("ransac",)), whole, "lab", "clean")
+    own = replace(TINY, estimators=("ransac",))
+    names = own.selection.names_of("clean")
+    whole.parts([bench.cell_of(own, "lab", "clean", name, whole.key) for name in names])
     made = {path: path.stat().st_mtime_ns for path in (tmp_path / "parts").iterdir()}
     assert {path.name for path in made} == {"lab.clean.particle.json", "lab.clean.ransac.json"}
     some = replace(TINY, estimators=("ransac",), sequences=("lab.clean", "site.matched"))
-    metrics = runner.run_experiment(some, tmp_path)
+    metrics = runner.run_experiment(some, tmp_path, engine=Serial())
     assert all(path.stat().st_mtime_ns == t for path, t in made.items())
     assert "rmse_m.lab.clean.ransac" in metrics
     assert "ratio_to_bound.ransac" in metrics

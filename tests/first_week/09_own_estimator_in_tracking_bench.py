@@ -27,7 +27,7 @@ file.write_text(ESTIMATOR)
 command = [sys.executable, "-m", "benchmarks", "--import", str(file), "tracking", "--quick"]
 asked = ["--estimators", "mine", "--sequences", "lab.clean", "env.two_cameras", "--seeds", "2"]
 done = subprocess.run(
-    [*command, *asked, "--processes", "1", "--out", str(out)],
+    [*command, *asked, "--engine", "serial", "--out", str(out)],
     cwd=ROOT, capture_output=True, text=True, check=False,
 )  # fmt: skip
 print(done.stdout, done.stderr)
