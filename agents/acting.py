@@ -70,6 +70,8 @@ def check_made_for(path: Path, meta: dict[str, Any], env_info: EnvInfo) -> None:
         beside |= {name: int(np.prod(shape)) for name, shape in images.items()}
     parts: Size = {**beside, FLAT: size} if beside else size
     check_fits(path, meta, parts, env_info.n_actions)
+    made_for = (meta.get("environment") or {}).get("control") or "joint"
+    sb3_files.check_control(path, made_for, env_info)
 
 
 def check_fits(path: Path, meta: dict[str, Any], observation: Size, action: Size) -> None:
@@ -84,6 +86,7 @@ def check_fits(path: Path, meta: dict[str, Any], observation: Size, action: Size
     if sizes != (observation, action):
         raise CheckpointError(
             f"{path} expects observations {sizes[0]} and actions {sizes[1]}, this environment has "
-            f"{observation} and {action}: make it with the same task, n_workers and control "
+            f"{observation} and {action}: make it with the same task, robot, "
+            f"n_workers, control and observe_images "
             f"({meta.get('environment')})."
         )

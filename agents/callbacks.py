@@ -2,6 +2,7 @@
 
 import json
 import signal
+import textwrap
 import threading
 import time
 from collections import deque
@@ -14,6 +15,7 @@ import numpy as np
 from matplotlib.ticker import EngFormatter
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
+from stable_baselines3.common.vec_env import VecEnvWrapper
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.progress import Meter
@@ -74,6 +76,34 @@ class Curriculum(BaseCallback):
 
     def _on_step(self) -> bool:
         return True
+
+
+class ProximityRamp(Curriculum):
+    """Lets the proximity term's weight grow from 0, for a learner of Stable-Baselines3.
+
+        env = VecNormalize(HRCVecEnv(64, stagger=True), norm_obs=False, gamma=0.98)
+        model = PPO("MlpPolicy", env, **PPOSettings().keywords())
+        model.learn(1_000_000, callback=ProximityRamp(400_000))
+
+    Args:
+        n_steps: environment steps until the weight is the environment's (`RewardConfig`), as
+            `train --ramp` has them.
+
+    Raises:
+        ConfigError: fewer than 0 steps; or, when it learns, no `HRCVecEnv`.
+    """
+
+    def __init__(self, n_steps: int = 400_000) -> None:
+        BaseCallback.__init__(self)
+        self.ramp, self.share = Ramp(n_steps), 0.0
+
+    def _init_callback(self) -> None:
+        env: Any = self.training_env
+        while isinstance(env, VecEnvWrapper):
+            env = env.venv
+        if not isinstance(env, HRCVecEnv):
+            raise ConfigError(f"ProximityRamp wants an HRCVecEnv, got {type(env).__name__}.")
+        self.env, self.whole = env, env.env.config.reward
 
 
 class Interrupt:
@@ -205,6 +235,8 @@ class TrainingMonitor(BaseCallback):
         self.log.note(weights)
 
 
+Y_WIDTH = 20
+"""Characters of a line beside an axis."""
 PANELS = {
     "success_rate": ("attempts achieved (dashed: episodes with is_success)", "tab:green"),
     "goals_per_minute": ("goals per minute", "tab:blue"),
@@ -234,7 +266,7 @@ def plot_curve(curve: Curve, path: Path, title: str) -> None:
             axis.plot(steps, succeeded, color=colour, linestyle="--")
         if name == "cost":
             axis.axhline(curve[-1]["limit"], color="grey", linestyle="--")
-        label(axis, "environment steps", words)
+        label(axis, "environment steps", textwrap.fill(words, Y_WIDTH))
         axis.set_ylim(bottom=0)
         axis.xaxis.set_major_formatter(EngFormatter(sep=" "))
         if len(growing):

@@ -19,7 +19,7 @@ from hrc_env.sb3 import HRCVecEnv
 from .acting import Size, check_fits, check_made_for, describe
 from .env_info import EnvInfo, Observation
 from .ppo_lagrangian import PPOLagrangian
-from .sac import first_steps
+from .sac import ResumedSAC, first_steps
 
 with learner():
     from stable_baselines3 import PPO, SAC
@@ -43,7 +43,7 @@ def save(learner: Learner, path: Path, facts: dict[str, Any]) -> None:
     scale = learner.get_vec_normalize_env()
     meta = {
         "hrc_env": __version__,
-        "algorithm": next(name for name, kind in KINDS.items() if type(learner) is kind),
+        "algorithm": algorithm_of(learner),
         "observation_size": _size(learner.observation_space),
         "action_size": int(np.prod(learner.action_space.shape or ())),
         "num_timesteps": learner.num_timesteps,
@@ -57,8 +57,15 @@ def save(learner: Learner, path: Path, facts: dict[str, Any]) -> None:
     os.replace(draft, path)
 
 
+def algorithm_of(learner: Learner) -> str:
+    """Return the name of a learner's algorithm; `StopIteration` for one that is not in `KINDS`."""
+    kinds = {kind: name for name, kind in KINDS.items()}
+    return next(kinds[kind] for kind in type(learner).__mro__ if kind in kinds)
+
+
 def resume(path: Path, env: HRCVecEnv, tensorboard: Path | None = None) -> Learner:
-    """Go on from a checkpoint: PPO with its scale of rewards; SAC fills its buffer anew first.
+    """Go on from a checkpoint: PPO with its scale of rewards; SAC acts as it has learnt, and learns
+    again when its buffer holds an episode of every environment.
 
     Raises:
         CheckpointError: it was made for another version or another environment.
@@ -68,7 +75,7 @@ def resume(path: Path, env: HRCVecEnv, tensorboard: Path | None = None) -> Learn
     log = None if tensorboard is None else str(tensorboard)
     kind = KINDS[meta.get("algorithm", "ppo")]
     if kind is SAC:
-        learner = SAC.load(path, env=env, device="cpu", tensorboard_log=log)
+        learner = ResumedSAC.load(path, env=env, device="cpu", tensorboard_log=log)
         learner.learning_starts = learner.num_timesteps + first_steps(env)
         return learner
     normalised = VecNormalize(env, norm_obs=False, norm_reward=True)

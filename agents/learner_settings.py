@@ -12,9 +12,13 @@ from hrc_env.core.mapping import answer_unknown_fields
 class PPOSettings:
     """Settings of PPO that learn the built-in tasks: keywords of `stable_baselines3.PPO`.
 
-    `PPO("MlpPolicy", env, **PPOSettings().keywords())`, best round an `HRCVecEnv(64, stagger=True)`
-    inside `VecNormalize(env, norm_obs=False, gamma=0.98)`: rewards are scaled, observations are as
-    they should be already.
+    They need episodes out of phase, scaled rewards (observations are scaled already), and a
+    proximity term that grows: with the whole term from the first step a learner learns to stay
+    away before it finds a goal. `train` has all three:
+
+        env = VecNormalize(HRCVecEnv(64, stagger=True), norm_obs=False, gamma=0.98)
+        model = PPO("MlpPolicy", env, **PPOSettings().keywords())
+        model.learn(1_000_000, callback=ProximityRamp(400_000))
     """
 
     n_steps: int = 64

@@ -93,7 +93,8 @@ def control_of(name: str) -> str | None:
         return None
     from . import acting
 
-    return acting.meta_of(Path(name)).get("environment", {}).get("control")
+    said = acting.meta_of(Path(name)).get("environment", {}).get("control")
+    return said or acting.sb3_files.control_of(Path(name))
 
 
 def function_of(name: str) -> Callable[..., Any]:

@@ -4,6 +4,7 @@ Haarnoja et al. 2018, arXiv:1801.01290; Andrychowicz et al. 2017, arXiv:1707.014
 """
 
 from pathlib import Path
+from typing import Any
 
 from hrc_env.core.errors import learner
 from hrc_env.sb3 import HRCVecEnv
@@ -47,3 +48,11 @@ def make_learner(
 def first_steps(env: HRCVecEnv) -> int:
     """In which a new buffer fills with random actions: an episode of every environment."""
     return env.num_envs * (env.env.max_episode_steps + 1)
+
+
+class ResumedSAC(SAC):
+    """SAC that goes on: its empty buffer fills with its policy's actions."""
+
+    def _sample_action(self, learning_starts: int, *args: Any, **kwargs: Any) -> Any:
+        """Return noisy actions of the policy, from the first step on."""
+        return super()._sample_action(0, *args, **kwargs)

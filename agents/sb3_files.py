@@ -23,6 +23,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from hrc_env.control import CONTROLS
 from hrc_env.core.brought import described
 from hrc_env.core.errors import CheckpointError, learner
 from hrc_env.observations import FLAT
@@ -84,10 +85,34 @@ def load(path: Path, env_info: EnvInfo, trust: bool = False) -> "SB3Agent":
     said = _shapes_said(data.get("observation_space")) or {}
     seen, actions = spaces_of(env_info, [name for name in env_info.images if name in said])
     _check_spaces(path, data, seen, actions, env_info)
+    if (control := _control_said(data)) is not None:
+        check_control(path, control, env_info)
     make, keywords = _architecture(path, data, trust)
     with torch.random.fork_rng(devices=[]):  # the first weights are drawn, and replaced
         policy = _built(path, lambda: make(seen, actions, lambda _: 0.0, **keywords), weights)
     return SB3Agent(policy, _statistics(path, trust))
+
+
+def control_of(path: Path) -> str | None:
+    """Return the `control` of the environment in which the policy of a file learnt; None if the
+    file does not hold it. `CheckpointError` unless Stable-Baselines3 has written it."""
+    return _control_said(_read(path)[0])
+
+
+def check_control(path: Path, control: str, env_info: EnvInfo) -> None:
+    """Raise `CheckpointError` for a policy that learnt with another `control`."""
+    if control != env_info.control:
+        raise CheckpointError(
+            f"{path} acts by control={control!r}, and this environment has control="
+            f"{env_info.control!r}: make it with the former (--control {control})."
+        )
+
+
+def _control_said(data: Mapping[str, Any]) -> str | None:
+    """Return the attribute `control` of the space of actions (`hrc_env.env.spaces`)."""
+    said = data.get("action_space")
+    control = said.get("control") if isinstance(said, dict) else None
+    return control if control in CONTROLS else None
 
 
 def check_is_one(path: Path) -> None:
@@ -191,8 +216,8 @@ def _check_spaces(
     """Raise `CheckpointError` unless a policy's spaces are those of the environment."""
     advice = (
         f"Make the environment as it was trained in ({here.task} here, control={here.control!r}: "
-        "task, control, robot and n_workers decide), or wrap it in an agent of your own "
-        "(MODULE:FUNCTION)."
+        "task, control, robot, n_workers and observe_images decide), or wrap it in an agent of "
+        "your own (MODULE:FUNCTION)."
     )
     for what, space in (("observation", seen), ("action", actions)):
         said: Any = data.get(f"{what}_space")

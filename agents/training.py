@@ -41,7 +41,7 @@ from .requests import TrainingRequest
 
 with learner():
     import torch
-    from stable_baselines3 import PPO
+    from stable_baselines3 import PPO, SAC
 
 SETTINGS: dict[str, tuple[Any, Any]] = {
     "ppo": (PPOSettings(), IMITATOR),
@@ -180,7 +180,7 @@ def train(arguments: Run, folder: Path, console: Console) -> tuple[Curve, dict[s
         record = {"arguments": asdict(arguments), "config": config, **provenance()}
         _write(folder / "run.json", record)
         started_s, busy_s = time.monotonic(), time.process_time()
-        learner, curve = _learner(arguments, folder, env, settings)
+        learner, curve = _learner(arguments, folder, env, settings, console)
         if arguments.resume is None and arguments.demonstrations:
             _clone(learner, arguments, env, console)
         facts = {"environment": kwargs, "settings": asdict(settings)}
@@ -226,7 +226,9 @@ def _learn(arguments: Run, env: HRCVecEnv, log: TrainingLog, interrupt: Interrup
     )
 
 
-def _learner(arguments: Run, folder: Path, env: HRCVecEnv, settings: Any) -> tuple[Any, Curve]:
+def _learner(
+    arguments: Run, folder: Path, env: HRCVecEnv, settings: Any, console: Console
+) -> tuple[Any, Curve]:
     """A learner and its curve: new ones, or those of the run that is resumed."""
     seed, log = arguments.seed, folder / "tensorboard"
     if arguments.resume is None and arguments.algorithm == "sac":
@@ -241,6 +243,12 @@ def _learner(arguments: Run, folder: Path, env: HRCVecEnv, settings: Any) -> tup
             return ppo.make_learner(env, settings, seed, log, kind), []
     learner = checkpoints.resume(folder / "policy.zip", env, folder / "tensorboard")
     env.seed(arguments.seed + learner.num_timesteps)  # other episodes than the first ones
+    if isinstance(learner, SAC):
+        anew = learner.learning_starts - learner.num_timesteps
+        console.print(
+            "Checkpoints keep no replay buffer: it fills anew with what the policy does, and "
+            f"learning goes on after {anew:,} steps.", highlight=False, soft_wrap=True,
+        )  # fmt: skip
     path = folder / "curve.json"
     return learner, json.loads(path.read_text()) if path.exists() else []
 

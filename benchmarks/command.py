@@ -25,6 +25,8 @@ class Arguments(EngineArguments):
     """Folder for results.json, a report and finished parts."""
     quick: bool = False
     """Every number, from a few episodes."""
+    overwrite: bool = False
+    """Delete other results in the folder."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ def run_study(study: Study, arguments: StudyArguments) -> int:
     """Run a study as it was asked, and show its report; return the exit status."""
     study = study.select(arguments.only) if arguments.only else study
     study = replace(study.quick() if arguments.quick else study, threads=arguments.threads)
-    run = partial(run_experiment, study, engine=arguments.chosen())
+    run = partial(run_experiment, study, overwrite=arguments.overwrite, engine=arguments.chosen())
     return show(run, arguments.out, study.name)
 
 

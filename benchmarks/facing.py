@@ -258,7 +258,7 @@ def main() -> int:
     """Follow, sort, write, show."""
     arguments = tyro.cli(Arguments, default=Arguments(Path("out/facing")), description=__doc__)
     facing = Facing(episodes=(12, 4)) if arguments.quick else Facing()
-    run = partial(run_experiment, facing, engine=arguments.chosen())
+    run = partial(run_experiment, facing, overwrite=arguments.overwrite, engine=arguments.chosen())
     return show(run, arguments.out, "facing")
 
 

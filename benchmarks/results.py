@@ -36,6 +36,7 @@ from benchmarks.studies import COMMANDS, STUDIES, Command, commands_of
 from docs import generate, tables
 from hrc_env.core.errors import HRCError
 from hrc_env.core.results import provenance
+from hrc_env.experiments.cache import disown
 from hrc_env.experiments.runner import settings_of
 from hrc_env.experiments.versions import versions_of
 
@@ -215,6 +216,7 @@ def call(command: Command, out: Path, more: str, until_s: float = float("inf")) 
     """Call a study's command: its status, None if it was stopped as the time was up."""
     words = [sys.executable, *command.command.split()[1:], *more.split()]
     words += ["--out", str(out)] if command.tables else []
+    disown(out)  # settings may have changed; the parts know with which they were made
     process = subprocess.Popen(words, cwd=ROOT, start_new_session=True)
     left_s = until_s - time.monotonic()
     try:

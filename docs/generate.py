@@ -28,6 +28,7 @@ REFERENCE: dict[Path, Callable[[], str]] = {
     DOCS / "reference" / "recordings.md": reference.recordings,
     DOCS / "reference" / "shields.md": reference.shields,
     DOCS / "reference" / "leaderboard.md": leaderboard.page,
+    DOCS / "reference" / "declarations.md": reference.declarations,
     DOCS / "reference" / "names.md": names.page,
 }
 """Generated whole."""

@@ -4,6 +4,7 @@ import dataclasses
 import importlib
 import inspect
 import re
+import textwrap
 from collections.abc import Iterator, Sequence
 from typing import Any, get_args, get_origin
 
@@ -18,7 +19,7 @@ from benchmarks.__main__ import Benchmarks
 from docs.names import doc_of
 from hrc_env import __main__, observations
 from hrc_env.belief import NEAR_FLOOR_M
-from hrc_env.core.docstrings import field_docs
+from hrc_env.core.docstrings import attribute_docs, field_docs
 from hrc_env.core.infos import ALWAYS, ENTRIES, FAULT, OF_WORKERS, Entry
 from hrc_env.env import HRCEnv
 from hrc_env.env_config import EnvConfig
@@ -225,6 +226,49 @@ def task_page(task_id: str) -> str:
     )
     env.close()
     return text
+
+
+DECLARATIONS = """\
+# Tasks and goals of your own
+
+{notice}
+
+A task ([how to write one](../bring_your_own.md#a-task)) declares attributes beside its methods:
+
+{attributes}
+
+## Goals
+
+{goal}
+
+{fields}
+"""
+
+
+def declarations() -> str:
+    """docs/reference/declarations.md"""
+    docs = attribute_docs(Task)
+    attributes = [
+        (f"`{name}`", f"`{getattr(Task, name)!r}`" if hasattr(Task, name) else "", docs[name])
+        for name in docs if name != "config"
+    ]  # fmt: skip
+    fields = [(f"`{name}`", text) for name, text in field_docs(Goal).items()]
+    return DECLARATIONS.format(
+        notice=NOTICE,
+        attributes=_table(("attribute", "default", "meaning"), attributes),
+        goal=_as_page(inspect.cleandoc(Goal.__doc__ or "")),
+        fields=_table(("field", "meaning"), fields),
+    )
+
+
+def _as_page(text: str) -> str:
+    """Return a docstring as a page shows it: what is indented is Python."""
+    found = re.sub(r"((?:^    .*\n?|^\n(?=    ))+)", _as_block, text, flags=re.M)
+    return found.strip()
+
+
+def _as_block(found: re.Match[str]) -> str:
+    return f"```python\n{textwrap.dedent(found[0]).strip()}\n```\n"
 
 
 def _env(task_id: str, perception: str, **arguments: Any) -> HRCEnv:

@@ -15,6 +15,7 @@ from hrc_env.registration import adopt, import_files, register_environment
 from hrc_env.tasks import BUILT_IN
 
 if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
+    from hrc_env.agents.callbacks import ProximityRamp as ProximityRamp
     from hrc_env.agents.env_info import Agent as Agent
     from hrc_env.agents.env_info import EnvInfo as EnvInfo
     from hrc_env.agents.env_info import env_info as env_info
@@ -42,6 +43,7 @@ if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
     from hrc_env.evaluation.dataset import load_episodes as load_episodes
     from hrc_env.evaluation.episodes import Score as Score
     from hrc_env.evaluation.episodes import evaluate as evaluate
+    from hrc_env.evaluation.episodes import evaluate_episodes as evaluate_episodes
     from hrc_env.evaluation.intervals import Comparison as Comparison
     from hrc_env.evaluation.intervals import compare_means as compare_means
     from hrc_env.evaluation.intervals import compare_rates as compare_rates
@@ -208,6 +210,7 @@ PUBLIC = {
     "EpisodeSet": "hrc_env.evaluation.dataset",
     "Metric": "hrc_env.core.results",
     "PPOSettings": "hrc_env.agents.learner_settings",
+    "ProximityRamp": "hrc_env.agents.callbacks",
     "RECIPES": "hrc_env.agents.learner_settings",
     "SACSettings": "hrc_env.agents.learner_settings",
     "Score": "hrc_env.evaluation.episodes",
@@ -216,6 +219,7 @@ PUBLIC = {
     "compare_rates": "hrc_env.evaluation.intervals",
     "env_info": "hrc_env.agents.env_info",
     "evaluate": "hrc_env.evaluation.episodes",
+    "evaluate_episodes": "hrc_env.evaluation.episodes",
     "load_episodes": "hrc_env.evaluation.dataset",
     "make_agent": "hrc_env.agents.registry",
     "mean_over": "hrc_env.evaluation.intervals",
@@ -241,7 +245,7 @@ RENAMED = {
     "sample_window": "crop_window",
 }
 """Former public names, and the present ones."""
-EXTRAS = {"HRCSubprocVecEnv": "stable_baselines3", "HRCVecEnv": "stable_baselines3"}
+EXTRAS = dict.fromkeys(("HRCSubprocVecEnv", "HRCVecEnv", "ProximityRamp"), "stable_baselines3")
 """Public names that need a package which an extra installs."""
 
 

@@ -1,12 +1,14 @@
 """What a robot believes in one step: itself, its task and the estimate. No truth in here."""
 
 import math
+import threading
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from hrc_env.core.kernels import kernel
+from hrc_env.core.lending import constant, read_only
 from hrc_env.core.records import HandState, ObjectState, PoseEstimate, RobotState
 from hrc_env.core.skeleton import SEGMENT_RADIUS_M
 from hrc_env.core.typing import Bools, Floats, Ints, JointVelocities, Points3
@@ -23,6 +25,8 @@ PERSON_M = 0.5
 """Distance of the floor that people take up from their hips [m]."""
 NEAR_FLOOR_M = 1.5
 """Floor farther from a robot than this is of no concern [m]."""
+_LAST = threading.local()
+"""The belief that was lent last, in each thread."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,6 +79,14 @@ class Belief:
     """(B, W, S) which segments of estimated bodies may touch its hand; None: none of them."""
     unseen: UnseenFloor | None = None
     """Where an undetected person may be; None: anywhere."""
+
+
+def lent_belief(now: Belief) -> Belief:
+    """Return a belief with read-only arrays, for functions of users."""
+    if getattr(_LAST, "now", None) is not now:  # several terms are given the same one
+        lent = read_only(replace(now, model=None))
+        _LAST.now, _LAST.lent = now, replace(lent, model=constant(now.model))
+    return _LAST.lent
 
 
 def estimated_separation(robot: RobotState, estimate: PoseEstimate) -> Separation:

@@ -18,7 +18,13 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats, JointAngles, JointVelocities, Velocities3
 from hrc_env.geometry.chains import SerialChain, jacobian, turning
 
-CONTROLS = ("joint", "tool", "twist")
+MEANINGS = {
+    "joint": "velocities of its joints",
+    "tool": "a velocity of its tool",
+    "twist": "velocity and turn rate of its tool",
+}
+"""Meaning of an action, without the entry of a hand, by `control`."""
+CONTROLS = tuple(MEANINGS)
 SINGULAR_M3 = 0.05
 """Manipulability below which the damping of `twist` fades in."""
 
@@ -63,13 +69,19 @@ def fastest(control: str, chain: SerialChain, config: ControlConfig) -> JointVel
     return share * chain.velocity_limit_rad_s
 
 
-def checked_action(action: ArrayLike, shape: tuple[int, ...]) -> Floats:
+def checked_action(action: ArrayLike, shape: tuple[int, ...], control: str) -> Floats:
     """Actions as float64, clipped to [-1, 1]; `ConfigError` for other shapes or no numbers."""
     try:
         values = np.asarray(action, np.float64)
     except (TypeError, ValueError) as error:
         raise ConfigError(f"action must be numbers of shape {shape}, got {action!r}.") from error
-    check_shape("action", values.shape, shape, "(environments,) joint or tool velocities")
+    meaning = (
+        f"(environments,) {MEANINGS[control]}, as control={control!r} has it; other agents may be "
+        f"for {' or '.join(repr(each) for each in CONTROLS if each != control)}, which control= "
+        "and --control choose"
+    )
+    if values.shape != shape:
+        check_shape("action", values.shape, shape, meaning)
     if not np.isfinite(values).all():
         raise ConfigError(f"action must be finite numbers in [-1, 1], got {values}.")
     return np.minimum(np.maximum(values, -1.0), 1.0)

@@ -57,6 +57,11 @@ class EnvBase(HasSpec, Stateful):
         share()
         self._size = picture_size(asked.width, asked.height)
         self._shown = shown_beside(asked.render_markers, asked.overlay)
+        if asked.overlay is not None and not str(asked.render_mode).startswith("rgb_array"):
+            warnings.warn(
+                f"overlay={asked.overlay!r} is drawn in pictures of render_mode='rgb_array' only, "
+                f"got render_mode={asked.render_mode!r}.", stacklevel=4,
+            )  # fmt: skip
         self.render_mode, self.config, self._task = (
             asked.render_mode,
             settings.config,
@@ -188,7 +193,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         self.refuse_closed()
         if not self._begun:
             raise ConfigError("Call reset() before step().")
-        values = checked_action(action, (self.simulation.n_actions,))
+        values = checked_action(action, (self.simulation.n_actions,), self.simulation.control)
         result = self.simulation.step(values[None])
         self._steps_left -= 1
         return (
@@ -396,6 +401,7 @@ def spaces(simulation: Simulation) -> tuple[Any, Any]:
     where, apart, images = simulation.layout, simulation.task.goal, simulation.images
     seen = Box(where.low, where.high, dtype=np.float32)
     actions = Box(-1.0, 1.0, (simulation.n_actions,), np.float32)
+    vars(actions)["control"] = simulation.control  # files of Stable-Baselines3 hold it, too
     if apart is None and images is None:
         return seen, actions
     parts: dict[str, Any] = {observations.FLAT: seen}

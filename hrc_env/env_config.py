@@ -50,7 +50,8 @@ class EnvConfig:
     (docs/bring_your_own.md)."""
     perception: str = "pixels"
     """How the robot sees people: "pixels" (rendered images through MediaPipe Pose), "keypoints" (an
-    emulator of that), "truth" (the worker as they are) or "none"."""
+    emulator of that), "truth" (the worker as they are) or "none". `HRCVectorEnv` and `HRCVecEnv`,
+    which cannot draw images in a batch, have "keypoints" by default."""
     estimator: "EstimatorChoice" = "particle"
     """From keypoints to poses: "particle", "kalman" (the same with one hypothesis), "paper"
     (Algorithm 1 as printed), "paper_restarts" (with what it lacks), "triangulation" or "ransac";

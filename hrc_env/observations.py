@@ -15,11 +15,13 @@ from hrc_env.belief import (
     Belief,
     covariance_factor_m,
     deviation_towards_robot_m,
+    lent_belief,
     standard_deviation_m,
 )
 from hrc_env.core.brought import check_arguments
 from hrc_env.core.errors import check_shape, needed
 from hrc_env.core.kernels import kernel
+from hrc_env.core.lending import called, is_of_user
 from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.records import HandState, ObjectState
 from hrc_env.core.skeleton import N_JOINTS
@@ -319,7 +321,7 @@ def observe(now: Belief, where: ObservationLayout, terms: tuple[ObservationTerm,
     `FloatingPointError` for one that is no number, a fault of the code, never of a camera."""
     batch = len(now.action)
     present = [terms[k] for k in where.terms]
-    values = [term.function(now) for term in present]
+    values = [_value(term, now) for term in present]
     for term, value in zip(present, values, strict=True):
         name, rows = f"rows of observation term {term.name!r}", np.shape(value)[:1]
         check_shape(name, rows, (batch,), "one an environment")
@@ -334,6 +336,13 @@ def observe(now: Belief, where: ObservationLayout, terms: tuple[ObservationTerm,
         names = [name for name, part in where.slices.items() if np.isnan(physical[:, part]).any()]
         raise FloatingPointError(f"Observation terms that are not a number: {', '.join(names)}.")
     return observation
+
+
+def _value(term: ObservationTerm, now: Belief) -> Floats:
+    """The value (B, ...) of a term; one of users is given a read-only belief."""
+    if is_of_user(term.function):
+        return called(f"Observation term {term.name!r}", term.function, lent_belief(now))
+    return term.function(now)
 
 
 @kernel

@@ -9,7 +9,7 @@ imports this package. The files in `examples/bring_your_own/` show one of each.
 import os
 import sys
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
@@ -45,9 +45,12 @@ def register_task(task: "TaskType") -> None:
     from hrc_env.settings import settle
     from hrc_env.tasks.check import check_task
     from hrc_env.tasks.task import TASKS
+    from hrc_env.together import check_rows
 
     check_task(task)
-    play_briefly(settle(task=task, perception="none"))
+    settings = settle(task=task, perception="none")
+    play_briefly(settings)
+    check_rows(settings)
     _add(TASKS, task.id, task)
     register_environment(task.id, task.max_episode_steps)
 
@@ -123,17 +126,22 @@ def register_environment(task_id: str, max_episode_steps: int = EPISODE_STEPS) -
     IDS.append(task_id)
 
 
-def import_files(paths: str | None = None) -> None:
+def import_files(paths: str | Path | Sequence[str | Path] | None = None) -> None:
     """Import Python files that register things, each once, here and in child processes.
 
     Args:
-        paths: separated as in PATH; None: those of the environment variable `IMPORT`.
+        paths: one, several, or a text of several, separated as in PATH; None: those of the
+            environment variable `HRC_ENV_IMPORT`.
 
     Raises:
         ConfigError: there is no such file.
     """
     given = os.environ.get(IMPORT, "") if paths is None else paths
-    for path in (Path(each).resolve() for each in given.split(os.pathsep) if each):
+    each = [given] if isinstance(given, str | Path) else given
+    if not isinstance(each, Sequence) or not all(isinstance(one, str | Path) for one in each):
+        raise ConfigError(f"paths must be the paths of Python files, got {given!r}.")
+    names = [name for one in each for name in str(one).split(os.pathsep) if name]
+    for path in (Path(name).resolve() for name in names):
         _import_file(path, recorded=paths is not None)
 
 
@@ -166,7 +174,9 @@ def _import_file(path: Path, recorded: bool) -> None:
     if name in sys.modules:
         return
     spec = spec_from_file_location(name, path)
-    if spec is None or spec.loader is None or not path.is_file():
+    if not path.is_file():
+        raise ConfigError(f"There is no file {path} to import.")
+    if spec is None or spec.loader is None:
         raise ConfigError(f"{path} cannot be imported: it must be a Python file (.py).")
     sys.modules[name] = module = module_from_spec(spec)
     try:

@@ -197,6 +197,8 @@ def _goal(goal: Any, room: Room) -> Floats | None:
         place = np.array(goal, float)
     except (TypeError, ValueError) as error:
         raise ConfigError(f'options["goal"] must be numbers, got {goal!r}.') from error
+    if not np.isfinite(place).all():
+        raise ConfigError(f'options["goal"] must be finite numbers, got {goal!r}.')
     targets = room.task.goal_targets(place)
     check_places(f"{room.task.id}: goal_targets", targets)
     check_reach(room.task.id, room.scene.robot.name, room.chain, targets)

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.belief import Belief
+from hrc_env.belief import Belief, lent_belief
 from hrc_env.core.brought import check_arguments
 from hrc_env.core.errors import ConfigError, check_fields, check_names, check_shape
 from hrc_env.core.kernels import kernel
+from hrc_env.core.lending import called, is_of_user, read_only
 from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.typing import Floats
 
@@ -140,8 +141,16 @@ SHARED_TERMS: tuple[RewardTerm, ...] = (
 def evaluated(
     terms: tuple[RewardTerm, ...], now: Belief, step: Any, previous_action: Floats, weights: Any
 ) -> dict[str, Floats]:
-    """The value (B,) of each of these terms by its name."""
-    return {term.name: term.function(now, step, previous_action, weights) for term in terms}
+    """The value (B,) of each of these terms by its name; those of users get read-only arrays."""
+    values = {}
+    for term in terms:
+        given: Any = now, step, previous_action, weights
+        if is_of_user(term.function):
+            lent = lent_belief(now), *read_only(given[1:])
+            values[term.name] = called(f"Reward term {term.name!r}", term.function, *lent)
+        else:
+            values[term.name] = term.function(*given)
+    return values
 
 
 def checked_factors(factors: Mapping[str, float], terms: Sequence[RewardTerm]) -> dict[str, float]:

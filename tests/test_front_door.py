@@ -100,7 +100,7 @@ def test_a_star_imports_all_that_needs_no_extra():
         "print(*(name for name in hrc_env.PUBLIC if name not in dir(hrc_env)))"
     )
     said = subprocess.check_output([sys.executable, "-c", code], text=True)
-    assert said.split() == ["HRCSubprocVecEnv", "HRCVecEnv"] * 2
+    assert said.split() == ["HRCSubprocVecEnv", "HRCVecEnv", "ProximityRamp"] * 2
 
 
 # Names

@@ -1,6 +1,8 @@
 """Learners beside PPO on the task that it suits: hindsight, other ids, demonstrations first."""
 
 import json
+import shutil
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -62,6 +64,26 @@ def test_sac_goes_on_where_it_stopped(run, tmp_path):
     env = HRCEnv(REACH, perception="truth", n_workers=0, control="tool")
     observation, _ = env.reset(seed=0)
     assert not np.array_equal(before.act(observation), after.act(observation))
+
+
+def test_a_resumed_run_acts_as_it_has_learnt_while_its_buffer_fills(run):
+    with closing(HRCVecEnv(2, task=REACH, control="tool", perception="truth", n_workers=0)) as env:
+        learner = checkpoints.resume(run / "policy.zip", env)
+        learner._last_obs = env.reset()
+        learner.actor.log_std.weight.data.zero_()
+        learner.actor.log_std.bias.data.fill_(-20.0)  # no noise
+        action, _ = learner._sample_action(learner.learning_starts, None, 2)
+        assert learner.num_timesteps < learner.learning_starts
+        expected = learner.predict(learner._last_obs, deterministic=True)[0]
+        np.testing.assert_allclose(action, expected, atol=1e-4)
+
+
+def test_a_resumed_run_says_that_its_buffer_fills_anew(run, tmp_path):
+    again = shutil.copytree(run, tmp_path / "again")
+    n_steps = checkpoints.describe(again / "policy.zip")["num_timesteps"]
+    done = train("--resume", again, "--timesteps", n_steps + 8)
+    said = " ".join(done.stdout.split())
+    assert "keep no replay buffer: it fills anew with what the policy does" in said
 
 
 def told(task: str, **kwargs):

@@ -8,6 +8,7 @@ from pathlib import Path
 from hrc_env.cli.checks import at_least, writable_file
 from hrc_env.cli.engines import EngineArguments
 from hrc_env.cli.show import show
+from hrc_env.core.errors import check_names
 from hrc_env.tasks import BUILT_IN
 
 
@@ -27,7 +28,7 @@ class Benchmark(EngineArguments):
     trust: bool = False
     """Read pickles in a checkpoint, which run code of whoever made it; see play."""
     ids: tuple[str, ...] = tuple(BUILT_IN)
-    """Which environments; a learnt policy is for one."""
+    """Which environments, your own (--import) among them; a learnt policy is for one."""
     control: str | None = None
     """What its actions are: joint, if not given, tool or twist; checkpoints know it."""
     out: Path | None = None
@@ -38,13 +39,14 @@ class Benchmark(EngineArguments):
     """Write the numbers as an entry of the leaderboard, a JSON file of this name: in a clone
     docs/results/leaderboard/NAME.json."""
     overwrite: bool = False
-    """Delete the results of something else in the folder."""
+    """Delete the results of something else, or with other settings, in the folder."""
 
     def run(self) -> int:
         """Judge it."""
         at_least("--seeds", self.seeds, 1)
         if self.enter is not None:
             writable_file(self.enter, ".json", "--enter")
+            check_names("environment of the leaderboard", self.ids, BUILT_IN)
         engine = self.chosen()
         leaderboard = import_module("hrc_env.experiments.leaderboard")
         runner = import_module("hrc_env.experiments.runner")

@@ -27,7 +27,7 @@ class AnyExperiment(EngineArguments):
     seeds: int | None = None
     """How many seeds."""
     overwrite: bool = False
-    """Delete the results of something else in the folder."""
+    """Delete the results of something else, or with other settings, in the folder."""
 
     def run(self) -> int:
         """Run, show the tables."""

@@ -11,7 +11,7 @@ from hrc_env.env_words import EnvironmentArguments
 
 @dataclass(frozen=True, kw_only=True)
 class List(EnvironmentArguments):
-    """Environments, perception levels, estimators, scenes, cameras and agents by name.
+    """Environments, perception levels, estimators, scenes, cameras, shields and agents by name.
 
     With --config: every setting of the environment that the arguments say, as a TOML file has it.
     """
@@ -27,6 +27,7 @@ class List(EnvironmentArguments):
         from hrc_env.agents.registry import AGENTS
         from hrc_env.control import CONTROLS
         from hrc_env.pipeline.levels import LEVELS
+        from hrc_env.safety.shield import SHIELDS
         from hrc_env.scene.build import SCENES
         from hrc_env.scene.rig import LAB_CAMERAS
         from hrc_env.scene.robot import ROBOTS
@@ -36,7 +37,7 @@ class List(EnvironmentArguments):
         known = {
             "id": IDS, "perception": LEVELS, "estimator": ESTIMATORS, "scene": SCENES,
             "robot": ROBOTS, "cameras": [camera.name for camera in LAB_CAMERAS],
-            "control": CONTROLS,
+            "control": CONTROLS, "shield": SHIELDS,
             "agent": (
                 *AGENTS, *policies.names(), "a checkpoint: PATH.zip",
                 "a policy: PATH.safetensors", "a function: MODULE:FUNCTION",

@@ -36,7 +36,7 @@ def write_rows(record: object, ids: Any, part: object) -> None:
     if isinstance(record, dict):
         for name, array in record.items():
             write_rows(array, ids, part[name])  # type: ignore[index]
-    for name in _names(type(record)):
+    for name in names_of(type(record)):
         write_rows(getattr(record, name), ids, getattr(part, name))
 
 
@@ -46,7 +46,7 @@ def mapped(record: RecordT, change: Callable[[Any], Any]) -> RecordT:
         return change(record)
     if isinstance(record, dict):
         return type(record)((name, mapped(part, change)) for name, part in record.items())
-    names = _names(type(record))
+    names = names_of(type(record))
     values = [mapped(getattr(record, name), change) for name in names]
     return type(record)(*values) if names else record
 
@@ -55,7 +55,7 @@ def copied(value: Any) -> Any:
     """A deep copy of records, lists and generators; arrays that are read-only are shared."""
     if isinstance(value, np.ndarray):
         return value.copy() if value.flags.writeable else value
-    if names := _names(type(value)):
+    if names := names_of(type(value)):
         return type(value)(*[copied(getattr(value, name)) for name in names])
     if isinstance(value, (list, tuple)):
         return type(value)(copied(each) for each in value)
@@ -97,7 +97,7 @@ class Stateful:
 
 
 @functools.cache
-def _names(kind: type) -> tuple[str, ...]:
+def names_of(kind: type) -> tuple[str, ...]:
     """The fields of a dataclass or a named tuple; whatever else there is has none."""
     if dataclasses.is_dataclass(kind):
         return tuple(each.name for each in dataclasses.fields(kind))

@@ -61,12 +61,18 @@ def learner() -> Iterator[None]:
         ) from error
 
 
+REGISTERED = ("task", "environment", "robot", "estimator", "detector", "shield")
+"""Kinds of things that users can register (`hrc_env.registration`)."""
+OWN = "One of your own is known once its file is imported: --import FILE, hrc_env.import_files."
+
+
 def unknown(what: str, got: object, valid: Iterable[str]) -> ConfigError:
     """The error for a name that is not in a list, with the nearest valid one."""
     names = list(valid)
     near = difflib.get_close_matches(str(got), names, n=1)
     hint = f" Did you mean {near[0]!r}?" if near else ""
-    return ConfigError(f"Unknown {what} {got!r}.{hint} Valid: {', '.join(map(repr, names))}.")
+    own = f" {OWN}" if what in REGISTERED else ""
+    return ConfigError(f"Unknown {what} {got!r}.{hint} Valid: {', '.join(map(repr, names))}.{own}")
 
 
 def check_names(what: str, names: Iterable[object], valid: Collection[str]) -> None:

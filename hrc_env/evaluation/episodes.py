@@ -63,6 +63,7 @@ def evaluate(
     *,
     engine: str | Engine | None = None,
     tick: Callable[[float], None] = lambda share: None,
+    trust: bool = False,
     **kwargs: Any,
 ) -> Score:
     """Return the score of an agent over whole episodes with fixed seeds.
@@ -76,7 +77,38 @@ def evaluate(
             cluster that this process is connected to, or one on this machine); None: what is
             fastest on this machine.
         tick: called with the share that was done since the last call.
+        trust: whether pickles in a checkpoint are read, as of `make_agent`.
         kwargs: the environment's, as of `HRCVectorEnv`: task, perception, estimator, ...
+
+    Raises:
+        ConfigError: no such agent, engine, or no episode.
+    """
+    given = {"engine": engine, "tick": tick, "trust": trust, **kwargs}
+    return summarize(evaluate_episodes(make, n_episodes, seed, **given))
+
+
+def evaluate_episodes(
+    make: str | Callable[[Any], Agent],
+    n_episodes: int = 64,
+    seed: int = EVALUATION_SEED,
+    *,
+    engine: str | Engine | None = None,
+    tick: Callable[[float], None] = lambda share: None,
+    trust: bool = False,
+    **kwargs: Any,
+) -> list[dict[str, float]]:
+    """Return the statistics of each episode of `evaluate`, in the order of seeds.
+
+    Two agents on the same seeds are compared pair by pair:
+
+        ours, theirs = (evaluate_episodes(agent, 64) for agent in ("a.zip", "b.zip"))
+        compare_means([e["cost"] for e in ours], [e["cost"] for e in theirs])
+
+    Args:
+        make, n_episodes, seed, engine, tick, trust, kwargs: as of `evaluate`.
+
+    Returns:
+        Of each its return `r`, `cost`, `contacts`, `goals_reached`, `success`, `seconds`, ...
 
     Raises:
         ConfigError: no such agent, engine, or no episode.
@@ -87,13 +119,13 @@ def evaluate(
     if isinstance(make, str):
         registry = import_module("hrc_env.agents.registry")  # here: it reads learners' files
         registry.check_agent(make)
-        make = partial(registry.make_agent, carried(make))
+        make = partial(registry.make_agent, carried(make), trust=trust)
     if not callable(make):
         raise ConfigError(
             "evaluate wants a function that makes an agent for an EnvInfo, or an agent as "
             f"make_agent takes it, got {type(make).__name__}."
         )
-    return summarize(play_shards(make, n_episodes, seed, engine, tick, **kwargs))
+    return play_shards(make, n_episodes, seed, engine, tick, **kwargs)
 
 
 def play_shards(

@@ -109,10 +109,15 @@ def bootstrap(statistic: Statistic, n: int, unit: str, n_draws: int = 4000) -> M
 def paired(name: str, statistic: Statistic, n: int, unit: str, n_draws: int = 4000) -> Metrics:
     """Return the difference of a statistic between two rows with the same seeds.
 
+    Of numbers `ours` and `theirs` (n,) the difference of the means, as `compare_means` gives it:
+
+        both = np.array([*ours, *theirs])
+        paired("mean", lambda weights: weights @ both / weights.sum(-1), len(ours), "m")
+
     Args:
         name: of the statistic.
-        statistic: it is given weights of 2n seeds, one row's and then the other's, as
-            `rmse_of([*ours, *theirs], counts)` is.
+        statistic: of one row, not the difference. It is given weights (R, 2n), how often each seed
+            counts, of ours and then of theirs; for the statistic of ours those of theirs are 0.
         n: number of seeds of a row.
         unit: of the statistic.
         n_draws: how often seeds are drawn.
@@ -187,6 +192,11 @@ def rate_of(counts: Numbers, exposure: Numbers | float, unit: str = "1") -> Metr
         raise ConfigError(
             "counts must be whole numbers from 0 on, one with each seed: of other numbers take "
             f"mean_over; got {described(counts)}."
+        )
+    if np.ndim(exposure) and len(_column("exposure", exposure)) != len(events):
+        raise ConfigError(
+            f"counts and exposure must be of the same seeds, got {len(events)} and "
+            f"{np.size(exposure)} numbers; one number is the exposure of all together."
         )
     if not np.all(np.asarray(exposure, float) >= 0):
         raise ConfigError(f"exposure must not be negative, got {described(exposure)}.")

@@ -5,6 +5,7 @@ import os
 import shutil
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,8 @@ Progress = Callable[[float, str], None]
 PartProgress = Callable[[float], None]
 """Told by how much the share of a part that is done grew."""
 LABEL = "experiment.json"
+_MOST_SAID = 3
+"""Differences of settings that an error names."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,22 +123,91 @@ class PartCache:
         return content["part"]
 
 
-def own_folder(out: Path, name: str, overwrite: bool = False) -> None:
-    """Make `out` the folder of a study; what an earlier run of it finished there stays. Other
-    results are deleted if that is wanted, or else a `ConfigError`, as is a file."""
+def own_folder(
+    out: Path, name: str, overwrite: bool = False, settings: Mapping[str, Any] | None = None
+) -> None:
+    """Make `out` the folder of a study.
+
+    Args:
+        out: folder. Parts that an earlier run with the same settings finished there stay.
+        name: of the study.
+        overwrite: delete other results; parts of the same study stay, as each has the key
+            of its settings.
+        settings: all that the numbers depend on; None: not known.
+
+    Raises:
+        ConfigError: a file, or other results that are not to be deleted.
+    """
     if out.exists() and not out.is_dir():
         raise ConfigError(f"--out must be a folder; {out} is a file.")
-    owner = owner_of(out)
+    owner, asked = owner_of(out), None if settings is None else _as_written(settings)
+    differs = ""
     if owner not in (None, name):
+        differs = f"the results of {owner!r}; this is {name!r}"
+    elif owner is not None and asked is not None and (found := _settings_in(out)) is not None:
+        differs = "; ".join(_differences(found, asked))
+        differs = differs and f"results of {name!r} with other settings: {differs}"
+    if differs:
         if not overwrite:
             raise ConfigError(
-                f"{out} holds the results of {owner!r}; this is {name!r}. Choose another --out, "
-                "or give --overwrite to delete those."
+                f"{out} holds {differs}. Choose another folder (--out), or delete what is there: "
+                "--overwrite, in Python overwrite=True."
             )
-        for each in ("parts", "figures"):
+        for each in ("figures",) if owner == name else ("parts", "figures"):
             shutil.rmtree(out / each, ignore_errors=True)
         (out / "results.json").unlink(missing_ok=True)
-    write_whole(out / LABEL, json.dumps({"experiment": name}))
+    known = {} if asked is None else {"settings": asked}
+    write_whole(out / LABEL, json.dumps({"experiment": name, **known}))
+
+
+def disown(out: Path) -> None:
+    """Let any settings go on in a folder, with the parts that are the same."""
+    for each in (LABEL, "results.json"):
+        (out / each).unlink(missing_ok=True)
+
+
+def _as_written(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return settings as JSON has them, without digests of source files: after a change of code a
+    study goes on in the same folder, and parts that depend on it are made anew."""
+
+    def kept(value: Any) -> Any:
+        if isinstance(value, dict):
+            named = {k: each for k, each in value.items() if not k.endswith("source")}
+            return {name: kept(each) for name, each in named.items()}
+        return [kept(each) for each in value] if isinstance(value, list) else value
+
+    return kept(json.loads(json.dumps(settings, default=str)))
+
+
+def _settings_in(out: Path) -> dict[str, Any] | None:
+    """Return the settings with which a folder's study began; None: not known."""
+    label, results = out / LABEL, out / "results.json"
+    content = json.loads(label.read_text()) if label.exists() else {}
+    found = content.get("settings")
+    if found is None and results.exists():  # of an earlier version
+        with suppress(json.JSONDecodeError, KeyError):
+            found = json.loads(results.read_text())["config"]
+            found.pop("experiment", None)
+    return None if found is None else _as_written(found)
+
+
+def _differences(found: Any, asked: Any, where: str = "") -> list[str]:
+    """Return in words where two settings differ, at most `_MOST_SAID` places."""
+    said: list[str] = []
+    if isinstance(found, dict) and isinstance(asked, dict):
+        for name in dict.fromkeys((*found, *asked)):
+            here = f"{where}.{name}" if where else name
+            theirs, ours = found.get(name, "nothing"), asked.get(name, "nothing")
+            said += _differences(theirs, ours, here) if theirs != ours else []
+    elif found != asked:
+        said.append(f"{where} is {_short(found)} there and {_short(asked)} here")
+    more = len(said) - _MOST_SAID
+    return said if more <= 0 else [*said[:_MOST_SAID], f"and {more} more"]
+
+
+def _short(value: Any) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= 80 else f"{text[:77]}..."
 
 
 def owner_of(out: Path) -> str | None:

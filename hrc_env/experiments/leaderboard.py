@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from hrc_env.agents.registry import control_of
-from hrc_env.core.errors import ConfigError, check_names
+from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric, provenance, write_whole
 from hrc_env.evaluation.sums import ACHIEVED
 from hrc_env.experiments.columns import per_minute, rate, share_of_tries
@@ -17,6 +17,7 @@ from hrc_env.experiments.setups import PerceptionSetup
 from hrc_env.experiments.study import Row, Study
 from hrc_env.safety.incidents import KINDS
 from hrc_env.tasks import BUILT_IN
+from hrc_env.tasks.task import find_task
 
 VERSION = 1
 """Of the conditions, seeds and counts: numbers of different versions do not compare."""
@@ -103,7 +104,8 @@ def make_study(
     Raises:
         ConfigError: an unknown policy or environment, or no episode.
     """
-    check_names("environment", ids, BUILT_IN)
+    for each in ids:
+        find_task(each)
     control = control or control_of(policy)
     env = {} if control is None else {"control": control}
     rows = {

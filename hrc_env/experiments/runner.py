@@ -78,7 +78,7 @@ def cache_of(
 
 def run_experiment(
     experiment: Experiment[Any],
-    out: Path,
+    out: Path | str,
     progress: Progress = lambda share, label: None,
     overwrite: bool = False,
     engine: Engine | None = None,
@@ -90,7 +90,7 @@ def run_experiment(
         out: folder of the results, and of parts: those that an earlier run with the same settings
             and versions finished there are not played again.
         progress: called with the growth of the share that is done, and its part.
-        overwrite: delete the results of something else in the folder.
+        overwrite: delete the results of something else, or with other settings, in the folder.
         engine: where parts are played, which changes none of them; None: where it is fastest on
             this machine.
 
@@ -98,9 +98,11 @@ def run_experiment(
         Every number by its name.
 
     Raises:
-        ConfigError: the folder holds the results of something else.
+        ConfigError: the folder holds the results of something else, or with other settings: what
+            differs is said.
     """
-    own_folder(out, experiment.name, overwrite)
+    out = Path(out)
+    own_folder(out, experiment.name, overwrite, experiment.settings())
     played = experiment.play(cache_of(experiment, out / "parts", progress, engine))
     metrics = experiment.metrics(played)
     report = experiment.report(played, metrics, out / "figures")

@@ -99,6 +99,6 @@ class Endless:
     def step(self, action: Any) -> tuple[Observation, Floats, Bools, Bools, Info]:
         """Step every environment; no episode is over."""
         shape = len(self.terminated), self.env.first.n_actions
-        result = self.env.step(checked_action(action, shape))
+        result = self.env.step(checked_action(action, shape, self.env.first.control))
         self.terminated, never = result.terminated, np.zeros_like(result.terminated)
         return result.observation, result.reward, never, never, result.info

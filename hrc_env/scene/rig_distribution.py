@@ -44,7 +44,7 @@ class RigDistribution:
     """Each camera has one of these lenses; none: its own."""
     n_cameras: int | tuple[int, int] | None = None
     """How many of the cameras there are; (fewest, most): drawn, too; None: all of them. Which ones
-    is drawn."""
+    is drawn; images of the others (`observe_images`) are black."""
 
     def __post_init__(self) -> None:
         if isinstance(self.around, str) and self.around not in RIGS:

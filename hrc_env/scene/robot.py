@@ -211,6 +211,10 @@ def check_robot(robot: Robot) -> None:
     """Raise `ConfigError` for what is missing or wrong in a robot."""
     if not isinstance(robot, Robot):
         raise ConfigError(f"A robot must be a Robot, got {type(robot).__name__}.")
+    if not isinstance(robot.name, str) or not robot.name.strip():
+        raise ConfigError(
+            f"A robot must have a name, by which robot= knows it, got {robot.name!r}."
+        )
     if not (robot.joints and robot.capsules):
         raise ConfigError(f"{robot.name}: joints and capsules must name at least one each.")
     chain = chain_of(robot, (0.0, 0.0, 0.0))

@@ -9,6 +9,7 @@ stays; shapes that collide go where others are drawn, and capsules are fitted to
 each link.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -34,6 +35,7 @@ LEAST_ARMATURE = 0.1
 TURN = 2 * np.pi
 """Range of a joint without one, to both sides [rad]."""
 HINGE, SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
+FREE, BALL = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)
 
 
 def robot_from_mjcf(
@@ -108,14 +110,20 @@ def _compiled(spec: Any) -> mujoco.MjModel:
         raise ConfigError(f"The MJCF must compile: {error}") from error
 
 
+def _joints_said(model: mujoco.MjModel) -> str:
+    """Return how many joints of which kinds there are, in words."""
+    names = {FREE: "free", BALL: "ball", HINGE: "hinge", SLIDE: "slide"}
+    counts = Counter(names[int(kind)] for kind in model.jnt_type)
+    return ", ".join(f"{n} {name} joint{'s' * (n > 1)}" for name, n in counts.items()) or "no joint"
+
+
 def _chain(model: mujoco.MjModel, name: str) -> tuple[list[str], list[str]]:
     """Return the names of joints and of their bodies; `ConfigError` unless they are one chain."""
     kinds = {int(kind) for kind in model.jnt_type}
     if not model.njnt or not kinds <= {HINGE, SLIDE}:
         raise ConfigError(
             f"{name}: an arm has hinges and slides only, with its foot fixed; this MJCF has "
-            f"{model.njnt} joints, {sorted(kinds - {HINGE, SLIDE})} of them of other kinds "
-            "(0: free, 1: ball). Take free joints out, and a gripper or a second arm."
+            f"{_joints_said(model)}. Take free joints out, and a gripper or a second arm."
         )
     bodies = model.jnt_bodyid.tolist()
     for before, body in pairwise(bodies):

@@ -12,6 +12,7 @@ import numpy as np
 
 from hrc_env.core.brought import check_kind
 from hrc_env.core.errors import ConfigError, check_shape, whole
+from hrc_env.core.lending import read_only, refuse_writing
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm
 from hrc_env.tasks.goal import Goal
@@ -60,10 +61,35 @@ def check_parts(task: TaskType) -> None:
         raise ConfigError(f"{task.id}: every field of config needs a default ({error}).") from error
     if task.goal is not None and not isinstance(task.goal, Goal):
         raise ConfigError(f"{task.id}: goal must be a Goal, got {type(task.goal).__name__}.")
+    if task.goal is not None:
+        _check_goal(task.id, task.goal, made.config)
     _check_terms(made)
     check_kind(f"{task.id}: make_scene", made.make_scene(), TaskScene)
     check_places(f"{task.id}: reach_targets", made.reach_targets())
     _check_state(made)
+
+
+def _check_goal(who: str, goal: Goal, config: Any) -> None:
+    """Refuse a reward that is not of each pair of goals for itself, however many there are."""
+    name, size = f"{who}: Goal.reward", whole(f"{who}: Goal.size", goal.size, 1, 2**62)
+    rng = np.random.default_rng(0)
+    achieved = goal.bound * rng.uniform(-1, 1, (2, 3, size))
+    desired = achieved + 0.1 * goal.bound * rng.uniform(-1, 1, (2, 3, size))
+    desired[0] = achieved[0]  # reached
+    says = f"(..., {size}) and (..., {size}) to (...), for any leading axes: reduce axis=-1"
+    try:
+        found = [np.asarray(goal.reward(*read_only((achieved[at], desired[at])), config))
+                 for at in (..., 0, (0, 0), 1, (1, 2))]  # fmt: skip
+    except (ValueError, IndexError, TypeError) as error:
+        if "read-only" in str(error):
+            refuse_writing(name, error)  # type: ignore[arg-type]
+        raise ConfigError(f"{name} must take {says}; it raises {error}.") from error
+    whole_one, *parts = found
+    for at, part in zip((0, (0, 0), 1, (1, 2)), parts, strict=True):
+        if whole_one.shape != (2, 3) or part.shape != whole_one[at].shape:
+            raise ConfigError(f"{name} must take {says}; got {whole_one.shape} of (2, 3, {size}).")
+        if not np.allclose(part, whole_one[at], equal_nan=True):
+            raise ConfigError(f"{name} must judge each pair for itself, whatever stands beside it.")
 
 
 def _described(task: object) -> str:

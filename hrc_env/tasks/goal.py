@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hrc_env.belief import Belief
+from hrc_env.belief import Belief, lent_belief
 from hrc_env.core.brought import check_arguments
 from hrc_env.core.errors import ConfigError, check_shape
+from hrc_env.core.lending import called, is_of_user, read_only
 from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.typing import Bools, Floats, Tensor
 from hrc_env.rewards import RewardTerm
@@ -27,10 +28,25 @@ TERM = "goal"
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """What a task wants, apart from its observation. Functions are over batches (B, ...).
+    """A goal apart from the observation, as hindsight replay (HER) needs it.
 
-    The observation must not tell the goal: a transition that is judged by another goal would tell
-    the old one.
+        import numpy as np
+        from hrc_env import Goal
+
+        goal = Goal(
+            size=3,
+            bound=4.0,
+            achieved=lambda belief: belief.robot.tool_world,
+            desired=lambda belief: belief.task,
+            reward=lambda achieved, desired, config: -np.linalg.norm(achieved - desired, axis=-1),
+            doc="Minus the distance of the tool from the goal [m].",
+        )
+
+    In a task with the attribute `goal` observations are dictionaries of `observation`,
+    `achieved_goal` and `desired_goal`, `reward` is a term of the reward, and `compute_reward` and
+    `train --algorithm sac` judge transitions by other goals. Functions are over batches (B, ...).
+    The observation must not hold the goal: a transition that is judged by another goal would still
+    hold the old one.
     """
 
     size: int
@@ -55,11 +71,19 @@ class Goal:
 
 def parts(goal: Goal, now: Belief) -> dict[str, Tensor]:
     """(B, size) float32 what the observation holds of a goal, by name."""
-    wanted = {ACHIEVED: goal.achieved(now), DESIRED: goal.desired(now)}
+    wanted = {
+        ACHIEVED: _asked("Goal.achieved", goal.achieved, now),
+        DESIRED: _asked("Goal.desired", goal.desired, now),
+    }
     for name, value in wanted.items():
         check_shape(name, np.shape(value), (len(now.action), goal.size), "its `size`")
     clipped = {k: np.clip(value, -goal.bound, goal.bound) for k, value in wanted.items()}
     return {name: value.astype(np.float32) for name, value in clipped.items()}
+
+
+def _asked(what: str, function: Callable[[Belief], Floats], now: Belief) -> Floats:
+    """The value (B, size) of a function; one of users is given a read-only belief."""
+    return called(what, function, lent_belief(now)) if is_of_user(function) else function(now)
 
 
 def reward_terms(goal: Goal | None) -> tuple[RewardTerm, ...]:
@@ -69,7 +93,8 @@ def reward_terms(goal: Goal | None) -> tuple[RewardTerm, ...]:
 
     def function(now: Belief, step: Any, previous: Floats, config: Any) -> Floats:
         held = parts(goal, now)
-        return goal.reward(held[ACHIEVED].astype(float), held[DESIRED].astype(float), config)
+        pair = (held[ACHIEVED].astype(float), held[DESIRED].astype(float))
+        return called("Goal.reward", goal.reward, *read_only(pair), config)
 
     return (RewardTerm(TERM, goal.doc, function),)
 
@@ -100,7 +125,9 @@ def judged(
         A number, or (B,).
     """
     reached, wanted = _pair(goal, achieved, desired)
-    value = np.zeros(reached.shape[:-1]) + factor * goal.reward(reached, wanted, config)
+    pair = read_only((reached, wanted))
+    given = called("Goal.reward", goal.reward, *pair, config)
+    value = np.zeros(reached.shape[:-1]) + factor * given
     for name in others:
         value = value + _told(info, f"reward/{name}", value.shape)
     return value if value.ndim else float(value)

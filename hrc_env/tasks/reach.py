@@ -108,6 +108,9 @@ def _judge(tool_world, dt_s, radius_m, time_limit_s, state, step):
     return done
 
 
+MIDDLE = "the middle of its goals"
+
+
 def _new_goals(
     state: Records, ids: Ints, rngs: Rngs, tool_world: Points3, config: ReachConfig
 ) -> None:
@@ -118,13 +121,20 @@ def _new_goals(
         state["distance_m"][b] = math.dist(goal, tool)
 
 
-def nearest_targets(config: TargetConfig) -> list[ReachTarget]:
-    """Return the places of the nearest goals."""
-    (x, y), near_m = config.base_xy_world, config.distance_m[0]
+def goal_places(config: TargetConfig) -> list[ReachTarget]:
+    """Return the places of the nearest goals, and the middle of all: a robot that is too short for
+    that cannot reach most of them."""
+    (x, y), (near_m, far_m) = config.base_xy_world, config.distance_m
     (left, right), (low_m, high_m) = config.azimuth_rad, config.height_m
-    x, y = x + near_m * math.cos((left + right) / 2), y + near_m * math.sin((left + right) / 2)
-    at, within_m = (x, y, (low_m + high_m) / 2), (high_m - low_m) / 2
-    return [ReachTarget("the nearest goal", at, within_m=within_m)]
+    middle_rad, z, within_m = (left + right) / 2, (low_m + high_m) / 2, (high_m - low_m) / 2
+
+    def at(away_m: float) -> tuple[float, float, float]:
+        return x + away_m * math.cos(middle_rad), y + away_m * math.sin(middle_rad), z
+
+    return [
+        ReachTarget("the nearest goal", at(near_m), within_m=within_m),
+        ReachTarget(MIDDLE, at((near_m + far_m) / 2), within_m=config.radius_m),
+    ]
 
 
 def given_target(goal: Floats, config: TargetConfig) -> list[ReachTarget]:
@@ -195,7 +205,7 @@ class Reach(Task[ReachConfig, Records]):
         return np.zeros(batch, REACH)
 
     def reach_targets(self) -> list[ReachTarget]:
-        return nearest_targets(self.config)
+        return goal_places(self.config)
 
     def goal_targets(self, goal: Floats) -> list[ReachTarget]:
         """A place (3,) [m, world]: the first goal of the episode."""

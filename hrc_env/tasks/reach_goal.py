@@ -9,7 +9,7 @@ from hrc_env.core.typing import Floats, Ints, Points3, Records, Rngs
 from hrc_env.geometry.reach import ReachTarget
 from hrc_env.tasks import BUILT_IN
 from hrc_env.tasks.goal import Goal
-from hrc_env.tasks.reach import TargetConfig, drawn_goal, given_target, nearest_targets
+from hrc_env.tasks.reach import TargetConfig, drawn_goal, given_target, goal_places
 from hrc_env.tasks.task import Task
 from hrc_env.world import World
 
@@ -69,7 +69,7 @@ class ReachGoal(Task[ReachGoalConfig, Records]):
         return np.zeros(batch, REACH_GOAL)
 
     def reach_targets(self) -> list[ReachTarget]:
-        return nearest_targets(self.config)
+        return goal_places(self.config)
 
     def goal_targets(self, goal: Floats) -> list[ReachTarget]:
         """A place (3,) [m, world]: the goal of the episode."""

@@ -30,12 +30,13 @@ class Task(Generic[ConfigT, StateT]):
 
     The first paragraph of a subclass's docstring describes the task. A subclass must define `id`,
     `config_type`, `achieved`, `failed`, and the methods `make_state`, `reset`, `advance`, `view`
-    and `info`; the other attributes and methods have defaults.
+    and `info`; the other attributes (docs/reference/declarations.md) and methods have defaults.
 
     All methods work on a batch of environments. `state` is a structured array, or a dataclass of
     arrays, with a row for every environment; `ids` are the rows in question, all rows where a
     method has no such argument. `rngs` holds a generator for every environment of the batch, and
-    events in environment b draw from `rngs[b]` only. `world` is the robot, its hand and the objects
+    events in environment b draw from `rngs[b]` only. Methods write into `state` in `reset`,
+    `set_goal` and `advance`, and only read all else. `world` is the robot, its hand and the objects
     as they are. B is the number of environments in question,
     O of the task's loose objects, W of worker slots, N of robot joints.
 

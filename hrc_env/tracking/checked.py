@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from hrc_env.core.batching import copied
 from hrc_env.core.brought import check_arguments, described, flags_of, numbers_of
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Keypoints, PoseEstimate
@@ -63,15 +64,15 @@ class CheckedEstimator:
 
     def reset(self, state: Any, ids: Ints, rngs: Rngs) -> None:
         """Start environments `ids` anew."""
-        self.inner.reset(state, ids, rngs)
+        self.inner.reset(state, ids.copy(), rngs)
 
     def predict(self, state: Any, dt_s: float, rngs: Rngs) -> None:
         """Let `dt_s` seconds pass."""
         self.inner.predict(state, dt_s, rngs)
 
     def update(self, state: Any, keypoints: Keypoints, rngs: Rngs) -> None:
-        """Take one set of frames in."""
-        self.inner.update(state, keypoints, rngs)
+        """Take one set of frames in, of which the estimator gets arrays of its own."""
+        self.inner.update(state, copied(keypoints), rngs)
 
     def estimate(self, state: Any) -> PoseEstimate:
         """Return what is believed now, checked."""

@@ -14,12 +14,13 @@
 A control step is `predict` and then `update`; `estimate` may be asked at any time.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
+from hrc_env.core.batching import copied, rows
 from hrc_env.core.brought import check_arguments, check_kind, described
 from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.core.mapping import answer_unknown_fields
@@ -278,3 +279,60 @@ def check_estimator(spec: EstimatorSpec) -> None:
         made.update(state, replace(nothing, time_s=times_s), rngs)
     made.estimate(state)
     made.forecast(state, 0.2)
+    _check_alone(spec)
+
+
+def _check_alone(spec: EstimatorSpec) -> None:
+    """Raise `ConfigError` for an estimator in which environments depend on each other, or on
+    anything outside its state."""
+    seeds = (0, 1)
+    together = _followed(spec, seeds)
+    for row, seed in enumerate(seeds):
+        for one, several in zip(_followed(spec, (seed,)), together, strict=True):
+            _check_same(spec, one, rows(several, np.array([row])), (
+                "one environment is estimated otherwise beside others than alone: draw from "
+                "rngs[b] of environment b only, and take nothing over the first axis"
+            ))  # fmt: skip
+
+
+def _followed(spec: EstimatorSpec, seeds: Sequence[int]) -> list[PoseEstimate]:
+    """Return the estimates of standing people, one in each environment."""
+    made, rngs = make_estimator(spec, _P, _DT_S), [np.random.default_rng(seed) for seed in seeds]
+    state, everyone = made.init(len(seeds), 1), np.arange(len(seeds))
+    made.reset(state, everyone, rngs)
+    noise = [np.random.default_rng((seed, 1)) for seed in seeds]
+    body = np.random.default_rng(0).uniform(-0.4, 0.4, (N_JOINTS, 3))
+    homogeneous = np.append(body, np.ones((N_JOINTS, 1)), axis=1)
+    image = homogeneous @ _P.swapaxes(-1, -2)
+    px = (image[..., :2] / image[..., 2:])[None, :, None]
+
+    def look() -> Keypoints:
+        shape = (len(seeds), len(_P), 1, N_JOINTS)
+        moved = np.stack([each.normal(0.0, 1.0, (*shape[1:], 2)) for each in noise])
+        return Keypoints(px + moved, np.full(shape, 0.9), np.full(shape, 2.0))
+
+    found: list[PoseEstimate] = []
+    for k in range(6):
+        seen, before = look(), (copied(state), copied(rngs))
+        made.predict(state, _DT_S, rngs)
+        made.update(state, seen, rngs)
+        found.append(made.estimate(state))
+        if k == 3:  # it forgets one of them, as when its episode ends
+            made.reset(state, np.flatnonzero(np.array(seeds) == 1), rngs)
+        if k == 5:  # late frames: it goes on from a copy of the state
+            state, rngs = before
+            made.predict(state, _DT_S, rngs)
+            made.update(state, seen, rngs)
+            _check_same(spec, made.estimate(state), found[-1], (
+                "it comes to something else from a copy of its state: keep all that changes in the "
+                "state, nothing in self, and draw from rngs only"
+            ))  # fmt: skip
+            _check_same(spec, made.estimate(state), found[-1], "estimate must change nothing")
+    return found
+
+
+def _check_same(spec: EstimatorSpec, one: PoseEstimate, other: PoseEstimate, said: str) -> None:
+    for name in ("mean_world", "cov_world", "velocity_world", "age_s", "tracked"):
+        x, y = (np.asarray(getattr(each, name), float) for each in (one, other))
+        if not np.allclose(x, y, 1e-5, 1e-7):
+            raise ConfigError(f"{spec.name}: {said} ({name} differs).")

@@ -370,7 +370,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         if len(over) > 0 and np.shape(actions) == self.action_space.shape:
             actions = np.array(actions)
             actions[over] = 0.0
-        return checked_action(actions, self._action_shape)
+        return checked_action(actions, self._action_shape, self.shards.first.control)
 
 
 def _without_pictures(arguments: dict[str, Any]) -> dict[str, Any]:

@@ -156,6 +156,7 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
             return getattr(self._vector, name)
         if name not in self._vector.notes[self._k]:
             valid = [each for each in dir(self) if not each.startswith("_")]
+            valid += [each for each in (*ALIKE, *TOGETHER) if each not in valid]
             raise NoAttributeError(str(unknown("attribute of one environment", name, valid)))
         return self._vector.notes[self._k][name]
 

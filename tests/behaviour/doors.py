@@ -108,6 +108,7 @@ from hrc_env.scene.rigs import floor as floor_points
 from hrc_env.scene.robot import ROBOTS, chain_of
 from hrc_env.settings import settle
 from hrc_env.simulation import Simulation
+from hrc_env.tasks.reach import MIDDLE
 from hrc_env.tasks.task import find_task
 from hrc_env.tracking import metrics, oracle, presence
 from hrc_env.tracking.calibration_monitor import forget_monitor, make_monitor, monitor
@@ -509,7 +510,8 @@ def spots_of(env_id: str, fields: Mapping[str, Any]) -> NDArray[np.float64]:
     """Return where a task with some settings has the tool get to: (n, 7), a place [m], a direction
     (0 if any will do), and how near is near enough [m]."""
     task = find_task(env_id)
-    spots = task(task.config_type(**fields)).reach_targets()
+    found = task(task.config_type(**fields)).reach_targets()
+    spots = [each for each in found if each.name != MIDDLE]  # it refuses robots, and came later
     rows = [[*each.place_world, *(each.along_world or (0, 0, 0)), each.within_m] for each in spots]
     return np.array(rows, float).reshape(-1, 7)
 

@@ -14,7 +14,7 @@ from hrc_env.core.results import Metric, write_results, write_whole
 from hrc_env.evaluation import intervals
 from hrc_env.evaluation.counts import ERRORS_M
 from hrc_env.experiments import plots, report, runner
-from hrc_env.experiments.cache import PartCache, own_folder, owner_of
+from hrc_env.experiments.cache import PartCache, disown, own_folder, owner_of
 from hrc_env.experiments.columns import Column
 
 PLAYED = []
@@ -265,12 +265,43 @@ def test_a_report_holds_its_pictures_its_origin_and_all_numbers(tmp_path):
 
 def test_an_experiment_plays_each_part_once_and_again_with_other_settings(tmp_path):
     for n in (1, 1, 2):
-        found = runner.run_experiment(Counting(n), tmp_path)
+        found = runner.run_experiment(Counting(n), str(tmp_path), overwrite=n == 2)
         assert found["x"].value == n
     assert PLAYED == [1, 2]
     assert runner.changed(Counting(1), n=None) == Counting(1)
     with pytest.raises(ConfigError, match="n must be at least 1, got 0"):
         runner.at_least_one(Counting(0), "n")
+
+
+@pytest.mark.parametrize("left", ["experiment.json", "results.json"])
+def test_results_with_other_settings_are_refused_and_stay(tmp_path, left):
+    runner.run_experiment(Counting(1), tmp_path)
+    for name in {"experiment.json", "results.json"} - {left}:
+        (tmp_path / name).unlink()
+    if left == "results.json":  # as earlier versions wrote the other one
+        (tmp_path / "experiment.json").write_text('{"experiment": "count"}')
+    before = {each: each.read_bytes() for each in tmp_path.iterdir() if each.is_file()}
+    with pytest.raises(ConfigError, match=r"other settings: n is 1 there and 2 here.*--overwrite"):
+        runner.run_experiment(Counting(2), tmp_path)
+    assert before == {each: each.read_bytes() for each in tmp_path.iterdir() if each.is_file()}
+    assert runner.run_experiment(Counting(1), tmp_path)["x"].value == 1
+    assert runner.run_experiment(Counting(2), tmp_path, overwrite=True)["x"].value == 2
+    with pytest.raises(ConfigError, match="n is 2 there and 1 here"):
+        own_folder(tmp_path, "count", settings={"n": 1})
+    disown(tmp_path)
+    own_folder(tmp_path, "count", settings={"n": 1})
+
+
+def test_differences_of_settings_are_named_and_those_of_code_are_none(tmp_path):
+    def settings(**row):
+        return {"rows": {"a": {"source": "f0", **row}}, "setups": ("x", "y")}
+
+    own_folder(tmp_path, "s", settings=settings(n=1))
+    own_folder(tmp_path, "s", settings=settings(n=1, source="f1", estimator_source="9"))
+    with pytest.raises(ConfigError) as refused:
+        own_folder(tmp_path, "s", settings=settings(n=2, b=1, c=2, d=3))
+    assert "rows.a.n is 1 there and 2 here; rows.a.b is" in str(refused.value)
+    assert "and 1 more" in str(refused.value)
 
 
 def test_a_quick_report_says_so_at_every_table_and_figure_and_marks_nothing(tmp_path):

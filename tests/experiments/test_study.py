@@ -99,7 +99,7 @@ def test_a_row_is_played_once_and_again_only_where_it_changed(tmp_path, monkeypa
     assert run_experiment(study(), tmp_path) == first
     other = {**study().rows, "qp": Row("`ssm`", 2, setup=TRUTH, env={"shield": "ssm"})}
     with pytest.raises(pytest.fail.Exception, match="played again"):
-        run_experiment(study(rows=other, columns=(mean("cost"),)), tmp_path)
+        run_experiment(study(rows=other, columns=(mean("cost"),)), tmp_path, overwrite=True)
 
 
 def test_the_size_of_a_part_changes_no_number(tmp_path):

@@ -1,5 +1,7 @@
 """Where tools have to get to: an arm that is too short is refused before anything happens."""
 
+from dataclasses import replace
+
 import gymnasium
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from hrc_env.env import HRCEnv
 from hrc_env.geometry.reach import ReachTarget, check_reach, wrist_reach
 from hrc_env.scene.build import build
 from hrc_env.tasks import pick_place
+from hrc_env.tasks.task import find_task
 from hrc_env.world import FOOT_WORLD, TaskScene
 from tests.tasks.variants import vary
 
@@ -40,7 +43,7 @@ def test_it_depends_on_where_the_tool_points(x_m, along, fits):
 
 
 def test_goals_too_far_away_are_refused():
-    said = r"the nearest goal at .* out of reach of the robot 'ur10e_like', whose wrist .* nearer"
+    said = r"the nearest goal at .* out of reach of the robot 'ur10e_like', .* nearer"
     for task in ("HRCReach-v0", "HRCReachGoal-v0"):
         with pytest.raises(ConfigError, match=said):
             gymnasium.make(task, perception="none", config={"task": {"distance_m": (2.0, 2.5)}})
@@ -60,3 +63,21 @@ def test_a_command_for_a_hand_that_an_arm_has_not_is_refused():
     with pytest.raises(ConfigError, match=r"\(6,\).*\(7,\)"):
         env.step(np.zeros(7, np.float32))
     env.close()
+
+
+@pytest.mark.parametrize(("size", "fits"), [(1.0, True), (0.7, True), (0.35, False)])
+def test_an_arm_that_is_too_short_for_most_goals_is_refused(size, fits):
+    """The package's arm, scaled, would reach the nearest goals with a third of its length."""
+    own = ARM.parent_from_joint.copy()
+    own[1:, :3, 3] *= size
+    tool = ARM.link_from_tool.copy()
+    tool[:3, 3] *= size
+    short = replace(ARM, parent_from_joint=own, link_from_tool=tool)
+    for task in ("HRCReach-v0", "HRCReachGoal-v0"):
+        nearest, middle = find_task(task)().reach_targets()
+        check_reach(task, "short", short, [nearest])
+        if fits:
+            check_reach(task, "short", short, [middle])
+        else:
+            with pytest.raises(ConfigError, match=r"the middle of its goals at .* out of reach"):
+                check_reach(task, "short", short, [middle])

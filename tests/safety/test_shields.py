@@ -439,7 +439,7 @@ def test_to_a_welcome_hand_the_last_link_may_come_and_others_stand_still(beside,
     [
         ("cbf", "Unknown shield 'cbf'. Valid: 'ssm', 'qp', 'pfl'"),
         ({"kind": "cbf"}, "kind of shield 'cbf'"),
-        ({"margin_m": -0.1}, r"shield\.margin_m must not be negative, got -0.1"),
+        ({"sigmas": -0.1}, r"shield\.sigmas must not be negative, got -0.1"),
         ({"margin": 0.1}, r"shield\.margin"),
         ({"retreat_m_s": "fast"}, r"shield\.retreat_m_s must be a finite number"),
         ({"unknown_m_s": -1.0}, r"shield\.unknown_m_s must not be negative"),

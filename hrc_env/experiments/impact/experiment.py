@@ -183,7 +183,7 @@ class Impact:
             Part(
                 name if len(shards) == 1 else f"{name}.{shard[0]}",
                 partial(
-                    play_row, setup, made_with, shard, self.n_steps,
+                    _play, policy.label, setup, made_with, shard, self.n_steps,
                     maker(policy, checkpoint, self.trust), policy.margin_m,
                 ),
                 self._key(setup, control, policy, ppo, shard),
@@ -224,6 +224,14 @@ class Impact:
         """Draw the figure; return the tables beside it."""
         robots = labels_of(self.policies, WORDS)
         return report(figures, played, metrics, robots, self.warning)
+
+
+def _play(label: str, *given: Any) -> Any:
+    """Return the rows of `play_row`; errors begin with the label of the policy."""
+    try:
+        return play_row(*given)
+    except ConfigError as error:
+        raise ConfigError(f"{label}: {error}") from error
 
 
 QUICK: dict[str, Any] = {"n_seeds": 8, "n_pixels": 1, "n_steps": 100, "learning_steps": 65_536}

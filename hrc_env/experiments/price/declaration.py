@@ -14,7 +14,8 @@ ASKED = """\
 Eyes that see less need more distance, and distance costs work. Every pair of eyes gets the shield
 margin with which the robot touches a worker while moving towards them {level:g} times in 1,000
 episodes of 10 s, {hourly:.1f} times an hour; the goals that are left are compared. The margin is
-added to all protective distances of the `{shield}` shield and may be negative: the shield as it
+added to all protective distances of the `{shield}` shield (`margin_m` and `hand_margin_m`
+of `ShieldConfig`) and may be negative: the shield as it
 comes is much safer than that. It is found by bisection on {n_seeds} episodes, the same for all
 eyes, and confirmed on {n_fresh} others: the uncertainty of the level and of the margin is in the
 intervals. Workers take no notice of {robot}; a touch is called by what the robot did in the step

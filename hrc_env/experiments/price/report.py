@@ -60,9 +60,18 @@ def _open_ended(task: str, rows: Mapping[str, Row], metrics: Metrics) -> str:
     beyond = [f"`{name}`" for name, row in rows.items() if row.ends_at(margins_m[name])]
     if not beyond:
         return ""
+    unsure = [
+        f"`{name}` ({row.margin_m:+.3f} m)"
+        for name, row in rows.items()
+        if row.ends_at(margins_m[name]) and abs(row.margin_m - margins_m[name]) > 1e-6
+    ]
+    elsewhere = (
+        f" Fresh seeds of {', '.join(unsure)} were played with that margin, where the search "
+        "supposed the level; they contradict it, and are too few to place it."
+    )
     return (
         f"The level lies beyond the margins that were tried for {', '.join(beyond)}: theirs is "
-        "the last one tried, and their price a bound."
+        f"the last one tried, and their price a bound.{elsewhere if unsure else ''}"
     )
 
 

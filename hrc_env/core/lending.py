@@ -1,0 +1,102 @@
+"""Read-only views of arrays, for functions of users: others are given the same arrays."""
+
+import functools
+from collections.abc import Callable
+from typing import Any, NoReturn, TypeVar
+
+import numpy as np
+
+from hrc_env.core.batching import names_of
+from hrc_env.core.errors import ConfigError
+
+RecordT = TypeVar("RecordT")
+_CONSTANTS: dict[int, tuple[Any, Any]] = {}
+"""Records that never change, by identity, with their read-only forms."""
+_MOST = 64
+"""Greatest number of these that is kept."""
+
+
+def read_only(record: RecordT) -> RecordT:
+    """Return a (nested) record of the same kind with read-only views of its arrays.
+
+    Args:
+        record: an array, or a dataclass, named tuple, tuple, list or dict of these; anything else
+            is returned as it is.
+    """
+    if isinstance(record, np.ndarray):
+        if not record.flags.writeable:
+            return record
+        view = record.view()
+        view.flags.writeable = False
+        return view  # type: ignore[return-value]
+    names = names_of(type(record))
+    if names:
+        return _record_of(type(record), names, [read_only(getattr(record, n)) for n in names])
+    if isinstance(record, dict):
+        return type(record)((name, read_only(part)) for name, part in record.items())
+    if isinstance(record, tuple | list):
+        return type(record)(map(read_only, record))  # type: ignore[return-value]
+    return record
+
+
+def constant(record: RecordT) -> RecordT:
+    """Return `read_only` of a record that never changes, made once."""
+    known = _CONSTANTS.get(id(record))
+    if known is None or known[0] is not record:
+        if len(_CONSTANTS) >= _MOST:
+            _CONSTANTS.clear()
+        known = _CONSTANTS[id(record)] = record, read_only(record)
+    return known[1]
+
+
+def is_of_user(function: Any) -> bool:
+    """Return whether a function is none of this package."""
+    try:
+        return _is_of_user(function)
+    except TypeError:  # an object with a __call__, not hashable
+        return True
+
+
+@functools.cache
+def _is_of_user(function: Any) -> bool:
+    while isinstance(function, functools.partial):
+        function = function.func
+    return str(getattr(function, "__module__", "")).partition(".")[0] != "hrc_env"
+
+
+def called(what: str, function: Callable[..., Any], *given: Any) -> Any:
+    """Call a function of a user with read-only arguments.
+
+    Args:
+        what: name of the function in the error.
+        function: of the user.
+        given: its arguments, as `read_only` returns them.
+
+    Raises:
+        ConfigError: it writes into one of them.
+    """
+    try:
+        return function(*given)
+    except ValueError as error:
+        if "read-only" in str(error):
+            refuse_writing(what, error)
+        raise
+
+
+def refuse_writing(what: str, error: ValueError) -> NoReturn:
+    """Raise the `ConfigError` of a function that writes into its arguments."""
+    raise ConfigError(
+        f"{what} writes into an array that it is given ({error}). It may only read it, as others "
+        "are given the same: make a copy first (x = x.copy()), or a new array (x = x - y in place "
+        "of x -= y)."
+    ) from error
+
+
+def _record_of(kind: type[Any], names: tuple[str, ...], values: list[Any]) -> Any:
+    """Make a record of its fields, without its `__post_init__`."""
+    if issubclass(kind, tuple):
+        return kind(*values)
+    made = object.__new__(kind)
+    for name, value in zip(names, values, strict=True):
+        object.__setattr__(made, name, value)
+    return made

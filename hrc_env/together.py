@@ -1,0 +1,110 @@
+"""A task with several environments together and with each alone: both must give the same, as no
+environment depends on others, or on anything outside its state."""
+
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import closing
+from typing import Any
+
+import numpy as np
+
+from hrc_env.core.errors import ConfigError
+from hrc_env.settings import Settings
+from hrc_env.simulation import Simulation
+from hrc_env.step_result import StepResult
+
+SEEDS = (0, 1)
+"""Of the environments, one each; their later episodes have others."""
+N_STEPS = 4
+"""Control steps before something else is tried."""
+RULE = (
+    "All methods work on rows: of environment b draw from rngs[b], write and return the rows of "
+    "`ids` only, and take no sum, mean or greatest value over the first axis."
+)
+Numbers = dict[str, Any]
+"""Arrays (B, ...) of a result, by name."""
+
+
+def check_rows(settings: Settings) -> None:
+    """Play a task with two environments together, with each alone, and from a state again.
+
+    Raises:
+        ConfigError: an environment gives something else beside others, or after `set_state`; it
+            names the first difference.
+    """
+    together = _whole(settings, SEEDS)
+    for row, seed in enumerate(SEEDS):
+        for one, several in zip(_whole(settings, (seed,)), together, strict=True):
+            mine = {name: value[row] for name, value in several.items()}
+            if wrong := _different({name: value[0] for name, value in one.items()}, mine):
+                raise ConfigError(
+                    f"{settings.task.id}: {wrong} of an environment is another one beside others "
+                    f"than alone. {RULE}"
+                )
+
+
+def _whole(settings: Settings, seeds: Sequence[int]) -> list[Numbers]:
+    """Return all results of `_played`, without warnings: they come when an environment is made."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            return list(_played(settings, seeds))
+        except (ValueError, IndexError, TypeError) as error:
+            raise ConfigError(
+                f"{settings.task.id} fails with {len(seeds)} of its environments, or at the reset "
+                f"of one of them: {type(error).__name__}: {error}. {RULE}"
+            ) from error
+
+
+def _played(settings: Settings, seeds: Sequence[int]) -> Iterator[Numbers]:
+    """Yield the results of resets and steps, some of them again from a state."""
+    batch = len(seeds)
+    with closing(Simulation(batch, settings)) as simulation:
+        everyone = np.arange(batch)
+        rngs = [np.random.default_rng(seed) for seed in seeds]
+        draws = [np.random.default_rng((seed, 1)) for seed in seeds]
+
+        def steps() -> Iterator[Numbers]:
+            for _ in range(N_STEPS):
+                action = [each.uniform(-1, 1, simulation.n_actions) for each in draws]
+                yield _numbers(simulation.step(np.array(action)))
+
+        yield _numbers(simulation.reset(everyone, rngs))
+        yield from steps()
+        state, drawn = simulation.get_state(), [each.bit_generator.state for each in draws]
+        first = list(steps())
+        simulation.set_state(state)
+        for each, before in zip(draws, drawn, strict=True):
+            each.bit_generator.state = before
+        for before, after in zip(first, steps(), strict=True):
+            if wrong := _different(before, after):
+                raise ConfigError(
+                    f"{settings.task.id}: {wrong} is another one when an environment goes on from "
+                    "a state again. All that changes must be in the state that make_state "
+                    "returns, nothing in self, and all chance in rngs."
+                )
+            yield after
+        again: dict[int, Numbers] = {}
+        for b in everyone.tolist():  # one after the other, as episodes end
+            rng = np.random.default_rng((seeds[b], 2))
+            again[b] = _numbers(simulation.reset(everyone[b : b + 1], [rng]))
+        yield {k: np.concatenate([again[b][k] for b in again]) for k in again[0]}
+        yield from steps()
+
+
+def _numbers(result: StepResult) -> Numbers:
+    """A result by name of its parts."""
+    seen = result.observation
+    parts = dict(seen) if isinstance(seen, dict) else {"observation": seen}
+    named = {"the reward": result.reward, "the end": result.terminated}
+    named |= {f"info[{name!r}]": value for name, value in result.info.items()}
+    return named | {f"{name!r}": value for name, value in parts.items()}
+
+
+def _different(one: Numbers, other: Numbers) -> str:
+    """Return the name of the first array that differs by more than rounding; "" if none does."""
+    for name, value in one.items():
+        x, y = np.asarray(value, float), np.asarray(other[name], float)
+        if x.shape != y.shape or not np.allclose(x, y, 1e-5, 1e-7, equal_nan=True):
+            return name
+    return ""
