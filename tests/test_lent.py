@@ -104,9 +104,8 @@ def test_a_shield_that_writes_into_the_belief_is_refused(field):
         zeroed(field)(now)
         return velocities, {}
 
-    env = HRCVectorEnv(2, perception="none", shield=shield)
     with pytest.raises(hrc_env.ConfigError, match=r"A shield writes.*copy"):
-        env.reset(seed=0)
+        HRCVectorEnv(2, perception="none", shield=shield).reset(seed=0)
 
 
 def test_the_velocities_are_a_shields_own():
