@@ -31,7 +31,7 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     ),
     "list": (
         "hrc_env.cli.listing", "List",
-        "Environments, perception levels, estimators, scenes, cameras and agents by name.",
+        "Environments, perception levels, estimators, scenes, cameras, shields and agents by name.",
     ),
     "play": (
         "hrc_env.cli.play", "Play",

@@ -175,7 +175,7 @@ def _import_file(path: Path, recorded: bool) -> None:
         return
     spec = spec_from_file_location(name, path)
     if not path.is_file():
-        raise ConfigError(f"There is no file {path} to import.")
+        raise ConfigError(f"{path} cannot be imported: there is no such file.")
     if spec is None or spec.loader is None:
         raise ConfigError(f"{path} cannot be imported: it must be a Python file (.py).")
     sys.modules[name] = module = module_from_spec(spec)
