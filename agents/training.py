@@ -60,7 +60,7 @@ SHARES = {"success_rate": ", of attempts", "is_success": ", of episodes"}
 FILM_SEEDS = 8
 """Number of episodes of which the film shows the one that comes closest to the worker."""
 STOPPED = 130
-"""Exit status of what Ctrl-C stopped."""
+"""Exit status of a run that Ctrl-C stopped."""
 
 
 def run(arguments: TrainingRequest) -> int:

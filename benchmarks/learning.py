@@ -31,7 +31,7 @@ class Training:
 
     @property
     def score(self) -> dict[str, Any]:
-        """What `train` found at its end."""
+        """Return the score that `train` wrote at its end."""
         return json.loads((self.folder / "score.json").read_text())
 
     def run(self) -> None:

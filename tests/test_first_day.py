@@ -194,7 +194,7 @@ def test_files_are_imported_as_paths_come(tmp_path):
     hrc_env.import_files([files[0], str(files[1])])
     hrc_env.import_files(files[2])
     assert sys.first_day == [0, 1, 2]
-    with pytest.raises(hrc_env.ConfigError, match=r"nowhere\.py cannot be imported: there is no such"):
+    with pytest.raises(hrc_env.ConfigError, match=r"nowhere\.py cannot be imported: there is no"):
         hrc_env.import_files(tmp_path / "nowhere.py")
     with pytest.raises(hrc_env.ConfigError, match="must be the paths of Python files, got 3"):
         hrc_env.import_files(3)

@@ -25,7 +25,7 @@ from .policy_module import PolicyModule
 from .runner_env import RunnerEnv, make_envs
 
 ENVIRONMENT = "hrc_env"
-"""What RLlib calls our environments."""
+"""Name of our environments in RLlib."""
 _LOGGER = logging.getLogger("ray.rllib")
 """Of workers that fail; its lines would come between those of the progress."""
 SEEDS_OF_RUN = 100_000
@@ -47,12 +47,12 @@ class RunnerSettings:
     share: float
     """Of a core that each counts as, where there are fewer cores."""
     registrations: Registrations
-    """What is made known to them."""
+    """Registrations of this process, which they take."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sampled:
-    """What an update has learnt from."""
+    """Data of an update."""
 
     n_steps: int
     """Environment steps."""
@@ -66,7 +66,7 @@ class Sampled:
     learning_s: float
 
     def facts(self) -> dict[str, float]:
-        """Return what TensorBoard and Ray's metrics show, by name."""
+        """Return rates and counts for TensorBoard and Ray's metrics, by name."""
         passed_s = max(self.sampling_s + self.learning_s, 1e-9)
         return {
             "steps_per_s": self.n_steps / passed_s,
@@ -148,8 +148,7 @@ class RLlibPPO:
         self.push()
 
     def push(self) -> None:
-        """Give learner and runners what the policy knows: network, Adam's moments, the scale of
-        rewards."""
+        """Give learner and runners the policy's network, Adam's moments and scale of rewards."""
         known = self.policy.policy
         weights, moments = known.state_dict(), known.optimizer.state_dict()
 
@@ -167,7 +166,7 @@ class RLlibPPO:
         self._each(lambda envs: envs.take_rewards_state(scale))
 
     def pull(self) -> None:
-        """Give the policy what was learnt, and the scale of rewards."""
+        """Give the policy the learnt network, Adam's moments and scale of rewards."""
 
         def give(learner: Any) -> Any:
             module = learner.module[DEFAULT_MODULE_ID].policy
@@ -187,7 +186,7 @@ class RLlibPPO:
         return found
 
     def _each(self, do: Callable[[RunnerEnv], Any]) -> list[Any]:
-        """Return what a function of each living runner's environments returns."""
+        """Return the results of a function of each living runner's environments."""
         return self.algorithm.env_runner_group.foreach_env_runner(
             lambda runner: do(envs_of(runner)), local_env_runner=False
         )
@@ -212,7 +211,7 @@ class RLlibPPO:
         )
 
     def last_error(self) -> str:
-        """Return the last error of a worker: its own, or what RLlib says of one that died."""
+        """Return the last error of a worker: its own, or RLlib's message of its death."""
         return ray.get(self._told.last.remote()) or self._errors.said or "none was said"
 
     def close(self) -> None:
@@ -260,7 +259,7 @@ class GoOn(RLlibCallback):
 
 
 class Told:
-    """What workers say before they fail; an actor of Ray."""
+    """Last words of workers that fail; an actor of Ray."""
 
     def __init__(self) -> None:
         self.said = ""
@@ -270,7 +269,7 @@ class Told:
         self.said = said
 
     def last(self) -> str:
-        """Return the last of it; "" if nothing was said."""
+        """Return the last message; "" if there is none."""
         return self.said
 
 

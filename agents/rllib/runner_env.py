@@ -38,14 +38,14 @@ def make_envs(num_envs: int, keywords: Mapping[str, Any]) -> VectorEnv[Any, Any,
 
 
 def try_environment(keywords: Mapping[str, Any]) -> None:
-    """Make an environment and step it; an `HRCError` says what this machine lacks."""
+    """Make an environment and step it once; an `HRCError` names a missing requirement."""
     with closing(make_envs(1, keywords)) as env:
         env.reset(seed=0)
         env.step(env.action_space.sample())
 
 
 class RunnerEnv(VectorWrapper[Any, Any, Any, Any, Any]):
-    """What PPO learns in: `env` with scaled rewards, without infos; finished episodes are kept.
+    """Environments with scaled rewards and without infos, which keep finished episodes.
 
     A running estimate of the discounted return's variance scales rewards, as `VecNormalize` of
     Stable-Baselines3 does. First episodes end early at random times, so that a short rollout sees
@@ -54,7 +54,7 @@ class RunnerEnv(VectorWrapper[Any, Any, Any, Any, Any]):
     Args:
         env: starts environments anew in the step after an episode's end.
         gamma: discount per step.
-        tell: told an error of a step in words, before it is raised.
+        tell: receives the error of a step in words, before it is raised.
     """
 
     def __init__(

@@ -30,16 +30,16 @@ def learn(
     interrupt: Interrupt,
     console: Console,
 ) -> None:
-    """Learn on what was learnt before, up to the run's steps, or an interrupt.
+    """Learn on from the policy of a run, up to its steps or an interrupt.
 
     Args:
-        run: what is learnt.
+        run: task, budget and workers.
         settings: of PPO; of every worker's environments a rollout has `n_steps`.
         whole: weight of the proximity term when the ramp is over.
         log: of a PPO of Stable-Baselines3, which has the network, Adam's moments and the scale of
             rewards, and is saved.
         interrupt: asked before every update.
-        console: for sentences that somebody should read.
+        console: shows notes on the cluster.
 
     Raises:
         ConfigError: no such cluster, or a machine that cannot work.

@@ -22,7 +22,7 @@ class Benchmark(EngineArguments):
     """
 
     policy: str
-    """random, scripted, scripted_slowed, hrc://ID/NAME; the path of a checkpoint of `train` or of
+    """Agent: random, scripted, scripted_slowed, hrc://ID/NAME; the path of a checkpoint of `train` or of
     Stable-Baselines3 (.zip) or of a policy of `export` (.safetensors); or MODULE:FUNCTION, a
     function that is given an EnvInfo and returns an object with act(observation)."""
     trust: bool = False

@@ -11,8 +11,8 @@ class EngineArguments:
     """Where parts are played; their numbers are the same everywhere."""
 
     engine: str | None = None
-    """serial: one after the other; processes: as many at once as there are cores; ray: as tasks of
-    a cluster (docs/many_machines.md). If not given, what is faster on this machine."""
+    """Engine: serial, one part after the other; processes, as many at once as there are cores; ray, as
+    tasks of a cluster (docs/many_machines.md). If not given, what is faster on this machine."""
     workers: int | None = None
     """With processes and ray: how many parts are played at once; all cores if not given."""
     address: str | None = None

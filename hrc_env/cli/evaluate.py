@@ -1,4 +1,4 @@
-"""python -m hrc_env evaluate: the score of an agent over many episodes, on one machine or many."""
+"""Score agents over many episodes, on one machine or many: python -m hrc_env evaluate."""
 
 import json
 from dataclasses import asdict, dataclass, replace
@@ -29,7 +29,7 @@ class Evaluate(EnvironmentArguments, EngineArguments):
     task: Annotated[str, tyro.conf.Positional] = DEFAULT
     """Which environment, by its id."""
     agent: str = "scripted"
-    """random, scripted, scripted_slowed, hrc://ID/NAME; the path of a checkpoint of `train` or of
+    """Agent: random, scripted, scripted_slowed, hrc://ID/NAME; the path of a checkpoint of `train` or of
     Stable-Baselines3 (.zip) or of a policy of `export` (.safetensors); or MODULE:FUNCTION, a
     function that is given an EnvInfo and returns an object with act(observation)."""
     trust: bool = False

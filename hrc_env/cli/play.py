@@ -27,7 +27,7 @@ class Play(EnvironmentArguments):
     task: Annotated[str, tyro.conf.Positional] = DEFAULT
     """Which environment, by its id."""
     agent: str = "scripted_slowed"
-    """random, scripted, scripted_slowed, hrc://ID/NAME (python -m hrc_env list); the path of a
+    """Agent: random, scripted, scripted_slowed, hrc://ID/NAME (python -m hrc_env list); the path of a
     checkpoint of `train` or of Stable-Baselines3 (.zip) or of a policy of `export` (.safetensors);
     or MODULE:FUNCTION, a function that is given an EnvInfo and returns an object with
     act(observation). Files of this package know --control."""

@@ -1,4 +1,4 @@
-"""A cluster of Ray: one that is there, or one on this machine; and what its machines lack."""
+"""Clusters of Ray: connection, machines, and the requirements that these must meet."""
 
 import os
 import socket
@@ -30,7 +30,7 @@ ANSWER_S = 10.0
 STORE_BYTES = 500_000_000
 """Shared memory of a cluster on this machine."""
 Note = Callable[[str], None]
-"""Told a sentence that somebody should read."""
+"""Receives a sentence for the user."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ def connected(
     Args:
         address: of a cluster: "auto" on one of its machines, "HOST:6379", or "ray://HOST:10001";
             None: one is started on this machine, and stopped at the end.
-        note: told what is worth knowing of it.
+        note: receives notes on the cluster.
         dashboard: whether a cluster on this machine has Ray's dashboard.
 
     Raises:
@@ -83,7 +83,7 @@ def connected(
 
 
 def _check_answers(address: str) -> None:
-    """Raise `ConfigError` if nothing listens there; Ray itself would try for minutes."""
+    """Raise `ConfigError` if nothing listens at an address; Ray itself would try for minutes."""
     host, _, port = address.removeprefix("ray://").rpartition(":")
     if not (host and port.isdigit()):
         raise ConfigError(f"--address must be auto, HOST:PORT or ray://HOST:PORT, got {address!r}.")
@@ -101,7 +101,7 @@ def _refused(address: str | None, error: Exception, remedy: str) -> ConfigError:
 
 
 def _remedy(said: str) -> str:
-    """Return what helps against what Ray says."""
+    """Return the remedy for an error of Ray."""
     if "ersion mismatch" in said:
         return "all machines must have the same versions of Ray and of Python"
     if "oken" in said:
@@ -127,7 +127,7 @@ def share_of(workers: int, machines: list[Machine], note: Note = print) -> float
     Args:
         workers: how many there will be.
         machines: of the cluster.
-        note: told if there are more workers than cores.
+        note: receives a warning if there are more workers than cores.
     """
     n = sum(each.n_cores for each in machines)
     if workers <= n:
@@ -140,13 +140,13 @@ def share_of(workers: int, machines: list[Machine], note: Note = print) -> float
 def check_machines(
     machines: list[Machine], works: Callable[[], None] | None = None, note: Note = print
 ) -> None:
-    """Raise `ConfigError` for a machine that has no package, another version of it, or that lacks
-    what `works` needs, which is called on each; it is waited for while kernels are compiled.
+    """Raise `ConfigError` for a machine without the package, with another version of it, or on
+    which `works` fails; machines that compile kernels are waited for.
 
     Args:
         machines: of the cluster.
-        works: raises an `HRCError` for what is missing.
-        note: told what is waited for.
+        works: called on each machine; its `HRCError` says what is missing.
+        note: receives the addresses of machines that are waited for.
     """
     registrations = pack()
     asked = {
@@ -193,7 +193,7 @@ def _check_answer(answer: Any, machine: Machine) -> None:
 
 
 def reason_of(error: BaseException) -> str:
-    """Return in words what a worker died of, or raised."""
+    """Return the error of a worker in words."""
     cause: Any = getattr(error, "cause", None) if isinstance(error, RayTaskError) else None
     found = cause if isinstance(cause, BaseException) else error
     while isinstance(found, RayTaskError) and isinstance(found.cause, BaseException):

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 from hrc_env.core.errors import ConfigError, check_names, whole
 
 Tick = Callable[[float], None]
-"""Told by how much the share of a call that is done grew."""
+"""Receives the growth of the finished share of a call."""
 Call = Callable[[Tick], Any]
 """Something to be computed, of what it was made with alone: the result is the same everywhere."""
 ENGINES = ("serial", "processes", "ray")
@@ -23,7 +23,7 @@ class Done:
     """Its number."""
     result: Any
     seconds: float
-    """What it took."""
+    """Time that it took."""
 
 
 class Engine(Protocol):
@@ -38,12 +38,12 @@ class Engine(Protocol):
         """Compute calls; yield each as soon as it is done, in any order.
 
         Args:
-            calls: what is computed.
-            tick: told the number of a call, and by how much the share of it that is done grew;
-                calls in other processes tell nothing before they are done.
+            calls: functions of a `Tick`.
+            tick: receives the number of a call and the growth of its finished share; of a call in
+                another process once, at its end.
 
         Raises:
-            HRCError: what a call has raised; or a worker died again and again.
+            HRCError: an error of a call; or a worker died again and again.
         """
         ...
 

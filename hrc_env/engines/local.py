@@ -44,7 +44,7 @@ class Processes:
     is_parallel = True
 
     def run(self, calls: Sequence[Call], tick: Callable[[int, float], None]) -> Iterator[Done]:
-        """As of `Engine`; what a process has not finished that died is computed again."""
+        """As of `Engine`; unfinished calls of a process that died are computed again."""
         left, deaths = dict(enumerate(calls)), 0
         while left:
             try:
@@ -80,7 +80,7 @@ class Processes:
 
 
 def call_pickled(call: bytes) -> tuple[Any, float]:
-    """Return what a pickled call returns, and how long it took [s]."""
+    """Return the result of a pickled call and its duration [s]."""
     import cloudpickle
 
     started_s = time.monotonic()
@@ -89,7 +89,7 @@ def call_pickled(call: bytes) -> tuple[Any, float]:
 
 
 def ignore(share: float) -> None:
-    """Tell nobody of progress."""
+    """Drop the progress of a call."""
 
 
 def pickled(call: Call) -> bytes:

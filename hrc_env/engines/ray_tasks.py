@@ -23,7 +23,7 @@ class RayTasks:
     address: str | None = None
     """Of the cluster, as of `cluster.connected`."""
     note: Callable[[str], None] = print
-    """Told what is worth knowing of it."""
+    """Receives notes on the cluster."""
     is_parallel = True
 
     def run(self, calls: Sequence[Call], tick: Callable[[int, float], None]) -> Iterator[Done]:
@@ -48,14 +48,14 @@ class RayTasks:
 
 
 def _compute(registrations: Registrations, call: bytes) -> tuple[Any, float]:
-    """Return what a pickled call returns, and how long it took [s]."""
+    """Return the result of a pickled call and its duration [s]."""
     cluster.one_core()
     registrations.unpack()
     return call_pickled(call)
 
 
 def _got(answer: Any, k: int) -> tuple[Any, float]:
-    """Return the result of a call; what it raised of ours is raised again."""
+    """Return the result of a call; an `HRCError` of the call is raised again."""
     try:
         return ray.get(answer)
     except RayTaskError as error:

@@ -108,7 +108,7 @@ DELIVERY_STEP = np.dtype([("progress_m", "f8"), ("hit", "?"), ("delivered", "?")
 
 @dataclass(frozen=True, slots=True)
 class DeliveryView:
-    """What robots know of their task."""
+    """The robots' view of their task."""
 
     goal_world: Floats
     """(B, 2) middle of the zone [m]."""

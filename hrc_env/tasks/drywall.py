@@ -98,7 +98,7 @@ DRYWALL_STEP = np.dtype([("progress_m", "f8"), ("driven", "i8"), ("done", "?")],
 
 @dataclass(frozen=True, slots=True)
 class DrywallView:
-    """What robots know of their task."""
+    """The robots' view of their task."""
 
     place_world: Points3
     """(3,) where the board's middle belongs [m]."""

@@ -99,7 +99,7 @@ HANDOVER_STEP = np.dtype([("progress_m", "f8"), ("taken", "?"), ("done", "?")], 
 
 @dataclass(frozen=True, slots=True)
 class HandoverView:
-    """What robots know of their task."""
+    """The robots' view of their task."""
 
     meet_world: Points3
     """(3,) about where a hand is put out [m]."""

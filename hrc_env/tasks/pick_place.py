@@ -80,7 +80,7 @@ PICK_PLACE_STEP = np.dtype([("progress_m", "f8"), ("placed", "i8"), ("done", "?"
 
 @dataclass(frozen=True, slots=True)
 class PickPlaceView:
-    """What robots know of their task."""
+    """The robots' view of their task."""
 
     placed: Bools
     """(B, 3)."""

@@ -79,7 +79,7 @@ REACH_STEP = np.dtype(
 
 @dataclass(frozen=True, slots=True)
 class ReachView:
-    """What robots know of their task."""
+    """The robots' view of their task."""
 
     goal_world: Points3
     """(B, 3) [m]."""

@@ -31,7 +31,7 @@ REACH_GOAL = np.dtype(
 
 @dataclass(frozen=True, slots=True)
 class ReachGoalView:
-    """What robots know of their task."""
+    """The robots' view of their task."""
 
     goal_world: Points3
     """(B, 3) [m]."""
