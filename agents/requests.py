@@ -34,8 +34,9 @@ class TrainingRequest(EnvironmentArguments):
     num_envs: int = 64
     """Environments that step together; with --engine ray, in each worker."""
     engine: str = "sb3"
-    """Learner's library: sb3, Stable-Baselines3 on this machine; ray, RLlib's PPO, whose workers step environments on
-    the machines of a cluster (docs/many_machines.md). Its policies are the same files."""
+    """Learner's library: sb3, Stable-Baselines3 on this machine; ray, RLlib's PPO, whose workers
+    step environments on the machines of a cluster (docs/many_machines.md). Its policies are the
+    same files."""
     workers: int | None = None
     """With --engine ray: processes that step environments; one for each core if not given."""
     address: str | None = None

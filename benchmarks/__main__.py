@@ -99,6 +99,7 @@ class SpeedArguments(BenchArguments):
     Everybody takes turns: nothing else should run on the machine.
     """
 
+    stays = "it takes times, which other processes would disturb"
     out: Path = Path("out/bench_speed")
     task: str | None = None
     """Which environment, by its id, instead of the first; the other ids are then left out. Or
@@ -121,6 +122,7 @@ class SpeedArguments(BenchArguments):
 class MotionArguments(BenchArguments):
     """Play everything that workers can do; statistics beside those of people."""
 
+    stays = "it has no parts that could be played apart"
     out: Path = Path("out/bench_motion")
     seeds: int | None = None
     """How often each worker plays a scene, instead of 12 (2 if quick)."""

@@ -22,9 +22,10 @@ class Benchmark(EngineArguments):
     """
 
     policy: str
-    """Agent: random, scripted, scripted_slowed, hrc://ID/NAME; the path of a checkpoint of `train` or of
-    Stable-Baselines3 (.zip) or of a policy of `export` (.safetensors); or MODULE:FUNCTION, a
-    function that is given an EnvInfo and returns an object with act(observation)."""
+    """Agent: random, scripted, scripted_slowed, hrc://ID/NAME; the path of a checkpoint of `train`
+    or of Stable-Baselines3 (.zip) or of a policy of `export` (.safetensors); or
+    MODULE:FUNCTION, a function that is given an EnvInfo and returns an object with
+    act(observation)."""
     trust: bool = False
     """Read pickles in a checkpoint, which run code of whoever made it; see play."""
     ids: tuple[str, ...] = tuple(BUILT_IN)

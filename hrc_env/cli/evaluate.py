@@ -29,9 +29,10 @@ class Evaluate(EnvironmentArguments, EngineArguments):
     task: Annotated[str, tyro.conf.Positional] = DEFAULT
     """Which environment, by its id."""
     agent: str = "scripted"
-    """Agent: random, scripted, scripted_slowed, hrc://ID/NAME; the path of a checkpoint of `train` or of
-    Stable-Baselines3 (.zip) or of a policy of `export` (.safetensors); or MODULE:FUNCTION, a
-    function that is given an EnvInfo and returns an object with act(observation)."""
+    """Agent: random, scripted, scripted_slowed, hrc://ID/NAME; the path of a checkpoint of `train`
+    or of Stable-Baselines3 (.zip) or of a policy of `export` (.safetensors); or
+    MODULE:FUNCTION, a function that is given an EnvInfo and returns an object with
+    act(observation)."""
     trust: bool = False
     """Read pickles in a checkpoint, which run code of whoever made it; see play."""
     episodes: int = 64

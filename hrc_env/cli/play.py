@@ -27,10 +27,10 @@ class Play(EnvironmentArguments):
     task: Annotated[str, tyro.conf.Positional] = DEFAULT
     """Which environment, by its id."""
     agent: str = "scripted_slowed"
-    """Agent: random, scripted, scripted_slowed, hrc://ID/NAME (python -m hrc_env list); the path of a
-    checkpoint of `train` or of Stable-Baselines3 (.zip) or of a policy of `export` (.safetensors);
-    or MODULE:FUNCTION, a function that is given an EnvInfo and returns an object with
-    act(observation). Files of this package know --control."""
+    """Agent: random, scripted, scripted_slowed, hrc://ID/NAME (python -m hrc_env list); the path of
+    a checkpoint of `train` or of Stable-Baselines3 (.zip) or of a policy of `export`
+    (.safetensors); or MODULE:FUNCTION, a function that is given an EnvInfo and returns an
+    object with act(observation). Files of this package know --control."""
     trust: bool = False
     """Read pickles in a checkpoint of Stable-Baselines3, which run code of whoever made it: for
     policy or network classes of its author's own, and for statistics of VecNormalize."""

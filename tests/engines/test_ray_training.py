@@ -1,0 +1,96 @@
+"""Runs of `train --engine ray` through the command line: as others, and gone on with by both."""
+
+import json
+from pathlib import Path
+
+import pytest
+from commands import ROOT, called, hrc
+
+from hrc_env.__main__ import main
+
+pytestmark = pytest.mark.slow
+
+TINY = ["--num-envs", "4", "--episodes", "2", "--no-film"]
+BROKEN = """
+import os
+import signal
+import sys
+
+import hrc_env
+
+
+class Broken(hrc_env.find_task("HRCReach-v0")):
+    id = "HRCBroken-v0"
+    max_episode_steps = 50
+    n_views = 0
+
+    def view(self, *given):
+        Broken.n_views += 1
+        if "default_worker" in sys.argv[0] and Broken.n_views > 30:
+            raise ValueError("the task is broken")
+        return super().view(*given)
+
+
+hrc_env.register_task(Broken)
+"""
+
+
+def train(*words: object):
+    return called(ROOT / "train.py", *TINY, *words)
+
+
+def test_a_run_is_gone_on_with_by_both_libraries(tmp_path):
+    run = tmp_path / "run"
+    done = train("--engine", "ray", "--workers", "1", "--timesteps", 400, "--out", run)
+    assert done.returncode == 0, done.stderr
+    assert {"policy.zip", "curve.json", "score.json", "run.json", "tensorboard"} <= {
+        path.name for path in run.iterdir()
+    }
+    learnt = steps_of(run)
+    assert learnt[-1] >= 400
+    again = train("--timesteps", 800, "--resume", run)
+    assert again.returncode == 0, again.stderr
+    both = steps_of(run)
+    assert both[: len(learnt)] == learnt
+    assert both[-1] >= 800
+    last = train("--engine", "ray", "--timesteps", 1200, "--resume", run)
+    assert last.returncode == 0, last.stderr
+    assert steps_of(run)[-1] >= 1200
+    assert not (tmp_path / "run-2").exists()
+
+
+def steps_of(run: Path) -> list[float]:
+    """Steps at the points of the curve."""
+    return [point["steps"] for point in json.loads((run / "curve.json").read_text())]
+
+
+def test_workers_that_fail_again_and_again_end_it_with_their_error(tmp_path):
+    path = tmp_path / "broken.py"
+    path.write_text(BROKEN)
+    asked = ["--task", "HRCBroken-v0", "--engine", "ray", "--workers", "1", "--timesteps", "5000"]
+    out = ["--out", str(tmp_path / "run")]
+    done = hrc("--import", str(path), "train", *asked, *TINY, *out, HRC_ENV_REGISTERED="")
+    assert done.returncode == 2
+    assert "No worker has stepped" in done.stderr
+    assert "ValueError: the task is broken" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--engine", "ray", "--algorithm", "sac"], "--engine ray learns by ppo"),
+        (
+            ["--engine", "ray", "--cost-limit", "3", "--algorithm", "ppo_lagrangian"],
+            "learns by ppo",
+        ),
+        (["--engine", "ray", "--workers", "0"], "--workers must be at least 1"),
+        (["--engine", "ry"], "Did you mean 'ray'"),
+        (["--workers", "2"], "--workers goes with --engine ray"),
+        (["--address", "auto"], "--address goes with --engine ray"),
+        (["--perception", "pixels"], "or --engine ray"),
+        (["--engine", "ray", "--address", "nowhere"], "must be auto, HOST:PORT"),
+    ],
+)
+def test_what_the_engine_cannot_do_is_said(words, said, tmp_path, capsys):
+    assert main(["train", *words, "--no-film", "--out", str(tmp_path / "run")]) == 2
+    assert said in " ".join(capsys.readouterr().err.split())
