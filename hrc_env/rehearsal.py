@@ -15,8 +15,7 @@ from hrc_env.scene.render import VIEWPOINTS
 from hrc_env.settings import Settings
 from hrc_env.simulation import Simulation
 from hrc_env.tasks.check import check_counts
-from hrc_env.tasks.hooks import Sizes, with_checks
-from hrc_env.tasks.lent import lent
+from hrc_env.tasks.hooks import Sizes, lent, with_checks
 from hrc_env.tasks.task import is_known
 from hrc_env.tracking.estimators import BUILT_IN, ESTIMATORS
 

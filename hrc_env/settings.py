@@ -20,7 +20,7 @@ from hrc_env.scene.rigs import RIGS
 from hrc_env.scene.robot import DEFAULT as DEFAULT_ROBOT
 from hrc_env.scene.robot import ROBOTS, Robot, robot_called
 from hrc_env.tasks.check import check_parts
-from hrc_env.tasks.lent import lent
+from hrc_env.tasks.hooks import lent
 from hrc_env.tasks.task import Task, find_task, is_known
 from hrc_env.tracking.estimators import EstimatorSpec, estimator_called
 

@@ -1,5 +1,6 @@
-"""A task whose hooks are checked: for the steps that are played when it is registered."""
+"""Hooks of a task: checked for the steps of its registration, and read-only for those of users."""
 
+import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import wraps
@@ -9,6 +10,7 @@ import numpy as np
 
 from hrc_env.core.brought import check_kind, described, flags_of, numbers_of
 from hrc_env.core.errors import ConfigError, check_shape
+from hrc_env.core.lending import called, is_of_user, read_only
 from hrc_env.core.skeleton import SEGMENT_RADIUS_M
 from hrc_env.geometry.reach import ReachTarget
 from hrc_env.tasks.task import Task
@@ -125,3 +127,34 @@ CHECKS: dict[str, Check] = {
     "signal": _signal,
 }
 """Checks of results, by hook."""
+
+WRITERS = ("reset", "set_goal", "advance")
+"""Methods that write their first argument, the state; all others only read it."""
+_READERS = [
+    name for name, hook in inspect.getmembers(Task, inspect.isfunction)
+    if name[0] != "_" and name not in ("make_state", "make_scene", "reach_targets", "counts")
+]  # fmt: skip
+
+
+def lent(task: Task[Any, Any]) -> Task[Any, Any]:
+    """Give read-only arrays to methods that a user has written; return the task.
+
+    Such a method raises `ConfigError` if it writes into one of them, as others, a shield among
+    them, are given the same arrays.
+    """
+    for name in _READERS:
+        if is_of_user(getattr(type(task), name)):
+            vars(task)[name] = _reading(task, name)
+    return task
+
+
+def _reading(task: Task[Any, Any], name: str) -> Callable[..., Any]:
+    hook = getattr(task, name)
+    first = 1 if name in WRITERS else 0
+
+    @wraps(hook)
+    def reading(*given: Any) -> Any:
+        rest = [each if isinstance(each, list) else read_only(each) for each in given[first:]]
+        return called(f"{task.id}: {name}", hook, *given[:first], *rest)
+
+    return reading
