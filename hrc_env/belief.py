@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hrc_env.core.kernels import kernel
-from hrc_env.core.lending import constant, read_only
+from hrc_env.core.lending import read_only
 from hrc_env.core.records import HandState, ObjectState, PoseEstimate, RobotState
 from hrc_env.core.skeleton import SEGMENT_RADIUS_M
 from hrc_env.core.typing import Bools, Floats, Ints, JointVelocities, Points3
@@ -84,8 +84,8 @@ class Belief:
 def lent_belief(now: Belief) -> Belief:
     """Return a belief with read-only arrays, for functions of users."""
     if getattr(_LAST, "now", None) is not now:  # several terms are given the same one
-        lent = read_only(replace(now, model=None))
-        _LAST.now, _LAST.lent = now, replace(lent, model=constant(now.model))
+        _LAST.lent = read_only(now, constants=("model",))
+        _LAST.now = now
     return _LAST.lent
 
 

@@ -146,7 +146,7 @@ def evaluated(
     for term in terms:
         given: Any = now, step, previous_action, weights
         if is_of_user(term.function):
-            lent = lent_belief(now), *read_only(given[1:])
+            lent = lent_belief(now), *read_only(given[1:3]), weights
             values[term.name] = called(f"Reward term {term.name!r}", term.function, *lent)
         else:
             values[term.name] = term.function(*given)

@@ -1,7 +1,7 @@
 """Read-only views of arrays, for functions of users: others are given the same arrays."""
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any, NoReturn, TypeVar
 
 import numpy as np
@@ -16,22 +16,27 @@ _MOST = 64
 """Greatest number of these that is kept."""
 
 
-def read_only(record: RecordT) -> RecordT:
+def read_only(record: RecordT, constants: Collection[str] = ()) -> RecordT:
     """Return a (nested) record of the same kind with read-only views of its arrays.
 
     Args:
         record: an array, or a dataclass, named tuple, tuple, list or dict of these; anything else
             is returned as it is.
+        constants: names of its fields whose values never change, as of `constant`.
     """
     if isinstance(record, np.ndarray):
-        if not record.flags.writeable:
-            return record
         view = record.view()
-        view.flags.writeable = False
+        view.setflags(write=False)
         return view  # type: ignore[return-value]
+    if record is None or isinstance(record, float | int | str):
+        return record
     names = names_of(type(record))
     if names:
-        return _record_of(type(record), names, [read_only(getattr(record, n)) for n in names])
+        parts = [
+            constant(getattr(record, n)) if n in constants else read_only(getattr(record, n))
+            for n in names
+        ]
+        return _record_of(type(record), names, parts)
     if isinstance(record, dict):
         return type(record)((name, read_only(part)) for name, part in record.items())
     if isinstance(record, tuple | list):
@@ -96,7 +101,7 @@ def _record_of(kind: type[Any], names: tuple[str, ...], values: list[Any]) -> An
     """Make a record of its fields, without its `__post_init__`."""
     if issubclass(kind, tuple):
         return kind(*values)
-    made = object.__new__(kind)
+    made, write = object.__new__(kind), object.__setattr__
     for name, value in zip(names, values, strict=True):
-        object.__setattr__(made, name, value)
+        write(made, name, value)
     return made
