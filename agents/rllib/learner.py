@@ -1,6 +1,7 @@
 """RLlib's PPO round the network of Stable-Baselines3."""
 
 import logging
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -62,16 +63,13 @@ class Sampled:
     """Runners that live."""
     n_restarts: int
     """Runners that died and were started anew, so far."""
-    sampling_s: float
-    learning_s: float
+    seconds: float
+    """Time of sampling and learning."""
 
     def facts(self) -> dict[str, float]:
         """Return rates and counts for TensorBoard and Ray's metrics, by name."""
-        passed_s = max(self.sampling_s + self.learning_s, 1e-9)
         return {
-            "steps_per_s": self.n_steps / passed_s,
-            "sampling_s": self.sampling_s,
-            "learning_s": self.learning_s,
+            "steps_per_s": self.n_steps / self.seconds,
             "workers": self.n_runners,
             "restarts": self.n_restarts,
         }
@@ -198,16 +196,16 @@ class RLlibPPO:
             proximity: weight of the term of that name.
         """
         self._each(lambda envs: envs.weigh_proximity(proximity))
+        began_s = time.monotonic()
         result = self.algorithm.train()
         finished = self._each(lambda envs: envs.take_finished())
-        kept, timers = result.get("fault_tolerance", {}), result.get("timers", {})
+        kept = result.get("fault_tolerance", {})
         return Sampled(
             n_steps=int(result.get("env_runners", {}).get("num_env_steps_sampled", 0)),
             episodes=[each for some in finished for each in some],
             n_runners=int(kept.get("num_healthy_workers", self.runners.n)),
             n_restarts=int(kept.get("num_remote_worker_restarts", 0)),
-            sampling_s=float(timers.get("env_runner_sampling_timer", 0.0)),
-            learning_s=float(timers.get("learner_update_timer", 0.0)),
+            seconds=time.monotonic() - began_s,
         )
 
     def last_error(self) -> str:
