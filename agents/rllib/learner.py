@@ -87,7 +87,7 @@ class RLlibPPO:
     def __init__(self, policy: PPO, settings: PPOSettings, runners: RunnerSettings) -> None:
         self.policy, self.runners = policy, runners
         self._errors = LastError()
-        self._told = ray.remote(Told).options(num_cpus=0).remote()
+        self._told: Any = ray.remote(Told).options(num_cpus=0).remote()
         self._handlers = _LOGGER.handlers
         _LOGGER.handlers = [self._errors]
         n, num_envs = runners.n, runners.num_envs
