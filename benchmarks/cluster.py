@@ -1,15 +1,15 @@
 """What workers of RLlib are worth: python -m benchmarks.cluster [--quick] [--out DIR].
 
-One and two workers take turns on this machine: how long 64 of their environments take for a
-rollout of 64 steps, and how long PPO learns from it. From one worker follows a model: workers step
-at the same time, and one core learns from what all have seen; so n workers take the time of one
-rollout and n times the time of learning from it. It is held against two workers, and says what
-more of them would give.
+One and two workers take turns on this machine, and Stable-Baselines3 without any: how long 64 of
+their environments take for a rollout of 64 steps, and how long PPO learns from it. From one worker
+follows a model: workers step at the same time, and one core learns from the steps of all; so n
+workers take the time of one rollout and n times the time of learning from it. It is held against
+two workers, and extended to more.
 """
 
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -51,6 +51,7 @@ TABLE = Table(
     name="cluster",
     title="Steps a second of training, by workers of one core each",
     rows={
+        "sb3": ("none", "Stable-Baselines3, measured"),
         "1": ("1", "measured"),
         "2": ("2", "measured"),
         "2_predicted": ("2", "predicted from one"),
@@ -63,9 +64,10 @@ TABLE = Table(
         Column("steps_per_s.{}", "steps/s", digits=0),
         Column("speedup.{}", "times one worker", digits=2),
     ),
-    note="{n[update_s.1]} rounds in turns of 64 environments, 64 steps each, a worker. One step of "
-    "64 environments on one thread takes {step_ms} ms. A step is {bytes} bytes, so that 1 Gbit/s "
-    "carries the steps of {carried} workers.",
+    note="Stable-Baselines3 steps its environments on all cores. {n[update_s.1]} rounds in turns "
+    "of 64 environments, 64 steps each, a worker. One step of 64 environments on one thread takes "
+    "{step_ms} ms. A step is {bytes} bytes, so that 1 Gbit/s carries the steps of {carried} "
+    "workers.",
     numbers={
         "step_ms": Column("step_s", digits=1, scale=1e3, plain=True),
         "bytes": Column("bytes_per_step", digits=0, plain=True),
@@ -115,7 +117,7 @@ class ClusterBench:
         return times | cache.part("watched", self._watched)
 
     def _times(self, tick: PartProgress) -> dict[str, Any]:
-        with _workers() as learners:
+        with _workers() as learners, _alone() as alone:
             found: dict[str, list[float]] = {}
             for k in range(-1, self.n_rounds):  # the first one warms up
                 for n, learner in learners.items():
@@ -125,6 +127,8 @@ class ClusterBench:
                         found.setdefault(f"update_s.{n}", []).append(updated_s)
                         found.setdefault(f"steps.{n}", []).append(n_steps)
                         found.setdefault("bytes_per_step", []).append(n_bytes / n_steps)
+                if k >= 0:
+                    found.setdefault("sb3_steps_per_s", []).append(alone())
                 found.setdefault("step_s", []).append(_step_s())
                 tick(1 / (self.n_rounds + 1))
         return found
@@ -185,17 +189,41 @@ def _workers(numbers: Sequence[int] = MEASURED) -> Iterator[dict[int, Any]]:
                 each.close()
 
 
+@contextmanager
+def _alone() -> Iterator[Callable[[], float]]:
+    """Yield a function that lets Stable-Baselines3 learn from a rollout of as many environments as
+    a worker has, stepped by all cores, and returns its steps a second."""
+    import torch
+
+    from hrc_env.agents import ppo
+    from hrc_env.agents.learner_settings import PPOSettings
+    from hrc_env.sb3 import HRCVecEnv
+
+    torch.set_num_threads(1)  # as `train` does
+    with closing(HRCVecEnv(NUM_ENVS, stagger=True, **KEYWORDS)) as env:
+        learner, n_steps = ppo.make_learner(env, PPOSettings(), 0), NUM_ENVS * PPOSettings().n_steps
+        learner.learn(n_steps)
+
+        def turn() -> float:
+            started_s = time.monotonic()
+            learner.learn(n_steps, reset_num_timesteps=False)
+            return n_steps / (time.monotonic() - started_s)
+
+        yield turn
+
+
 def _turn(learner: Any) -> tuple[float, float, int, int]:
-    """Return the times of a rollout alone, and of a rollout with learning [s]; its steps, and the
-    bytes of one worker's rollout times the workers."""
+    """Return the times of a rollout alone, and of a rollout with learning [s]; the steps of a
+    rollout of all workers, and its bytes."""
     group = learner.algorithm.env_runner_group
     started_s = time.monotonic()
     samples = group.foreach_env_runner(lambda runner: runner.sample(), local_env_runner=False)
     sampled_s = time.monotonic() - started_s
     n_bytes = len(cloudpickle.dumps(samples))
+    n_steps = sum(len(episode) for episodes in samples for episode in episodes)
     started_s = time.monotonic()
-    sampled = learner.update(1.0)
-    return sampled_s, time.monotonic() - started_s, sampled.n_steps, n_bytes
+    learner.update(1.0)
+    return sampled_s, time.monotonic() - started_s, n_steps, n_bytes
 
 
 def _exported() -> dict[str, float]:
@@ -247,6 +275,8 @@ def metrics_of(played: Played) -> dict[str, Metric]:
         found[f"learning_s.{n}"] = over(learning_s.tolist(), "s")
         found[f"steps_per_s.{n}"] = over(rate[n].tolist(), "1/s")
         found[f"speedup.{n}"] = over((rate[n] / rate[1]).tolist(), "ratio")
+    found["steps_per_s.sb3"] = over(played["sb3_steps_per_s"], "1/s")
+    found["speedup.sb3"] = over((times["sb3_steps_per_s"] / rate[1]).tolist(), "ratio")
     n_steps = float(np.median(times["steps.1"]))
     sampling_s, learning_s = found["sampling_s.1"].value, found["learning_s.1"].value
     own = n_steps / (sampling_s + learning_s)

@@ -3,7 +3,6 @@
 import os
 import pickle
 import socket
-import time
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -124,13 +123,12 @@ def free_port() -> int:
         return found.getsockname()[1]
 
 
-def test_clusters_that_are_not_there_are_said_at_once():
+def test_clusters_that_are_not_there_are_said_at_once(monkeypatch):
+    monkeypatch.setattr(cluster.ray, "init", None)  # which would try for minutes
     for address, said in (
         (f"localhost:{free_port()}", "start one with `ray start --head`"),
         ("ray://localhost:1", "start one with `ray start --head`"),
         ("somewhere", "must be auto, HOST:PORT or ray://HOST:PORT"),
     ):
-        began_s = time.monotonic()
         with pytest.raises(ConfigError, match=said), cluster.connected(address):
             pass
-        assert time.monotonic() - began_s < 30

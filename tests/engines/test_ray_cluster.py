@@ -3,7 +3,6 @@
 import os
 import signal
 import textwrap
-import time
 from functools import partial
 
 import calls
@@ -33,6 +32,9 @@ from hrc_env.engines.engine import engine_called
 from hrc_env.engines.ray_tasks import RayTasks
 from hrc_env.engines.registrations import pack
 from hrc_env.evaluation.episodes import play_shards
+from hrc_env.experiments.impact.experiment import Impact
+from hrc_env.experiments.runner import cache_of
+from hrc_env.experiments.site.experiment import Site
 from hrc_env.sb3 import HRCVecEnv
 
 pytestmark = pytest.mark.slow
@@ -40,6 +42,8 @@ cloudpickle.register_pickle_by_value(calls)  # which workers cannot import
 ray.cloudpickle.register_pickle_by_value(calls)
 
 REACH = {"task": "HRCReach-v0", "perception": "keypoints"}
+MOST_UPDATES = 400
+"""After which a killed worker must be there again."""
 OWN = """
 import numpy as np
 import hrc_env
@@ -193,11 +197,13 @@ def test_training_goes_on_without_a_runner_and_without_a_machine(cluster):
         group = learnt.algorithm.env_runner_group
         pids = group.foreach_env_runner(lambda runner: os.getpid(), local_env_runner=False)
         os.kill(pids[0], signal.SIGKILL)
-        sampled, began_s = learnt.update(1.5), time.monotonic()
+        sampled = learnt.update(1.5)
         assert sampled.n_steps >= 2 * 32  # of those that live
-        while sampled.n_restarts == 0 or sampled.n_runners < 3:
-            assert time.monotonic() - began_s < 60
+        for _ in range(MOST_UPDATES):
+            if sampled.n_restarts > 0 and sampled.n_runners == 3:
+                break
             sampled = learnt.update(1.5)
+        assert (sampled.n_restarts > 0, sampled.n_runners) == (True, 3)
         scales = learnt._each(lambda envs: envs.rewards_state())
         assert [weight for _, weight in scales] == [1.5] * 3
         counts = [scale.count for scale, _ in scales]
@@ -267,3 +273,19 @@ def test_more_workers_than_cores_are_said_and_find_a_place(cluster):
     assert ray_cluster.share_of(2, machines, said.append) == 1.0
     found = list(RayTasks(5, note=said.append).run([cores] * 6, silent))
     assert sorted(each.k for each in found) == list(range(6))
+
+
+@pytest.mark.parametrize(
+    "experiment",
+    [
+        Impact(n_seeds=3, n_steps=8, policies=("scripted",), setups=("truth", "particle")),
+        Site(n_seeds=1, seconds=1.5, n_closed=1, estimators=("particle",)),
+    ],
+    ids=["impact", "site"],
+)
+def test_experiments_have_the_parts_of_one_process(cluster, weights, tmp_path, experiment):
+    played = {}
+    for name in ("serial", "ray"):
+        cache = cache_of(experiment, tmp_path / name, lambda *_: None, engine_called(name))
+        played[name] = experiment.play(cache)
+    assert played["serial"] == played["ray"]
