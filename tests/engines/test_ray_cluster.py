@@ -34,6 +34,7 @@ from hrc_env.engines.registrations import pack
 from hrc_env.evaluation.episodes import play_shards
 from hrc_env.experiments.impact.experiment import Impact
 from hrc_env.experiments.runner import cache_of
+from hrc_env.experiments.setups import REFERENCE
 from hrc_env.experiments.site.experiment import Site
 from hrc_env.sb3 import HRCVecEnv
 
@@ -278,7 +279,7 @@ def test_more_workers_than_cores_are_said_and_find_a_place(cluster):
 @pytest.mark.parametrize(
     "experiment",
     [
-        Impact(n_seeds=3, n_steps=8, policies=("scripted",), setups=("truth", "particle")),
+        Impact(n_seeds=3, n_steps=8, policies=("scripted",), setups=("truth", REFERENCE)),
         Site(n_seeds=1, seconds=1.5, n_closed=1, estimators=("particle",)),
     ],
     ids=["impact", "site"],
