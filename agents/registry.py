@@ -93,8 +93,9 @@ def control_of(name: str) -> str | None:
         return None
     from . import acting
 
-    said = acting.meta_of(Path(name)).get("environment", {}).get("control")
-    return said or acting.sb3_files.control_of(Path(name))
+    if meta := acting.meta_of(Path(name)):
+        return meta.get("environment", {}).get("control")
+    return acting.sb3_files.control_of(Path(name))
 
 
 def function_of(name: str) -> Callable[..., Any]:

@@ -133,8 +133,6 @@ STUDIES: dict[str, Study] = {
             BENCH + "speed --task every", 2, KEYPOINTS, ("speed_tasks",), goes_on=False,
             made=Made("benchmarks.speed.bench", "SpeedBench", {"task": "every"}),
         ),
-    }),
-    "cluster": Study({
         "cluster": Command(
             "python -m benchmarks.cluster", 8, (*KEYPOINTS, "agents"), ("cluster",),
             {"ray_metrics.png": "metrics.png"}, goes_on=False,

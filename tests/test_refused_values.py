@@ -43,11 +43,11 @@ ARM, BASE = (chain_of(ROBOTS[name], (0.0, 0.0, 0.0)) for name in ("ur10e_like", 
 )
 def test_an_action_in_which_one_entry_is_wrong_is_refused(action, said):
     with pytest.raises(ConfigError, match=said):
-        checked_action(action, (2, 3))
+        checked_action(action, (2, 3), "tool")
 
 
 def test_an_action_beyond_one_is_taken_as_one():
-    taken = checked_action([[2, -3.0, 0.5], [1.0, -1.0, 0.0]], (2, 3))
+    taken = checked_action([[2, -3.0, 0.5], [1.0, -1.0, 0.0]], (2, 3), "tool")
     assert taken.tolist() == [[1.0, -1.0, 0.5], [1.0, -1.0, 0.0]]
 
 
@@ -271,11 +271,11 @@ def test_a_shield_in_which_one_thing_is_wrong_is_refused(allowed, said, expected
 def test_a_shield_is_asked_about_a_copy_of_the_command_and_the_step():
     command = np.ones((2, 6))
 
-    def halved(now: str, asked: np.ndarray, dt_s: float) -> tuple[np.ndarray, dict]:
+    def halved(now: object, asked: np.ndarray, dt_s: float) -> tuple[np.ndarray, dict]:
         asked *= 0.5
         return asked, {"step_s": np.full(2, dt_s)}
 
-    allowed, said = shielded(halved, "now", command, 0.04)
+    allowed, said = shielded(halved, SimpleNamespace(model=None), command, 0.04)
     assert (allowed == 0.5).all()
     assert (command == 1.0).all()
     assert said["shield/step_s"].tolist() == [0.04, 0.04]

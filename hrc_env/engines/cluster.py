@@ -173,9 +173,10 @@ def _on(machine: Machine) -> Any:
 
 def _describe(registrations: Registrations, works: Callable[[], None] | None) -> str:
     """Return the version of this package on this machine."""
-    registrations.unpack()
-    if works is not None:
-        works()
+    with plain_errors():
+        registrations.unpack()
+        if works is not None:
+            works()
     return VERSION
 
 
@@ -210,6 +211,15 @@ def reason_of(error: BaseException) -> str:
         )
         return f"it cannot import {name!r}: {remedy}."
     return said if isinstance(found, HRCError) else f"{type(found).__name__}: {said[-600:]}"
+
+
+@contextmanager
+def plain_errors() -> Iterator[None]:
+    """Raise errors of ours without those that they came of, which others may not unpickle."""
+    try:
+        yield
+    except HRCError as error:
+        raise type(error)(str(error)) from None
 
 
 def one_core() -> None:

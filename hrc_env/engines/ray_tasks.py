@@ -50,8 +50,9 @@ class RayTasks:
 def _compute(registrations: Registrations, call: bytes) -> tuple[Any, float]:
     """Return the result of a pickled call and its duration [s]."""
     cluster.one_core()
-    registrations.unpack()
-    return call_pickled(call)
+    with cluster.plain_errors():
+        registrations.unpack()
+        return call_pickled(call)
 
 
 def _got(answer: Any, k: int) -> tuple[Any, float]:

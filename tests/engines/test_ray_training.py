@@ -26,7 +26,7 @@ class Broken(hrc_env.find_task("HRCReach-v0")):
 
     def view(self, *given):
         Broken.n_views += 1
-        if "default_worker" in sys.argv[0] and Broken.n_views > 30:
+        if "default_worker" in sys.argv[0] and Broken.n_views > 300:
             raise ValueError("the task is broken")
         return super().view(*given)
 
@@ -83,7 +83,7 @@ def test_workers_that_fail_again_and_again_end_it_with_their_error(tmp_path):
             ["--engine", "ray", "--cost-limit", "3", "--algorithm", "ppo_lagrangian"],
             "learns by ppo",
         ),
-        (["--engine", "ray", "--workers", "0"], "--workers must be at least 1"),
+        (["--engine", "ray", "--workers", "0"], "--workers must be 1 or more"),
         (["--engine", "ry"], "Did you mean 'ray'"),
         (["--workers", "2"], "--workers goes with --engine ray"),
         (["--address", "auto"], "--address goes with --engine ray"),
