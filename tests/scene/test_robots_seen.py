@@ -85,7 +85,7 @@ def test_capsules_are_fitted_to_what_is_drawn_not_to_what_collides(servoed):
     ("changes", "said"),
     [
         ({"mjcf": "<mujoco><worldbody/></mujoco>"}, "hinges and slides only"),
-        ({"mjcf": SERVOED.replace('axis="0 0 1" range="-170 170"', 'type="ball"')}, "other kinds"),
+        ({"mjcf": SERVOED.replace('axis="0 0 1" range="-170 170"', 'type="ball"')}, "1 ball joint"),
         ({"mjcf": "no_such_file.xml"}, "must be an MJCF"),
         ({"mjcf": "<mujoco><nothing/></mujoco>"}, "must be an MJCF"),
         ({"mjcf": 3}, "mjcf must be a str or Path"),
