@@ -2,6 +2,7 @@
 
 import multiprocessing
 import os
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -65,7 +66,8 @@ class Processes:
         """Compute calls with one pool; yield those that are done before a process dies."""
         n = min(self.workers or n_cores(), len(calls))
         context = multiprocessing.get_context("spawn")
-        with _variables(SINGLE), ProcessPoolExecutor(n, mp_context=context) as pool:
+        made = partial(ProcessPoolExecutor, n, mp_context=context, initializer=end_with_parent)
+        with _variables(SINGLE), made() as pool:
             running: dict[Future[Any], int] = {
                 pool.submit(call_pickled, pickled(call)): k for k, call in calls.items()
             }
@@ -77,6 +79,18 @@ class Processes:
                         yield Done(k, *future.result())
             finally:
                 pool.shutdown(wait=False, cancel_futures=True)
+
+
+def end_with_parent() -> None:
+    """End this process as soon as the one that started it has ended, also if that was killed."""
+    parent = multiprocessing.parent_process()
+
+    def wait_for_end() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    threading.Thread(target=wait_for_end, daemon=True, name="hrc_env-parent").start()
 
 
 def call_pickled(call: bytes) -> tuple[Any, float]:

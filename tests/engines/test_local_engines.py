@@ -3,6 +3,9 @@
 import os
 import pickle
 import socket
+import subprocess
+import sys
+import time
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -51,6 +54,32 @@ def test_processes_compute_on_one_core_each_and_what_dies_is_begun_again(tmp_pat
     assert os.getpid() not in {each["pid"] for each in (found[0], found[2])}
     assert found[1] == {"died": True}
     assert "HRC_ENV_CORES" not in os.environ
+
+
+@pytest.mark.slow
+def test_workers_end_with_a_process_that_is_killed(tmp_path):
+    pids = tmp_path / "pids"
+    script = (
+        "import os, sys, time\n"
+        "from hrc_env.engines.local import Processes\n"
+        "def work(tick):\n"
+        "    open(sys.argv[1], 'a').write(f'{os.getpid()} ')\n"
+        "    time.sleep(600)\n"
+        "if __name__ == '__main__':\n"
+        "    list(Processes(2).run([work, work], print))"
+    )
+    path = tmp_path / "script.py"
+    path.write_text(script)
+    with subprocess.Popen([sys.executable, path, pids]) as parent:
+        while not pids.exists() or len(pids.read_text().split()) < 2:
+            time.sleep(0.1)
+        parent.kill()
+    for pid in map(int, pids.read_text().split()):
+        for _ in range(600):
+            if not Path(f"/proc/{pid}").exists():
+                break
+            time.sleep(0.1)
+        assert not Path(f"/proc/{pid}").exists()
 
 
 @pytest.mark.slow

@@ -133,10 +133,11 @@ def test_a_run_that_is_killed_goes_on_to_the_same_numbers(process, tmp_path):
     script = (
         "import os, sys; from pathlib import Path; "
         "from hrc_env.experiments.ablations.experiment import Ablations\n"
+        "from hrc_env.engines.local import Serial\n"
         "from hrc_env.experiments.runner import run_experiment\n"
         "def say(share, label):\n"
         "    if label == 'workers.lab_3': os.kill(os.getpid(), 9)\n"
-        f"run_experiment({config!r}, Path(sys.argv[1]), say)"
+        f"run_experiment({config!r}, Path(sys.argv[1]), say, engine=Serial())"
     )
     out, other = tmp_path / "killed", tmp_path / "whole"
     killed = process("-c", script, out)
