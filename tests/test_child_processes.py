@@ -124,7 +124,8 @@ def test_they_reach_vector_environments_at_pixels(script, pixels):
             envs.close()
             class Other(find_task("HRCOwn-v0")):
                 def info(self, state):
-                    return {**super().info(state), "task/one": np.ones(1)}
+                    said = super().info(state)
+                    return {**said, "task/one": np.ones(len(said["task/goals_reached"]))}
 
             own = {"detector": {"keypoints": "own"}}
             envs = gymnasium.make_vec("HRCReach-v0", 1, task=Other, config=own)
@@ -201,7 +202,7 @@ def test_another_program_may_register_the_same_names(script, tmp_path):
             import_files("odd.py")
             Path("odd.py").unlink()
             """,
-            "odd.py cannot be imported: it must be a Python file (.py).",
+            "odd.py cannot be imported: there is no such file.",
         ),
         (
             """

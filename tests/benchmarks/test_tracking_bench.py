@@ -16,6 +16,7 @@ from benchmarks.tracking.sequences import make_sequences
 from benchmarks.tracking.timing import time_estimator
 from docs import tables
 from hrc_env.core.errors import ConfigError
+from hrc_env.engines.local import Serial
 from hrc_env.experiments import runner
 from hrc_env.tracking.estimators import ESTIMATORS
 
@@ -95,7 +96,7 @@ def test_a_second_run_makes_only_what_is_missing(end_to_end):
     real = tracking_bench.run_cell
     with small() as patch:
         patch.setattr(tracking_bench, "run_cell", lambda *a: made.append(a[0]) or real(*a))
-        runner.run_experiment(TINY, out, lambda share, label: None)
+        runner.run_experiment(TINY, out, lambda share, label: None, engine=Serial())
     assert made == ["paper"]
     again = json.loads(missing.read_text())
     assert {**again, "seconds": before["seconds"]} == before
