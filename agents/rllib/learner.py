@@ -1,6 +1,7 @@
 """RLlib's PPO round the network of Stable-Baselines3."""
 
 import logging
+import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -199,9 +200,10 @@ class RLlibPPO:
         began_s = time.monotonic()
         result = self.algorithm.train()
         finished = self._each(lambda envs: envs.take_finished())
-        kept = result.get("fault_tolerance", {})
+        kept, stepped = result.get("fault_tolerance", {}), result.get("env_runners", {})
+        n_steps = stepped.get("num_env_steps_sampled", math.nan)  # NaN: no worker has answered
         return Sampled(
-            n_steps=int(result.get("env_runners", {}).get("num_env_steps_sampled", 0)),
+            n_steps=0 if math.isnan(n_steps) else int(n_steps),
             episodes=[each for some in finished for each in some],
             n_runners=int(kept.get("num_healthy_workers", self.runners.n)),
             n_restarts=int(kept.get("num_remote_worker_restarts", 0)),

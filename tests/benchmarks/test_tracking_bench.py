@@ -48,7 +48,9 @@ def end_to_end(tmp_path_factory):
     """The folder of a bench on a few frames of two sequences, and what it said."""
     out, said = tmp_path_factory.mktemp("bench"), []
     with small():
-        runner.run_experiment(TINY, out, lambda share, label: said.append((share, label)))
+        runner.run_experiment(
+            TINY, out, lambda share, label: said.append((share, label)), engine=Serial()
+        )
     return out, said
 
 
