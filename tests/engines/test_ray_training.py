@@ -4,35 +4,13 @@ import json
 from pathlib import Path
 
 import pytest
-from commands import ROOT, called, hrc
+from commands import ROOT, called
 
 from hrc_env.__main__ import main
 
 pytestmark = pytest.mark.slow
 
 TINY = ["--num-envs", "4", "--episodes", "2", "--no-film"]
-BROKEN = """
-import os
-import signal
-import sys
-
-import hrc_env
-
-
-class Broken(hrc_env.find_task("HRCReach-v0")):
-    id = "HRCBroken-v0"
-    max_episode_steps = 50
-    n_views = 0
-
-    def view(self, *given):
-        Broken.n_views += 1
-        if "default_worker" in sys.argv[0] and Broken.n_views > 300:
-            raise ValueError("the task is broken")
-        return super().view(*given)
-
-
-hrc_env.register_task(Broken)
-"""
 
 
 def train(*words: object):
@@ -62,17 +40,6 @@ def test_a_run_is_gone_on_with_by_both_libraries(tmp_path):
 def steps_of(run: Path) -> list[float]:
     """Steps at the points of the curve."""
     return [point["steps"] for point in json.loads((run / "curve.json").read_text())]
-
-
-def test_workers_that_fail_again_and_again_end_it_with_their_error(tmp_path):
-    path = tmp_path / "broken.py"
-    path.write_text(BROKEN)
-    asked = ["--task", "HRCBroken-v0", "--engine", "ray", "--workers", "1", "--timesteps", "5000"]
-    out = ["--out", str(tmp_path / "run")]
-    done = hrc("--import", str(path), "train", *asked, *TINY, *out, HRC_ENV_REGISTERED="")
-    assert done.returncode == 2
-    assert "No worker has stepped" in done.stderr
-    assert "ValueError: the task is broken" in done.stderr
 
 
 @pytest.mark.parametrize(
