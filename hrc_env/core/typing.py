@@ -5,7 +5,7 @@ J joints (15, see `hrc_env.core.skeleton`), S body segments of the worker (22), 
 P particles, T time, N links of the arm.
 """
 
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,3 +30,14 @@ Image: TypeAlias = Annotated[NDArray[np.uint8], "(H, W, 3) RGB"]
 Tensor: TypeAlias = NDArray[np.float32]
 Rngs: TypeAlias = list[np.random.Generator]
 """One for each environment of a batch."""
+
+
+class Vector3(NamedTuple):
+    """Three coordinates that a kernel returns, in the frame and unit that it states."""
+
+    x: float
+    """First coordinate."""
+    y: float
+    """Second coordinate."""
+    z: float
+    """Third coordinate."""
