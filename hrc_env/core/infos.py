@@ -59,7 +59,7 @@ ENTRIES: dict[str, Entry] = {
     "shield/change": Entry("rad/s", f"{SHIELDED}its change of the command, over all joints"),
     "shield/active": Entry("0 or 1", f"{SHIELDED}whether by more than 0.02 rad/s"),
     "shield/scale": Entry("-", f"{SHIELDED}what is left of the command along itself; 1: all"),
-    "shield/least_m": Entry(
+    "shield/clearance_m": Entry(
         "m", "built-in: least D, what is clear between robot and estimated bodies after margins, "
         "Z_d and the worker's travel; infinite where nothing near matters", np.inf,
     ),

@@ -24,15 +24,18 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def answer_unknown_fields(record: type[RecordT]) -> type[RecordT]:
-    """Let a dataclass answer a keyword that it has not with a `ConfigError` that names the nearest
-    field, instead of a `TypeError`."""
+    """Let a dataclass refuse an unknown keyword with a `ConfigError` instead of a `TypeError`.
+
+    The error names the nearest field, or the present name of one that was renamed: a class may list
+    these as `RENAMED: ClassVar[Mapping[str, str]]`, new names by old ones.
+    """
     init, names = record.__init__, [each.name for each in dataclasses.fields(record)]  # type: ignore[arg-type]
 
     @wraps(init)
     def checked(self: RecordT, *args: Any, **values: Any) -> None:
         for name in values:
             if name not in names:
-                raise unknown(f"field of {record.__name__}", name, names)
+                raise _unknown_field(record, f"field of {record.__name__}", "", name)
         init(self, *args, **values)
 
     record.__init__ = checked  # type: ignore[method-assign]
@@ -62,7 +65,7 @@ def from_mapping(
     for name, value in mapping.items():
         where = f"{path}{name}"
         if where not in names:
-            raise unknown("config field", where, names)
+            raise _unknown_field(kind, "config field", path, name)
         values[name] = restored(hints[name], value, where)
     for each in fields:
         nothing = each.default is each.default_factory is dataclasses.MISSING
@@ -72,6 +75,15 @@ def from_mapping(
         return kind(**values)
     except ConfigError as error:
         raise _located(error, kind, path) from error
+
+
+def _unknown_field(record: type, what: str, path: str, name: str) -> ConfigError:
+    """Return the error for a field that a record does not have, or no longer under this name."""
+    renamed = getattr(record, "RENAMED", {})
+    if name in renamed:
+        return ConfigError(f"The {what} {path}{name} is called {path}{renamed[name]} now.")
+    names = [f"{path}{each.name}" for each in dataclasses.fields(record)]
+    return unknown(what, f"{path}{name}", names)
 
 
 def restored(hint: Any, value: Any, where: str) -> Any:

@@ -93,9 +93,9 @@ from hrc_env.pipeline import reacquisition
 from hrc_env.pipeline.bystanders import Bystanders
 from hrc_env.pipeline.pose_tracker import PoseTracker
 from hrc_env.safety import contact, incidents, separation, solver
+from hrc_env.safety.built_in import build_constraints, describe_pose
 from hrc_env.safety.config import PRESETS, ShieldConfig
-from hrc_env.safety.guard import constraints, describe_arm
-from hrc_env.safety.shield import shield_called, shielded
+from hrc_env.safety.shield import apply_shield, find_shield
 from hrc_env.safety.unseen import find_undetected
 from hrc_env.scene import domain_randomization as looks
 from hrc_env.scene import rigs
@@ -212,7 +212,7 @@ DRAWING = (
     ("map", ("znear", "zfar", "fogstart", "fogend", "haze", "shadowclip", "shadowscale", "alpha")),
 )
 """How MuJoCo draws, by its names."""
-RENAMED: dict[str, str] = {}
+RENAMED: dict[str, str] = {"shield/clearance_m": "shield/least_m"}
 """Today's names of observation terms, reward terms and infos that the probes know by another."""
 
 
@@ -440,7 +440,7 @@ def _numeric(infos: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
     named = {name: np.where(known[name], infos[name], 0.0) for name in plain if known[name].any()}
     if "is_success" in named:
         named["is_success"] = named["is_success"].astype(bool)
-    return named
+    return {RENAMED.get(name, name): value for name, value in named.items()}
 
 
 FLAGS_OF = {name: entry.flag for name, entry in ENTRIES.items() if entry.flag}
@@ -2351,14 +2351,27 @@ class Searches:
 # --- Shield and incidents (shield.py) ------------------------------------------------------------
 
 SHIELD_SETTINGS: dict[str, str] = {
-    name: name
-    for name in (
-        "kind", "margin_m", "hand_margin_m", "sigmas", "least_sigmas_m", "predicted_m_s",
-        "doubtful_m", "doubtful_sigmas", "human_m_s", "human_margin_m_s", "human_s", "latency_s",
-        "reaction_s", "deceleration_m_s2", "gain_hz", "retreat_m_s", "unseen_s", "unknown_m_s",
-        "welcome_m_s", "still_m_s",
-    )
-}  # fmt: skip
+    "kind": "kind",
+    "margin_m": "margin_m",
+    "hand_margin_m": "hand_margin_m",
+    "sigmas": "n_sigmas",
+    "least_sigmas_m": "min_uncertainty_m",
+    "predicted_m_s": "prediction_growth_m_s",
+    "doubtful_m": "single_view_std_m",
+    "doubtful_sigmas": "single_view_sigmas",
+    "human_m_s": "worker_speed_m_s",
+    "human_margin_m_s": "worker_speed_margin_m_s",
+    "human_s": "worker_time_s",
+    "latency_s": "latency_s",
+    "reaction_s": "reaction_s",
+    "deceleration_m_s2": "deceleration_m_s2",
+    "gain_hz": "retreat_gain_hz",
+    "retreat_m_s": "max_retreat_m_s",
+    "unseen_s": "stale_after_s",
+    "unknown_m_s": "unknown_speed_limit_m_s",
+    "welcome_m_s": "contact_speed_m_s",
+    "still_m_s": "creep_m_s",
+}
 """Names of the probes for settings of shields, and today's fields."""
 N_SEGMENTS = len(contact.SEGMENT_REGIONS)
 BODY_REGIONS = tuple(contact.REGIONS)
@@ -2417,25 +2430,25 @@ class Guarded:
         chosen = settings
         if not isinstance(settings, str):
             chosen = {SHIELD_SETTINGS[name]: value for name, value in settings.items()}
-        shield = shield_called(chosen)
+        shield = find_shield(chosen)
         assert shield is not None, "These settings are of a shield."
-        allowed, given = shielded(shield, self._now, wanted, step_s)
-        return {"allowed": allowed, **given}
+        allowed, given = apply_shield(shield, self._now, wanted, step_s)
+        return {"allowed": allowed, **{RENAMED.get(k, k): value for k, value in given.items()}}
 
     def constrain(
         self, wanted: NDArray[np.float64], step_s: float, settings: Mapping[str, Any]
     ) -> dict[str, NDArray[Any]]:
         """Return the rows that a shield keeps, as sums over them."""
         config = ShieldConfig(**{SHIELD_SETTINGS[name]: each for name, each in settings.items()})
-        arm, lost = describe_arm(self._now), find_undetected(self._now, config).lost
-        found = constraints(self._now, arm, lost, wanted, step_s, config)
+        pose, lost = describe_pose(self._now), find_undetected(self._now, config).is_lost
+        found = build_constraints(self._now, pose, lost, wanted, step_s, config)
         is_row = np.arange(found.b.shape[1]) < found.n_rows[:, None]
         J, b = np.where(is_row[..., None], found.J, 0.0), np.where(is_row, found.b, 0.0)
         return {
             "n_rows": found.n_rows, "J": J.sum(1), "b": b.sum(1),
             "Jb": np.einsum("brn,br->bn", J, b), "JJ": (J**2).sum(1), "low": found.low,
             "high": found.high,
-            "least_m": np.where(np.isinf(found.least_m), 9.0, found.least_m),
+            "least_m": np.where(np.isinf(found.clearance_m), 9.0, found.clearance_m),
         }  # fmt: skip
 
     def measure(self) -> dict[str, NDArray[np.float64]]:
@@ -2452,8 +2465,11 @@ class Guarded:
 
 def default_shields() -> dict[str, NDArray[Any]]:
     """Return the numbers of the shields that come with the package."""
-    return {name: np.array([config.record()[0][field] for field in config.record().dtype.names])
-            for name, config in PRESETS.items()}  # fmt: skip
+    fields = [field for field in SHIELD_SETTINGS.values() if field != "kind"]
+    return {
+        name: np.array([getattr(config, field) for field in fields], float)
+        for name, config in PRESETS.items()
+    }
 
 
 def solve_rows(
@@ -2462,7 +2478,8 @@ def solve_rows(
 ) -> NDArray[np.float64]:  # fmt: skip
     """Return the nearest velocities that keep rows as far as their weights ask."""
     x = np.empty_like(wanted)
-    solver.solve(J, b, weight, low, high, wanted, x, np.empty((len(x) + 3, len(x))))
+    problem = solver.Problem(J, b, weight, low, high, wanted)
+    solver.solve(problem, x, np.empty((len(x) + 3, len(x))))
     return x
 
 
@@ -2511,14 +2528,14 @@ class Watched:
         state = chains.robot_state(self._chain, np.zeros_like(qd), qd)
         nowhere, turn = np.zeros((*held.shape, 3)), np.zeros((*held.shape, 4))
         world = World(robot=state, objects=ObjectState(nowhere, turn, nowhere, nowhere, held))
-        paths = incidents.measured(robot, robot_m, workers, worker_m)
+        paths = incidents.measure_paths(robot, robot_m, workers, worker_m)
         found = self._watch.step(world, paths)
-        told = incidents.summed_up(found, self._watch.known)
-        values = {f"one/{name}": found[name].copy() for name in found.dtype.names}
-        values |= {f"all/{name}": told[name].copy() for name in told.dtype.names}
-        known = self._watch.known
-        values |= {f"known/{name}": known[name].copy() for name in known.dtype.names}
-        return {**values, "stop_s": self._watch.stop_s(state)}
+        told = incidents.summarize(found, self._watch.history)
+        values = {}
+        for group, records in (("one", found), ("all", told), ("known", self._watch.history)):
+            for name in records.dtype.names:
+                values[f"{group}/{name.removeprefix('is_')}"] = records[name].copy()
+        return {**values, "stop_s": self._watch.find_stop_time(state)}
 
 
 def start_near(home: NDArray[np.float64], spread: NDArray[np.float64], seeds: list[int]) -> Any:
