@@ -1,7 +1,7 @@
-"""States: records of arrays whose first axis is the environment; their rows, copies, saved ones.
+"""States: records of arrays whose first axis is the environment, with access to their rows.
 
-A component that works on a few environments only (a reset of 3 of 64) works on a record of
-their rows; as no result depends on the size of the batch, that is the same computation.
+A component that works on some environments only (a reset of 3 of 64) works on a record of their
+rows. As no result depends on the size of the batch, that is the same computation.
 """
 
 import copy
@@ -20,17 +20,23 @@ State = dict[str, Any]
 
 
 def rows(record: RecordT, ids: Ints | Bools) -> RecordT:
-    """A copy of rows `ids` of every array of a (nested) record."""
+    """Return rows `ids` of every array of a (nested) record, as copies."""
     return mapped(record, lambda array: array[ids])
 
 
 def one(record: RecordT, b: int) -> RecordT:
-    """Environment `b` of a record, without the batch's axis; its arrays are views."""
+    """Return environment `b` of a record without the batch axis; its arrays are views."""
     return mapped(record, lambda array: array[b])
 
 
 def write_rows(record: object, ids: Any, part: object) -> None:
-    """Write a record of rows back into rows `ids` (integers, a mask, `...`) of a record."""
+    """Write a record of rows into a record of the same kind.
+
+    Args:
+        record: the record, changed in place.
+        ids: the rows, as integers, a mask or `...`.
+        part: the values of these rows.
+    """
     if isinstance(record, np.ndarray):
         record[ids] = part
     if isinstance(record, dict):
@@ -41,7 +47,7 @@ def write_rows(record: object, ids: Any, part: object) -> None:
 
 
 def mapped(record: RecordT, change: Callable[[Any], Any]) -> RecordT:
-    """A (nested) record of the same kind with `change` applied to every array."""
+    """Return a (nested) record of the same kind with `change` applied to every array."""
     if isinstance(record, np.ndarray):
         return change(record)
     if isinstance(record, dict):
@@ -52,7 +58,7 @@ def mapped(record: RecordT, change: Callable[[Any], Any]) -> RecordT:
 
 
 def copied(value: Any) -> Any:
-    """A deep copy of records, lists and generators; arrays that are read-only are shared."""
+    """Return a deep copy of records, lists and generators; read-only arrays are shared."""
     if isinstance(value, np.ndarray):
         return value.copy() if value.flags.writeable else value
     if names := names_of(type(value)):
@@ -63,23 +69,26 @@ def copied(value: Any) -> Any:
 
 
 def flat(array: Floats, n_last: int) -> Floats:
-    """(..., *last) as (count, *last), contiguous, where there are n_last axes in `last`."""
+    """Return an array (..., *last) as (count, *last), contiguous; `last` has `n_last` axes."""
     last = array.shape[-n_last:]
     return np.ascontiguousarray(array).reshape(math.prod(array.shape[:-n_last]), *last)
 
 
 def picked(streams: Sequence[np.random.Generator], ids: Ints) -> list[np.random.Generator]:
-    """The generators of environments `ids`."""
+    """Return the generators of environments `ids`."""
     return [streams[b] for b in ids]
 
 
 class Stateful:
-    """Saves and brings back the attributes in `CHANGES`; the others are settings and constants."""
+    """Base of objects whose state can be saved and restored.
+
+    A subclass lists the attributes that change in `CHANGES`; all others are settings and constants.
+    """
 
     CHANGES: ClassVar[tuple[str, ...]] = ()
 
     def get_state(self) -> Any:
-        """A copy of everything that changes; `set_state` brings it back bit for bit."""
+        """Return a copy of everything that changes; `set_state` restores it bit for bit."""
         parts = {name: getattr(self, name) for name in self.CHANGES}
         return {
             name: part.get_state() if hasattr(part, "get_state") else copied(part)
@@ -87,7 +96,7 @@ class Stateful:
         }
 
     def set_state(self, state: Any) -> None:
-        """Continue from a state of a thing with the same settings; the state stays as it is."""
+        """Continue from a state of an object with the same settings; the state is not changed."""
         for name in self.CHANGES:
             part = getattr(self, name)
             if hasattr(part, "set_state"):
@@ -98,7 +107,7 @@ class Stateful:
 
 @functools.cache
 def names_of(kind: type) -> tuple[str, ...]:
-    """The fields of a dataclass or a named tuple; whatever else there is has none."""
+    """Return the field names of a dataclass or a named tuple; of any other class, none."""
     if dataclasses.is_dataclass(kind):
         return tuple(each.name for each in dataclasses.fields(kind))
     return getattr(kind, "_fields", ())

@@ -126,7 +126,7 @@ class AnyRecords(Protocol):
 
 
 class Records1(AnyRecords, Protocol[RowT]):
-    """A structured array of one axis, whose rows `RowT` declares."""
+    """A structured array of one axis with rows declared by `RowT`."""
 
     @overload
     def __getitem__(self, at: int, /) -> RowT: ...
@@ -138,7 +138,7 @@ class Records1(AnyRecords, Protocol[RowT]):
 
 
 class Records2(AnyRecords, Protocol[RowT]):
-    """A structured array of two axes, whose rows `RowT` declares."""
+    """A structured array of two axes with rows declared by `RowT`."""
 
     @overload
     def __getitem__(self, at: int, /) -> "Records1[RowT]": ...
@@ -152,7 +152,7 @@ class Records2(AnyRecords, Protocol[RowT]):
 
 
 class Records3(AnyRecords, Protocol[RowT]):
-    """A structured array of three axes, whose rows `RowT` declares."""
+    """A structured array of three axes with rows declared by `RowT`."""
 
     @overload
     def __getitem__(self, at: int, /) -> "Records2[RowT]": ...
@@ -168,7 +168,7 @@ class Records3(AnyRecords, Protocol[RowT]):
 
 
 class Records4(AnyRecords, Protocol[RowT]):
-    """A structured array of four axes, whose rows `RowT` declares."""
+    """A structured array of four axes with rows declared by `RowT`."""
 
     @overload
     def __getitem__(self, at: int, /) -> "Records3[RowT]": ...
@@ -186,7 +186,7 @@ class Records4(AnyRecords, Protocol[RowT]):
 
 
 class Records5(AnyRecords, Protocol[RowT]):
-    """A structured array of five axes, whose rows `RowT` declares."""
+    """A structured array of five axes with rows declared by `RowT`."""
 
     @overload
     def __getitem__(self, at: int, /) -> "Records4[RowT]": ...

@@ -1,4 +1,4 @@
-"""Read-only views of arrays, for functions of users: others are given the same arrays."""
+"""Read-only views of arrays for functions of users, since others receive the same arrays."""
 
 import functools
 from collections.abc import Callable, Collection
@@ -11,18 +11,18 @@ from hrc_env.core.errors import ConfigError
 
 RecordT = TypeVar("RecordT")
 _CONSTANTS: dict[int, tuple[Any, Any]] = {}
-"""Records that never change, by identity, with their read-only forms."""
+"""Read-only forms of records that never change, by identity."""
 _MOST = 64
-"""Greatest number of these that is kept."""
+"""Number of records in `_CONSTANTS` above which they are forgotten."""
 
 
 def read_only(record: RecordT, constants: Collection[str] = ()) -> RecordT:
     """Return a (nested) record of the same kind with read-only views of its arrays.
 
     Args:
-        record: an array, or a dataclass, named tuple, tuple, list or dict of these; anything else
-            is returned as it is.
-        constants: names of its fields whose values never change, as of `constant`.
+        record: an array, or a dataclass, named tuple, tuple, list or dict of arrays; any other
+            value is returned as it is.
+        constants: names of fields whose values never change (`constant`).
     """
     if isinstance(record, np.ndarray):
         view = record.view()
@@ -45,7 +45,7 @@ def read_only(record: RecordT, constants: Collection[str] = ()) -> RecordT:
 
 
 def constant(record: RecordT) -> RecordT:
-    """Return `read_only` of a record that never changes, made once."""
+    """Return the read-only form of a record that never changes; it is made once."""
     known = _CONSTANTS.get(id(record))
     if known is None or known[0] is not record:
         if len(_CONSTANTS) >= _MOST:
@@ -55,7 +55,7 @@ def constant(record: RecordT) -> RecordT:
 
 
 def is_of_user(function: Any) -> bool:
-    """Return whether a function is none of this package."""
+    """Return whether a function was not defined in this package."""
     try:
         return _is_of_user(function)
     except TypeError:  # an object with a __call__, not hashable
@@ -73,12 +73,12 @@ def called(what: str, function: Callable[..., Any], *given: Any) -> Any:
     """Call a function of a user with read-only arguments.
 
     Args:
-        what: name of the function in the error.
-        function: of the user.
+        what: name of the function, for the error.
+        function: the function.
         given: its arguments, as `read_only` returns them.
 
     Raises:
-        ConfigError: it writes into one of them.
+        ConfigError: the function writes into an argument.
     """
     try:
         return function(*given)
@@ -89,7 +89,7 @@ def called(what: str, function: Callable[..., Any], *given: Any) -> Any:
 
 
 def refuse_writing(what: str, error: ValueError) -> NoReturn:
-    """Raise the `ConfigError` of a function that writes into its arguments."""
+    """Raise `ConfigError` for a function that writes into its arguments."""
     raise ConfigError(
         f"{what} writes into an array that it is given ({error}). It may only read it, as others "
         "are given the same: make a copy first (x = x.copy()), or a new array (x = x - y in place "
@@ -98,7 +98,7 @@ def refuse_writing(what: str, error: ValueError) -> NoReturn:
 
 
 def _record_of(kind: type[Any], names: tuple[str, ...], values: list[Any]) -> Any:
-    """Make a record of its fields, without its `__post_init__`."""
+    """Make a record of its fields without calling `__post_init__`."""
     if issubclass(kind, tuple):
         return kind(*values)
     made, write = object.__new__(kind), object.__setattr__

@@ -1,4 +1,4 @@
-"""Frozen settings from plain mappings or TOML files, field by field, and back."""
+"""Settings from plain mappings or TOML files, field by field, and back."""
 
 import dataclasses
 import enum
@@ -19,7 +19,7 @@ from hrc_env.core.errors import ConfigError, unknown
 
 RecordT = TypeVar("RecordT")
 PRESETS: dict[Any, Mapping[str, Any]] = {}
-"""Values that have names, by the type hint of their field: a name stands for the value."""
+"""Named values by the type hint of their field: a name stands for the value."""
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -48,15 +48,17 @@ def from_mapping(
     path: str = "",
     kinds: Mapping[str, type] | None = None,
 ) -> RecordT:
-    """A dataclass from a mapping; what it nests may be mappings too, tuples may be lists.
+    """Return a dataclass made from a mapping; nested ones may be mappings, tuples may be lists.
 
     Args:
-        path: what comes before the fields' names in errors.
-        kinds: types of fields where the record's own hints leave them open.
+        kind: the dataclass.
+        mapping: values by field.
+        path: prefix of the fields' names in errors.
+        kinds: types of fields that the record's own hints leave open.
 
     Raises:
-        ConfigError: a field that does not exist or is missing, a value of another type or length,
-            or one that the dataclass refuses; by the path, as in `scene.cameras[0].name`.
+        ConfigError: a field does not exist or is missing, has a value of another type or length, or
+            one that the dataclass refuses; the message has the path, as in `scene.cameras[0].name`.
     """
     hints = {**typing.get_type_hints(kind), **(kinds or {})}
     fields = dataclasses.fields(kind)  # type: ignore[arg-type]
@@ -87,7 +89,7 @@ def _unknown_field(record: type, what: str, path: str, name: str) -> ConfigError
 
 
 def restored(hint: Any, value: Any, where: str) -> Any:
-    """A field's value as its type hint wants it, or a `ConfigError` that says so."""
+    """Return a value converted to a type hint, or raise `ConfigError` with the path `where`."""
     if isinstance(value, str) and (presets := PRESETS.get(hint)):
         if value not in presets:
             raise unknown(where, value, presets)
@@ -120,13 +122,13 @@ def restored(hint: Any, value: Any, where: str) -> Any:
 
 
 def _name_or(hint: Any) -> str:
-    """How errors begin to say what is valid: the names that a field of this hint takes."""
+    """Return the names that a field of this hint takes, as errors begin with them."""
     presets = PRESETS.get(hint, {})
     return f"a name ({', '.join(map(repr, presets))}) or " if presets else ""
 
 
 def _one_of(hints: tuple[Any, ...], value: Any, where: str) -> Any:
-    """The value as the first of several hints wants it that can have it; errors say all."""
+    """Return a value converted to the first hint that fits; the error lists all of them."""
     refused = []
     for hint in hints:
         try:
@@ -137,7 +139,7 @@ def _one_of(hints: tuple[Any, ...], value: Any, where: str) -> Any:
 
 
 def _tuple(hint: Any, value: Any, where: str) -> tuple[Any, ...]:
-    """Every part as its own hint wants it, and as many as there are hints."""
+    """Return a tuple whose parts are converted to their own hints, or raise `ConfigError`."""
     _checked(isinstance(value, list | tuple), f"{_name_or(hint)}a list", value, where)
     inner = typing.get_args(hint)
     hints = [inner[0]] * len(value) if inner[-1] is Ellipsis else list(inner)
@@ -158,8 +160,11 @@ def merge(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def plain(value: Any) -> Any:
-    """A value as JSON has it: paths are text, NumPy's numbers and enumerations what they hold. What
-    has no such form (a recorded clip, a function) stays; `for_json` refuses it."""
+    """Return a value in JSON's types where it has such a form.
+
+    Paths become text, NumPy's numbers and enumerations their values. Others (a recorded clip, a
+    function) are returned as they are; `for_json` refuses them.
+    """
     if isinstance(value, Mapping):
         return {name: plain(each) for name, each in value.items()}
     if isinstance(value, list | tuple):
@@ -172,10 +177,11 @@ def plain(value: Any) -> Any:
 
 
 def for_json(value: Any, where: str) -> Any:
-    """Return a value in JSON's types, records as mappings of their fields.
+    """Return a value in JSON's types, with records as mappings of their fields.
 
     Raises:
-        ConfigError: a part that has no such form, by its path: a function, a class, a recording.
+        ConfigError: a part has no such form: a function, a class, a recording; the message has its
+            path.
     """
     value = plain(value)
     if isinstance(value, Mapping):
@@ -192,7 +198,7 @@ def for_json(value: Any, where: str) -> Any:
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
-    """The content of a TOML file; `ConfigError` without one."""
+    """Return the content of a TOML file, or raise `ConfigError`."""
     try:
         return tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
@@ -202,7 +208,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
 
 
 def to_toml(content: Mapping[str, Any], path: str = "") -> str:
-    """TOML of nested mappings, lists, text, numbers and truth values; None is left out."""
+    """Return nested mappings, lists, text, numbers and booleans as TOML; None is left out."""
     lines, tables = [], []
     for name, value in content.items():
         key = name if _BARE.fullmatch(name) else json.dumps(name)
@@ -229,8 +235,10 @@ def _value(value: Any, where: str) -> str:
 
 
 def _located(error: ConfigError, kind: type, path: str) -> ConfigError:
-    """What a dataclass says about its fields, with these called by their path: any name with an
-    underscore, others where the sentence begins with them."""
+    """Return an error of a dataclass with fields named by their path.
+
+    Names with an underscore are replaced anywhere, others at the beginning of the sentence.
+    """
     if not path:
         return error
     said = str(error).removeprefix(f"{kind.__name__}.")

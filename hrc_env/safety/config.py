@@ -73,6 +73,7 @@ class ShieldConfig:
         "unseen_s": "stale_after_s", "unknown_m_s": "unknown_speed_limit_m_s",
         "welcome_m_s": "contact_speed_m_s", "still_m_s": "creep_m_s",
     }  # fmt: skip
+    """Present names of fields that were renamed, by their old names."""
 
     kind: str = "qp"
     """Method: "qp" takes the nearest joint velocities that keep all constraints; "ssm" scales all
