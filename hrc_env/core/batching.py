@@ -9,11 +9,11 @@ import dataclasses
 import functools
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, TypeVar, cast
 
 import numpy as np
 
-from hrc_env.core.typing import Bools, Floats, Ints
+from hrc_env.core.typing import Bools, Floats, Ints, is_array, is_dict, is_list_or_tuple
 
 RecordT = TypeVar("RecordT")
 State = dict[str, Any]
@@ -37,21 +37,22 @@ def write_rows(record: object, ids: Any, part: object) -> None:
         ids: the rows, as integers, a mask or `...`.
         part: the values of these rows.
     """
-    if isinstance(record, np.ndarray):
+    if is_array(record):
         record[ids] = part
-    if isinstance(record, dict):
+    if is_dict(record) and is_dict(part):
         for name, array in record.items():
-            write_rows(array, ids, part[name])  # type: ignore[index]
+            write_rows(array, ids, part[name])
     for name in names_of(type(record)):
         write_rows(getattr(record, name), ids, getattr(part, name))
 
 
 def mapped(record: RecordT, change: Callable[[Any], Any]) -> RecordT:
     """Return a (nested) record of the same kind with `change` applied to every array."""
-    if isinstance(record, np.ndarray):
+    if is_array(record):
         return change(record)
-    if isinstance(record, dict):
-        return type(record)((name, mapped(part, change)) for name, part in record.items())
+    if is_dict(record):
+        changed: Any = type(record)((k, mapped(part, change)) for k, part in record.items())
+        return changed
     names = names_of(type(record))
     values = [mapped(getattr(record, name), change) for name in names]
     return type(record)(*values) if names else record
@@ -59,11 +60,12 @@ def mapped(record: RecordT, change: Callable[[Any], Any]) -> RecordT:
 
 def copied(value: Any) -> Any:
     """Return a deep copy of records, lists and generators; read-only arrays are shared."""
-    if isinstance(value, np.ndarray):
+    if is_array(value):
         return value.copy() if value.flags.writeable else value
-    if names := names_of(type(value)):
-        return type(value)(*[copied(getattr(value, name)) for name in names])
-    if isinstance(value, (list, tuple)):
+    kind = cast(type[Any], type(value))
+    if names := names_of(kind):
+        return kind(*[copied(getattr(value, name)) for name in names])
+    if is_list_or_tuple(value):
         return type(value)(copied(each) for each in value)
     return copy.deepcopy(value)
 
@@ -106,7 +108,7 @@ class Stateful:
 
 
 @functools.cache
-def names_of(kind: type) -> tuple[str, ...]:
+def names_of(kind: type[Any]) -> tuple[str, ...]:
     """Return the field names of a dataclass or a named tuple; of any other class, none."""
     if dataclasses.is_dataclass(kind):
         return tuple(each.name for each in dataclasses.fields(kind))

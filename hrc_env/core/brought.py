@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.core.errors import ConfigError, check_shape
+from hrc_env.core.typing import is_array, is_list_or_tuple, is_numpy_scalar
 
 LONGEST = 80
 """Number of characters of a value that an error shows."""
@@ -18,9 +19,9 @@ LONGEST = 80
 
 def described(value: object) -> str:
     """Describe a value in a few words, for errors."""
-    if isinstance(value, np.ndarray):
+    if is_array(value):
         return f"an array of {value.dtype} with shape {value.shape}"
-    if isinstance(value, tuple | list):
+    if is_list_or_tuple(value):
         parts = ", ".join(described(each) for each in value[:4])
         more = ", ..." if len(value) > 4 else ""
         return f"a {type(value).__name__} of {len(value)} ({parts}{more})"
@@ -137,17 +138,20 @@ def points_of(what: str, value: object) -> NDArray[np.float64]:
 
 def count_of(value: object) -> int:
     """Return the length of a list or array, at least 1; of anything else 1."""
-    if isinstance(value, list | tuple) or (isinstance(value, np.ndarray) and value.ndim > 0):
+    if is_list_or_tuple(value) or (is_array(value) and value.ndim > 0):
         return max(len(value), 1)
     return 1
 
 
 def positive(what: str, value: object, unit: str) -> float:
     """Return a positive finite number, or raise `ConfigError`."""
-    is_number = isinstance(value, int | float | np.integer | np.floating)
-    if not is_number or isinstance(value, bool) or not 0 < float(value) < np.inf:  # type: ignore[arg-type]
+    plain = value.item() if is_numpy_scalar(value) else value
+    if isinstance(plain, bool) or not isinstance(plain, int | float):
+        plain = np.nan
+    number = float(plain)
+    if not 0 < number < np.inf:
         raise ConfigError(f"{what} must be positive and finite [{unit}], got {described(value)}.")
-    return float(value)  # type: ignore[arg-type]
+    return number
 
 
 def check_kind(what: str, value: object, *kinds: type | None) -> None:
@@ -160,7 +164,7 @@ def check_kind(what: str, value: object, *kinds: type | None) -> None:
 
 def check_kinds(what: str, values: object, *kinds: type) -> None:
     """Raise `ConfigError` unless there is a sequence of at least one value of these kinds."""
-    if not isinstance(values, list | tuple) or not values:
+    if not is_list_or_tuple(values) or not values:
         names = " or ".join(kind.__name__ for kind in kinds)
         raise ConfigError(
             f"{what} must be a list of at least one {names}, got {described(values)}."

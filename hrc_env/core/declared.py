@@ -61,10 +61,11 @@ def dtype_of(declaration: type) -> np.dtype[Any]:
 
 def _field_type(name: str, hint: Any) -> tuple[Any, ...]:
     """Return (type,) or (type, shape) of a field, as NumPy takes them."""
-    shape: tuple[Any, ...] = ()
+    shapes: list[tuple[int, ...]] = []
     if get_origin(hint) is Annotated:
         hint, *metadata = get_args(hint)
-        shape = tuple(each for each in metadata if isinstance(each, tuple))[-1:]
+        shapes = [each for each in metadata if isinstance(each, tuple)]
+    shape = shapes[-1:]
     if hint in SCALARS:
         return SCALARS[hint], *shape
     if get_origin(hint) is np.ndarray and shape:

@@ -20,7 +20,8 @@ def attribute_docs(kind: type) -> dict[str, str]:
     """Return the docstring of each annotated attribute in the body of a class."""
     docs: dict[str, str] = {}
     (tree,) = ast.parse(textwrap.dedent(inspect.getsource(kind))).body
-    for field, after in itertools.pairwise(getattr(tree, "body", ())):
+    body: list[ast.stmt] = getattr(tree, "body", [])
+    for field, after in itertools.pairwise(body):
         if isinstance(field, ast.AnnAssign) and isinstance(after, ast.Expr):
             docs[ast.unparse(field.target)] = " ".join(ast.literal_eval(after.value).split())
     return docs

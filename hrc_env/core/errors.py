@@ -16,7 +16,7 @@ A worker out of sight is data (a growing covariance, a flag), never an error.
 import contextlib
 import difflib
 import numbers
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Generator, Iterable
 from typing import Any, TypeVar
 
 T = TypeVar("T")
@@ -59,7 +59,7 @@ class MissingExtraError(HRCError, ImportError):
 
 
 @contextlib.contextmanager
-def learner() -> Iterator[None]:
+def learner() -> Generator[None]:
     """Turn a failed import of a learner's library into a `MissingExtraError` with the remedy."""
     try:
         yield
@@ -144,7 +144,7 @@ def check_shape(what: str, got: tuple[int, ...], expected: tuple[int, ...], mean
 
 def whole(what: str, value: Any, low: int, high: int) -> int:
     """Return an integer from `low` to `high`, or raise `ConfigError`."""
-    is_whole = isinstance(value, numbers.Integral) and not isinstance(value, bool)
-    if not is_whole or not low <= int(value) <= high:
+    is_bool = isinstance(value, bool)
+    if is_bool or not isinstance(value, numbers.Integral) or not low <= int(value) <= high:
         raise ConfigError(f"{what} must be a whole number from {low} to {high}, got {value!r}.")
     return int(value)

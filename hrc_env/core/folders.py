@@ -5,7 +5,7 @@ import hashlib
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from functools import lru_cache
 from pathlib import Path
 
@@ -56,7 +56,7 @@ def can_write(folder: Path) -> bool:
 
 
 @contextlib.contextmanager
-def alone(folder: Path, wait: Callable[[], object]) -> Iterator[None]:
+def alone(folder: Path, wait: Callable[[], object]) -> Generator[None]:
     """Hold the lock of a folder; `wait` is called if another program holds it."""
     try:
         import fcntl

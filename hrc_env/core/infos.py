@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from hrc_env.core.brought import described
 from hrc_env.core.errors import ConfigError, unknown
-from hrc_env.core.typing import Ints
+from hrc_env.core.typing import Ints, is_sequence_of_text
 
 Info = dict[str, NDArray[Any]]
 """Numbers (B,) by name; NaN where an environment has none in this step."""
@@ -286,7 +286,7 @@ def matching(patterns: str | Sequence[str], names: Sequence[str]) -> tuple[str, 
         ConfigError: a pattern is no text or matches no key; the nearest key is named.
     """
     given = [patterns] if isinstance(patterns, str) else patterns
-    if not isinstance(given, Sequence) or not all(isinstance(each, str) for each in given):
+    if not is_sequence_of_text(given):
         raise ConfigError(
             'infos must be names or patterns of names, as ("cost", "safety/*"), got '
             f"{described(patterns)}."

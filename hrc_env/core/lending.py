@@ -4,10 +4,9 @@ import functools
 from collections.abc import Callable, Collection
 from typing import Any, NoReturn, TypeVar
 
-import numpy as np
-
 from hrc_env.core.batching import names_of
 from hrc_env.core.errors import ConfigError
+from hrc_env.core.typing import is_array, is_dict, is_list_or_tuple
 
 RecordT = TypeVar("RecordT")
 _CONSTANTS: dict[int, tuple[Any, Any]] = {}
@@ -24,10 +23,10 @@ def read_only(record: RecordT, constants: Collection[str] = ()) -> RecordT:
             value is returned as it is.
         constants: names of fields whose values never change (`constant`).
     """
-    if isinstance(record, np.ndarray):
-        view = record.view()
+    if is_array(record):
+        view: Any = record.view()
         view.setflags(write=False)
-        return view  # type: ignore[return-value]
+        return view
     if record is None or isinstance(record, float | int | str):
         return record
     names = names_of(type(record))
@@ -37,10 +36,12 @@ def read_only(record: RecordT, constants: Collection[str] = ()) -> RecordT:
             for n in names
         ]
         return _record_of(type(record), names, parts)
-    if isinstance(record, dict):
-        return type(record)((name, read_only(part)) for name, part in record.items())
-    if isinstance(record, tuple | list):
-        return type(record)(map(read_only, record))  # type: ignore[return-value]
+    if is_dict(record):
+        items: Any = type(record)((name, read_only(part)) for name, part in record.items())
+        return items
+    if is_list_or_tuple(record):
+        parts_of: Any = type(record)(map(read_only, record))
+        return parts_of
     return record
 
 
@@ -99,7 +100,7 @@ def refuse_writing(what: str, error: ValueError) -> NoReturn:
 
 def _record_of(kind: type[Any], names: tuple[str, ...], values: list[Any]) -> Any:
     """Make a record of its fields without calling `__post_init__`."""
-    if issubclass(kind, tuple):
+    if tuple in kind.__mro__:
         return kind(*values)
     made, write = object.__new__(kind), object.__setattr__
     for name, value in zip(names, values, strict=True):

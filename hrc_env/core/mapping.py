@@ -16,9 +16,10 @@ from typing import Any, TypeVar
 import numpy as np
 
 from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.typing import is_array, is_list_or_tuple, is_mapping, is_numpy_scalar
 
 RecordT = TypeVar("RecordT")
-PRESETS: dict[Any, Mapping[str, Any]] = {}
+PRESETS: dict[Any, dict[str, Any]] = {}
 """Named values by the type hint of their field: a name stands for the value."""
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -90,20 +91,20 @@ def _unknown_field(record: type, what: str, path: str, name: str) -> ConfigError
 
 def restored(hint: Any, value: Any, where: str) -> Any:
     """Return a value converted to a type hint, or raise `ConfigError` with the path `where`."""
-    if isinstance(value, str) and (presets := PRESETS.get(hint)):
+    if isinstance(value, str) and (presets := PRESETS.get(hint, {})):
         if value not in presets:
             raise unknown(where, value, presets)
         return presets[value]
     if dataclasses.is_dataclass(hint):
-        if isinstance(value, Mapping):
-            return from_mapping(typing.cast(type, hint), value, f"{where}.")
+        if is_mapping(value):
+            return from_mapping(typing.cast(type[Any], hint), value, f"{where}.")
         is_it = isinstance(value, typing.cast(type, hint))
         return _checked(is_it, f"{_name_or(hint)}a mapping", value, where)
     if isinstance(hint, types.UnionType):
         return _one_of(typing.get_args(hint), value, where)
     if typing.get_origin(hint) is tuple:
         return _tuple(hint, value, where)
-    if isinstance(value, np.generic):
+    if is_numpy_scalar(value):
         value = value.item()
     if hint is str and isinstance(value, Path):
         return str(value)
@@ -129,7 +130,7 @@ def _name_or(hint: Any) -> str:
 
 def _one_of(hints: tuple[Any, ...], value: Any, where: str) -> Any:
     """Return a value converted to the first hint that fits; the error lists all of them."""
-    refused = []
+    refused: list[str] = []
     for hint in hints:
         try:
             return restored(hint, value, where)
@@ -165,11 +166,11 @@ def plain(value: Any) -> Any:
     Paths become text, NumPy's numbers and enumerations their values. Others (a recorded clip, a
     function) are returned as they are; `for_json` refuses them.
     """
-    if isinstance(value, Mapping):
+    if is_mapping(value):
         return {name: plain(each) for name, each in value.items()}
-    if isinstance(value, list | tuple):
+    if is_list_or_tuple(value):
         return type(value)(map(plain, value))
-    if isinstance(value, np.ndarray | np.generic):
+    if is_array(value) or is_numpy_scalar(value):
         return value.tolist()
     if isinstance(value, enum.Enum):
         return value.value
@@ -184,9 +185,9 @@ def for_json(value: Any, where: str) -> Any:
             path.
     """
     value = plain(value)
-    if isinstance(value, Mapping):
+    if is_mapping(value):
         return {name: for_json(each, f"{where}.{name}") for name, each in value.items()}
-    if isinstance(value, list | tuple):
+    if is_list_or_tuple(value):
         return [for_json(each, f"{where}[{k}]") for k, each in enumerate(value)]
     if dataclasses.is_dataclass(value) and not callable(value):
         parts = {each.name: getattr(value, each.name) for each in dataclasses.fields(value)}
@@ -209,12 +210,13 @@ def read_toml(path: str | Path) -> dict[str, Any]:
 
 def to_toml(content: Mapping[str, Any], path: str = "") -> str:
     """Return nested mappings, lists, text, numbers and booleans as TOML; None is left out."""
-    lines, tables = [], []
+    lines: list[str] = []
+    tables: list[str] = []
     for name, value in content.items():
         key = name if _BARE.fullmatch(name) else json.dumps(name)
-        if isinstance(value, Mapping):
+        if is_mapping(value):
             tables.append(f"[{path}{key}]\n{to_toml(value, f'{path}{key}.')}")
-        elif isinstance(value, list | tuple) and value and isinstance(value[0], Mapping):
+        elif is_list_or_tuple(value) and value and is_mapping(value[0]):
             for each in value:
                 tables.append(f"[[{path}{key}]]\n{to_toml(each, f'{path}{key}.')}")
         elif value is not None:
@@ -229,7 +231,7 @@ def _value(value: Any, where: str) -> str:
         return json.dumps(value, ensure_ascii=False)
     if isinstance(value, int | float):
         return repr(value)
-    if isinstance(value, list | tuple):
+    if is_list_or_tuple(value):
         return f"[{', '.join(_value(each, where) for each in value)}]"
     raise ConfigError(f"{where} cannot be written to a file: {value!r}.")
 

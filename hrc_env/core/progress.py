@@ -1,7 +1,7 @@
 """Progress of long computations: a bar in a terminal, a line every ten seconds elsewhere."""
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Sized
+from collections.abc import Callable, Generator, Iterable, Iterator, Sized
 from contextlib import contextmanager
 from datetime import timedelta
 from typing import Self, TypeVar
@@ -82,7 +82,7 @@ class Meter:
 
 
 @contextmanager
-def progress_bar(console: Console, name: str) -> Iterator[Say]:
+def progress_bar(console: Console, name: str) -> Generator[Say]:
     """Yield a function of (added share, current activity) that advances a progress bar."""
     with Meter(console, name) as meter:
         yield lambda share, label: meter.show(meter.done + share, label)

@@ -9,6 +9,7 @@ metrics the second (`tests/test_architecture.py` verifies this).
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -102,11 +103,13 @@ class PoseEstimate:
             ) from error
 
     def _complete(self) -> None:
-        if self.unknown is None:
+        """Fill in the fields that were not given."""
+        given: Any = self
+        if given.unknown is None:
             object.__setattr__(self, "unknown", ~self.tracked)
-        if self.blind_s is None:
+        if given.blind_s is None:
             object.__setattr__(self, "blind_s", self.age_s.min(-1))
-        if self.seen_world is None:
+        if given.seen_world is None:
             seen = np.where(self.tracked[..., None, None], self.mean_world, np.nan)
             object.__setattr__(self, "seen_world", seen)
 

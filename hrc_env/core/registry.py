@@ -6,7 +6,7 @@ first use. A registration in this process replaces it.
 
 import threading
 from collections import UserDict
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from io import BytesIO
@@ -78,7 +78,7 @@ class Registry(UserDict[str, ObjectT]):
 
 
 @contextmanager
-def importing(file: str, recorded: bool) -> Iterator[None]:
+def importing(file: str, recorded: bool) -> Generator[None]:
     """Attribute registrations to a file; if `recorded`, child processes import it as well."""
     _IMPORTING.append(file if recorded else "")
     try:
@@ -115,16 +115,20 @@ def _entry(thing: Any, file: str | None, own: set[int]) -> Entry:
 
 def _pickled(thing: Any, own: set[int]) -> bytes:
     """Pickle a registered object by value, so that a script or a notebook can define it."""
-    from cloudpickle import Pickler  # takes time to import
+    import cloudpickle  # type: ignore[reportMissingTypeStubs]  # takes time to import
 
-    class ByValue(Pickler):
+    pickler: Any = cloudpickle.Pickler
+
+    class ByValue(pickler):
         def reducer_override(self, obj: Any) -> Any:
+            """Reduce a registered record to its class and fields."""
             if id(obj) in own and is_dataclass(obj):
                 return type(obj), tuple(getattr(obj, each.name) for each in fields(obj))
-            return super().reducer_override(obj)
+            return pickler.reducer_override(self, obj)
 
     file = BytesIO()
-    ByValue(file).dump(thing)
+    by_value: Any = ByValue(file)
+    by_value.dump(thing)
     return file.getvalue()
 
 

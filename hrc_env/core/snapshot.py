@@ -41,7 +41,9 @@ class Entry:
 class Snapshot:
     """Registrations of a process."""
 
-    entries: Mapping[str, Mapping[str, Entry]] = field(default_factory=dict)
+    entries: Mapping[str, Mapping[str, Entry]] = field(
+        default_factory=dict[str, Mapping[str, Entry]]
+    )
     """Entries by kind (such as "robot") and name."""
     files: tuple[str, ...] = ()
     """Python files to import, in this order."""

@@ -5,6 +5,9 @@ again, and a change of a callee in another file is missed. Here the name of a fi
 everything that the kernel depends on (`digest`), so that a file that is found always fits.
 """
 
+# numba's compiler, on whose inside this builds, has no types.
+# pyright: standard
+
 import contextlib
 import hashlib
 import os

@@ -1,6 +1,9 @@
 """The digest of a kernel: of its module, bytecode, options, constants and all kernels that it
 calls."""
 
+# numba's compiler, on whose inside this builds, has no types.
+# pyright: standard
+
 import dis
 import hashlib
 import types

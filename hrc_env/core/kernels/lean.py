@@ -9,6 +9,9 @@ subclassed classes are internals of numba: releases other than the tested ones (
 `plain`.
 """
 
+# numba's compiler, on whose inside this builds, has no types.
+# pyright: standard
+
 import copy
 from collections.abc import Callable, Iterator
 from functools import cache

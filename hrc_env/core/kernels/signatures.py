@@ -3,6 +3,9 @@
 `python -m assets.kernels.record` writes the file.
 """
 
+# numba's compiler, on whose inside this builds, has no types.
+# pyright: standard
+
 import importlib
 import json
 import sys
