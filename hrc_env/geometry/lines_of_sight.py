@@ -1,28 +1,37 @@
 """Lines of sight: cameras as centres that look along rays, and where two rays pass each other."""
 
 import math
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
+from hrc_env.core.declared import Records1, dtype_of, make_records
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
 
 MIN_CROSSING = 0.1
 """Sine of the smallest angle between two lines that fixes a point."""
-CAMERA = np.dtype(
-    [
-        # projection, rays from pixels; optical centre [m]; focal length [px]
-        ("P", "f8", (3, 4)), ("back", "f8", (3, 3)), ("eye", "f8", (3,)), ("focal", "f8"),
-    ],
-    align=True,
-)  # fmt: skip
-"""A camera of the rig."""
 
 
-def cameras_of(P: Floats) -> Any:
-    """Return the cameras (C,) of projections P (C, 3, 4) as records of `CAMERA`."""
-    cameras = np.empty(len(P), CAMERA)
+class Camera:
+    """A pinhole camera of the rig."""
+
+    P: Annotated[Floats, (3, 4)]
+    """Projection from the world frame to pixels."""
+    back: Annotated[Floats, (3, 3)]
+    """Matrix from homogeneous pixels to ray directions in the world frame."""
+    eye: Annotated[Floats, (3,)]
+    """Optical centre in the world frame [m]."""
+    focal: float
+    """Focal length [px]."""
+
+
+CAMERA = dtype_of(Camera)
+
+
+def cameras_of(P: Floats) -> Records1[Camera]:
+    """Return the cameras (C,) of projections P (C, 3, 4)."""
+    cameras = make_records(Camera, len(P))
     model_cameras(np.ascontiguousarray(P, np.float64), cameras)
     return cameras
 

@@ -23,7 +23,7 @@ from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.tracks import bounded, relax
-from hrc_env.tracking.tree.evidence import heading
+from hrc_env.tracking.tree.evidence import find_heading
 from hrc_env.worker.body import assets_dir
 
 LONGEST_S = 1.0
@@ -70,7 +70,7 @@ def describe(points, velocity, cov, log_std, out):
     Joints about the torso (J, 3), velocities about the torso's (J, 3), both forward, left, up; the
     torso's velocity (3,) and height; ln of the joints' deviations (J,) within the bounds `log_std`.
     """
-    cos, sin, known = heading(points)
+    cos, sin, known = find_heading(points)
     root, speed = np.zeros(3), np.zeros(3)
     for j in _TORSO:
         for i in range(3):

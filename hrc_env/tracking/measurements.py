@@ -34,14 +34,23 @@ _ENOUGH, _AGAINST = 3, 5.0
 _LEAST_CHANCE, _MOST_EVIDENCE = 1e-3, 50.0
 
 
-def arrays_of(
-    keypoints: Keypoints, shape: tuple[int, int, int, int]
-) -> tuple[Floats, Floats, Floats]:
+class KeypointArrays(NamedTuple):
+    """The arrays of a `Keypoints` that estimators read, as compiled functions take them."""
+
+    px: Floats
+    """(B, C, W, J, 2) pixels."""
+    confidence: Floats
+    """(B, C, W, J) confidence, 0 to 1."""
+    sigma_px: Floats
+    """(B, C, W, J) standard deviation of a coordinate [px]."""
+
+
+def arrays_of(keypoints: Keypoints, shape: tuple[int, int, int, int]) -> KeypointArrays:
     """Pixels, confidence and sigma as contiguous float64; `shape` is (B, C, W, J)."""
     check_shape("Keypoints.px", keypoints.px.shape, (*shape, 2), "B, C, W, J, 2")
     check_shape("Keypoints.confidence", keypoints.confidence.shape, shape, "B, C, W, J")
     check_shape("Keypoints.sigma_px", keypoints.sigma_px.shape, shape, "B, C, W, J")
-    return (
+    return KeypointArrays(
         np.ascontiguousarray(keypoints.px, np.float64),
         np.ascontiguousarray(keypoints.confidence, np.float64),
         np.ascontiguousarray(keypoints.sigma_px, np.float64),
@@ -106,7 +115,7 @@ def read_worker(measured, b, w, scale, frame):
     `measured` is as `arrays_of` gives it, `scale` a factor on sigma. Missing measurements get
     pixel 0 and sigma 1, so that no NaN enters the arithmetic.
     """
-    px, confidence, sigma_px = measured
+    px, confidence, sigma_px = measured.px, measured.confidence, measured.sigma_px
     z, sigma, ok = frame.z, frame.sigma, frame.ok
     any_ok = False
     for c in range(px.shape[1]):
@@ -196,13 +205,13 @@ def undo_swaps(tree, frame, views, s):
         for j in range(len(_MIRROR)):
             sees |= frame.ok[j, c]
         if not sees:
-            view.blind += 1
+            view.unseen_updates += 1
             continue
-        back = view.blind > _BLIND_UPDATES
-        view.believed = _BELIEVED_UPDATES if back else max(view.believed - 1, 0)
-        view.blind = 0
+        back = view.unseen_updates > _BLIND_UPDATES
+        view.trusted_updates = _BELIEVED_UPDATES if back else max(view.trusted_updates - 1, 0)
+        view.unseen_updates = 0
         n_seeing += 1
-        if view.believed > 0:
+        if view.trusted_updates > 0:
             view.swap_chance = _LEAST_CHANCE
             continue
         prior = view.swap_chance * (1.0 - s.swap_ends) + (1.0 - view.swap_chance) * s.swap_begins
@@ -217,7 +226,7 @@ def undo_swaps(tree, frame, views, s):
         for c in range(len(views)):
             views[c].swap_chance = _LEAST_CHANCE
     for c in range(len(views)):
-        if views[c].swap_chance > 0.5 and views[c].blind == 0:
+        if views[c].swap_chance > 0.5 and views[c].unseen_updates == 0:
             mirror(c, frame.z, frame.sigma, frame.ok)
     return mirrored
 

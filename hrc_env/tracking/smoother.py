@@ -29,7 +29,7 @@ from hrc_env.tracking.config import ParticleConfig, TrackerConfig, of_kind
 from hrc_env.tracking.particle import ParticleEstimator
 from hrc_env.tracking.tracks import bounded
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT
-from hrc_env.tracking.tree.predict import motion
+from hrc_env.tracking.tree.predict import make_motion_model
 
 _N = 6 * N_JOINTS
 Moments: TypeAlias = tuple[Floats, Floats]
@@ -111,7 +111,7 @@ def rts_step(belief: Moments, predicted: Floats, later: Moments, F: Floats, Q: F
 
 def linear_motion(dt_s: float, config: ParticleConfig) -> tuple[Floats, Floats]:
     """F, Q (90, 90): x' = F x + constant + noise, as `tree.predict` moves the body."""
-    own, travel, noise, shared = motion(dt_s, config.damping, config.root_acceleration)
+    own, travel, noise, shared = make_motion_model(dt_s, config.damping, config.root_acceleration)
     F = np.zeros((N_JOINTS, 2, N_JOINTS, 2))
     Q = np.tile(shared[None, :, None, :], (N_JOINTS, 1, N_JOINTS, 1))
     for j in range(N_JOINTS):

@@ -1,14 +1,14 @@
 """What the estimators without hypotheses keep of a worker, and how all of them age and report."""
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Ints
+from hrc_env.core.typing import Bools, Covariances3, Floats, Ints, Points3, Velocities3
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.settings import settings_of
 
@@ -24,6 +24,23 @@ TRACK = np.dtype(
     align=True,
 )  # fmt: skip
 """What is believed of one worker."""
+
+
+class EstimateArrays(NamedTuple):
+    """The arrays of a `PoseEstimate` that estimators fill, as compiled functions take them."""
+
+    mean_world: Points3
+    """(B, W, J, 3) positions in the world frame [m]."""
+    cov_world: Covariances3
+    """(B, W, J, 3, 3) covariances of the positions [m^2]."""
+    velocity_world: Velocities3
+    """(B, W, J, 3) velocities in the world frame [m/s]."""
+    age_s: Floats
+    """(B, W, J) time since a measurement last supported the joint [s]."""
+    tracked: Bools
+    """(B, W) whether the worker is tracked."""
+
+
 REPORTED = ("mean_world", "cov_world", "velocity_world", "age_s", "tracked")
 """Fields of a `PoseEstimate` that tracks hold."""
 _ROUNDING = 1e-6
