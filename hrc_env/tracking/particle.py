@@ -85,10 +85,12 @@ class ParticleEstimator:
 
     def forecast(self, state: Hypotheses, horizon_s: float) -> PoseEstimate:
         """What is expected in `horizon_s`, hypothesis by hypothesis; see `tracking.forecast`."""
-        trees = np.reshape(state.trees, (len(state.trees), -1))
-        body, cov = trees["body"], trees["cov"]
+        body, cov, age_s, tracked = (
+            state.trees[name].reshape(len(state.trees), -1, *state.trees[name].shape[3:])
+            for name in ("body", "cov", "age_s", "tracked")
+        )
         where = body[..., :3], cov[..., :3, :3].copy(), body[..., 3:]
-        each = PoseEstimate(*where, trees["age_s"], trees["tracked"])
+        each = PoseEstimate(*where, age_s, tracked)
         later = forecast(bounded(each, self.config), horizon_s, self.config)
         whole = mixed(later, state.trees["log_weight"], state.n_alive)
         return self._widened(state, whole)

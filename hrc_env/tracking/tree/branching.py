@@ -144,7 +144,7 @@ def branch(
     """
     trees = worker.trees
     for part in range(N_PARTS):
-        n = worker.n_alive[0]
+        n: int = worker.n_alive[0]
         camera = _find_ambiguous_view(part, prior[0], frame, settings) if n < len(trees) else -1
         if camera < 0:
             continue

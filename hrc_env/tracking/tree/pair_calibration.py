@@ -295,7 +295,8 @@ def measure_displacement(pair: Pair, cameras: Records1[Camera], body: Floats, ou
         for i in range(3):
             middle[i] += body[j, i] / len(body)
     for k in range(2):
-        line[k] = middle - cameras[pair.cameras[k]].eye
+        c: int = pair.cameras[k]
+        line[k] = middle - cameras[c].eye
         squared = line[k, 0] ** 2 + line[k, 1] ** 2 + line[k, 2] ** 2
         for i in range(3):
             for m in range(3):

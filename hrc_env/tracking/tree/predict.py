@@ -372,9 +372,9 @@ def discretise_joints(dt_s: float, damping: float, root_acceleration: float) -> 
     F[:, 1, 0], F[:, 1, 1] = -decay * frequency**2 / damped * sin, decay * (cos - slope)
     stationary = np.zeros_like(F)
     stationary[:, 0, 0], stationary[:, 1, 1] = SPREAD_M**2, SPEED_M_S**2
-    Q = stationary - F @ stationary @ F.swapaxes(1, 2)
-    Q += make_shared_noise(dt_s, root_acceleration)
-    return JointMotion(F, Q)
+    noise = stationary - F @ stationary @ F.swapaxes(1, 2)
+    noise += make_shared_noise(dt_s, root_acceleration)
+    return JointMotion(F, noise)
 
 
 def make_shared_noise(dt_s: float, root_acceleration: float) -> Floats:
