@@ -360,7 +360,7 @@ class Simulation(Stateful):
         q_path = self.physics.step(command.velocities, path, far, grip)
         workers = worker_truth(self.bodies, motion)
         n = self.chain.n_joints
-        robot, arm = chains.robot_along(self.chain, q_path[..., :n], self.physics.qd)
+        robot, arm = chains.robot_path(self.chain, q_path[..., :n], self.physics.qd)
         world = handling.world_of(self.physics, self._everyone, robot)
         world, arm = handling.loaded(self.scene, world, arm, q_path, task.is_load(self.task_state))
         progress = self._show_workers(world, motion)

@@ -401,7 +401,7 @@ def test_the_geometry_of_a_robot_is_that_of_its_mjcf():
     data = mujoco.MjData(scene.model)
     data.qpos[:] = q
     mujoco.mj_kinematics(scene.model, data)
-    tip = chains.tool(scene.chain, q)[:3, 3]
+    tip = chains.tool_frame(scene.chain, q)[:3, 3]
     np.testing.assert_allclose(data.site("robot/tip").xpos, tip, atol=1e-9)
     for name, ends in zip(scene.robot.capsules, chains.capsules(scene.chain, q), strict=True):
         np.testing.assert_allclose(data.geom(f"robot/{name}").xpos, ends.mean(0), atol=1e-9)

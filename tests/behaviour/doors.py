@@ -1432,7 +1432,7 @@ class Camera:
 
     def resized(self, width_px: int, height_px: int) -> NDArray[np.float64]:
         """Return the intrinsics of the camera with another image."""
-        return cameras.resized(self._made, width_px, height_px).K
+        return cameras.resize(self._made, width_px, height_px).K
 
 
 def project_points(
@@ -1488,7 +1488,7 @@ def rotations(
 ) -> dict[str, NDArray[np.float64]]:
     """Return rotations by angles about each axis, and of unit quaternions, and turned offsets."""
     about = {f"about_{axis}": turns.about_axis(axis, angles_rad) for axis in "xyz"}
-    turned = np.array([turns.turned(each, offset) for each in quaternions])
+    turned = np.array([turns.rotate(each, offset) for each in quaternions])
     return {**about, "of_quaternion": turns.matrix(quaternions), "turned": turned}
 
 
@@ -1513,10 +1513,10 @@ class Chain:
     def pose(self, q: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
         """Return everything that is known at joints q (B, N)."""
         return {
-            "frames": chains.forward(self._made, q),
-            "tool": chains.tool(self._made, q),
+            "frames": chains.link_frames(self._made, q),
+            "tool": chains.tool_frame(self._made, q),
             "jacobian": chains.jacobian(self._made, q),
-            "turning": chains.turning(self._made, q),
+            "turning": chains.angular_jacobian(self._made, q),
             "capsules": chains.capsules(self._made, q),
         }
 
@@ -1524,7 +1524,7 @@ class Chain:
         self, path: NDArray[np.float64], qd: NDArray[np.float64]
     ) -> dict[str, NDArray[np.float64]]:
         """Return the robot at the end of paths (B, T, N), and its capsules along them."""
-        robot, along = chains.robot_along(self._made, path, qd)
+        robot, along = chains.robot_path(self._made, path, qd)
         return {
             "q": robot.q, "tool": robot.tool_world, "tool_velocity": robot.tool_velocity_world,
             "axes": robot.tool_axes_world, "capsules": robot.capsules_world, "along": along,
@@ -1586,9 +1586,9 @@ class Shapes:
     ) -> NDArray[np.bool_]:  # fmt: skip
         """Return which points (B, J, 3) are hidden from eyes, the last shapes being moved ones."""
         still, moving = self._table[:-n_moving], self._table[-n_moving:]
-        gone = np.stack([shapes.absent()])
+        gone = np.stack([shapes.absent_shape()])
         moving = np.repeat(np.concatenate([moving, gone])[None], len(points), 0)
-        return sight.hidden(sight.Surroundings(still, moving, robot, radius_m), eyes, points)
+        return sight.find_hidden(sight.Surroundings(still, moving, robot, radius_m), eyes, points)
 
     def hide_behind_bodies(
         self, eye: NDArray[np.float64], points: NDArray[np.float64],
@@ -1597,7 +1597,7 @@ class Shapes:
         """Return which points (J, 3) shapes or bodies' capsules hide, and how many may do so."""
         occluders = sight.make_occluders(self._table, 0, len(bodies))
         shapes.set_capsules(occluders.table, occluders.first_body, bodies, radius_m)
-        n = sight.look(eye, points, occluders)
+        n = sight.select_occluders(eye, points, occluders)
         hidden = [sight.is_hidden(eye, points, j, occluders, n) for j in range(len(points))]
         return np.array(hidden), int(n)
 
@@ -1624,12 +1624,12 @@ def meet_footprints(
     capsules: NDArray[np.float64], radius_m: NDArray[np.float64], footprints: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
     """Return which sets of capsules meet a footprint."""
-    return ways.met(capsules, radius_m, footprints)
+    return ways.find_overlaps(capsules, radius_m, footprints)
 
 
 def keep_apart(points: NDArray[np.float64], apart_m: float) -> NDArray[np.int64]:
     """Return which points are kept so that all are so far apart."""
-    return ways.spread_out(points, apart_m)
+    return ways.select_apart(points, apart_m)
 
 
 # --- Cameras and the emulator (emulator.py) ------------------------------------------------------
