@@ -22,7 +22,7 @@ from hrc_env.scene.robot import ROBOTS, Robot, robot_called
 from hrc_env.tasks.check import check_parts
 from hrc_env.tasks.hooks import lent
 from hrc_env.tasks.task import Task, find_task, is_known
-from hrc_env.tracking.estimators import EstimatorSpec, estimator_called
+from hrc_env.tracking.estimators import EstimatorSpec, find_estimator
 
 PARTS = {
     "people": "motion.people",
@@ -77,7 +77,7 @@ def make_settings(asked: EnvConfig) -> Settings:
     Raises:
         ConfigError: a value that cannot be, with those that can.
     """
-    task, estimator = find_task(asked.task), estimator_called(asked.estimator)
+    task, estimator = find_task(asked.task), find_estimator(asked.estimator)
     if not is_known(task):
         check_parts(task)
     config, cameras = resolve(asked.config, task, estimator), asked.cameras
