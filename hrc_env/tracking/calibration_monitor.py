@@ -202,7 +202,7 @@ def _fill_view(
         p: (3, 4) projection of the camera.
         out: (N_VIEW,) view, filled in.
     """
-    dx, dy, dz = velocity
+    dx, dy, dz = velocity[0], velocity[1], velocity[2]
     u, v, depth = pixel_of(p, mean[0] - age_s * dx, mean[1] - age_s * dy, mean[2] - age_s * dz)
     out[U], out[V] = px[0] - u, px[1] - v
     squares = (out[U] ** 2 + out[V] ** 2) / sigma_px**2

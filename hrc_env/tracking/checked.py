@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
-from typing import Any, cast
+from typing import Any, Generic, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hrc_env.core.batching import copied
 from hrc_env.core.brought import check_arguments, described, flags_of, numbers_of
@@ -13,7 +14,7 @@ from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import JOINTS, N_JOINTS
 from hrc_env.core.typing import Floats, Ints, Rngs
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.estimator import Estimator
+from hrc_env.tracking.estimator import Estimator, State
 
 METHODS = {
     "init": ("batch", "n_workers"),
@@ -28,8 +29,8 @@ OFF_M2 = 1e-9
 """Greatest asymmetry of a covariance [m^2]."""
 
 
-class CheckedEstimator:
-    """An estimator whose estimates are checked.
+class CheckedEstimator(Generic[State]):
+    """An estimator with a check of all its estimates.
 
     Args:
         name: name of the estimator, which errors begin with.
@@ -40,12 +41,12 @@ class CheckedEstimator:
             methods raise it for estimates that are invalid.
     """
 
-    def __init__(self, name: str, inner: Estimator[Any]) -> None:
+    def __init__(self, name: str, inner: Estimator[State]) -> None:
         missing = [each for each in METHODS if not callable(getattr(inner, each, None))]
         if missing:
             raise ConfigError(
                 f"{name}: the estimator lacks {', '.join(missing)}; "
-                "hrc_env.tracking.estimators.Estimator says what each does."
+                "hrc_env.tracking.estimators.Estimator describes each of them."
             )
         for method, arguments in METHODS.items():
             check_arguments(f"{name}: {method}", getattr(inner, method), *arguments)
@@ -61,7 +62,7 @@ class CheckedEstimator:
         """Settings of the estimator."""
         return self.inner.config
 
-    def init(self, batch: int, n_workers: int) -> Any:
+    def init(self, batch: int, n_workers: int) -> State:
         """Return the state of workers that have never been detected."""
         self.n_workers = n_workers
         state = self.inner.init(batch, n_workers)
@@ -72,23 +73,23 @@ class CheckedEstimator:
             )
         return state
 
-    def reset(self, state: Any, ids: Ints, rngs: Rngs) -> None:
+    def reset(self, state: State, ids: Ints, rngs: Rngs) -> None:
         """Reset environments `ids`."""
         self.inner.reset(state, ids.copy(), rngs)
 
-    def predict(self, state: Any, dt_s: float, rngs: Rngs) -> None:
+    def predict(self, state: State, dt_s: float, rngs: Rngs) -> None:
         """Let `dt_s` seconds pass."""
         self.inner.predict(state, dt_s, rngs)
 
-    def update(self, state: Any, keypoints: Keypoints, rngs: Rngs) -> None:
+    def update(self, state: State, keypoints: Keypoints, rngs: Rngs) -> None:
         """Update with one set of frames, of which the estimator receives a copy."""
         self.inner.update(state, copied(keypoints), rngs)
 
-    def estimate(self, state: Any) -> PoseEstimate:
+    def estimate(self, state: State) -> PoseEstimate:
         """Return the present estimate, checked."""
         return self._check_estimate("estimate", self.inner.estimate(state), _find_batch(state))
 
-    def forecast(self, state: Any, horizon_s: float) -> PoseEstimate:
+    def forecast(self, state: State, horizon_s: float) -> PoseEstimate:
         """Return the estimate expected in `horizon_s` [s], checked."""
         return self._check_estimate(
             "forecast", self.inner.forecast(state, horizon_s), _find_batch(state)
@@ -151,7 +152,8 @@ class CheckedEstimator:
 def _find_batch(state: object) -> int | None:
     """Return the length of the first axis of a state's arrays; None if it holds none."""
     if isinstance(state, np.ndarray):
-        return state.shape[0] if state.ndim else None
+        shape = cast(NDArray[Any], state).shape
+        return shape[0] if shape else None
     if is_dataclass(state) and not isinstance(state, type):
         parts: Sequence[object] = [getattr(state, each.name) for each in fields(state)]
     elif isinstance(state, tuple | list):

@@ -111,7 +111,7 @@ class ParticleConfig(TrackerConfig):
     """Share of Laplace's correction from the mode to the mean of the posterior that is applied.
     With 0 the depth that one camera leaves open drifts towards the lens; 1 overshoots a little."""
     one_view_inflation: float = 1.21
-    """Factor on the reported covariance of a worker whom only one camera has seen for a while."""
+    """Factor on the reported covariance of a worker seen by only one camera for a while."""
     lying_inflation: float = 4.5
     """Additional factor on the reported covariance of a lying body that only one camera sees,
     because one camera infers depth from how people stand."""

@@ -4,7 +4,7 @@ A camera contradicts a track if most of its confident detections are farther fro
 than the detector's errors. A single camera may do so for a moment after it has exchanged left and
 right, or while a track restarts. Several cameras that keep doing so are not placed as calibrated.
 
-A track whose body is far too small or too large for a person explains no detection: with a
+A track with a body that is far too small or too large explains no detection: with a
 calibration in other units, or by a board of another size, all cameras agree on such a body.
 """
 
@@ -38,7 +38,7 @@ CHAIN = tuple(JOINT[f"left_{name}"] for name in ("shoulder", "hip", "knee", "ank
 
 
 class DetectedPoses(NamedTuple):
-    """The cameras that detect poses, and those whose poses no track explains."""
+    """The cameras that detect poses, and those that detect unexplained ones."""
 
     poses: Bools
     """(B, C) whether the camera detects a pose."""
@@ -49,7 +49,7 @@ class DetectedPoses(NamedTuple):
 def find_unexplained(
     keypoints: Keypoints, age_s: Floats, estimate: PoseEstimate, P: Floats, focal_px: Floats
 ) -> DetectedPoses:
-    """Find the cameras that detect poses, and those whose poses no track explains.
+    """Find the cameras that detect poses, and those that detect poses of no track.
 
     Args:
         keypoints: (B, C, W, J) pinhole pixels, assigned to workers.

@@ -189,7 +189,7 @@ _P = np.array([[[900.0, 640, 0, 0], [0, 360, -900, 0], [0, 1, 0, 3]],
 def check_estimator(spec: EstimatorSpec) -> None:
     """Raise `ConfigError` for an estimator that is incomplete or returns invalid estimates.
 
-    The check includes workers that no camera sees, who must have an estimate, too.
+    The check includes workers that no camera sees: they must have an estimate, too.
     """
     given = cast(object, spec)
     if not isinstance(given, EstimatorSpec):

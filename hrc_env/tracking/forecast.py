@@ -2,8 +2,8 @@
 
 A small network, trained by `assets/ahead/train.py` on the environment's own motions, takes one body
 in the frame of its heading. For a few horizons it predicts the displacement of each joint and the
-standard deviation of its error, which is added to the present uncertainty. A body whose heading is
-unknown moves with constant velocity and random acceleration; one that is not tracked relaxes to the
+standard deviation of its error, which is added to the present uncertainty. A body of unknown
+heading moves with constant velocity and random acceleration; one that is not tracked relaxes to the
 prior (docs/tracking.md, "Forecast").
 """
 

@@ -65,7 +65,7 @@ class StepFrames(NamedTuple):
     """The frames of one control step in environments with equal times."""
 
     members: Ints
-    """(M,) indices of these environments among those that were asked for."""
+    """(M,) positions of these environments in the `ids` of `group_frames`."""
     step_s: float
     """Length of the step [s]."""
     frame_sets: list[TimedFrameSet]
@@ -158,7 +158,7 @@ def add_held_frames(frames: Frames, ids: Ints, frame_set: FrameSet, wanted: Bool
         frames: the stored frames.
         ids: (G,) indices of the environments.
         frame_set: the set of frames.
-        wanted: (G, W) the workers for whom frames are held.
+        wanted: (G, W) the workers that need held frames.
     """
     age_s = frame_set.at_s[:, None, None] - frames.time_s[ids]
     recent = (age_s > -SAME_S) & (age_s < _HELD_S) & ~frame_set.has[:, :, None]

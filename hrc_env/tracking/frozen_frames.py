@@ -1,8 +1,8 @@
-"""Detection of cameras whose image is frozen.
+"""Detection of cameras with a frozen image.
 
 No live camera reports exactly the same keypoints twice, because people sway and sensors have noise.
-A camera whose keypoints repeat bit for bit is ignored until several successive images are new. One
-new image is not enough: a crop that moves over a frozen image makes single new ones.
+If the keypoints of a camera repeat bit for bit, it is ignored until several successive images are
+new. One new image is not enough: a crop that moves over a frozen image makes single new ones.
 """
 
 import math

@@ -46,9 +46,9 @@ class TrackingError:
     lost: float
     """1 if fewer workers are tracked than present, else 0."""
     id_switches: float
-    """Number of identity switches of all workers in the episode so far."""
+    """Number of identity switches of all workers since the episode began."""
     idf1: float
-    """IDF1 of the episode so far."""
+    """IDF1 since the episode began."""
 
 
 TRACKING = dtype_of(TrackingError)
@@ -56,7 +56,7 @@ TRACKING = dtype_of(TrackingError)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Identities:
-    """The matches of workers and tracks in the episodes so far."""
+    """The matches of workers and tracks since the episodes began."""
 
     workers: Records2[Identity]
     """(B, W) history of each worker."""
@@ -78,8 +78,8 @@ def measure_errors(
 
     A match of worker and track lasts while they are within `SAME_M`. Then as many of the others as
     possible are matched within that distance, at the least sum of distances (CLEAR MOT). A worker
-    who is matched with another slot than the last time has switched, so an exchange of two workers
-    counts as two switches. IDF1 is 2 m / n. Here m is the number of steps in which workers and
+    matched with another slot than the last time has switched, so an exchange of two workers counts
+    as two switches. IDF1 is 2 m / n. Here m is the number of steps in which workers and
     tracks were within `SAME_M`, each worker with one slot for the whole episode, in the best
     assignment; n is the number of steps of workers and of tracks together (Ristani et al. 2016,
     doi:10.1007/978-3-319-48881-3_2).
@@ -88,7 +88,7 @@ def measure_errors(
         estimate: (B, W, ...) tracks.
         joints_world: (B, W, J, 3) true joints [m].
         present: (B, W) whether the worker is present.
-        identities: matches of the episodes so far, changed in place.
+        identities: matches since the episodes began, changed in place.
 
     Returns:
         (B,) errors of each environment.

@@ -127,7 +127,7 @@ class PaperEstimator:
 
         Args:
             state: changed in place.
-            moving: (B, W) the workers whose particles move.
+            moving: (B, W) the workers to move.
             dt_s: time that passes [s].
             rngs: (B,) one generator for each environment.
         """

@@ -1,4 +1,4 @@
-"""The default estimator: a particle filter whose particles are hypotheses with Gaussian bodies.
+"""The default estimator: a particle filter with hypotheses as particles, each a Gaussian body.
 
 It is a Rao-Blackwellised particle filter (Doucet, de Freitas, Murphy and Russell, UAI 2000). The
 particles represent discrete facts, such as whether the body or a limb is mirrored in depth; all
@@ -100,8 +100,8 @@ class ParticleEstimator:
     def _widen(self, state: Hypotheses, estimate: PoseEstimate) -> PoseEstimate:
         """Widen covariances, in place, for unknown sizes and for misaligned cameras; return them.
 
-        A worker whose track one view has started may be larger and farther from that camera by the
-        same share. A worker seen by two misaligned cameras may be displaced as a whole.
+        A worker with a track started from one view may be larger and farther from that camera by
+        the same share. A worker seen by two misaligned cameras may be displaced as a whole.
 
         Args:
             state: the hypotheses.

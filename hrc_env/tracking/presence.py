@@ -41,7 +41,7 @@ from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.contradiction import DetectedPoses
 
 LEAST_CAMERAS = 2
-"""Least number of cameras whose searches prove absence."""
+"""Least number of cameras that prove absence by their searches."""
 IMAGES = 8
 """Number of searches by all cameras together that prove absence where every image is processed
 whole; a part of the rig needs its share. Each of 2,000 workers was found in the first images of
@@ -121,7 +121,7 @@ class Evidence(NamedTuple):
     assigned: Floats
     """(b, C, W, J) confidence of the detections after association."""
     has_strangers: Bools
-    """(b,) whether there is a person whom no slot explains."""
+    """(b,) whether there is a person beyond the slots."""
     searched: Bools
     """(b, C) whether the camera searched its whole image."""
     image_age_s: Floats
@@ -167,7 +167,7 @@ class ImageSearches:
     enough: int
     """Number of searches that prove absence: `IMAGES` or `SEARCHES`."""
     shown: DetectedPoses
-    """Cameras that detect poses, and those whose poses no track explains."""
+    """Cameras that detect poses, and those that detect unexplained ones."""
     others: Others
     """Detected people beyond the slots."""
 
@@ -380,7 +380,7 @@ def _judge_group(
     Args:
         search: (C,) searches for the slot.
         sees: (C,) the cameras that see the group.
-        level: state of the group so far.
+        level: present state of the group.
         enough: number of searches by all cameras that prove absence.
         shown: whether a camera shows a person for the slot.
         hides: whether a lost worker may still be hidden.

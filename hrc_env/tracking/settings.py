@@ -51,9 +51,9 @@ class Settings(NamedTuple):
     mean_correction: float
     """Share of Laplace's correction from the mode to the mean that is applied."""
     one_view_inflation: float
-    """Factor on the reported covariance of a worker whom only one camera sees."""
+    """Factor on the reported covariance of a worker seen by only one camera."""
     lying_inflation: float
-    """Additional factor on that covariance for a lying body."""
+    """Additional factor on the reported covariance of a lying body seen by only one camera."""
     min_std_m: float
     """Smallest standard deviation that is reported in any direction [m]."""
     floor_std_m: float

@@ -117,7 +117,7 @@ def smooth(
     forth = _smooth_one_way(estimator, clip, dt_s)
     back = _reverse(_smooth_one_way(estimator, clip[::-1], dt_s))
     batch, _, n_workers = clip[0].px.shape[:3]
-    return _make_estimate(_mix(forth, back), (len(clip), batch, n_workers), config)
+    return _make_estimate(_mix(forth, back), batch, n_workers, config)
 
 
 def rts_step(filtered: Moments, predicted: Floats, later: Moments, F: Floats, Q: Floats) -> Moments:
@@ -130,12 +130,11 @@ def rts_step(filtered: Moments, predicted: Floats, later: Moments, F: Floats, Q:
         F: (d, d) transition from one frame to the next.
         Q: (d, d) covariance of its noise.
     """
-    mean, cov = filtered
-    moved = F @ cov
+    moved = F @ filtered.cov
     cov_predicted = moved @ F.T + Q
     gain = np.linalg.solve(cov_predicted, moved).swapaxes(-1, -2)
-    mean = mean + np.einsum("nij,nj->ni", gain, later.mean - predicted)
-    cov = cov + gain @ (later.cov - cov_predicted) @ gain.swapaxes(-1, -2)
+    mean = filtered.mean + np.einsum("nij,nj->ni", gain, later.mean - predicted)
+    cov = filtered.cov + gain @ (later.cov - cov_predicted) @ gain.swapaxes(-1, -2)
     return Moments(mean, 0.5 * (cov + cov.swapaxes(-1, -2)))
 
 
@@ -268,17 +267,18 @@ def _mix(a: _Smoothed, b: _Smoothed) -> _Smoothed:
 
 
 def _make_estimate(
-    smoothed: _Smoothed, shape: tuple[int, int, int], config: ParticleConfig
+    smoothed: _Smoothed, batch: int, n_workers: int, config: ParticleConfig
 ) -> PoseEstimate:
     """Return the estimate (T, B, W, ...) of a clip.
 
     Args:
         smoothed: the result for n = B W workers.
-        shape: numbers of frames T, environments B and workers W.
+        batch: number of environments B.
+        n_workers: number of workers W.
         config: bounds of the covariances.
     """
-    n_frames, batch, n_workers = shape
-    tracked = smoothed.tracked.reshape(-1, n_workers)
+    n_frames = len(smoothed.tracked)
+    tracked = smoothed.tracked.reshape(n_frames * batch, n_workers)
     joints = (*tracked.shape, N_JOINTS)
     estimate = PoseEstimate(
         mean_world=smoothed.mean[..., :3].reshape(*joints, 3),

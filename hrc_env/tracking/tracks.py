@@ -88,8 +88,8 @@ def reset_tracks(tracks: Records2[Track], ids: Ints, config: TrackerConfig) -> N
 def age_tracks(tracks: Records2[Track], dt_s: float, config: TrackerConfig) -> None:
     """Count ages up, end tracks that no measurement supports, and relax lost ones to the prior.
 
-    The mean and the covariance of a lost worker follow an Ornstein-Uhlenbeck process whose
-    stationary distribution is the prior.
+    The mean and the covariance of a lost worker follow an Ornstein-Uhlenbeck process with the
+    prior as its stationary distribution.
 
     Args:
         tracks: (B, W) tracks, changed in place.
@@ -136,7 +136,7 @@ def age_worker(
         velocity: (J, 3) velocities [m/s], likewise.
         age: (J,) ages [s], increased in place.
         conflict: (J,) counts of contradictions, set to zero where the worker is not tracked.
-        tracked: whether the worker has been tracked so far.
+        tracked: whether the worker was tracked before.
         dt: time that passes [s].
         settings: the prior and the times after which tracks are lost and forgotten.
     """

@@ -74,7 +74,7 @@ def _mask_invalid(detections: KeypointArrays, sigma_scale: float) -> KeypointArr
         detections: (B, C, W, J) detections.
         sigma_scale: factor on the standard deviations of the others.
     """
-    px, confidence, sigma_px = detections
+    px, confidence, sigma_px = detections.px, detections.confidence, detections.sigma_px
     inside = np.all(np.abs(px) < FURTHEST_PX, axis=-1)
     ok = inside & (confidence > 0) & (confidence <= 1 + 1e-6)
     ok &= (sigma_px > 0) & (sigma_px < FURTHEST_PX)

@@ -1216,8 +1216,8 @@ class Tracker:
             "count": state.n_alive.copy(),
             "log_weight": np.where(alive, state.trees["log_weight"], 0.0),
             "pose_log_prior": np.where(alive, state.trees["pose_log_prior"], 0.0),
-            "waited_s": state.waited_s.copy(),
-            "waited_updates": best["waited"].copy(),
+            "waited_s": state.since_search_s.copy(),
+            "waited_updates": best["one_view_updates"].copy(),
             "conflicts": best["conflict"].copy(),
             "size_std": best["size_std"].copy(),
             "bone_m": best["bone_length"].copy(),
@@ -1227,17 +1227,17 @@ class Tracker:
             "slope": best["slope"].copy(),
             "speed_std": np.sqrt(np.diagonal(best["cov"], axis1=-2, axis2=-1)[..., 3:]),
             "swap_chance": views["swap_chance"].copy(),
-            "blind": views["blind"].copy(),
-            "believed": views["believed"].copy(),
+            "blind": views["unseen_updates"].copy(),
+            "believed": views["trusted_updates"].copy(),
             "noise_factor": noise["factor"].copy(),
             "noise_sums": noise["sums"].copy(),
             "turn_rad": best["pair"]["turn"].copy(),
             "turn_std_rad": np.sqrt(
                 np.diagonal(best["pair"]["turn_cov"], axis1=-2, axis2=-1).clip(0)
             ),
-            "turn_fits": best["pair"]["fits"].copy(),
-            "is_askew": best["pair"]["askew"].copy(),
-            "pair_waited": best["pair"]["waited"].copy(),
+            "turn_fits": best["pair"]["meeting_share"].copy(),
+            "is_askew": best["pair"]["is_misaligned"].copy(),
+            "pair_waited": best["pair"]["untracked_updates"].copy(),
             "displaced_m": np.sqrt(np.diagonal(best["displaced_m2"], axis1=-2, axis2=-1).clip(0)),
         }
 

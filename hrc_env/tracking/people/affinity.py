@@ -1,4 +1,4 @@
-"""The affinity of a 2D pose in one camera to a body whose joints are predicted.
+"""The affinity of a 2D pose in one camera to a body with predicted joints.
 
 Each joint contributes the log likelihood ratio of a detection near its predicted pixel against one
 anywhere in the image; a gross error costs no more than the gate. The errors of a body's joints are
@@ -71,7 +71,7 @@ def project_body(
         camera: (3, 4) projection.
         mean: (J, 3) positions [m].
         cov: (J, 3, 3) covariances of the positions [m^2].
-        known: (J,) joints whose position is known.
+        known: (J,) joints with a known position.
         slack_m: standard deviation of errors that `cov` does not hold [m].
         image: (J, 3) u, v [px] and mean variance of a coordinate [px^2], filled in. The variance is
             -1 for joints that are not known or not in front of the camera.

@@ -307,8 +307,8 @@ def _find_worker(
     """Return the index of the worker that a body belongs to, or -1 for none.
 
     This is a worker tracked at that place, else a tracked worker that no camera sees nearby, else
-    the slot without a track whose last estimate is nearest, so that a person who returns is
-    assigned to the same slot.
+    the slot without a track with the nearest last estimate, so that a person returns to the same
+    slot.
 
     Args:
         body: the body.

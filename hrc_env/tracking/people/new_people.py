@@ -29,7 +29,7 @@ from hrc_env.tracking.people.affinity import (
 MEETING_M = 0.03
 """Standard deviation of the gap between lines of sight for other reasons than noise [m]."""
 AGREEING_SHARE = 0.6
-"""Share of the joints that two poses have in common whose lines of sight must meet."""
+"""Least share of the common joints of two poses with lines of sight that meet."""
 SHORTEST = 0.5
 """Least length of a bone, as a share of the population's mean."""
 LONGEST = 1.6
@@ -37,7 +37,7 @@ LONGEST = 1.6
 BONE_SLACK_M = 0.08
 """Tolerance added to both limits of a bone's length [m]."""
 GOOD_BONES = 0.7
-"""Share of a body's bones whose lengths must be within the limits."""
+"""Least share of a body's bones with lengths within the limits."""
 BODY_SLACK_M = 0.1
 """Standard deviation of a body made from two lines of sight, when other cameras see it [m]."""
 
