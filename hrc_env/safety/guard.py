@@ -139,7 +139,7 @@ def describe_arm(now: Belief) -> Arm:
     n_loads = len(now.robot.capsule_radius_m) - len(model.chain.capsule_link)
     carried = np.full(n_loads, model.chain.n_joints - 1)
     links = np.append(model.chain.capsule_link, carried)
-    return Arm(model, chains.forward(model.chain, now.robot.q), links)
+    return Arm(model, chains.link_frames(model.chain, now.robot.q), links)
 
 
 def _within_reach(

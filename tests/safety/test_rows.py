@@ -36,7 +36,7 @@ def somebody(middle, speed_m_s=0.6):
 
 def before(scene, away_m):
     """(2,) a place so far in front of the tool."""
-    return chains.tool(scene.chain, scene.home_q)[:2, 3] + np.array([away_m, 0.0])
+    return chains.tool_frame(scene.chain, scene.home_q)[:2, 3] + np.array([away_m, 0.0])
 
 
 def rows_of(chain, q, estimate, box, config=CONFIG, touches=(0.0, 0.0), gone_m=0.0):
@@ -45,7 +45,7 @@ def rows_of(chain, q, estimate, box, config=CONFIG, touches=(0.0, 0.0), gone_m=0
     found = np.empty((1, MOST_ROWS, chain.n_joints)), np.empty((1, MOST_ROWS))
     count, least_m = np.empty(1, np.int64), np.empty(1)
     tightest_rows(
-        (chains.forward(chain, q), chain.slides, chain.capsule_link, chains.capsules(chain, q),
+        (chains.link_frames(chain, q), chain.slides, chain.capsule_link, chains.capsules(chain, q),
          chain.capsule_radius_m, low[None], high[None], slew),
         (segments(estimate.mean_world), estimate.mean_world, estimate.velocity_world,
          estimate.cov_world, estimate.age_s, estimate.tracked, np.full((1, 1), gone_m),
@@ -150,7 +150,7 @@ def floor_rows_of(chain, q, places, level, reach_m, box, config=CONFIG):
     found = np.empty((1, MOST_ROWS, chain.n_joints)), np.empty((1, MOST_ROWS))
     count, least_m = np.zeros(1, np.int64), np.full(1, np.inf)
     floor_rows(
-        (chains.forward(chain, q), chain.slides, chain.capsule_link, chains.capsules(chain, q),
+        (chains.link_frames(chain, q), chain.slides, chain.capsule_link, chains.capsules(chain, q),
          chain.capsule_radius_m, low[None], high[None], slew),
         (places, np.array([level]), np.array([reach_m])), config.record(), (*found, count, least_m),
     )  # fmt: skip

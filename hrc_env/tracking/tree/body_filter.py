@@ -119,7 +119,7 @@ def _update_worker(
         branches = searches_now and h == 0
         is_weighed = has_rivals or branches
         if read_for_hypothesis(
-            tree, worker.views[h], noise, measured, (b, w), settings, frame
+            tree, worker.views[h], noise, measured, b, w, settings, frame
         ) and acquire(tree, frame, settings):  # the body was tracked with its sides exchanged
             tree.slope[:] = 0.0
         evidence = condition_on_frame(tree, prior, is_weighed, frame, settings, work)
