@@ -34,7 +34,7 @@ from hrc_env.scene.build import SceneConfig
 from hrc_env.scene.domain_randomization import APPEARANCES, AppearanceConfig
 from hrc_env.scene.handling import ObjectsConfig
 from hrc_env.tasks.task import TaskType
-from hrc_env.tracking.config import ParticleConfig, TrackerConfig, of_kind
+from hrc_env.tracking.config import ParticleConfig, TrackerConfig, cast_config
 from hrc_env.tracking.estimators import EstimatorSpec
 from hrc_env.tracking.forecast import LONGEST_S
 from hrc_env.tracking.people.association import AssociationConfig
@@ -132,7 +132,7 @@ def resolve(config: ConfigChoice, task: TaskType, estimator: EstimatorSpec) -> H
             "config must be an HRCConfig, a mapping, a TOML file's path or None, "
             f"got {type(config).__name__}."
         )
-    config = replace(config, tracker=of_kind(config.tracker, estimator.config))
+    config = replace(config, tracker=cast_config(config.tracker, estimator.config))
     if config.task is None:
         return replace(config, task=task.config_type())
     if not isinstance(config.task, task.config_type):

@@ -68,7 +68,7 @@ def tracking_info(
 ) -> Info:
     """How far the belief is from the truth, and whether it takes one worker for another; no error
     is given where nobody is tracked."""
-    found = metrics.tracking_error(estimate, truth.joints_world, present, identities)
+    found = metrics.measure_errors(estimate, truth.joints_world, present, identities)
     return {f"tracking/{name}": found[name] for name in metrics.TRACKING.names or ()}
 
 

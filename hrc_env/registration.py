@@ -220,12 +220,12 @@ class Spec(EnvSpec):
         from hrc_env.config import HRCConfig, resolve
         from hrc_env.core.mapping import for_json
         from hrc_env.tasks.task import find_task
-        from hrc_env.tracking.estimators import estimator_called
+        from hrc_env.tracking.estimators import find_estimator
 
         given = {**self.kwargs}
         if isinstance(given.get("config"), HRCConfig):  # its tracker is of the estimator's kind
             task = find_task(given.get("task", DEFAULT))
-            estimator = estimator_called(given.get("estimator", "particle"))
+            estimator = find_estimator(given.get("estimator", "particle"))
             given["config"] = resolve(given["config"], task, estimator)
         for name, value in given.items():
             try:

@@ -11,7 +11,7 @@ from hrc_env.config import HRCConfig, resolve
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.mapping import restored
 from hrc_env.env_config import EnvConfig
-from hrc_env.geometry.camera_config import CameraConfig, camera_of, read_rig
+from hrc_env.geometry.camera_config import CameraConfig, parse_camera, read_rig
 from hrc_env.safety.shield import Shield, find_shield
 from hrc_env.scene.build import Scene
 from hrc_env.scene.camera_images import ImageConfig, images_called
@@ -22,7 +22,7 @@ from hrc_env.scene.robot import ROBOTS, Robot, robot_called
 from hrc_env.tasks.check import check_parts
 from hrc_env.tasks.hooks import lent
 from hrc_env.tasks.task import Task, find_task, is_known
-from hrc_env.tracking.estimators import EstimatorSpec, estimator_called
+from hrc_env.tracking.estimators import EstimatorSpec, find_estimator
 
 PARTS = {
     "people": "motion.people",
@@ -77,7 +77,7 @@ def make_settings(asked: EnvConfig) -> Settings:
     Raises:
         ConfigError: a value that cannot be, with those that can.
     """
-    task, estimator = find_task(asked.task), estimator_called(asked.estimator)
+    task, estimator = find_task(asked.task), find_estimator(asked.estimator)
     if not is_known(task):
         check_parts(task)
     config, cameras = resolve(asked.config, task, estimator), asked.cameras
@@ -137,7 +137,7 @@ def _camera(given: Any, index: int) -> CameraConfig:
     if isinstance(given, CameraConfig):
         return given
     if isinstance(given, Mapping):
-        return camera_of(given, f"cameras[{index}]")
+        return parse_camera(given, f"cameras[{index}]")
     place = np.asarray(given) if isinstance(given, Sequence | np.ndarray) else np.zeros(0)
     if place.shape != (3,) or not np.issubdtype(place.dtype, np.number):
         raise ConfigError(

@@ -142,9 +142,10 @@ class Simulation(Stateful):
         self.action, self.shield_change = (np.zeros((batch, n)) for n in (self.n_actions, n_joints))
         self.episode_cost, self.separation_m = np.zeros(batch), np.zeros(batch)
         made = (batch, self.scene.n_workers, config.tracker)
-        self.estimates = tuple(oracle.prior(*made) for _ in (0.0, *config.forecast_s))
+        self.estimates = tuple(oracle.estimate_prior(*made) for _ in (0.0, *config.forecast_s))
         """What is believed of the workers now, and expected at each of `forecast_s`."""
-        self.identities, self.keys = metrics.no_identities(batch, self.scene.n_workers), list[str]()
+        self.identities = metrics.make_identities(batch, self.scene.n_workers)
+        self.keys: list[str] = []
         robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
         self.measured = handling.world_of(self.physics, self._everyone, robot).objects
         """The task's loose objects as they were measured last; None: there are none."""
@@ -361,7 +362,7 @@ class Simulation(Stateful):
         q_path = self.physics.step(command.velocities, path, far, grip)
         workers = worker_truth(self.bodies, motion)
         n = self.chain.n_joints
-        robot, arm = chains.robot_along(self.chain, q_path[..., :n], self.physics.qd)
+        robot, arm = chains.robot_path(self.chain, q_path[..., :n], self.physics.qd)
         world = handling.world_of(self.physics, self._everyone, robot)
         world, arm = handling.loaded(self.scene, world, arm, q_path, task.is_load(self.task_state))
         progress = self._show_workers(world, motion)
@@ -433,7 +434,7 @@ class Simulation(Stateful):
         """Return observations and infos of episodes that begin."""
         ids, task, world = truth.ids, self.task, truth.world
         present, nothing = self.present[ids], np.zeros(len(ids))
-        identities = metrics.no_identities(*present.shape)
+        identities = metrics.make_identities(*present.shape)
         terms = (*task.own_rewards, *rewards.SHARED_TERMS)
         still = np.zeros((len(ids), self.chain.n_joints))
         info = agreed(self.keys, {

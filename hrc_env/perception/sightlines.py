@@ -7,9 +7,9 @@ import numpy as np
 from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats
-from hrc_env.geometry.lens import FOLD, distorted, magnification_at
+from hrc_env.geometry.lens import FOLD, distort_point, magnification_at
 from hrc_env.geometry.shapes import set_capsules, set_rows
-from hrc_env.geometry.sight import is_hidden, look, make_occluders
+from hrc_env.geometry.sight import is_hidden, make_occluders, select_occluders
 from hrc_env.geometry.triangulation import pixel_of
 from hrc_env.perception import outline
 from hrc_env.perception.windows import MIN_DEPTH_M, window_round
@@ -101,7 +101,7 @@ def see(camera, joints, meant, occluders, seen):
     """Project what is meant (J, 3), find out what hides the joints. How many of these are seen."""
     uv, depth = seen.uv, seen.depth
     seen.look[SIDE], seen.look[TURN] = frame(camera, meant, uv, depth)
-    n_view, n_seen = look(camera.eye, joints, occluders), 0
+    n_view, n_seen = select_occluders(camera.eye, joints, occluders), 0
     for j in range(len(joints)):
         seen.sight[j] = _in_image(camera, uv[j], depth[j])
         if seen.sight[j] == SEEN:
@@ -139,7 +139,7 @@ def _distort(camera, uv, depth):
             x, y = (uv[j, 0] - cx) / fx, (uv[j, 1] - cy) / fy
             total += magnification_at(camera.lens, x, y)
             n += 1
-            x, y = distorted(camera.lens, x, y)
+            x, y = distort_point(camera.lens, x, y)
             uv[j, 0], uv[j, 1] = x * fx + cx, y * fy + cy
     return total / n if n > 0 else 1.0
 

@@ -115,7 +115,7 @@ def describe_pose(belief: Belief) -> ArmPose:
     n_loads = len(belief.robot.capsule_radius_m) - len(model.chain.capsule_link)
     carried = np.full(n_loads, model.chain.n_joints - 1)
     links = np.append(model.chain.capsule_link, carried)
-    return ArmPose(model, chains.forward(model.chain, belief.robot.q), links)
+    return ArmPose(model, chains.link_frames(model.chain, belief.robot.q), links)
 
 
 def build_constraints(

@@ -15,8 +15,8 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import HandState, ObjectState, RobotState
 from hrc_env.core.typing import Bools, Capsules, Floats, Points3
-from hrc_env.geometry.rotations import turned
-from hrc_env.geometry.shapes import BOX, WIDTH, absent, shape
+from hrc_env.geometry.rotations import rotate
+from hrc_env.geometry.shapes import BOX, WIDTH, absent_shape, shape
 from hrc_env.scene.primitives import DECORATION, OBJECT_BIT
 from hrc_env.worker.props import placed
 from hrc_env.world import TaskScene
@@ -163,7 +163,7 @@ def _is_free(body: Any) -> bool:
 def _filled(parts: list[list[Floats]]) -> Floats:
     """(O, n, `shapes.WIDTH`) with rows that are absent where an object has fewer."""
     n = max(map(len, parts), default=0)
-    table = np.broadcast_to(absent(), (len(parts), n, WIDTH)).copy()
+    table = np.broadcast_to(absent_shape(), (len(parts), n, WIDTH)).copy()
     for row, own in zip(table, parts, strict=True):
         row[: len(own)] = own
     return table
@@ -186,7 +186,7 @@ def _holding(poses, half_size, tool_world, closed_on, held):
         for o in range(poses.shape[1] if closed_on[b] else 0):
             at, tool = poses[b, o], tool_world[b]
             away = tool[0] - at[0], tool[1] - at[1], tool[2] - at[2]
-            x, y, z = turned((at[3], -at[4], -at[5], -at[6]), away)
+            x, y, z = rotate((at[3], -at[4], -at[5], -at[6]), away)
             half = half_size[o]
             out_m = max(abs(x) - half[0], abs(y) - half[1], abs(z) - half[2])
             if out_m < nearest:
@@ -204,7 +204,7 @@ def _carry(poses, capsules, held, loads):
             for e in range(2):
                 x, y, z = AWAY_M, AWAY_M, AWAY_M
                 if held[b, o] and capsules[o, k, e, 0] == capsules[o, k, e, 0]:
-                    x, y, z = turned(pose[3:], capsules[o, k, e])
+                    x, y, z = rotate(pose[3:], capsules[o, k, e])
                     x, y, z = x + pose[0], y + pose[1], z + pose[2]
                 loads[b, t, o, k, e, 0] = x
                 loads[b, t, o, k, e, 1] = y

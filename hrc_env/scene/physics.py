@@ -14,7 +14,7 @@ from hrc_env.core.errors import ConfigError, HRCError, check_shape
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import HandState, WorkerPath
 from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, JointVelocities, Points3, Records
-from hrc_env.geometry.chains import tool
+from hrc_env.geometry.chains import tool_frame
 from hrc_env.scene.build import Scene, without_workers
 from hrc_env.scene.cups import Cups, load_n, seals
 from hrc_env.scene.limits import slew_rad_s2
@@ -129,7 +129,7 @@ class Physics:
     def _suck(self, cups: Cups, on: Bools) -> None:
         """Vent the cups, or let them seal; what is too heavy is torn off."""
         q, welded = self._qpos[:, : self._n], self._welded[:, cups.welds] > 0.0
-        near = seals(cups, tool(self.scene.chain, q), self.scene.objects.poses(self._qpos))
+        near = seals(cups, tool_frame(self.scene.chain, q), self.scene.objects.poses(self._qpos))
         torn = self._grip[:, :1] > cups.limit_n
         self._welded[:, cups.welds] = on[:, None] & (welded | near) & ~(welded & torn)
 

@@ -16,7 +16,7 @@ from hrc_env.geometry.cameras import (
     rays,
 )
 from hrc_env.geometry.shapes import AXES, BOX, CENTRE, HALF_SIZE, KIND, PLANE, REACH, WIDTH
-from hrc_env.geometry.sight import hidden, nothing
+from hrc_env.geometry.sight import find_hidden, no_surroundings
 from hrc_env.scene.build import Scene
 from hrc_env.scene.places import SCENES, within
 from hrc_env.scene.rig import LAB_CAMERAS, SITE_CAMERAS
@@ -100,7 +100,7 @@ def workspace(grounds: Grounds, spacing_m: float = SPACING_M) -> Points3:
 def sees(cameras: tuple[PinholeCamera, ...], still: Floats, points_world: Points3) -> Bools:
     """(C, P) which points are in a camera's image and not behind what stands still (G, WIDTH)."""
     eyes_world = np.stack([camera.eye_world for camera in cameras])
-    seen = ~hidden(replace(nothing(1), still=still), eyes_world, points_world[None])[0]
+    seen = ~find_hidden(replace(no_surroundings(1), still=still), eyes_world, points_world[None])[0]
     for c, camera in enumerate(cameras):
         px, depth_m = project(camera.P[None], points_world[None])
         seen[c] &= inside_image(camera, image_from_pinhole(camera, px[0, 0])) & (depth_m[0, 0] > 0)

@@ -17,7 +17,15 @@ from hrc_env.core.errors import ConfigError, check_fields
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import RobotState
 from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, Points3, Records, Rngs
-from hrc_env.geometry.ways import gaps_m, met, nearest_point, ranges_m, spread_out, value_at, ways_m
+from hrc_env.geometry.ways import (
+    find_overlaps,
+    gaps_m,
+    nearest_point,
+    ranges_m,
+    select_apart,
+    value_at,
+    ways_m,
+)
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm, check_kind, progress
 from hrc_env.tasks import BUILT_IN
@@ -220,7 +228,7 @@ class Delivery(Task[DeliveryConfig, Records]):
         works = np.array([place.xy_m for place in grounds.places]).reshape(-1, 2)
         away = np.linalg.norm(points[:, None] - works, axis=-1).min(1, initial=np.inf)
         points = points[away > OFF_WORK_M]
-        zones = points[spread_out(points, APART_M)] if len(points) else points
+        zones = points[select_apart(points, APART_M)] if len(points) else points
         price = np.where(gaps > ROUND_M, 1.0, np.where(gaps > HALF_WIDTH_M, TIGHT, np.inf))
         cells = [nearest_point(x, y, origin, CELL_M) for x, y in zones.tolist()]
         ways = np.array([ways_m(price, cell, CELL_M) for cell in cells]).reshape(-1, *gaps.shape)
@@ -265,7 +273,7 @@ class Delivery(Task[DeliveryConfig, Records]):
         step["progress_m"] = state["way_m"]
         _look(state, robot, site)
         step["progress_m"] -= state["way_m"]
-        touching = met(robot.capsules_world, robot.capsule_radius_m, site.footprints)
+        touching = find_overlaps(robot.capsules_world, robot.capsule_radius_m, site.footprints)
         people = np.zeros(len(state), bool) if world.touched is None else world.touched
         step["hit"] = touching & ~state["touching"]
         state["hits"][:, 0] += step["hit"]

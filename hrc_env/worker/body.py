@@ -16,7 +16,7 @@ from hrc_env.core.errors import ConfigError, check_shape, unknown
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import WorkerMotion, WorkerPath, WorkerTruth
 from hrc_env.core.typing import Capsules, Floats, Ints, Points3, QuaternionsWxyz
-from hrc_env.geometry.rotations import turned
+from hrc_env.geometry.rotations import rotate
 
 TRUNK = ("pelvis", "abdomen", "torso", "chest", "neck", "head")
 LIMBS = ("clavicle", "upper_arm", "forearm", "hand", "thigh", "shank", "foot", "toes")
@@ -166,7 +166,7 @@ def _joints(segments, rows, segment, offset, out):  # pragma: no cover - compile
         mine = offset[rows[b]]
         for j in range(len(segment)):
             s = segment[j]
-            arm = turned(quaternion[b, s], mine[j])
+            arm = rotate(quaternion[b, s], mine[j])
             for i in range(3):
                 k, m = (i + 1) % 3, (i + 2) % 3
                 joints[b, j, i] = position[b, s, i] + arm[i]
@@ -182,7 +182,7 @@ def _capsules(position, quaternion, rows, segment, ends, capsules):  # pragma: n
         for k in range(len(segment)):
             s = segment[k]
             for end in range(2):
-                arm = turned(quaternion[b, s], mine[k, end])
+                arm = rotate(quaternion[b, s], mine[k, end])
                 for i in range(3):
                     capsules[b, k, end, i] = position[b, s, i] + arm[i]
 

@@ -12,14 +12,14 @@ import numpy as np
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Held
 from hrc_env.core.typing import Floats, Ints, Points3, QuaternionsWxyz
-from hrc_env.geometry.rotations import turned
+from hrc_env.geometry.rotations import rotate
 from hrc_env.geometry.shapes import (
     BOX,
     CAPSULE,
     CENTRE,
     HALF_SIZE,
     WIDTH,
-    absent,
+    absent_shape,
     bounds,
     shape,
 )
@@ -126,7 +126,7 @@ BOUNDS_M = np.zeros((len(PROPS), 2, 3))
 for _row, _each in zip(BOUNDS_M[1:], PROPS[1:], strict=True):
     _row[:] = bounds(_each.shapes)
 _N_PARTS = max(len(prop.shapes) for prop in PROPS)
-_PARTS = np.tile(absent(), (len(PROPS), _N_PARTS, 1))
+_PARTS = np.tile(absent_shape(), (len(PROPS), _N_PARTS, 1))
 """(P, n, `shapes.WIDTH`) the parts of every prop; rows that it leaves over are absent."""
 for _parts, _each in zip(_PARTS, PROPS, strict=True):
     _parts[: len(_each.shapes)] = _each.shapes
@@ -163,7 +163,7 @@ def _place(kind, position, quaternion, parts, rows):
             for i in range(WIDTH):
                 row[i] = own[i]
             for at in range(CENTRE, HALF_SIZE, 3):
-                x, y, z = turned(quaternion[b, w], own[at : at + 3])
+                x, y, z = rotate(quaternion[b, w], own[at : at + 3])
                 row[at], row[at + 1], row[at + 2] = x, y, z
             for i in range(3):
                 row[CENTRE + i] += position[b, w, i]

@@ -113,11 +113,11 @@ from hrc_env.tasks.task import find_task
 from hrc_env.tracking import metrics, oracle, presence
 from hrc_env.tracking.calibration_monitor import forget_monitor, make_monitor, monitor
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.contradiction import Shown, find_unexplained
-from hrc_env.tracking.estimators import ESTIMATORS, estimator_called, make_estimator
+from hrc_env.tracking.contradiction import DetectedPoses, find_unexplained
+from hrc_env.tracking.estimators import ESTIMATORS, find_estimator, make_estimator
 from hrc_env.tracking.forecast import forecast
 from hrc_env.tracking.frozen_frames import (
-    believed,
+    find_live_cameras,
     forget_frozen,
     leave_out_frozen,
     make_frozen,
@@ -559,15 +559,15 @@ def compare_tracks(
 ) -> dict[str, NDArray[np.float64]]:
     """Return the errors of tracks (T, W, J, 3) from workers (T, W, J, 3), and who was whose."""
     n_workers = means_m.shape[1]
-    identities = metrics.no_identities(1, n_workers)
-    prior = oracle.prior(1, n_workers, TrackerConfig())
+    identities = metrics.make_identities(1, n_workers)
+    prior = oracle.estimate_prior(1, n_workers, TrackerConfig())
     found = []
     for mean, joints, known, there in zip(means_m, joints_m, tracked, present, strict=True):
         estimate = dataclasses.replace(prior, mean_world=mean[None], tracked=known[None])
         capsules = np.zeros((1, n_workers, 1, 2, 3)), np.zeros((1, n_workers, 1))
         truth = WorkerTruth(joints[None], np.zeros_like(joints[None]), *capsules)
         found.append(
-            metrics.tracking_error(estimate, truth.joints_world, there[None], identities)[0]
+            metrics.measure_errors(estimate, truth.joints_world, there[None], identities)[0]
         )
     return {name: np.array([each[name] for each in found]) for name in metrics.TRACKING.names}
 
@@ -1171,7 +1171,7 @@ class Tracker:
         settings: Mapping[str, Any], seed: int = 0,
     ) -> None:  # fmt: skip
         """Begin `shape` (places, workers) of an estimator by its name."""
-        kind = estimator_called(estimator).config
+        kind = find_estimator(estimator).config
         config = kind(**{TRACKER_SETTINGS[name]: value for name, value in settings.items()})
         self._made, self._P = make_estimator(estimator, P, step_s, config), P
         self._rngs = [np.random.default_rng([seed, b]) for b in range(shape[0])]
@@ -1216,8 +1216,8 @@ class Tracker:
             "count": state.n_alive.copy(),
             "log_weight": np.where(alive, state.trees["log_weight"], 0.0),
             "pose_log_prior": np.where(alive, state.trees["pose_log_prior"], 0.0),
-            "waited_s": state.waited_s.copy(),
-            "waited_updates": best["waited"].copy(),
+            "waited_s": state.since_search_s.copy(),
+            "waited_updates": best["one_view_updates"].copy(),
             "conflicts": best["conflict"].copy(),
             "size_std": best["size_std"].copy(),
             "bone_m": best["bone_length"].copy(),
@@ -1227,17 +1227,17 @@ class Tracker:
             "slope": best["slope"].copy(),
             "speed_std": np.sqrt(np.diagonal(best["cov"], axis1=-2, axis2=-1)[..., 3:]),
             "swap_chance": views["swap_chance"].copy(),
-            "blind": views["blind"].copy(),
-            "believed": views["believed"].copy(),
+            "blind": views["unseen_updates"].copy(),
+            "believed": views["trusted_updates"].copy(),
             "noise_factor": noise["factor"].copy(),
             "noise_sums": noise["sums"].copy(),
             "turn_rad": best["pair"]["turn"].copy(),
             "turn_std_rad": np.sqrt(
                 np.diagonal(best["pair"]["turn_cov"], axis1=-2, axis2=-1).clip(0)
             ),
-            "turn_fits": best["pair"]["fits"].copy(),
-            "is_askew": best["pair"]["askew"].copy(),
-            "pair_waited": best["pair"]["waited"].copy(),
+            "turn_fits": best["pair"]["meeting_share"].copy(),
+            "is_askew": best["pair"]["is_misaligned"].copy(),
+            "pair_waited": best["pair"]["untracked_updates"].copy(),
             "displaced_m": np.sqrt(np.diagonal(best["displaced_m2"], axis1=-2, axis2=-1).clip(0)),
         }
 
@@ -1308,7 +1308,8 @@ def believe_truth(joints_world: NDArray[Any], velocity_world: NDArray[Any]) -> d
 
 def believe_prior(shape: tuple[int, int]) -> dict[str, Any]:
     """Return the beliefs in nobody, and in whoever may be there."""
-    nobody, prior = oracle.nobody(*shape, TrackerConfig()), oracle.prior(*shape, TrackerConfig())
+    nobody = oracle.estimate_absence(*shape, TrackerConfig())
+    prior = oracle.estimate_prior(*shape, TrackerConfig())
     return {f"{kind}/{name}": value for kind, each in (("nobody", nobody), ("prior", prior))
             for name, value in _as_values(each).items()}  # fmt: skip
 
@@ -1344,13 +1345,14 @@ class Presence:
         """
         enough = presence.SEARCHES if by_search else presence.IMAGES
         nobody = np.zeros_like(looked)
-        poses = Shown(*(nobody if each is None else each for each in (shown, unexplained)))
+        poses = DetectedPoses(*(nobody if each is None else each for each in (shown, unexplained)))
         others = no_others(len(looked))
         if others_m is not None:
             others = Others(others_m, np.where(np.isnan(others_m[..., 0]), np.inf, 0.0))
+        searches = presence.ImageSearches(looked, age_s, enough, poses, others)
         said = self._known.update(
             np.arange(len(looked)), _as_estimate(belief), _as_keypoints(found), _as_keypoints(own),
-            presence.Looks(looked, age_s, enough, poses, others), self._step_s, TrackerConfig(),
+            searches, self._step_s, TrackerConfig(),
         )  # fmt: skip
         return _as_values(said)
 
@@ -1375,7 +1377,7 @@ class Watchers:
     def leave_out_stuck(self, seen: dict[str, Any]) -> NDArray[np.bool_]:
         """Take stuck cameras' frames out, in place, and return which cameras are believed."""
         leave_out_frozen(self._frozen, self._ids, _as_keypoints(seen))
-        return believed(self._frozen, self._ids)
+        return find_live_cameras(self._frozen, self._ids)
 
     def monitor(
         self, seen: Mapping[str, Any], age_s: NDArray[np.float64], belief: Mapping[str, Any]
@@ -1432,7 +1434,7 @@ class Camera:
 
     def resized(self, width_px: int, height_px: int) -> NDArray[np.float64]:
         """Return the intrinsics of the camera with another image."""
-        return cameras.resized(self._made, width_px, height_px).K
+        return cameras.resize(self._made, width_px, height_px).K
 
 
 def project_points(
@@ -1488,7 +1490,7 @@ def rotations(
 ) -> dict[str, NDArray[np.float64]]:
     """Return rotations by angles about each axis, and of unit quaternions, and turned offsets."""
     about = {f"about_{axis}": turns.about_axis(axis, angles_rad) for axis in "xyz"}
-    turned = np.array([turns.turned(each, offset) for each in quaternions])
+    turned = np.array([turns.rotate(each, offset) for each in quaternions])
     return {**about, "of_quaternion": turns.matrix(quaternions), "turned": turned}
 
 
@@ -1513,10 +1515,10 @@ class Chain:
     def pose(self, q: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
         """Return everything that is known at joints q (B, N)."""
         return {
-            "frames": chains.forward(self._made, q),
-            "tool": chains.tool(self._made, q),
+            "frames": chains.link_frames(self._made, q),
+            "tool": chains.tool_frame(self._made, q),
             "jacobian": chains.jacobian(self._made, q),
-            "turning": chains.turning(self._made, q),
+            "turning": chains.angular_jacobian(self._made, q),
             "capsules": chains.capsules(self._made, q),
         }
 
@@ -1524,7 +1526,7 @@ class Chain:
         self, path: NDArray[np.float64], qd: NDArray[np.float64]
     ) -> dict[str, NDArray[np.float64]]:
         """Return the robot at the end of paths (B, T, N), and its capsules along them."""
-        robot, along = chains.robot_along(self._made, path, qd)
+        robot, along = chains.robot_path(self._made, path, qd)
         return {
             "q": robot.q, "tool": robot.tool_world, "tool_velocity": robot.tool_velocity_world,
             "axes": robot.tool_axes_world, "capsules": robot.capsules_world, "along": along,
@@ -1586,9 +1588,9 @@ class Shapes:
     ) -> NDArray[np.bool_]:  # fmt: skip
         """Return which points (B, J, 3) are hidden from eyes, the last shapes being moved ones."""
         still, moving = self._table[:-n_moving], self._table[-n_moving:]
-        gone = np.stack([shapes.absent()])
+        gone = np.stack([shapes.absent_shape()])
         moving = np.repeat(np.concatenate([moving, gone])[None], len(points), 0)
-        return sight.hidden(sight.Surroundings(still, moving, robot, radius_m), eyes, points)
+        return sight.find_hidden(sight.Surroundings(still, moving, robot, radius_m), eyes, points)
 
     def hide_behind_bodies(
         self, eye: NDArray[np.float64], points: NDArray[np.float64],
@@ -1597,7 +1599,7 @@ class Shapes:
         """Return which points (J, 3) shapes or bodies' capsules hide, and how many may do so."""
         occluders = sight.make_occluders(self._table, 0, len(bodies))
         shapes.set_capsules(occluders.table, occluders.first_body, bodies, radius_m)
-        n = sight.look(eye, points, occluders)
+        n = sight.select_occluders(eye, points, occluders)
         hidden = [sight.is_hidden(eye, points, j, occluders, n) for j in range(len(points))]
         return np.array(hidden), int(n)
 
@@ -1624,12 +1626,12 @@ def meet_footprints(
     capsules: NDArray[np.float64], radius_m: NDArray[np.float64], footprints: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
     """Return which sets of capsules meet a footprint."""
-    return ways.met(capsules, radius_m, footprints)
+    return ways.find_overlaps(capsules, radius_m, footprints)
 
 
 def keep_apart(points: NDArray[np.float64], apart_m: float) -> NDArray[np.int64]:
     """Return which points are kept so that all are so far apart."""
-    return ways.spread_out(points, apart_m)
+    return ways.select_apart(points, apart_m)
 
 
 # --- Cameras and the emulator (emulator.py) ------------------------------------------------------

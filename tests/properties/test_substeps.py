@@ -54,8 +54,8 @@ def measure_tool_error_mm(scene: Scene, wanted: Floats) -> Floats:
         reference = reference + command * CTRL_DT_S + change * (CTRL_DT_S - ramp_s / 2)
         command = command + change
         physics.step(target, nobody)
-        here = chains.tool(scene.chain, physics.q)[:, :3, 3]
-        there = chains.tool(scene.chain, reference)[:, :3, 3]
+        here = chains.tool_frame(scene.chain, physics.q)[:, :3, 3]
+        there = chains.tool_frame(scene.chain, reference)[:, :3, 3]
         errors_mm.append(1000 * np.linalg.norm(here - there, axis=-1))
     return np.concatenate(errors_mm)
 

@@ -45,14 +45,14 @@ def somebody(middle, speed_m_s=0.6):
 
 def before(scene, away_m):
     """(2,) a place so far in front of the tool."""
-    return chains.tool(scene.chain, scene.home_q)[:2, 3] + np.array([away_m, 0.0])
+    return chains.tool_frame(scene.chain, scene.home_q)[:2, 3] + np.array([away_m, 0.0])
 
 
 def robots_of(chain, q, box):
     """One robot as the constraints need it."""
     low, high, slew = box
     return Robots(
-        chains.forward(chain, q[None]), chain.slides, chain.capsule_link,
+        chains.link_frames(chain, q[None]), chain.slides, chain.capsule_link,
         chains.capsules(chain, q[None]), chain.capsule_radius_m, low[None], high[None], slew,
     )  # fmt: skip
 

@@ -8,7 +8,7 @@ import pytest
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import HandState
-from hrc_env.geometry.chains import robot_along, tool
+from hrc_env.geometry.chains import robot_path, tool_frame
 from hrc_env.scene.build import HARD, SceneConfig, build
 from hrc_env.scene.cups import seals
 from hrc_env.scene.objects import box_capsules, held_by, surfaces, with_load
@@ -78,7 +78,7 @@ def test_what_is_carried_is_part_of_the_robot():
     place = scene()
     physics = Physics(place, 1)
     path = physics.qpos[:, None]
-    robot, arm = robot_along(place.chain, path[..., :6], physics.qd)
+    robot, arm = robot_path(place.chain, path[..., :6], physics.qd)
     for held, near in ((True, True), (False, False)):
         loaded, along = with_load(robot, arm, place.objects, path, np.array([[held]]))
         n = along.shape[2] - arm.shape[2]
@@ -155,7 +155,7 @@ def _with_block_on_cups():
     """The block hangs right below the cups of an arm at rest."""
     place = scene("ur10e_cups", CUPS)
     physics = Physics(place, 1)
-    at = tool(place.chain, physics.q)[0]
+    at = tool_frame(place.chain, physics.q)[0]
     turn, R = np.zeros(4), at[:3, :3] @ np.diag([1.0, -1.0, -1.0])
     mujoco.mju_mat2Quat(turn, R.ravel())
     pose = np.concatenate([at[:3, 3] - R @ [0, 0, 0.05], turn])

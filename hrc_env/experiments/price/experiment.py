@@ -37,7 +37,7 @@ from hrc_env.experiments.stage import PEOPLE, Rows
 from hrc_env.experiments.versions import key_of, source_digest
 from hrc_env.tasks import BUILT_IN, DEFAULT
 from hrc_env.tasks.task import Task, find_task
-from hrc_env.tracking.estimators import estimator_called
+from hrc_env.tracking.estimators import find_estimator
 
 QUICK_FRESH = 600
 """Episodes that confirm a margin in the short form."""
@@ -288,7 +288,7 @@ def _part(
     made_of = {
         "people": PEOPLE, "task": stage.task, "seeds": seeds, "n_steps": stage.n_steps,
         "eyes": sight, "margin_m": margin_m, "shield": SHIELD if stage.is_shielded else "",
-        "estimator": source_digest(estimator_called(eyes.setup.estimator).make),
+        "estimator": source_digest(find_estimator(eyes.setup.estimator).make),
         **config.driver.settings(),
     }  # fmt: skip
     which = {FIRST_SEED: "searched", FIRST_FRESH: "fresh", FIRST_PIXELS: "pixels"}[seeds[0]]
