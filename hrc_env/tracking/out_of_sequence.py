@@ -236,7 +236,13 @@ class OutOfSequence(Generic[State]):
             write_rows(state.now, ids, part)
 
     def _keep(self, state: LateState[State], ids: Ints, age: int) -> None:
-        """Store the present states of environments `ids` `age` slots before the open one."""
+        """Store the present states of some environments in a slot.
+
+        Args:
+            state: changed in place.
+            ids: indices of the environments.
+            age: number of slots before the open one.
+        """
         slots = _find_slots(state, ids, age)
         write_rows(_flatten_slots(state.kept), slots, self._part(state, ids))
 
@@ -293,7 +299,13 @@ def _select_usable(
 
 
 def _find_slots(state: LateState[Any], ids: Ints, age: int) -> Ints:
-    """Return the rows of the flattened slots that hold the states of `age` slots back."""
+    """Return the rows of the flattened slots that hold past states.
+
+    Args:
+        state: the whole state.
+        ids: indices of the environments.
+        age: number of slots before the open one.
+    """
     n_slots = state.end_s.shape[1]
     return ids * n_slots + (state.slot[ids] - age) % n_slots
 
