@@ -2,8 +2,8 @@
 
 `update_all` reads a worker's measurements as each hypothesis takes them (`measurements`),
 conditions the hypothesis on them (`update`, which searches the mode first: `search`), weighs it
-(`evidence`), learns from it (`learning`), looks for other hypotheses (`branching`), repairs what
-has gone astray (`acquisition`), and prunes and merges.
+(`evidence`), learns from it (`learning`), searches for other hypotheses (`branching`), repairs
+contradicted joints (`acquisition`), and prunes and merges.
 """
 
 from hrc_env.core.declared import Records1

@@ -1,4 +1,4 @@
-"""Branching: other bodies that one view can hardly tell from the one that is tracked.
+"""Branching: other bodies that one view can hardly distinguish from the one that is tracked.
 
 A camera sees a limb in front of its joint as it sees it behind (the bas-relief ambiguity). A limb
 is reflected: its joints keep their rays, and their depths are reflected in the depth of a pivot.
@@ -52,7 +52,7 @@ class Part(NamedTuple):
     """A part of the body that is reflected."""
 
     pivot: tuple[int, ...]
-    """Joints whose mean is the pivot."""
+    """Joints of which the mean is the pivot."""
     moved: tuple[int, ...]
     """Joints that are reflected."""
 
@@ -103,7 +103,7 @@ def is_ambiguous(tree: Tree, frame: Frame, settings: Settings) -> bool:
 
 @kernel
 def _find_ambiguous_view(part: int, tree: Tree, frame: Frame, settings: Settings) -> int:
-    """Return the camera that alone sees a part whose depth is open in the prediction, or -1.
+    """Return the only camera that sees a part, if the prediction leaves its depth open, or -1.
 
     That one camera alone sees it in this frame is not enough: measurements of other cameras a
     moment ago still count in the prediction.
@@ -112,7 +112,7 @@ def _find_ambiguous_view(part: int, tree: Tree, frame: Frame, settings: Settings
         part: index of the part.
         tree: the predicted hypothesis.
         frame: the measurements.
-        settings: settings of the estimator, which tell the parts that may be reflected.
+        settings: settings of the estimator, with the parts that may be reflected.
     """
     if not (settings.mirrors_body if part == WHOLE_BODY else settings.mirrors_limbs):
         return -1
@@ -144,7 +144,7 @@ def branch(
     """
     trees = worker.trees
     for part in range(N_PARTS):
-        n = worker.n_alive[0]
+        n: int = worker.n_alive[0]
         camera = _find_ambiguous_view(part, prior[0], frame, settings) if n < len(trees) else -1
         if camera < 0:
             continue

@@ -1,4 +1,4 @@
-"""Learning: what a hypothesis keeps of a frame for later ones, true noise and lengths of bones.
+"""Learning: true noise and lengths of bones, which a hypothesis keeps from frame to frame.
 
 True errors of a detector may be larger or smaller than it reports, and they may persist for about
 half a second. Per worker and camera a factor on the reported variance is learnt with which a
@@ -99,7 +99,7 @@ def learn_from_frame(
 
     Args:
         frame: the measurements, with `sigma` as `measurements.scale_sigma` leaves it.
-        tree: the hypothesis, whose lengths are changed in place.
+        tree: the hypothesis; its lengths are changed in place.
         noise: (J, C) its measurement noise, changed in place.
         model: constants for learning the factors.
         work: scratch with `n_views` and with `predicted`, the covariances before the update.
@@ -286,8 +286,8 @@ def _set_factors(noise: Records2[Noise], persistence: Floats, model: NoiseModel)
 def learn_lengths(tree: Tree, n_views: Ints) -> None:
     """Learn a hypothesis's bone lengths where two cameras measured both ends.
 
-    Each length has a Kalman filter, whose measurement noise is larger by the number of updates for
-    which errors last.
+    Each length has a Kalman filter with a measurement noise that is larger by the number of updates
+    for which errors last.
 
     Args:
         tree: the updated hypothesis, changed in place.

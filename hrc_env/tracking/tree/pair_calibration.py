@@ -1,9 +1,9 @@
-"""Two cameras of which one is turned against its calibration: the turns by which their lines of
-sight meet.
+"""Pair calibration: the turns of two cameras by which their lines of sight meet.
 
-Two lines of sight with unit directions d_a, d_b from e_a, e_b, nearest to each other at distances
-r_a, r_b, pass each other at g = n . (e_b - e_a), n = d_a x d_b / |d_a x d_b|. Small turns w_a, w_b
-of the cameras about their centres change that to
+One of two cameras that alone see a worker may be turned against its calibration. Two lines of
+sight with unit directions d_a, d_b from e_a, e_b, nearest to each other at distances r_a, r_b, pass
+each other at g = n . (e_b - e_a), n = d_a x d_b / |d_a x d_b|. Small turns w_a, w_b of the cameras
+about their centres change that to
 
     g + r_b (d_b x n) . w_b - r_a (d_a x n) . w_a,
 
@@ -64,7 +64,7 @@ def check_pair_calibration(worker: WorkerHypotheses, frame: Frame, settings: Set
 
     Args:
         worker: the hypotheses of one worker, changed in place.
-        frame: the measurements, whose projections are those of the turned cameras afterwards.
+        frame: the measurements; its projections are set to those of the turned cameras.
         settings: settings of the estimator.
     """
     tree, cameras = worker.trees[0], np.zeros(2, np.int64)
@@ -131,7 +131,7 @@ def _update_turns(tree: Tree, cameras: Ints, frame: Frame, least_joints: int) ->
     """Learn the turns of two cameras from the gaps between their lines of sight.
 
     Args:
-        tree: the worker's heaviest hypothesis, whose `pair` is changed in place.
+        tree: the worker's heaviest hypothesis; its `pair` is changed in place.
         cameras: (2,) indices of the cameras.
         frame: the measurements.
         least_joints: number of joints below which nothing is learnt.
@@ -295,7 +295,8 @@ def measure_displacement(pair: Pair, cameras: Records1[Camera], body: Floats, ou
         for i in range(3):
             middle[i] += body[j, i] / len(body)
     for k in range(2):
-        line[k] = middle - cameras[pair.cameras[k]].eye
+        c: int = pair.cameras[k]
+        line[k] = middle - cameras[c].eye
         squared = line[k, 0] ** 2 + line[k, 1] ** 2 + line[k, 2] ** 2
         for i in range(3):
             for m in range(3):

@@ -12,7 +12,7 @@ covariances is the nearest Gaussian on the tree (least Kullback-Leibler divergen
 
 A trunk that leans little counts as upright, as people's are: where one view leaves open how far it
 leans, that fixes the depth. One that lies takes head and arms with it; the legs go with it, or
-stay below it as those of a person who bends down, whichever they are nearer to.
+stay below it as in a person bending down, whichever is nearer.
 """
 
 import functools
@@ -305,7 +305,7 @@ def set_axes(body: Floats, root: TorsoState, offset: Floats, axes: Floats) -> bo
 
 @kernel
 def _complete_axes(body: Floats, axes: Floats) -> bool:
-    """Complete axes (3, 3) whose last column is up; return whether the body's left is known."""
+    """Complete axes (3, 3) from their last column, up; return whether the body's left is known."""
     length = along = across = 0.0
     for i in range(3):
         axes[i, 1] = body[1, i] - body[2, i] + body[7, i] - body[8, i]
@@ -372,9 +372,9 @@ def discretise_joints(dt_s: float, damping: float, root_acceleration: float) -> 
     F[:, 1, 0], F[:, 1, 1] = -decay * frequency**2 / damped * sin, decay * (cos - slope)
     stationary = np.zeros_like(F)
     stationary[:, 0, 0], stationary[:, 1, 1] = SPREAD_M**2, SPEED_M_S**2
-    Q = stationary - F @ stationary @ F.swapaxes(1, 2)
-    Q += make_shared_noise(dt_s, root_acceleration)
-    return JointMotion(F, Q)
+    noise = stationary - F @ stationary @ F.swapaxes(1, 2)
+    noise += make_shared_noise(dt_s, root_acceleration)
+    return JointMotion(F, noise)
 
 
 def make_shared_noise(dt_s: float, root_acceleration: float) -> Floats:
@@ -384,10 +384,10 @@ def make_shared_noise(dt_s: float, root_acceleration: float) -> Floats:
 
 @kernel
 def _learn_offsets(tree: Tree, root: TorsoState, axes: Floats, dt: float) -> None:
-    """Learn the places on the body of the joints whose positions are certain.
+    """Learn the places on the body of joints with certain positions.
 
     Args:
-        tree: the hypothesis, whose offsets are changed in place.
+        tree: the hypothesis; its offsets are changed in place.
         root: mean of the torso's joints.
         axes: (2, 3, 3) as `set_axes` writes them.
         dt: time since the last prediction [s].

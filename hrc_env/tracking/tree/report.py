@@ -1,9 +1,9 @@
 """Report: the mixture of a worker's hypotheses, as wide as one view needs it.
 
-The motion model is that of people who walk and work. With one view, a person who spins, falls or
-runs is farther from the estimate than the Gaussian has it: the depth of joints follows from how
-the body is turned, and that is found late. `find_pace_factor` is the factor on the covariance for
-it.
+The motion model is that of walking and working people. With one view, a person that spins, falls
+or runs is farther from the estimate than the Gaussian's deviations: the depth of joints follows
+from how the body is turned, and that is found late. `find_pace_factor` returns the factor on the
+covariance for it.
 """
 
 import math
@@ -35,8 +35,8 @@ class Excess(NamedTuple):
 
 
 _TURN = Excess(2.3, 1.1)
-"""For turning about the vertical; all three were fitted to people who walk, spin, fall, tumble
-and run."""
+"""For turning about the vertical; all three were fitted to people walking, spinning, falling,
+tumbling and running."""
 _TIP = Excess(0.52, 5.0)
 """For tipping."""
 _SPEED = Excess(1.63, 1.1)
@@ -138,14 +138,14 @@ def update_pace(pace: Pace, body: Floats, dt: float) -> None:
 
 @kernel
 def forget_pace(pace: Pace) -> None:
-    """Put a pace back to that of a worker whose track begins."""
+    """Put a pace back to that at the beginning of a track."""
     pace.is_known, pace.since_s = False, 0.0
     pace.turn_rad_s = pace.tip_rad_s = pace.speed_m_s = 0.0
 
 
 @kernel
 def find_pace_factor(pace: Pace) -> float:
-    """Return the factor on the covariance for the movement of a worker whom one camera sees."""
+    """Return the factor on the covariance, with one view, for the movement of a worker."""
     log_factor = _TURN.log_factor * max(pace.turn_rad_s - _TURN.limit, 0.0)
     log_factor += _TIP.log_factor * max(pace.tip_rad_s - _TIP.limit, 0.0)
     log_factor += _SPEED.log_factor * max(pace.speed_m_s - _SPEED.limit, 0.0)

@@ -35,7 +35,7 @@ def find_pose(tree: Tree, frame: Frame, settings: Settings, work: Work) -> None:
 
     Args:
         tree: the predicted hypothesis.
-        frame: the measurements, whose `belief` and `images` are written.
+        frame: the measurements; `belief` and `images` are written.
         settings: settings of the estimator.
         work: scratch. It receives the positions (`point`), the variances of the bones as
             measurements, and information and gradient of cameras and bones: those of the
@@ -57,12 +57,12 @@ def find_pose_near(
 
     Args:
         tree: the predicted hypothesis.
-        frame: the measurements, whose `belief` and `images` are written.
+        frame: the measurements; `belief` and `images` are written.
         settings: settings of the estimator.
         n_steps: number of Gauss-Newton steps.
         widen: factor on the prior's own image variance that is added to the detector's in the
             first step; it is halved from step to step.
-        work: scratch with the start and the bones' variances; it receives what `find_pose` lists.
+        work: scratch with the start and the bones' variances; it receives the same as there.
     """
     body, cov, slope = tree.body, tree.cov, tree.slope
     for j in ORDER:
@@ -130,7 +130,7 @@ def _linearise_cameras(
     """Write the cameras' information and gradient at `work.point`.
 
     Args:
-        frame: the measurements, whose `belief` is written.
+        frame: the measurements; `belief` is written.
         inlier_odds: odds of a perfect inlier, times the variance of its pixel [px^2].
         widening: factor on the prior's image variance that is added to the detector's.
         is_last: whether the Jacobians and residuals are kept in `frame.images`.
@@ -164,12 +164,12 @@ def _linearise_cameras(
 def _add_floor(body: Floats, information: float, work: Work) -> None:
     """Add a measurement of height 0 to joints below the floor.
 
-    One view leaves the distance of a body open; that nobody is below the floor bounds it.
+    One view leaves the distance of a body open; that no joint is below the floor bounds it.
 
     Args:
         body: (J, 6) predicted means.
         information: information of the measurement [1/m^2].
-        work: scratch, whose camera information and gradient are changed.
+        work: scratch; the camera information and gradient are changed.
     """
     for j in range(len(body)):
         if work.point[j, 2] < 0.0:
@@ -209,7 +209,7 @@ def _add_second_bone(cov: Floats, bone_length: Floats, work: Work) -> None:
     Args:
         cov: (J, 6, 6) predicted covariances.
         bone_length: (J,) lengths of the bones [m].
-        work: scratch, whose information and gradient of the nose's edge are changed.
+        work: scratch; information and gradient of the nose's edge are changed.
     """
     nose, right = _NOSE, _RIGHT_SHOULDER
     left: int = PARENT[_RIGHT_SHOULDER]
@@ -324,7 +324,7 @@ def _add_view(
         points: (N_POINT, LANES) positions and predicted covariances.
         view: (N_VIEW, LANES) pixels and precisions.
         widen: factor on the prior's image variance that is added to the detector's in the
-            weights, which tell inliers from outliers.
+            weights of the measurements.
         inlier_odds: odds of a perfect inlier, times the variance of its pixel [px^2].
         image: (N_IMAGE, LANES) receives weights, Jacobians and residuals.
         sums: (N_SUM, LANES) to which information and gradient are added.

@@ -1,7 +1,7 @@
 """The state of the default estimator, as records declared in one place.
 
 The joints of a body share their errors: with one view the depth of all of them is wrong together.
-So the whole body is one Gaussian whose dependencies are the kinematic tree's (`gaussian`), and a
+So the whole body is one Gaussian with the dependencies of the kinematic tree (`gaussian`), and a
 worker is a few such hypotheses. `predict` moves them, `update` conditions them on a frame,
 `evidence` weighs them.
 """
@@ -112,8 +112,8 @@ class Tree:
     """Updates in which one camera alone has shown a person while the worker was not tracked, less
     those in which not."""
     size_std: float
-    """Relative standard deviation of the size, and with it of the distance, of a body whose track
-    one camera has begun; 0 once two cameras agree."""
+    """Relative standard deviation of the size, and with it of the distance, of a body while one
+    camera alone has begun its track; 0 once two cameras agree."""
     pair: Pair
     """Relative calibration of the two cameras that alone see the body."""
     displaced_m2: Annotated[Floats, (3, 3)]

@@ -178,7 +178,7 @@ def _widen_joint(j: int, tree: Tree, point: Floats, work: Work) -> bool:
         j: the joint.
         tree: the predicted hypothesis.
         point: (3,) the place to which the joint has jumped [m].
-        work: scratch, whose `moved` receives the growth.
+        work: scratch; `moved` receives the growth.
     """
     q: int = PARENT[j]
     body, cov, inherited = tree.body[j], tree.cov[j], work.b
@@ -238,7 +238,7 @@ def _add_information(j: int, cov: Floats, slope: Floats, work: Work) -> None:
         j: the joint.
         cov: (J, 6, 6) predicted covariances.
         slope: (J, 6, 6) predicted slopes; 0 is written where an edge has to be cut.
-        work: scratch, whose `precision`, `coupling`, `back` and `known` of the joint are written.
+        work: scratch; the joint's `precision`, `coupling`, `back` and `known` are written.
     """
     own, rest, shared = work.precision[j], work.a, work.b
     if PARENT[j] >= 0:
@@ -287,7 +287,7 @@ def _marginalise(j: int, cov: Floats, slope: Floats, work: Work) -> None:
     """Write a joint's marginal covariance, C_j = inverse Hessian + B_j C_q B_j'.
 
     Args:
-        j: the joint, whose parent q is done.
+        j: the joint; its parent q is done.
         cov: (J, 6, 6) covariances, written for the joint.
         slope: (J, 6, 6) posterior slopes.
         work: scratch with the inverse Hessians.
@@ -336,7 +336,7 @@ def shift_to_mean(tree: Tree, frame: Frame, share: float, work: Work) -> None:
     A camera's information falls with the square of the depth: there is more room behind the mode
     than before it. With J the Jacobian of joint j's pixel, n the camera's optical axis (both in the
     world), d the depth and S_j the posterior covariance, mean - mode = H^-1 g with g_j = sum over
-    cameras of n tr(S_j J'J / sigma^2) / d, H being the Hessian of all joints, whose factors
+    cameras of n tr(S_j J'J / sigma^2) / d, H being the Hessian of all joints in the factors that
     `update_tree` left.
 
     Args:
