@@ -22,7 +22,6 @@ from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Floats, Ints, Rngs
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.estimator import Estimator, State
 from hrc_env.tracking.frame_sets import (
     SAME_S,
     Frames,
@@ -35,6 +34,7 @@ from hrc_env.tracking.frame_sets import (
     make_frames,
     remember,
 )
+from hrc_env.tracking.interface import Estimator, State
 
 IGNORED = ("no time", "future", "not newer", "too old")
 """Reasons for which frames are ignored, in the order of the last axis of `LateState.ignored`."""
