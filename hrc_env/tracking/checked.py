@@ -14,7 +14,7 @@ from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import JOINTS, N_JOINTS
 from hrc_env.core.typing import Floats, Ints, Rngs
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.estimator import Estimator, State
+from hrc_env.tracking.interface import Estimator, State
 
 METHODS = {
     "init": ("batch", "n_workers"),

@@ -34,7 +34,7 @@ from hrc_env.tracking.config import (
     TriangulationConfig,
     cast_config,
 )
-from hrc_env.tracking.estimator import Estimator as Estimator
+from hrc_env.tracking.interface import Estimator as Estimator
 from hrc_env.tracking.out_of_sequence import OutOfSequence
 from hrc_env.tracking.paper import PaperEstimator
 from hrc_env.tracking.paper_restarts import PaperRestarts

@@ -101,7 +101,7 @@ class Frame(NamedTuple):
     """(C, N_VIEW, LANES) the measurements as `tree.search` reads them."""
     images: Floats
     """(C, N_IMAGE, LANES) the joints in each camera where `tree.search` linearised last."""
-    looks: Floats
+    joint_views: Floats
     """(C, 8) scratch of `tree.learning` for one joint."""
 
 
@@ -149,7 +149,7 @@ def make_frame(cameras: Records1[Camera]) -> Frame:
         belief=np.empty((N_JOINTS, n)),
         views=np.zeros((n, N_VIEW, LANES)),
         images=np.zeros((n, N_IMAGE, LANES)),
-        looks=np.empty((n, 8)),
+        joint_views=np.empty((n, 8)),
     )
 
 

@@ -22,7 +22,6 @@ from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Floats, Ints, Rngs
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.estimator import Estimator, State
 from hrc_env.tracking.frame_sets import (
     SAME_S,
     Frames,
@@ -35,6 +34,7 @@ from hrc_env.tracking.frame_sets import (
     make_frames,
     remember,
 )
+from hrc_env.tracking.interface import Estimator, State
 
 IGNORED = ("no time", "future", "not newer", "too old")
 """Reasons for which frames are ignored, in the order of the last axis of `LateState.ignored`."""
@@ -236,7 +236,13 @@ class OutOfSequence(Generic[State]):
             write_rows(state.now, ids, part)
 
     def _keep(self, state: LateState[State], ids: Ints, age: int) -> None:
-        """Store the present states of environments `ids` `age` slots before the open one."""
+        """Store the present states of some environments in a slot.
+
+        Args:
+            state: changed in place.
+            ids: indices of the environments.
+            age: number of slots before the open one.
+        """
         slots = _find_slots(state, ids, age)
         write_rows(_flatten_slots(state.kept), slots, self._part(state, ids))
 
@@ -293,7 +299,13 @@ def _select_usable(
 
 
 def _find_slots(state: LateState[Any], ids: Ints, age: int) -> Ints:
-    """Return the rows of the flattened slots that hold the states of `age` slots back."""
+    """Return the rows of the flattened slots that hold past states.
+
+    Args:
+        state: the whole state.
+        ids: indices of the environments.
+        age: number of slots before the open one.
+    """
     n_slots = state.end_s.shape[1]
     return ids * n_slots + (state.slot[ids] - age) % n_slots
 

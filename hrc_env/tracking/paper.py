@@ -244,7 +244,13 @@ def count_support(tracks: Records2[Track], b: int, w: int, frame: Frame, gate_si
 
 
 def roll(particles: Floats, sigma_m: float, rng: np.random.Generator) -> None:
-    """Move particles (J, 3, M) by Gaussian steps of `sigma_m` [m] on each axis, in place."""
+    """Move particles by Gaussian steps, in place.
+
+    Args:
+        particles: (J, 3, M) positions [m].
+        sigma_m: standard deviation of a step on each axis [m].
+        rng: generator of the steps.
+    """
     _add_scaled(particles, rng.standard_normal(particles.shape, dtype=np.float32), sigma_m)
 
 

@@ -314,9 +314,15 @@ def _update_slots(
 
 @kernel
 def _count_searches(search: Records1[SearchCount], row: int, w: int, evidence: Evidence) -> bool:
-    """Count the searches (C,) for slot `w`; return whether a camera shows a person for it.
+    """Count the searches for one slot, and return whether a camera shows a person for it.
 
     Such a person is the slot's worker, or one more than there are tracks.
+
+    Args:
+        search: (C,) searches for the slot, changed in place.
+        row: row of the environment in `evidence`.
+        w: index of the slot.
+        evidence: the tracks and the searches of the update.
     """
     shown, people = evidence.has_strangers[row], evidence.tracked[row].sum()
     for c in range(len(search)):

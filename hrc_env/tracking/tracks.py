@@ -64,7 +64,13 @@ def get_estimate_arrays(estimate: PoseEstimate) -> EstimateArrays:
 
 
 def make_tracks(batch: int, n_workers: int, config: TrackerConfig) -> Records2[Track]:
-    """Return tracks (B, W) of workers that have never been detected."""
+    """Return tracks (B, W) of workers that have never been detected.
+
+    Args:
+        batch: number of environments B.
+        n_workers: number of workers W in each.
+        config: the prior and the largest age.
+    """
     tracks = make_records(Track, (batch, n_workers))
     reset_tracks(tracks, np.arange(batch), config)
     return tracks
@@ -152,7 +158,13 @@ def age_worker(
 
 @kernel
 def count_up(age: Floats, dt: float, max_age: float) -> float:
-    """Add `dt` [s] to ages (J,), up to `max_age` [s], in place; return the smallest."""
+    """Increase ages and return the smallest [s].
+
+    Args:
+        age: (J,) ages [s], changed in place.
+        dt: time that passes [s].
+        max_age: upper bound of the ages [s].
+    """
     youngest = np.inf
     for j in range(len(age)):
         age[j] = min(age[j] + dt, max_age)

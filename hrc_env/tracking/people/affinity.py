@@ -105,7 +105,14 @@ def compute_affinity(image: Floats, pose: Pose, settings: AssociationSettings) -
 def _score_reading(
     image: Floats, pose: Pose, swapped: bool, settings: AssociationSettings
 ) -> float:
-    """Return the affinity of a pose as it is or, if `swapped`, with left and right exchanged."""
+    """Return the affinity of one reading of a pose; 0 where it does not fit.
+
+    Args:
+        image: (J, 3) predicted pixels and variances, of `project_body`.
+        pose: the detected pose.
+        swapped: whether left and right of the pose are exchanged.
+        settings: the gate and the area of the image.
+    """
     z, sigma, ok, gate_sigma = pose.px, pose.sigma_px, pose.ok, settings.gate_sigma
     n, n_near, total, product, gate = 0, 0, 0.0, 1.0, gate_sigma * gate_sigma
     for j in range(len(image)):

@@ -81,13 +81,13 @@ class Association:
 
 
 def associate(
-    P: Floats, found: Keypoints, predicted: PoseEstimate, config: AssociationConfig | None = None
+    P: Floats, detected: Keypoints, predicted: PoseEstimate, config: AssociationConfig | None = None
 ) -> Association:
     """Assign poses to workers.
 
     Args:
         P: (C, 3, 4) projections from the world [m] to pixels.
-        found: (B, C, D, J, ...) D poses a camera in any order; missing ones are NaN.
+        detected: (B, C, D, J, ...) D poses a camera in any order; missing ones are NaN.
         predicted: (B, W, ...) prediction of the workers for the time of these frames.
         config: when a pose is assigned; None for the defaults.
 
@@ -96,8 +96,8 @@ def associate(
     """
     cameras = cameras_of(P)
     batch, n_workers = predicted.tracked.shape
-    n_poses = found.px.shape[2] if found.px.ndim == 5 else -1
-    detections = get_keypoint_arrays(found, (batch, len(cameras), n_poses, N_JOINTS))
+    n_poses = detected.px.shape[2] if detected.px.ndim == 5 else -1
+    detections = get_keypoint_arrays(detected, (batch, len(cameras), n_poses, N_JOINTS))
     check_shape("mean_world", predicted.mean_world.shape, (batch, n_workers, N_JOINTS, 3), "B, W")
     config = config or AssociationConfig()
     settings = AssociationSettings(*(getattr(config, name) for name in AssociationSettings._fields))
@@ -106,14 +106,14 @@ def associate(
     out = KeypointArrays(np.full((*shape, 2), np.nan), np.zeros(shape), np.full(shape, np.inf))
     poses, estimate = make_records(Pose, (len(cameras), n_poses)), get_estimate_arrays(predicted)
     _associate_all(cameras, poses, detections, estimate, settings, pose, out)
-    return Association(Keypoints(*out, time_s=found.time_s), pose)
+    return Association(Keypoints(*out, time_s=detected.time_s), pose)
 
 
 @kernel(makes_arrays=True)
 def _associate_all(
     cameras: Records1[Camera],
     poses: Records2[Pose],
-    found: KeypointArrays,
+    detected: KeypointArrays,
     predicted: EstimateArrays,
     settings: AssociationSettings,
     pose: Ints,
@@ -124,7 +124,7 @@ def _associate_all(
     Args:
         cameras: (C,) cameras.
         poses: (C, D) scratch for the poses of one environment.
-        found: (B, C, D, J, ...) detections.
+        detected: (B, C, D, J, ...) detections.
         predicted: (B, W, ...) prediction of the workers.
         settings: when a pose is assigned.
         pose: (B, C, W) index of the assigned pose, filled in; must be -1.
@@ -132,16 +132,16 @@ def _associate_all(
     """
     for b in range(len(pose)):
         mean, cov, tracked = predicted.mean_world[b], predicted.cov_world[b], predicted.tracked[b]
-        _read_poses(found.px[b], found.confidence[b], found.sigma_px[b], poses)
+        _read_poses(detected.px[b], detected.confidence[b], detected.sigma_px[b], poses)
         _assign_to_tracked(cameras, poses, mean, cov, tracked, settings, pose[b])
         _assign_new_people(cameras, poses, mean, tracked, settings, pose[b])
         for c in range(len(cameras)):
             for w in range(pose.shape[2]):
                 d: int = pose[b, c, w]
                 if d >= 0:
-                    out.px[b, c, w] = found.px[b, c, d]
-                    out.confidence[b, c, w] = found.confidence[b, c, d]
-                    out.sigma_px[b, c, w] = found.sigma_px[b, c, d]
+                    out.px[b, c, w] = detected.px[b, c, d]
+                    out.confidence[b, c, w] = detected.confidence[b, c, d]
+                    out.sigma_px[b, c, w] = detected.sigma_px[b, c, d]
 
 
 @kernel(makes_arrays=True)
@@ -329,7 +329,13 @@ def _find_worker(
 
 @kernel(makes_arrays=True)
 def _find_nearest(distance: Floats, among: Bools, limit: float) -> int:
-    """Return the index of the least distance (W,) below `limit` among some workers, or -1."""
+    """Return the index of the nearest of some workers, or -1 if none is near enough.
+
+    Args:
+        distance: (W,) distances [m].
+        among: (W,) the workers to choose from.
+        limit: greatest distance, excluded [m].
+    """
     best = -1
     for w in range(len(distance)):
         if among[w] and distance[w] < limit:

@@ -107,7 +107,7 @@ def learn_from_frame(
     learn_lengths(tree, work.n_views)
     if model.min_factor == model.max_factor:
         return
-    view, spread, persistence = frame.looks, work.spread, work.persistence
+    view, spread, persistence = frame.joint_views, work.spread, work.persistence
     turn = noise[0, 0].sums[TURN]
     noise[0, 0].sums[TURN] = (turn + 1.0) % _TURNS
     for j in range(len(tree.body)):
