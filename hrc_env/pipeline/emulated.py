@@ -77,7 +77,7 @@ class EmulatedCameras(TrueState):
         keypoints = emulator.emulate(state, rngs, now.truth, around, cameras, config, *told)
         if self.scene.n_workers < 2:
             return keypoints
-        return emulator.without_names(keypoints, rngs)
+        return emulator.shuffle_workers(keypoints, rngs)
 
     def _dim(self, ids: Ints) -> Quality | None:
         """Return how well the pictures taken now show people, (B, C); None: as in usual light."""

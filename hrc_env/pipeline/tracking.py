@@ -116,7 +116,7 @@ class TrackingSetup:
 
 def setup_in(scene: Scene, config: HRCConfig) -> TrackingSetup:
     """Return how the workers of a scene are followed."""
-    calibration = config.emulator.calibrated()
+    calibration = config.emulator.make_calibration()
     followed = scene.cameras, scene.n_workers, coverage(scene)
     return TrackingSetup(*followed, config.ctrl_dt, config.association, calibration)
 

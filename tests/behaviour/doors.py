@@ -1772,7 +1772,7 @@ class Emulator:
             cameras or self.rig.cameras, self._config, expected,
         )  # fmt: skip
         if has_no_names:
-            found = keypoint_emulator.without_names(found, self._rngs)
+            found = keypoint_emulator.shuffle_workers(found, self._rngs)
         return _keypoints(found)
 
     def remember(self) -> Arrays:
@@ -1871,12 +1871,12 @@ def describe_posture(joints_m: NDArray[np.float64], speed_m_s: Any, eye_m: Any) 
     front = outline.facing(joints_m)
     known = calibration.read_calibration()
     return {
-        "facing": np.array(front), "folded": outline.folded(joints_m),
+        "facing": np.array(front), "folded": outline.folding(joints_m),
         "kneeling": outline.kneeling(joints_m), "handling": outline.handling(joints_m),
         "speed": outline.speed(speed_m_s), "stepping": outline.stepping(outline.speed(speed_m_s)),
         "shares": np.array(outline.posture_of(joints_m, speed_m_s)),
         "pose": outline.pose_of(joints_m), "novelty_m": outline.novelty_m(joints_m, known.poses),
-        "from": outline.seen_from(joints_m, *front, eye_m),
+        "from": outline.view_angle(joints_m, front, eye_m),
         "is_folded": outline.is_folded(joints_m),
     }  # fmt: skip
 
