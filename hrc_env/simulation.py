@@ -524,6 +524,6 @@ class Simulation(Stateful):
         return {
             **{name: value[ids] for name, value in tally.items()},
             **infos.worker_info(activity[ids], body[ids], happened),
-            **infos.perception_info(cameras, seen.suspected(ids), seen.vacancy(ids)),
+            **infos.perception_info(cameras, seen.suspected_cameras(ids), seen.vacancy(ids)),
             **self.cameras.info(ids),
         }

@@ -13,7 +13,7 @@ from hrc_env.observations import ObservationLayout, ObservationTerm, observe
 from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.pipeline import levels
 from hrc_env.pipeline.levels import LEVELS, make_pipeline
-from hrc_env.pipeline.sensor_input import SensorInput, TrueSensorInput, with_truth
+from hrc_env.pipeline.sensor_input import SensorInput, TrueSensorInput, require_truth
 from hrc_env.rewards import check_kind, total
 from hrc_env.safety.config import ShieldConfig
 from hrc_env.safety.contact import contact_force, effective_mass, find_region
@@ -196,9 +196,9 @@ def test_a_level_is_refused_with_what_it_does_not_know(level, changes, said):
 
 def test_truth_is_known_to_whom_it_is_told():
     told, untold = (kind(*[None] * n) for kind, n in ((TrueSensorInput, 5), (SensorInput, 3)))
-    assert with_truth(told) is told
+    assert require_truth(told) is told
     with pytest.raises(ConfigError, match="needs a TrueSensorInput, got a SensorInput"):
-        with_truth(untold)
+        require_truth(untold)
 
 
 def test_a_state_of_one_other_setting_is_refused():

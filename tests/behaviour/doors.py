@@ -75,13 +75,13 @@ from hrc_env.motion.anatomy import anatomy
 from hrc_env.motion.clip import Clip, fitted_to, load_clip, placed_at_origin, save_clip
 from hrc_env.motion.traffic import meets
 from hrc_env.perception import (
-    believing,
     blazepose,
     calibration,
     detector,
-    lensed,
+    lenses,
     noise,
     outline,
+    plausibility,
     searching,
     windows,
 )
@@ -1725,7 +1725,7 @@ class Crowd:
         return {
             "hips_m": np.nan_to_num(now.hips_world[0], nan=9.0),
             "age_s": np.minimum(now.age_s[0], 9.0), "remembered": np.array(n),
-            "beside": np.array(sum(each.cameras for each in beside)),
+            "beside": np.array(sum(each.n_cameras for each in beside)),
             "given_up": self._known.given_up[0].copy(),
         }  # fmt: skip
 
@@ -1774,7 +1774,7 @@ class Emulator:
             cameras or self.rig.cameras, self._config, expected,
         )  # fmt: skip
         if has_no_names:
-            found = keypoint_emulator.without_names(found, self._rngs)
+            found = keypoint_emulator.shuffle_workers(found, self._rngs)
         return _keypoints(found)
 
     def remember(self) -> Arrays:
@@ -1803,7 +1803,7 @@ class Faults:
         configs = tuple(faults.FaultConfig(**_renamed(each, FAULT_FIELDS)) for each in wrong)
         self._schedule = fault_schedule.Schedule(rig.configs, configs, step_s)
         self._rig = rig
-        self._recent = fault_schedule.Recent(2, self._schedule)
+        self._recent = fault_schedule.History(2, self._schedule)
 
     def summarise(self) -> NDArray[np.float64]:
         """Return whether nothing is wrong, the longest delay, the memory and what is frozen."""
@@ -1817,13 +1817,13 @@ class Faults:
         plan, rows = self._schedule, []
         for c in range(len(self._rig.cameras)):
             frame = plan.frame(seed, step, c)
-            shows = (-1, -1) if frame is None else (frame.shows, frame.taken)
+            shows = (-1, -1) if frame is None else (frame.scene_step, frame.taken_step)
             rows.append((*shows, plan.exposure_s(c, step)))
         return np.array(rows, float)
 
     def move_cameras(self, seed: int, step: int) -> Any:
         """Return the cameras as they really are at a step."""
-        return self._schedule.actual(self._rig.cameras, seed, step)
+        return self._schedule.actual_cameras(self._rig.cameras, seed, step)
 
     def begin(self, seed: int) -> NDArray[np.int64]:
         """Begin two episodes and return their numbers for faults."""
@@ -1834,8 +1834,8 @@ class Faults:
     def arrive(self, b: int) -> NDArray[np.float64]:
         """Take an image of a step and return of each camera (C, 2) the number of the one that
         arrives (-1: none) and its time."""
-        step = self._recent.begin(b)
-        records, times_s = self._recent.arrived(b, step)
+        step = self._recent.begin_step(b)
+        records, times_s = self._recent.exchange(b, step)
         return np.column_stack([[-1 if each is None else each for each in records], times_s])
 
     def places(self, cameras: Any) -> Arrays:
@@ -1873,12 +1873,12 @@ def describe_posture(joints_m: NDArray[np.float64], speed_m_s: Any, eye_m: Any) 
     front = outline.facing(joints_m)
     known = calibration.read_calibration()
     return {
-        "facing": np.array(front), "folded": outline.folded(joints_m),
+        "facing": np.array(front), "folded": outline.folding(joints_m),
         "kneeling": outline.kneeling(joints_m), "handling": outline.handling(joints_m),
         "speed": outline.speed(speed_m_s), "stepping": outline.stepping(outline.speed(speed_m_s)),
         "shares": np.array(outline.posture_of(joints_m, speed_m_s)),
         "pose": outline.pose_of(joints_m), "novelty_m": outline.novelty_m(joints_m, known.poses),
-        "from": outline.seen_from(joints_m, *front, eye_m),
+        "from": outline.view_angle(joints_m, front, eye_m),
         "is_folded": outline.is_folded(joints_m),
     }  # fmt: skip
 
@@ -1887,7 +1887,7 @@ def believe(rig: Rig, found: Arrays, is_floor_known: bool) -> bool:
     """Return whether keypoints (C, J, ...) are believed to be a person's."""
     floor_m = rig.floor_m if is_floor_known else None
     joints = (found[name] for name in ("px", "confidence", "sigma_px"))
-    return believing.is_somebody(*joints, rig.cameras, floor_m)
+    return plausibility.is_person(*joints, rig.cameras, floor_m)
 
 
 # --- Recorded motion (importer.py) ---------------------------------------------------------------
@@ -2103,22 +2103,23 @@ def agree(rig: Rig, candidates: Any) -> tuple[Any, list[Any]]:
     """Return the windows (C, 4) of each proposal, best first, of candidates (C,) of windows, and
     those that are left without the first one's."""
     known = [[_roi(each) for each in found] for found in candidates]
-    proposed = [[_window(w) for w in each] for each in searching.proposals(known, rig.cameras)]
+    proposed = [[_window(w) for w in each] for each in searching.propose_people(known, rig.cameras)]
     first = searching.agreed_windows(known, rig.cameras)
-    left = searching.apart_from(known, [first])
+    left = searching.exclude_people(known, [first])
     return np.array(proposed).reshape(-1, len(known), 4), [len(each) for each in left]
 
 
 def keep_distinct(found: Any, n_cameras: int) -> list[Any]:
     """Return each camera's people of all that were found: camera, score, window."""
-    kept = searching.distinct([(c, s, _roi(w)) for c, s, w in found], n_cameras)
+    candidates = [searching.Found(c, s, _roi(w)) for c, s, w in found]
+    kept = searching.drop_duplicates(candidates, n_cameras)
     return [[_window(each) for each in some] for some in kept]
 
 
 def to_pinhole(rig: Rig, found: Arrays) -> Arrays:
     """Return keypoints (B, C, W, J) of images with lenses as pinholes would show them."""
     joints = (found[name] for name in ("px", "confidence", "sigma_px"))
-    return _keypoints(lensed.pinhole_keypoints(Keypoints(*joints), rig.cameras))
+    return _keypoints(lenses.pinhole_keypoints(Keypoints(*joints), rig.cameras))
 
 
 class Drawn:
@@ -2144,7 +2145,7 @@ class Drawn:
 
 def view_through_lens(rig: Rig, drawn: Drawn, c: int, window: Window) -> Picture:
     """Return a window of a camera's image as its lens distorts it."""
-    return lensed.Lensed(drawn, rig.cameras).crop(c, _roi(window))
+    return lenses.LensRenderer(drawn, rig.cameras).crop(c, _roi(window))
 
 
 def sample_picture(picture: Picture, window: Window, side_px: int) -> Picture:
@@ -2168,8 +2169,8 @@ def spoil_picture(
     seeds: tuple[int, ...],
 ) -> Picture:  # fmt: skip
     """Return a picture of a window of the first camera with one fault."""
-    shown = corruptions.Shown(picture, rig.cameras[0], _roi(window), seeds)
-    return corruptions.spoil(shown, faults.FaultConfig(kind, (0,), amount))
+    shown = corruptions.CropView(picture, rig.cameras[0], _roi(window), seeds)
+    return corruptions.corrupt(shown, faults.FaultConfig(kind, (0,), amount))
 
 
 class Film:
@@ -2179,13 +2180,14 @@ class Film:
         """Plan faults, mappings with the names of `FAULT_FIELDS`."""
         configs = tuple(faults.FaultConfig(**_renamed(each, FAULT_FIELDS)) for each in wrong)
         plan = fault_schedule.Schedule(rig.configs, configs, step_s)
-        self._film = camera_film.CameraFilm(lensed.Lensed(drawn, rig.cameras), plan)
+        self._film = camera_film.CameraFilm(lenses.LensRenderer(drawn, rig.cameras), plan)
         self._rig = rig
 
     def show(self, step: int, now: Arrays, before: Arrays, shown: Any, seed: int) -> None:
         """Show people and arm now, as they were a step before, to the cameras that are `shown`."""
         at, was = (_posed(each) for each in (now, before))
-        shot = camera_film.Shot(step, now["q"], at, (before["q"], was), self._rig.cameras)
+        pose, last = camera_film.ScenePose(now["q"], at), camera_film.ScenePose(before["q"], was)
+        shot = camera_film.Shot(step, pose, last, self._rig.cameras)
         self._film.show([shot if c in shown else None for c in range(len(self._rig.cameras))], seed)
 
     def take(self, c: int, window: Window) -> Picture:
@@ -2274,7 +2276,7 @@ class Follower:
 
 def joints_by(find: Callable[[Picture], Any], picture: Picture, window: Window) -> Any:
     """Return joints (J, 3) that somebody's own function finds in a picture of a window."""
-    return detector.own_joints(find, picture, _roi(window))
+    return detector.call_detector(find, picture, _roi(window))
 
 
 class Renderer:
@@ -2284,7 +2286,7 @@ class Renderer:
         """Make a renderer of the rig's scene with workers."""
         scene = build_scene(rig.scene.config, rig.scene.name, n_workers, names)
         self._renderer = CropRenderer(scene)
-        self._lensed = lensed.Lensed(self._renderer, scene.cameras)
+        self._lensed = lenses.LensRenderer(self._renderer, scene.cameras)
 
     def pose(self, people: Arrays) -> None:
         """Pose arm and people, whose bodies are rows of the names."""
@@ -2317,7 +2319,7 @@ class Searches:
     def tick(self, has_image: list[bool]) -> list[int]:
         """Count a step and return the cameras whose images are to be searched."""
         self._schedule.tick(0)
-        return self._schedule.due(0, has_image)
+        return self._schedule.due_cameras(0, has_image)
 
     def remember(self, cameras: list[int], found: list[list[Window]]) -> list[list[Window]]:
         """Keep what some cameras show and return it with what others showed lately."""
@@ -2330,8 +2332,8 @@ class Searches:
 
     def count(self, worker: int, shown: NDArray[np.bool_], has_image: list[bool]) -> list[int]:
         """Count the cameras that show a worker and return those to be searched for them."""
-        self._workers.saw(0, worker, shown)
-        return self._workers.blind(0, worker, has_image)
+        self._workers.count(0, worker, shown)
+        return self._workers.blind_cameras(0, worker, has_image)
 
     def learn(
         self,
@@ -2343,11 +2345,13 @@ class Searches:
         """Learn what a search for a worker has shown."""
         candidates = [list(map(_roi, each)) for each in found]
         theirs = [list(map(_roi, each)) for each in others]
-        self._workers.found(0, worker, candidates, list(map(_roi, windows)), theirs)
+        self._workers.learn(0, worker, candidates, list(map(_roi, windows)), theirs)
 
     def look(self, worker: int, expected: list[Window]) -> list[Window]:
         """Return where the cameras look for a worker."""
-        return list(map(_window, self._workers.windows(0, worker, list(map(_roi, expected)))))
+        return list(
+            map(_window, self._workers.choose_windows(0, worker, list(map(_roi, expected))))
+        )
 
 
 # --- Shield and incidents (shield.py) ------------------------------------------------------------
