@@ -293,7 +293,7 @@ class Simulation(Stateful):
             )  # fmt: skip
         except NoRoomError as error:
             grounds = all_grounds(config.scene)
-            played = fit.played_s(error.clip, grounds, config.worker, config.motion)
+            played = fit.measure_played_s(error.clip, grounds, config.worker, config.motion)
             where = fit.describe_fit(error.clip, played)
             raise ConfigError(f"{error} {where}") from None
         self.scene: Scene = scene_for(n_workers=most)
@@ -314,7 +314,7 @@ class Simulation(Stateful):
         people, task_rngs = (self.motion, self.streams["motion"]), self.streams["task"]
         casts = {b: each.cast for b, each in given.items() if each.cast is not None}
         draw = partial(self._draw_starts, given=given) if given else self._draw_starts
-        q = starts.apart(ids, draw, *people, self.chain, self.bodies, casts)
+        q = starts.begin_apart(ids, draw, *people, self.chain, self.bodies, casts)
         robot = chains.robot_state(self.chain, q, np.zeros_like(q))
         self.task.reset(self.task_state, ids, task_rngs, World(robot, place=self.place))
         for b, each in given.items():
@@ -403,7 +403,7 @@ class Simulation(Stateful):
         ids, sensor = truth.ids, self.pipeline.sensor
         now = SensorInput(ids, self.physics.qpos[ids], truth.motion)
         if sensor.NEEDS_TRUTH:
-            present = self.motion.workers["present"][ids]
+            present = self.motion.workers["is_present"][ids]
             now = TrueSensorInput(ids, now.qpos, now.motion, truth.workers, present)
         sensor.expose(now)
 

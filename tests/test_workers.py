@@ -13,7 +13,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import WorkerMotion, WorkerPath
 from hrc_env.core.skeleton import MIRROR, N_JOINTS
 from hrc_env.motion import generator
-from hrc_env.motion.anatomy import anatomies, anatomy
+from hrc_env.motion.anatomy import measure_bodies, measure_body
 from hrc_env.worker.body import (
     N_SEGMENTS,
     SEGMENT,
@@ -184,9 +184,9 @@ def test_a_path_of_a_stack_has_each_workers_own_capsules_at_all_times():
 
 
 def test_anatomies_of_a_stack_are_those_of_its_bodies():
-    together = anatomies(stack(worker_names()))
+    together = measure_bodies(stack(worker_names()))
     for row, name in enumerate(worker_names()):
-        alone = anatomy(load_body(name))
+        alone = measure_body(load_body(name))
         np.testing.assert_array_equal(together.offset[row], alone.offset)
         np.testing.assert_array_equal(together.frame[row], alone.frame)
         np.testing.assert_array_equal(together.size[row], alone.size)

@@ -9,9 +9,9 @@ from benchmarks.tracking.rigs import DT_S
 from hrc_env.core.typing import Floats, Points3
 from hrc_env.motion import state as st
 from hrc_env.motion.activities.falling import plan_fall
-from hrc_env.motion.activities.running import fastest, plan_run
+from hrc_env.motion.activities.running import limit_run_speed, plan_run
 from hrc_env.motion.paths import lay_path
-from hrc_env.motion.repertoire import OPEN, REPERTOIRE, Act, alone, perform
+from hrc_env.motion.repertoire import OPEN, REPERTOIRE, Act, make_worker, perform
 from hrc_env.motion.state import Worker
 from hrc_env.worker.body import load_body, worker_names, worker_truth
 
@@ -24,7 +24,7 @@ def run_to_and_fro(walk_m: tuple[float, float], seeds: list[int], n_frames: int)
 
     def run(draws: Floats, height_m: float, me: Worker) -> float:
         yaw = _across(me)
-        return plan_run(yaw, fastest(_FASTEST_M_S, me), me)
+        return plan_run(yaw, limit_run_speed(_FASTEST_M_S, me), me)
 
     return _played((st.RUN, run, 0.0), walk_m, seeds, n_frames)
 
@@ -55,7 +55,7 @@ def _played(act: Act, walk_m: tuple[float, float], seeds: list[int], n_frames: i
         rng = np.random.default_rng([seed, 11])
         body = load_body(worker_names()[seed % len(worker_names())])
         corner = rng.choice([-1.0, 1.0], 2) * rng.uniform(0.9, 1.0, 2) * walk_m
-        me = alone(body, (corner[0], corner[1]), float(rng.uniform(-np.pi, np.pi)))
+        me = make_worker(body, (corner[0], corner[1]), float(rng.uniform(-np.pi, np.pi)))
         joints = []
         while sum(map(len, joints)) < n_frames:
             for film in perform((act, *REPERTOIRE["look round"]), me, rng, DT_S):

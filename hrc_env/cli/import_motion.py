@@ -86,7 +86,7 @@ class ImportMotion:
         with progress_bar(console, name) as say:
             clip, error = retarget(capture, body, lambda share: say(share, name))
         tell_error(console, capture, clip, error)
-        played = fit.played_s(clip, all_grounds(), ANY)
+        played = fit.measure_played_s(clip, all_grounds(), ANY)
         save_clip(clip, self.out)
         ready = f"play it with motions=[{str(self.out)!r}]. " if any(played.values()) else ""
         console.print(f"In [bold]{self.out}[/]: {ready}{fit.describe_fit(clip, played)}")
@@ -145,20 +145,20 @@ def _film_strip(clip: "Clip", worker: str) -> "Image":
     from hrc_env.geometry.cameras import pinhole
     from hrc_env.mocap.poses import posed
     from hrc_env.motion import controls as c
-    from hrc_env.motion.anatomy import anatomy
-    from hrc_env.motion.clip import fitted_to
+    from hrc_env.motion.anatomy import measure_body
+    from hrc_env.motion.clip import scale_clip
     from hrc_env.render import overlay
     from hrc_env.scene.build import SceneConfig, build
     from hrc_env.scene.render import PictureRenderer
     from hrc_env.worker.body import load_body
 
     scene = build(SceneConfig(), "lab", 1, worker)
-    bones = anatomy(load_body(worker))
+    bones = measure_body(load_body(worker))
     eye = np.array([STAGE_M[0] + EYE_M[0], STAGE_M[1] + EYE_M[1], EYE_M[2]])
     target = np.array([*STAGE_M, TARGET_Z_M])
     camera = pinhole("strip", eye, target, HFOV_DEG, *TILE)
     rows = np.linspace(0, len(clip.controls) - 1, N_MOMENTS).astype(int)
-    q = fitted_to(clip, bones.size)[rows]
+    q = scale_clip(clip, bones.lengths)[rows]
     shift = np.array(STAGE_M) - q[:, [c.ROOT_X, c.ROOT_Y]]
     for at in (c.ROOT_X, c.ANKLE, c.ANKLE + 6):
         q[:, at : at + 2] += shift

@@ -7,8 +7,8 @@ import numpy as np
 from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import JOINTS
 from hrc_env.core.typing import Floats, Ints, Points3, QuaternionsWxyz, Rotations
-from hrc_env.motion.anatomy import Anatomy, anatomy
-from hrc_env.motion.kinematics import pose, quaternion
+from hrc_env.motion.anatomy import Anatomy, measure_body
+from hrc_env.motion.kinematics import pose, write_quaternion
 from hrc_env.motion.state import WORKER, Worker
 from hrc_env.worker.body import N_SEGMENTS, SEGMENT, Body
 
@@ -23,7 +23,7 @@ STARTS = {
 class Marks:
     """Where a body carries the 15 joints."""
 
-    anatomy: Anatomy
+    measure_body: Anatomy
     segment: Ints
     """(15,) that carries each."""
     offset: Floats
@@ -41,7 +41,7 @@ def marks_of(body: Body, landmarks: bool) -> Marks:
             side, _, part = joint.partition("_")
             if part in STARTS:
                 segment[j], offset[j] = SEGMENT[f"{side}_{STARTS[part]}"], 0.0
-    return Marks(anatomy(body), segment, offset, body.rest_position[segment] + offset)
+    return Marks(measure_body(body), segment, offset, body.rest_position[segment] + offset)
 
 
 def joints_in(q: Floats, marks: Marks) -> Points3:
@@ -57,7 +57,7 @@ def posed(q: Floats, bones: Anatomy) -> tuple[Points3, QuaternionsWxyz, Rotation
     position, turn = np.empty((len(q), N_SEGMENTS, 3)), np.empty((len(q), N_SEGMENTS, 4))
     matrix = np.empty((len(q), N_SEGMENTS, 3, 3))
     me = np.zeros(1, WORKER)[0]
-    me["bones"], me["frame"], me["size"] = bones.offset, bones.frame, bones.size
+    me["bones"], me["frame"], me["lengths"] = bones.offset, bones.frame, bones.lengths
     _pose_each(np.ascontiguousarray(q), position, turn, matrix, me)
     return position, turn, matrix
 
@@ -70,4 +70,4 @@ def _pose_each(q: Floats, position: Floats, turn: Floats, matrix: Floats, me: Wo
         pose(me)
         position[n, :], matrix[n, :] = me.p[:N_SEGMENTS], me.r[:N_SEGMENTS]
         for s in range(N_SEGMENTS):
-            quaternion(me.r, s, turn[n])
+            write_quaternion(me.r, s, turn[n])

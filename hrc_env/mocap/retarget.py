@@ -19,7 +19,7 @@ from hrc_env.mocap.poses import Marks, joints_in, marks_of
 from hrc_env.mocap.record import Capture
 from hrc_env.mocap.stance import locked, slip
 from hrc_env.motion import controls as c
-from hrc_env.motion.clip import Clip, placed_at_origin
+from hrc_env.motion.clip import Clip, move_to_origin
 from hrc_env.worker.body import Body, load_body
 
 STILL_M_S, LOW_SHARE = 0.15, 40.0
@@ -86,7 +86,7 @@ def retarget(
     body = load_body(body) if isinstance(body, str) else body
     marks = marks_of(body, capture.landmarks)
     target = adapted(capture.joints_world, capture.fps, marks)
-    size = marks.anatomy.size
+    size = marks.anatomy.lengths
     poses = fitted(target, capture.fps, marks, say)
     controls, contacts = locked(poses, capture.fps, size)
     done = joints_in(controls, marks)
@@ -96,7 +96,7 @@ def retarget(
         apart.mean(0), np.percentile(apart, 95, axis=0), scale,
         float(np.percentile(slips, 95)) if len(slips) else float("nan"),
     )  # fmt: skip
-    clip = Clip(placed_at_origin(controls), capture.fps, contacts, size, capture.source)
+    clip = Clip(move_to_origin(controls), capture.fps, contacts, size, capture.source)
     return clip, error
 
 

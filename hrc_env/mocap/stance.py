@@ -11,7 +11,7 @@ from hrc_env.mocap.person import runs, smoothed
 from hrc_env.mocap.poses import posed
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import ANKLE_Z, Anatomy
-from hrc_env.motion.clip import footprints, rolled
+from hrc_env.motion.clip import find_footprints, shift_by_roll
 from hrc_env.motion.curves import decay
 from hrc_env.worker.body import SEGMENT
 
@@ -30,11 +30,11 @@ def locked(q: Floats, fps: float, size: Floats) -> tuple[Floats, Bools]:
     out, stands = q.copy(), np.zeros((len(q), 2), bool)
     for side in range(2):
         at = c.ANKLE + 6 * side
-        footprint = footprints(q[:, at:], size)
+        footprint = find_footprints(q[:, at:], size)
         stances = _stances(footprint, fps)
         cleaned = footprint + _corrections(footprint, stances, fps, size[ANKLE_Z])
         cleaned[:, 2] = np.maximum(cleaned[:, 2], size[ANKLE_Z])
-        out[:, at : at + 3] = cleaned[:, :3] + rolled(cleaned[:, 3], q[:, at + 4], size)
+        out[:, at : at + 3] = cleaned[:, :3] + shift_by_roll(cleaned[:, 3], q[:, at + 4], size)
         out[:, at + 3] = cleaned[:, 3]
         for first, last in stances:
             stands[first:last, side] = True

@@ -15,7 +15,7 @@ from hrc_env.mocap.read import read_recording
 from hrc_env.mocap.retarget import retarget
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import ANKLE_Z
-from hrc_env.motion.clip import footprints
+from hrc_env.motion.clip import find_footprints
 from hrc_env.worker.body import load_body
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -40,7 +40,7 @@ def test_resting_feet_are_on_the_floor_wherever_the_files_floor_is(work, tmp_pat
     path = saved(tmp_path, work.joints + floor_m * UP)
     clip, _ = retarget(read_recording(path), load_body())
     for side in range(2):
-        feet = footprints(clip.controls[:, c.ANKLE + 6 * side :], clip.size)
+        feet = find_footprints(clip.controls[:, c.ANKLE + 6 * side :], clip.size)
         above = feet[clip.contacts[:, side], 2] - clip.size[ANKLE_Z]
         assert np.abs(above).max() < 1e-3
 

@@ -11,8 +11,8 @@ from hrc_env.mocap.poses import joints_in, marks_of, posed
 from hrc_env.mocap.read import read_recording
 from hrc_env.mocap.retarget import aligned_errors, retarget
 from hrc_env.motion import controls as c
-from hrc_env.motion.anatomy import LEG, anatomy
-from hrc_env.motion.clip import fitted_to, load_clip, save_clip
+from hrc_env.motion.anatomy import LEG, measure_body
+from hrc_env.motion.clip import load_clip, save_clip, scale_clip
 from hrc_env.worker.body import SEGMENT, load_body, worker_names
 
 
@@ -50,7 +50,7 @@ def test_joints_of_the_projects_own_sense_are_followed_in_that_sense(work, tmp_p
 def test_standing_feet_do_not_slide(imported, capture):
     clip, error = imported
     assert error.slip_m_s < 0.05
-    position, _, _ = posed(clip.controls, anatomy(BODY))
+    position, _, _ = posed(clip.controls, measure_body(BODY))
     for side, name in enumerate(("left", "right")):
         ball = position[:, SEGMENT[f"{name}_toes"]]
         stands = clip.contacts[1:, side] & clip.contacts[:-1, side]
@@ -70,7 +70,7 @@ def test_nothing_jumps_where_feet_were_locked(imported, capture):
 
 def test_feet_do_not_go_through_the_floor(imported):
     clip, _ = imported
-    position, _, _ = posed(clip.controls, anatomy(BODY))
+    position, _, _ = posed(clip.controls, measure_body(BODY))
     resting = BODY.rest_position[[SEGMENT["left_toes"], SEGMENT["right_toes"]], 2]
     toes = position[:, [SEGMENT["left_toes"], SEGMENT["right_toes"]], 2]
     assert (toes > resting - 0.01).mean() > 0.99
@@ -93,8 +93,10 @@ def test_the_best_alignment_undoes_any_similarity(work):
 def test_a_clip_scales_to_another_body(imported):
     clip, _ = imported
     other = clip.size * 0.9
-    q = fitted_to(clip, other)
-    small = dataclasses.replace(anatomy(BODY), offset=0.9 * anatomy(BODY).offset, size=other)
+    q = scale_clip(clip, other)
+    small = dataclasses.replace(
+        measure_body(BODY), offset=0.9 * measure_body(BODY).offset, size=other
+    )
     marks = dataclasses.replace(marks_of(BODY, False), anatomy=small, offset=np.zeros((15, 3)))
     big = dataclasses.replace(marks_of(BODY, False), offset=np.zeros((15, 3)))
     assert np.allclose(joints_in(q, marks), 0.9 * joints_in(clip.controls, big), atol=5e-3)

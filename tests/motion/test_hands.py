@@ -9,7 +9,7 @@ from recorded import begin, standing, started, watched
 from hrc_env.motion import generator
 from hrc_env.motion import state as ws
 from hrc_env.motion.anatomy import GRIP_M
-from hrc_env.motion.feet import foot
+from hrc_env.motion.feet import place_foot
 from hrc_env.motion.hands import plan_lift, plan_reach
 from hrc_env.worker.body import SEGMENT
 
@@ -20,8 +20,8 @@ def worker(activity, planner, *arguments):
     """A worker at (0.4, 0) facing the robot, who has just begun to reach or lift."""
     me = standing(STATE, 0.4, np.pi)
     me["out_at"] = 0.2
-    foot(0.0, 0, me["prints"], me["stance"], me)
-    foot(0.0, 1, me["prints"], me["stance"], me)
+    place_foot(0.0, 0, me["footprints"], me["stance"], me)
+    place_foot(0.0, 1, me["footprints"], me["stance"], me)
     begin(me, activity, planner(*arguments, me))
     me["clock_s"] = 0.0
     return STATE, me

@@ -7,7 +7,7 @@ import pytest
 from recorded import begin, standing, started, watched
 
 from hrc_env.motion import state as st
-from hrc_env.motion.paths import along, facing, lay_path
+from hrc_env.motion.paths import average_heading, lay_path, locate_on_path
 from hrc_env.motion.walk import brake, plan_walk
 from hrc_env.worker.body import SEGMENT
 
@@ -24,7 +24,7 @@ def laid(via=CORNERS, end=END):
 def test_metres_along_a_path_are_metres():
     me = laid()
     s = np.linspace(0.0, me["length"], 4001)
-    points = np.array([along(each, me) for each in s])
+    points = np.array([locate_on_path(each, me) for each in s])
     np.testing.assert_allclose(points[0], (0.0, 0.0), atol=1e-12)
     np.testing.assert_allclose(points[-1], END, atol=1e-9)
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
@@ -36,7 +36,7 @@ def test_metres_along_a_path_are_metres():
 
 def test_who_walks_round_a_corner_turns_smoothly_and_in_time():
     me = laid(np.array([[2.0, 0.0, 0.5]]), (2.0, 3.0))
-    yaw = np.array([facing(s, me) for s in np.arange(0.0, me["length"], 0.01)])
+    yaw = np.array([average_heading(s, me) for s in np.arange(0.0, me["length"], 0.01)])
     assert yaw[0] == pytest.approx(0.0)
     assert yaw[-1] == pytest.approx(math.pi / 2)
     assert (np.diff(yaw) >= -1e-12).all()
@@ -45,7 +45,7 @@ def test_who_walks_round_a_corner_turns_smoothly_and_in_time():
 
 def test_corners_too_near_each_other_share_the_way_between_them():
     me = laid(np.array([[0.3, 0.0, 9.0], [0.3, 0.3, 9.0], [0.6, 0.3, 9.0]]), (0.6, 0.6))
-    points = np.array([along(s, me) for s in np.linspace(0, me["length"], 200)])
+    points = np.array([locate_on_path(s, me) for s in np.linspace(0, me["length"], 200)])
     np.testing.assert_allclose(points[-1], (0.6, 0.6), atol=1e-9)
     assert np.linalg.norm(np.diff(points, axis=0), axis=1).max() < 0.01
 

@@ -16,14 +16,14 @@ from hrc_env.mocap.retarget import retarget
 from hrc_env.motion import controls as c
 from hrc_env.motion import generator
 from hrc_env.motion import state as st
-from hrc_env.motion.activities.pieces import LONGEST_S, stage, stocked
+from hrc_env.motion.activities.pieces import LONGEST_S, cut_clips, make_stage
 from hrc_env.motion.activities.playing import PACE_S, SETTLE_S
-from hrc_env.motion.blending import settle as settle_at
+from hrc_env.motion.blending import place_standing as settle_at
 from hrc_env.motion.clip import load_clip, save_clip
-from hrc_env.motion.floorplan import floorplan
+from hrc_env.motion.floorplan import make_floorplan
 from hrc_env.motion.paths import lay_path
 from hrc_env.motion.state import N_ROOTS
-from hrc_env.motion.traffic import meets
+from hrc_env.motion.traffic import find_meeting
 from hrc_env.motion.walk import plan_walk
 from hrc_env.settings import settle
 from hrc_env.worker.body import SEGMENT, load_body, worker_truth
@@ -113,7 +113,9 @@ def test_a_long_clip_is_played_in_pieces_from_both_feet_to_both_feet(clip):
         again[:, at : at + 2] += step[:, None] * (clip.controls[-1, :2] - clip.controls[0, :2])
     long = dataclasses.replace(clip, controls=again, contacts=np.concatenate([clip.contacts] * 20))
     hall = dataclasses.replace(generator.OPEN_FLOOR, walkable_x_m=(-99.0, 99.0))
-    pieces = stocked([long], clip.size[None], stage(floorplan(hall), generator.MotionConfig()))
+    pieces = cut_clips(
+        [long], clip.size[None], make_stage(make_floorplan(hall), generator.MotionConfig())
+    )
     assert len(pieces.count) > 2
     assert (pieces.count / pieces.fps <= LONGEST_S + 1 / FPS).all()
     first = pieces.frames[pieces.row]
@@ -142,7 +144,7 @@ def test_who_arrives_early_does_not_stay_in_the_way_of_a_clip(clip):
         lay_path((8.0, -4.0), np.zeros((0, 3)), (8.0, end_y_m), walker)
         begin(walker, st.WALK, plan_walk(0.0, 1.2, walker))
         assert walker["duration_s"] < 8.0  # the player comes by after 16 s
-        assert (meets(1, state.workers[0])[0] > 0.0) == early
+        assert (find_meeting(1, state.workers[0])[0] > 0.0) == early
 
 
 def test_motions_come_as_paths_or_clips(clip, tmp_path):

@@ -31,7 +31,7 @@ class Room:
         self.worker_m[ids] += self.n_moved[ids] > 0
 
     def start(self):
-        return starts.apart(np.arange(len(self.worker_m)), self.draw, None, [], None, None)
+        return starts.begin_apart(np.arange(len(self.worker_m)), self.draw, None, [], None, None)
 
     def gap_m(self, ids, q):
         return np.abs(self.worker_m[ids] - q[:, 0]) + 1e-9
