@@ -280,7 +280,7 @@ def _mind(people: Any, mind: BehaviourParams) -> BehaviourParams | None:
         return None
     config = replace(mind.config, people=restored(PeopleConfig, people, "people"))
     return replace(
-        mind, config=config, numbers=make_hand_params(config, mind.plan.grounds.robot_xy_m)
+        mind, config=config, hand_params=make_hand_params(config, mind.hand_params.robot_xy_m)
     )
 
 

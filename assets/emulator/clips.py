@@ -222,7 +222,7 @@ def _place(
         turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
         part = path[first : first + N_FRAMES : 10] @ turn.T
         begin = middle - part.mean(0)
-        room = min(read_slack(x, y, plan.slack, plan.origin) for x, y in part + begin)
+        room = min(read_slack(x, y, plan.grid) for x, y in part + begin)
         room = min(room, NEAR_M - float(np.hypot(*(part + begin - middle_of_work).T).max()))
         if room > most:
             best, most = ((float(begin[0]), float(begin[1])), yaw, first), room

@@ -34,7 +34,7 @@ GRIP_M = 0.08
 HEEL_M = -0.045
 """Distance of the heel's contact ahead of the ankle [m]; a quarter of a foot behind it."""
 FOREARM_TWIST_RAD = 0.15
-"""Outward turn about the forearm from the rest pose [rad], so that a hanging palm faces the thigh."""
+"""Outward turn about the forearm from the rest pose [rad]; a hanging palm faces the thigh."""
 HAND_TWIST_RAD = 0.35
 """Outward turn of the hand about the forearm from the rest pose [rad]."""
 STAND_SHARE = 0.994
@@ -100,8 +100,7 @@ def _list_trunk_ends(body: Body, rest: Floats) -> Floats:
 
 
 def _make_rest_frame(along: Floats, pole: Floats) -> Floats:
-    """Return the rows bone, hinge x bone and hinge of a bone whose middle joint bulges towards
-    `pole`."""
+    """Return rows bone, hinge x bone and hinge of a bone with a joint bulging to `pole`."""
     along = along / np.linalg.norm(along)
     hinge = np.cross(pole, along)
     hinge /= np.linalg.norm(hinge)

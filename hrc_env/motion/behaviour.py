@@ -1,6 +1,6 @@
 """The next activity of a worker: chosen when an activity has ended, from uniform draws in [0, 1).
 
-Jobs at places follow each other (`schedule`). A worker who finds no free path to a place takes
+Jobs at places follow each other (`schedule`). A worker without a free path to a place takes
 another one of its kind, or waits.
 """
 
@@ -36,7 +36,7 @@ CHANGE_S = 1.5
 GIVE_UP_S = 4.5
 """Time without a free path after which the errand is given up [s]; judgement."""
 PARKED_M = 60.0
-"""Distance along x and y at which workers stand who are not in the episode [m]."""
+"""Distance along x and y at which absent workers stand [m]."""
 WITH_LOAD = (*st.IDLE, *st.GIVING)
 """Activities that are possible with a load; before any other one the load is set down."""
 ABOVE_M = 0.21
@@ -154,7 +154,7 @@ def _store_action(decision: Decision, action: Action) -> None:
     worker.activity, worker.duration_s = activity, action.duration_s
     if worker.reacts_at_s < np.inf:
         return
-    if activity in (st.SCREW, st.TAKE):  # beside a robot that holds what they work at
+    if activity in (st.SCREW, st.TAKE):  # beside a robot that holds the workpiece
         worker.planned_reaction = st.NO_REACTION
         return
     draw = decision.draws.item(dc.REACTION)
@@ -191,7 +191,7 @@ def _choose_errand(decision: Decision) -> None:
 
 
 def _choose_other_place(decision: Decision) -> None:
-    """Choose anew what to do with the load that is held."""
+    """Choose another use of the load that is held."""
     schedule, prop = decision.mind.schedule, PROP_NAMES[decision.worker.load_prop]
     for job, then in zip(schedule.jobs, schedule.then, strict=True):
         if job.activity == "pick up" and job.prop == prop and then:
@@ -212,7 +212,7 @@ def _begin_job(decision: Decision) -> Action:
 
 
 def _begin_activity(decision: Decision, activity: int) -> Action:
-    """Begin an activity where the worker is, if it meets nobody; else stand for a while."""
+    """Begin an activity where the worker is if no other is in the way, else stand a while."""
     config, worker = decision.mind.config, decision.worker
     near = decision.kind_here == "robot"
     if activity == st.STAND:

@@ -72,7 +72,7 @@ class Clip:
 
 
 def move_to_origin(controls: Floats) -> Floats:
-    """Return control vectors, moved and turned so that the first root is at the origin, towards +x."""
+    """Return control vectors that begin with the root at the origin, towards +x."""
     out = controls.copy()
     x, y, yaw = controls[0, [c.ROOT_X, c.ROOT_Y, c.HEADING]]
     cos, sin = np.cos(yaw), np.sin(yaw)

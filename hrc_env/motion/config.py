@@ -23,7 +23,7 @@ class PeopleConfig:
     notice_m: float = 0.40
     """Distance from trunk, head or a hand within which workers notice a part of the arm [m]."""
     fast_m_s: float = 0.6
-    """Approach speed above which workers notice a part of the arm from twice that distance [m/s].
+    """Approach speed of the arm above which `notice_m` counts twice [m/s].
     """
     delay_s: Range = (0.4, 0.8)
     """Time from noticing to reacting [s]; longer than the reaction to an expected signal."""
@@ -36,8 +36,7 @@ class PeopleConfig:
     calm_s: float = 4.0
     """Time after a reaction in which nothing startles the worker [s]."""
     detour_m: float = 0.55
-    """Distance of paths from the tool and elbow of the robot when a walk begins [m]; 0 to ignore
-    them."""
+    """Distance of paths from the robot's tool and elbow [m]; 0 to ignore them."""
     speed_m_s: Range = (0.8, 1.4)
     """Walking speed of a worker, drawn once an episode [m/s]; adults indoors."""
     tempo: float = 1.0
@@ -45,8 +44,7 @@ class PeopleConfig:
     sudden_probability: float = 0.05
     """Probability that a reach is sudden; the approach speeds of ISO 13855 are for such reaches."""
     lunge_probability: float = 0.01
-    """Probability that a reach to the robot is a lunge: a step, and the hand there in half a
-    second."""
+    """Probability that a reach to the robot is a lunge with a step, in half a second."""
     stumble_probability: float = 0.01
     """Probability that a walker's foot catches on something."""
     fall_probability: float = 0.0
@@ -163,8 +161,7 @@ class MotionConfig:
     haunches, bent (docs/people_and_scenes.md).
     """
     motions: tuple[str | Clip, ...] = ()
-    """Clips of recorded motion that workers play, or paths of their files
-    (docs/people_and_scenes.md)."""
+    """Clips that workers play, or paths of their files (docs/people_and_scenes.md)."""
     motions_probability: float = 0.5
     """Probability that a worker with empty hands plays a clip next, where there is room for it."""
 

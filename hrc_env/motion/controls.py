@@ -6,7 +6,7 @@ are given in the world, with the share by which they follow their target.
 """
 
 ROOT_X, ROOT_Y, HEADING = 0, 1, 2
-"""Position of the root on the floor [m] and heading [rad], the ground frame of the other columns."""
+"""Position of the root on the floor [m] and heading [rad], the frame of other columns."""
 PELVIS_Z = 3
 """Wanted height of the pelvis [m]; legs that are too short lower it."""
 PELVIS_PITCH, PELVIS_ROLL, PELVIS_YAW = 4, 5, 6

@@ -12,16 +12,17 @@ from hrc_env.motion.points import Point, SagittalShift
 
 @kernel
 def min_jerk(u: float) -> float:
-    """Rise from 0 to 1 over u in [0, 1], at rest at both ends; peak rate 1.875 (Flash & Hogan
-    1985)."""
+    """Return a rise from 0 to 1 over u in [0, 1], at rest at both ends.
+
+    The peak rate is 1.875 (Flash & Hogan 1985).
+    """
     u = min(max(u, 0.0), 1.0)
     return u * u * u * (10.0 - 15.0 * u + 6.0 * u * u)
 
 
 @kernel
 def ramp(u: float) -> float:
-    """Return the distance travelled while the speed rises from 0 to 1 over u in [0, 1] and then
-    stays."""
+    """Return the distance travelled at a speed that rises from 0 to 1 over u in [0, 1]."""
     if u <= 0.0:
         return 0.0
     if u >= 1.0:
@@ -31,7 +32,7 @@ def ramp(u: float) -> float:
 
 @kernel
 def cruise(u: float, share: float) -> float:
-    """Rise from 0 to 1 over u in [0, 1] at constant speed.
+    """Return a rise from 0 to 1 over u in [0, 1] at constant speed.
 
     Args:
         u: time as a share of the duration.

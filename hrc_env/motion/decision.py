@@ -68,8 +68,7 @@ class Cast:
     bodies: tuple[int, ...] | None = None
     """Row of the body of each of the first workers; None to draw them."""
     activities: tuple[int, ...] | None = None
-    """First activity of each of the first workers, an index into `ACTIVITY_NAMES` or
-    `ANY_ACTIVITY`."""
+    """First activity of the first workers: indices into `ACTIVITY_NAMES` or `ANY_ACTIVITY`."""
     mind: BehaviourParams | None = None
     """Behaviour in this episode; None for that of all episodes."""
 
@@ -85,7 +84,7 @@ class MotionState:
     mind: BehaviourParams
     """Constants of the behaviour."""
     minds: dict[int, BehaviourParams] = field(default_factory=dict)
-    """Constants of the environments whose episode has its own."""
+    """Constants of the environments that have their own in this episode."""
 
     def mind_of(self, b: int) -> BehaviourParams:
         """Return the constants of environment b's episode."""
@@ -101,7 +100,7 @@ class Decision:
     workers: Records1[Worker]
     """Records (W,) of the workers of the environment."""
     w: int
-    """Row of the worker who decides."""
+    """Row of the deciding worker."""
     draws: Floats
     """Uniform draws (N_DRAWS,) in [0, 1)."""
     clock_s: float
@@ -115,7 +114,7 @@ class Decision:
 
     @property
     def worker(self) -> Worker:
-        """Record of the worker who decides."""
+        """Record of the deciding worker."""
         return self.workers[self.w]
 
     def set_travel(self, travel: int) -> None:
@@ -231,7 +230,7 @@ def _list_candidates(decision: Decision, kind: str) -> Iterator[Place]:
 
 
 def take_first_place(decision: Decision) -> None:
-    """Choose the place and the job of the beginning; if all are taken, the most remote free spot."""
+    """Choose place and job of the beginning; if all are taken, the most remote spot."""
     mind, worker, draw = decision.mind, decision.worker, decision.draws.item(NEXT)
     begins = [k for k, _ in mind.schedule.begins]
     near = draw < mind.config.near_probability or not begins

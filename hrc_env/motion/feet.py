@@ -139,13 +139,12 @@ def place_feet(t: float, worker: Worker) -> None:
 
 @kernel
 def raise_heel(side: int, pitch: float, worker: Worker) -> None:
-    """Pitch a standing foot about its ball, where the toes stay; about its heel if pitch is
-    negative.
+    """Pitch a standing foot about its ball, or about its heel if pitch is negative.
 
     Args:
         side: 0 left, 1 right.
         pitch: additional pitch, the heel up [rad].
-        worker: record whose `q` is changed.
+        worker: record; its `q` is changed.
     """
     q = worker.q
     at = c.ANKLE + 6 * side

@@ -26,7 +26,7 @@ def measure_played_s(
         config: settings of the workers' motion; None for the default.
 
     Raises:
-        ConfigError: there are no two moments with both feet on the floor, so nobody plays the clip.
+        ConfigError: there are no two moments with both feet on the floor, so it is never played.
     """
     lengths, played_s = measure_bodies(stack(pool(worker))).lengths, dict[str, float]()
     for name, ground in grounds.items():
@@ -39,7 +39,7 @@ def measure_played_s(
 
 
 def describe_fit(clip: Clip, played: dict[str, float]) -> str:
-    """Return one or two sentences about where a clip plays, from the result of `measure_played_s`."""
+    """Return a sentence or two about where a clip plays, from `measure_played_s`."""
     whole_s = (len(clip.controls) - 1) / clip.fps
     plays = [f"{name} ({s:.1f} of its {whole_s:.1f} s)" for name, s in played.items() if s > 0.0]
     lacks = [name for name, s in played.items() if s == 0.0]

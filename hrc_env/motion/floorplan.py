@@ -67,14 +67,13 @@ def make_floorplan(grounds: Grounds) -> Floorplan:
 
 
 def locate_beside_robot(grounds: Grounds, radius_m: float, angle_rad: float) -> Point:
-    """Return the point at a distance [m] from the robot's axis and an angle [rad] from its front."""
+    """Return the point at a distance from the robot's axis and an angle from its front."""
     x, y = grounds.robot_xy_m
     return Point(x + radius_m * math.cos(angle_rad), y + radius_m * math.sin(angle_rad))
 
 
 def count_room(plan: Floorplan, apart_m: float) -> int:
-    """Return the number of workers who find a place a distance apart, taken in the order of the
-    grid."""
+    """Return how many places fit a distance apart, taken in the order of the grid."""
     coarse = 4  # grid points of the field to one that is tried
     taken = np.zeros((0, 2))
     for point in np.argwhere(plan.grid.slack[::coarse, ::coarse] >= 0.0) * coarse * CELL_M:
@@ -84,8 +83,7 @@ def count_room(plan: Floorplan, apart_m: float) -> int:
 
 
 def _measure_slack(xs: Floats, ys: Floats, grounds: Grounds) -> Floats:
-    """Return the distance (X, Y) of grid points from footprints and the robot, less half a body
-    [m].
+    """Return the distance (X, Y) from footprints and the robot beyond half a body [m].
 
     Args:
         xs: world x (X, 1) of the grid points [m].

@@ -50,9 +50,9 @@ __all__ = [
 activity_names: tuple[str, ...] = st.ACTIVITY_NAMES
 """Names of the values of `activity`."""
 ABSENT = -1
-"""Activity of a worker who is not in the episode."""
+"""Activity of an absent worker."""
 PARKED_Z_M = -100.0
-"""Height of workers who are not in the episode, where no camera looks [m]."""
+"""Height of absent workers, where no camera looks [m]."""
 HALT_S = 0.3
 """Time in which moving hands halt [s]."""
 
@@ -243,7 +243,7 @@ def _begin_cast_episode(
 
 
 def draw_bodies(draws: Floats, n_bodies: int) -> Ints:
-    """Return a body (W,) for each worker by draws in [0, 1), different ones while there are others."""
+    """Return a body (W,) for each worker by draws in [0, 1), different ones if possible."""
     bodies, left = np.zeros(len(draws), np.int64), list[int]()
     for w, draw in enumerate(draws.tolist()):
         left = left or list(range(n_bodies))
@@ -539,7 +539,7 @@ def _evaluate_rates(frames: Floats, velocity: Floats, turning: Floats, worker: W
 
 @kernel
 def _write_pose(position: Floats, quaternion: Floats, worker: Worker) -> None:
-    """Write a pose into arrays; workers who are absent are far below the floor.
+    """Write a pose into arrays; absent workers are far below the floor.
 
     Args:
         position: origins (22, 3), which are written [m].

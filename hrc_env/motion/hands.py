@@ -66,7 +66,7 @@ def reach(t: float, worker: Worker) -> None:
 
     Args:
         t: time since the reach began [s].
-        worker: record with the plan, whose `q` stands at ease; `q` is changed.
+        worker: record with the plan; its `q`, standing at ease, is changed.
     """
     q = worker.q
     there = worker.out_at + worker.out_s
@@ -91,7 +91,7 @@ def lift(t: float, worker: Worker) -> None:
 
     Args:
         t: time since the lift began [s].
-        worker: record with the plan, whose `q` stands at ease; `q` is changed.
+        worker: record with the plan; its `q`, standing at ease, is changed.
     """
     q = worker.q
     grip = worker.out_at + worker.out_s

@@ -21,7 +21,7 @@ N_HELD = 8
 
 @kernel
 def write_prop_pose(out: Floats, worker: Worker) -> None:
-    """Write kind, position and quaternion of the prop in the control vector into `out` (N_HELD,)."""
+    """Write kind, position and quaternion of the held prop into `out` (N_HELD,)."""
     out[:] = 0.0
     out[0], out[4] = worker.q[c.PROP], 1.0
     if out[0] == 0.0:
@@ -40,15 +40,14 @@ def write_prop_pose(out: Floats, worker: Worker) -> None:
 
 @kernel
 def grip(side: int, gx: float, gy: float, gz: float, worker: Worker) -> None:
-    """Set the target of a hand to a point in the frame of the prop, whose pose is in the control
-    vector.
+    """Set the target of a hand to a point in the frame of the prop in the control vector.
 
     Args:
         side: 0 left, 1 right.
         gx: x of the point in the prop's frame [m].
         gy: y of the point in the prop's frame [m].
         gz: z of the point in the prop's frame [m].
-        worker: record whose `q` is changed.
+        worker: record; its `q` is changed.
     """
     q = worker.q
     yaw, pitch, roll = q[c.PROP_POSE + 3], q[c.PROP_POSE + 4], q[c.PROP_POSE + 5]
@@ -72,7 +71,7 @@ def hold_load(x: float, y: float, yaw: float, up: float, worker: Worker) -> None
         y: world y of the root [m].
         yaw: heading [rad].
         up: height of the load above that of standing [m].
-        worker: record whose `q` is changed.
+        worker: record; its `q` is changed.
     """
     place_load(x, y, yaw, up, worker)
     grip_load(1.0, worker)
@@ -87,7 +86,7 @@ def place_load(x: float, y: float, yaw: float, up: float, worker: Worker) -> Non
         y: world y of the root [m].
         yaw: heading [rad].
         up: height of the load above that of standing [m].
-        worker: record whose `q` is changed.
+        worker: record; its `q` is changed.
     """
     q, at = worker.q, worker.load_at
     q[c.PROP] = worker.load_prop

@@ -1,5 +1,4 @@
-"""From a control vector to 22 body segments: a spine, and four limbs by two-bone inverse
-kinematics."""
+"""From a control vector to 22 body segments: a spine, and four limbs of two bones."""
 
 import math
 
@@ -45,7 +44,7 @@ def set_rotation(yaw: float, pitch: float, roll: float, segment: int, worker: Wo
         pitch: angle about y [rad].
         roll: angle about x [rad].
         segment: row of `r`.
-        worker: record whose `r` is written.
+        worker: record; its `r` is written.
     """
     r = worker.r
     cy, sy = math.cos(yaw), math.sin(yaw)
@@ -91,7 +90,7 @@ def aim(bone: int, end: int, length: float, worker: Worker) -> None:
         bone: row of the bone.
         end: row of `p` that the bone points to.
         length: length of the bone [m].
-        worker: record whose `r` is written.
+        worker: record; its `r` is written.
     """
     p, r = worker.p, worker.r
     inverse = 1.0 / length
@@ -111,8 +110,9 @@ def aim(bone: int, end: int, length: float, worker: Worker) -> None:
 def solve_two_bones(
     start: int, end: int, first: float, second: float, knee: float, limit: float, worker: Worker
 ) -> None:
-    """Solve a chain of two bones from p[start] to p[TARGET]; write p[start + 1], p[end] and
-    p[HINGE].
+    """Solve a chain of two bones from p[start] to p[TARGET].
+
+    The middle joint p[start + 1], the end p[end] and p[HINGE] are written.
 
     Args:
         start: row of the first bone; its middle joint, row start + 1, bulges towards p[POLE].
@@ -121,7 +121,7 @@ def solve_two_bones(
         second: length of the second bone [m].
         knee: share of the chain's length from which stretching is resisted.
         limit: share of the chain's length that the chain never passes.
-        worker: record whose `p` is written.
+        worker: record; its `p` is written.
     """
     p = worker.p
     dx = p[TARGET, 0] - p[start, 0]
@@ -149,7 +149,7 @@ def solve_two_bones(
 
 @kernel
 def pose_trunk(worker: Worker) -> None:
-    """Pose the pelvis, as high as wanted and as the legs allow, the spine, the neck and the head."""
+    """Pose pelvis, spine, neck and head, as high as wanted and as the legs allow."""
     q, p = worker.q, worker.p
     yaw = q[c.HEADING] + q[c.PELVIS_YAW]
     set_rotation(yaw, q[c.PELVIS_PITCH], q[c.PELVIS_ROLL], 0, worker)
@@ -211,7 +211,7 @@ def _level_pole(side: int, segment: int, ahead: float, out: float, worker: Worke
         segment: row of the segment whose x axis is used.
         ahead: 1 for a knee, -1 for an elbow.
         out: share of pointing outwards.
-        worker: record whose p[POLE] is changed.
+        worker: record; its p[POLE] is changed.
     """
     p, r = worker.p, worker.r
     left = 1.0 - 2.0 * side
@@ -226,14 +226,13 @@ def _level_pole(side: int, segment: int, ahead: float, out: float, worker: Worke
 
 @kernel
 def pose_shoulder(side: int, cos: float, sin: float, worker: Worker) -> None:
-    """Pose a clavicle, which follows the hand a little up and forward, and set p[TARGET] to the
-    grip.
+    """Pose a clavicle, which follows the hand a little, and set p[TARGET] to the grip.
 
     Args:
         side: 0 left, 1 right.
         cos: cosine of the level heading of the chest.
         sin: sine of the level heading of the chest.
-        worker: record whose `p` and `r` are written.
+        worker: record; its `p` and `r` are written.
     """
     q, p, r = worker.q, worker.p, worker.r
     sign = 1.0 - 2.0 * side
@@ -271,7 +270,7 @@ def pose_arm(side: int, cos: float, sin: float, worker: Worker) -> None:
         side: 0 left, 1 right.
         cos: cosine of the level heading of the chest.
         sin: sine of the level heading of the chest.
-        worker: record whose `p` and `r` are written.
+        worker: record; its `p` and `r` are written.
     """
     p = worker.p
     pose_shoulder(side, cos, sin, worker)
@@ -351,7 +350,7 @@ def set_pitch(cos: float, sin: float, pitch: float, segment: int, worker: Worker
         sin: sine of the yaw.
         pitch: angle about y [rad].
         segment: row of `r`.
-        worker: record whose `r` is written.
+        worker: record; its `r` is written.
     """
     r = worker.r
     cp, sp = 1.0, 0.0

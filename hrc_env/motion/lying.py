@@ -45,7 +45,7 @@ MOVED_M = 0.015
 TURNED_RAD = 0.03
 """Greatest turn of a load in a pile from its place [rad]."""
 HIGH = ("pile", "bench", "task")
-"""Kinds of places whose height is that of a surface on which loads lie.
+"""Kinds of places with a surface, at the place's height, on which loads lie.
 
 At other places the loads lie on the floor, or hang on the wall.
 """
@@ -224,7 +224,7 @@ def find_rest_pose_here(
 
 
 def lay_down_load(loads: Records1[Load], places: Sequence[Workplace], worker: Worker) -> None:
-    """Add the load of a worker who ends an activity to those that lie about."""
+    """Add the load at the end of a worker's activity to those that lie about."""
     free = np.flatnonzero(loads["shown"][:, 0] == 0)
     if not len(free):
         return

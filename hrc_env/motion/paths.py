@@ -14,7 +14,7 @@ from hrc_env.motion.points import Point
 from hrc_env.motion.state import MAX_VIA, Worker
 
 HEADING_WINDOW_M = 0.3
-"""Distance behind and ahead over which walkers average the path's direction (Grasso et al. 1998)."""
+"""Distance to both sides over which walkers average the direction (Grasso et al. 1998) [m]."""
 OWN_EDGE = 0.9
 """Greatest share of the first or last edge that the arc of a corner takes."""
 SHARED_EDGE = 0.5
@@ -86,8 +86,10 @@ def locate_on_path(s: float, worker: Worker) -> Point:
 
 @kernel
 def average_heading(s: float, worker: Worker) -> float:
-    """Return the mean direction of the path around `s` metres [rad]; it and its rate are
-    continuous."""
+    """Return the mean direction of the path around `s` metres [rad].
+
+    The direction and its rate are continuous.
+    """
     behind, ahead = s - HEADING_WINDOW_M, s + HEADING_WINDOW_M
     return (_integrate_heading(ahead, worker) - _integrate_heading(behind, worker)) / (
         2.0 * HEADING_WINDOW_M
@@ -96,8 +98,10 @@ def average_heading(s: float, worker: Worker) -> float:
 
 @kernel
 def _integrate_heading(s: float, worker: Worker) -> float:
-    """Return the integral of the direction from 0 to `s` [rad m]; the path goes on straight at its
-    ends."""
+    """Return the integral of the direction from 0 to `s` [rad m].
+
+    The path goes on straight at its ends.
+    """
     within = min(max(s, 0.0), worker.length)
     piece = worker.path[_find_piece(within, worker)]
     way, heading, curvature = within - piece[0], piece[3], piece[4]

@@ -61,7 +61,7 @@ def hang(side: int, pitch: float, elbow: float, worker: Worker) -> None:
         side: 0 left, 1 right.
         pitch: turn of the upper arm forward from the vertical [rad].
         elbow: bend of the elbow [rad].
-        worker: record whose `q` is changed.
+        worker: record; its `q` is changed.
     """
     q = worker.q
     sign = 1.0 - 2.0 * side
@@ -84,7 +84,7 @@ def stand(x: float, y: float, yaw: float, clock_s: float, worker: Worker) -> Non
         y: world y of the root [m].
         yaw: heading [rad].
         clock_s: time since the episode began [s].
-        worker: record whose `q` is written.
+        worker: record; its `q` is written.
     """
     q = worker.q
     first, second, third = (
@@ -120,7 +120,7 @@ def lean(amount: float, squat: float, twist: float, worker: Worker) -> None:
         amount: lean; 1 is a deep bow.
         squat: share of the lean that the knees take.
         twist: turn to the left [rad].
-        worker: record whose `q` is changed.
+        worker: record; its `q` is changed.
     """
     q = worker.q
     shift(q, c.ROOT_X, q[c.HEADING], -(0.07 + 0.10 * squat) * amount, 0.0)
@@ -134,7 +134,7 @@ def lean(amount: float, squat: float, twist: float, worker: Worker) -> None:
 
 @kernel
 def measure_overreach(worker: Worker) -> float:
-    """Return the distance of the hands' targets beyond the reach of the arms in this posture [m]."""
+    """Return the distance of the hands' targets beyond the reach of the arms [m]."""
     used = Sides(worker.q[c.HAND_SHARE], worker.q[c.HAND_SHARE + 1])
     far = find_farthest(UPPER_ARM, worker.q[c.HAND_TARGET :], used, worker)
     return max(far - ARM_KNEE * worker.lengths[ARM], -1.0)
@@ -142,8 +142,7 @@ def measure_overreach(worker: Worker) -> float:
 
 @kernel
 def find_farthest(segment: int, goals: Floats, used: Sides, worker: Worker) -> float:
-    """Pose the body and return the greater distance from a segment of the used arms to their goals
-    [m].
+    """Pose the body and return the greatest distance of a segment from its goal [m].
 
     Args:
         segment: segment of an arm, counted from the first of its side.
@@ -198,7 +197,7 @@ def look_at(x: float, y: float, z: float, share: float, worker: Worker) -> None:
         y: world y of the point [m].
         z: world z of the point [m].
         share: share of the turn.
-        worker: record whose `q` is changed.
+        worker: record; its `q` is changed.
     """
     q = worker.q
     if share <= 0.0:

@@ -31,7 +31,7 @@ WITHDRAW = -1.6
 MACHINE_S = 2.0
 """Time over which walkers predict a driving machine [s]; judgement."""
 MACHINE_CALM_S = 0.4
-"""Time after a reaction in which a driving machine startles nobody [s]; judgement."""
+"""Time after a reaction without another reaction to a driving machine [s]; judgement."""
 
 
 class NoticeParams(NamedTuple):
@@ -98,8 +98,8 @@ def notice_robot(
 def follow_signal(stage: Ints, offered: Floats, dt_s: float, workers: Records2[Worker]) -> None:
     """Let workers follow the signal of the task.
 
-    The stages are 0 (not yet), 1 (the robot is in place) and 2 (the tool is released). Work at what
-    the robot holds halts until stage 1. A taking hand waits for stage 2, and moves to what is
+    The stages are 0 (not yet), 1 (the robot is in place) and 2 (the tool is released). Work on the
+    robot's workpiece halts until stage 1. A taking hand waits for stage 2, and moves to what is
     offered.
 
     Args:
@@ -124,13 +124,12 @@ def follow_signal(stage: Ints, offered: Floats, dt_s: float, workers: Records2[W
 
 @kernel
 def _move_hand(offered: Floats, dt_s: float, worker: Worker) -> None:
-    """Move the target of a taking hand to the offered point, if that is close to where it was held
-    out.
+    """Move the target of a taking hand towards the offered point, if that is close.
 
     Args:
         offered: point (3,) at which the tool is offered [m].
         dt_s: time since the last call [s].
-        worker: record whose target is changed.
+        worker: record; its target is changed.
     """
     goal, squared = worker.target[3 * worker.side : 3 * worker.side + 3], 0.0
     for i in range(3):
@@ -147,8 +146,7 @@ def _move_hand(offered: Floats, dt_s: float, worker: Worker) -> None:
 
 @kernel
 def _is_load_in_use(params: NoticeParams, robot: Floats, worker: Worker) -> bool:
-    """Return whether hands on their way to a load must wait, because a point of the robot is close
-    to it.
+    """Return whether hands must wait because a point of the robot is close to the load.
 
     Args:
         params: when workers notice the robot.
@@ -205,10 +203,11 @@ def _is_machine_startling(
     chest_velocity: Floats,
     worker: Worker,
 ) -> bool:
-    """Return whether a driving machine is too close as seen from above; for walkers, or soon will
-    be.
+    """Return whether a driving machine is too close, or soon will be to a walker.
 
-    No walker who takes notice of robots at all overlooks a machine.
+    Distances are seen from above.
+
+    Walkers that take notice of robots at all never overlook a machine.
 
     Args:
         dt_s: time since the last look [s].
@@ -264,7 +263,7 @@ def _react(w: int, workers: Records1[Worker]) -> None:
 
 @kernel(makes_arrays=True)
 def _brake(w: int, workers: Records1[Worker]) -> bool:
-    """Brake a walker, unless another worker would then come too close; return whether they brake."""
+    """Brake a walker unless another one would come too close; return whether they brake."""
     before = np.empty(1, WORKER)
     before[0] = workers[w]
     duration_s = brake(workers[w].time_s, workers[w])

@@ -64,7 +64,7 @@ class Film:
 def make_worker(
     body: Body, xy_m: tuple[float, float] = (0.0, 0.0), yaw_rad: float = 0.0, right: bool = True
 ) -> Worker:
-    """Return a worker who stands at a point with the feet side by side and has nothing to do.
+    """Return a worker without a task, standing at a point with the feet side by side.
 
     Args:
         body: body of the worker.
@@ -207,11 +207,11 @@ HASTY: dict[str, tuple[Act, ...]] = {
     **{f"run {v} m/s": (_going(st.RUN, v, way_m=FAR_M),) for v in (2.5, 3.0, 3.5)},
     "fall": (_going(st.FALL, 1.2),),
 }
-"""Scenes of workers who run and fall; no emulator is fitted to them."""
+"""Scenes of running and falling; no emulator is fitted to them."""
 FOR_TASKS: dict[str, tuple[Act, ...]] = {
     "screw below each other": _here(st.SCREW, 1.5),
     "take what is brought": _here(st.TAKE, 1.15),
 }
-"""Scenes of what workers do for tasks."""
+"""Scenes of activities for tasks."""
 SCENES = {**REPERTOIRE, **HASTY, **FOR_TASKS}
 """All scenes."""

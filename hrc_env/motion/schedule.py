@@ -31,8 +31,7 @@ class Job:
     at: str
     """Kind of the workplace (`WORKPLACE_KINDS`), or "here"."""
     then: tuple[tuple[str, float], ...] = ()
-    """Jobs that may follow, with weights; the errand ends without any, or after too long at one
-    place."""
+    """Jobs that may follow, with weights; without any the errand ends."""
     begins: float = 0.0
     """Weight with which an errand begins with this job; 0 for never."""
     prop: str = "nothing"
@@ -46,7 +45,7 @@ class Job:
     height_m: float = 0.0
     """Height of the work above the floor [m]; 0 for the height of the place."""
     waits: bool = False
-    """Whether the job begins only at the task's signal; until then the job before it is repeated.
+    """Whether the job waits for the task's signal, while the job before it is repeated.
     """
 
 
@@ -104,13 +103,13 @@ _BOARD = (
     Job("screw the board on", "screw", "task", (("step aside", 1.0),), waits=True),
     Job("step aside", "look round", "robot", (("step aside", 1.0),)),
 )
-"""Jobs of a worker who helps to fix a board: `HRCDrywall-v0`."""
+"""Jobs of helping to fix a board: `HRCDrywall-v0`."""
 _TOOL = (
     Job("wait for the tool", "stand", "robot", (("take the tool", 1.0),)),
     Job("take the tool", "take", "task", (("go on", 1.0),), waits=True),
     Job("go on", "look round", "robot", (("go on", 1.0),)),
 )
-"""Jobs of a worker who is brought a tool: `HRCHandover-v0`."""
+"""Jobs of receiving a tool: `HRCHandover-v0`."""
 _STACK = (
     Job("look at the work", "look round", "robot", (("take from the stack", 1.0),)),
     Job("take from the stack", "pick up", "task", (("lay it down", 1.0),), 1.0, "stud"),
@@ -121,7 +120,7 @@ _STACK = (
         (("take from the stack", 0.9), ("look at the work", 0.1)),
     ),
 )
-"""Jobs of a worker who takes from the robot's stack: `HRCPickPlace-v0`."""
+"""Jobs of taking from the robot's stack: `HRCPickPlace-v0`."""
 WORK: dict[str, tuple[Job, ...]] = {
     "framing": JOBS,
     "low_work": (
@@ -140,8 +139,7 @@ others belong to tasks in which workers take part.
 
 
 def check_jobs(jobs: Sequence[Job]) -> None:
-    """Refuse unknown names of activities, places, jobs and props, bad numbers, and no job at the
-    robot."""
+    """Refuse unknown names, numbers out of bounds, and jobs of which none is at the robot."""
     names = [job.name for job in jobs]
     if len(set(names)) < len(names):
         raise ConfigError(f"Jobs must have different names, got {names}.")

@@ -1,4 +1,4 @@
-"""Setting out: to a place by a path that meets nobody, a few steps back, into a clip."""
+"""Setting out: to a place by a path clear of other workers, a few steps back, into a clip."""
 
 import math
 from collections.abc import Iterable
@@ -41,7 +41,7 @@ ARRIVED_M = 0.12
 HURRY = (1.0, 0.75)
 """Shares of the walking speed that are tried in turn."""
 STAY_DOWN_S = (15.0, 40.0)
-"""Time on the floor of a worker who stays down [s]; judgement."""
+"""Time on the floor without getting up soon [s]; judgement."""
 STUMBLE_TO = ("robot", "open", "floor")
 """Kinds of places with room ahead for the arms of a stumbling worker."""
 

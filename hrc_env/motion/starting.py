@@ -57,7 +57,7 @@ def start_going(
 
 @kernel
 def start_take(draws: Floats, height: float, worker: Worker) -> float:
-    """Hold out a hand for a tool that somebody brings, and hold it there.
+    """Hold out a hand for a tool that is brought, and hold it there.
 
     Args:
         draws: uniform draws (N_START,) in [0, 1).

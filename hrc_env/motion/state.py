@@ -1,4 +1,4 @@
-"""State of the workers' motion: one structured array whose axes are environments and workers.
+"""State of the workers' motion: one structured array, with axes for environments and workers.
 
 Lengths are in metres, times in seconds, angles in radians. A kernel takes the record of one worker
 (`Worker`) or an array of them. `WORKER` rows are NumPy records, so Python code reads and writes
@@ -135,7 +135,7 @@ class Worker:
     undo_at: float
     """Time from which the steps are retraced, the last one first [s]; 0 for never."""
     total_s: float
-    """Duration of an activity whose second half mirrors the first [s]."""
+    """Duration of an activity with a second half that mirrors the first [s]."""
     load_prop: int
     """Prop that is carried from one activity to the next, an index into `PROPS`; 0 for nothing."""
     load_at: Annotated[Floats, (6,)]
@@ -257,7 +257,7 @@ class Worker:
     shoulder_s: float
     """Time to bring a load from before the body to where it is carried [s]."""
     is_hidden: bool
-    """Whether the load belongs to somebody else until it is gripped, and so is not drawn."""
+    """Whether the load is another person's until it is gripped, and so is not drawn."""
     stroke: int
     """Kind of stroke, see `strokes`."""
     stroke_m: float
@@ -353,6 +353,6 @@ WAYS = (WALK, TURN, CARRY, PUSH, STUMBLE, CLIP, RUN, FALL)
 NOWHERE = -1
 """Kind of place of a worker without an errand."""
 ON_STAGE = -2
-"""Kind of place of a worker who goes where there is room to play a clip."""
+"""Kind of place with room to play a clip."""
 THERE, UNDER_WAY, WAITING = range(3)
 NO_REACTION, PAUSE, BACK_AWAY = range(3)

@@ -1,4 +1,4 @@
-"""Where workers will be: nobody begins an activity in which two workers come too close."""
+"""Where workers will be, so that no activity begins in which two workers come too close."""
 
 import math
 from typing import NamedTuple
@@ -21,7 +21,7 @@ AHEAD_M = 0.48
 HANDS_M = 0.76
 """Least distance of another root from those hands [m]."""
 FALL_APART_M = 1.3
-"""Least distance of another root from the root of a worker who falls [m]."""
+"""Least distance of another root from the root of a falling worker [m]."""
 
 
 class HandsClearance(NamedTuple):
@@ -45,9 +45,9 @@ class Meeting(NamedTuple):
 
 
 PUSHING = HandsClearance(1.0, 0.95)
-"""Clearance of a worker who pushes a cart."""
+"""Clearance in pushing a cart."""
 PLAYING = HandsClearance(0.01, 1.15)
-"""Clearance of a worker who plays a clip: an arm's length more on every side."""
+"""Clearance in playing a clip: an arm's length more on every side."""
 FALLING = HandsClearance(0.01, FALL_APART_M)
 """Clearance of a falling worker: head and feet from the pelvis, and half a body."""
 BEHIND_M = 0.40
@@ -92,8 +92,7 @@ def predict_root(t: float, worker: Worker) -> Point:
 
 @kernel
 def measure_gap(x: float, y: float, t: float, worker: Worker) -> float:
-    """Return the distance of a root from a worker's body and hands beyond the least allowed one
-    [m].
+    """Return the distance of a root from a worker beyond the least allowed one [m].
 
     Args:
         x: world x of the other root [m].

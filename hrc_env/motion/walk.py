@@ -180,7 +180,7 @@ def _lurch(t: float, trip: float, worker: Worker) -> None:
     Args:
         t: time since a foot caught [s].
         trip: severity of the stumble in [0, 1].
-        worker: record whose `q` is changed.
+        worker: record; its `q` is changed.
     """
     q = worker.q
     scale = worker.lengths[LEG] / LEG_M
@@ -348,7 +348,7 @@ def _choose_first_foot(worker: Worker) -> int:
 def write_footprint(
     side: int, x: float, y: float, yaw: float, half_width: float, out: Floats, worker: Worker
 ) -> None:
-    """Write x, y, heading and height of a foot of a worker who stands with both feet side by side.
+    """Write x, y, heading and height of a foot, standing with both feet side by side.
 
     Args:
         side: 0 left, 1 right.

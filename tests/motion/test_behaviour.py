@@ -10,7 +10,7 @@ from recorded import started
 from hrc_env.core.errors import ConfigError
 from hrc_env.motion import generator
 from hrc_env.motion import state as st
-from hrc_env.motion.schedule import JOBS, WORK, Job, make_schedule, pick_job
+from hrc_env.motion.schedule import JOBS, WORK, Choice, Job, make_schedule, pick_job
 from hrc_env.motion.traffic import APART_M
 from hrc_env.worker.body import load_body, worker_truth
 from hrc_env.worker.props import PROP_NAMES
@@ -60,8 +60,9 @@ def test_every_task_leads_to_tasks_that_there_are():
     for shares in schedule.then:
         assert not shares or shares[-1][1] == pytest.approx(1.0)
         assert all(0 <= k < len(schedule.jobs) for k, _ in shares)
-    assert pick_job(((4, 0.25), (7, 1.0)), 0.2) == 4
-    assert pick_job(((4, 0.25), (7, 1.0)), 0.3) == 7
+    choices = (Choice(4, 0.25), Choice(7, 1.0))
+    assert pick_job(choices, 0.2) == 4
+    assert pick_job(choices, 0.3) == 7
 
 
 def test_a_task_of_ones_own_is_what_workers_do():

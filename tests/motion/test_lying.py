@@ -12,6 +12,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.motion import generator, lying
 from hrc_env.motion import state as st
 from hrc_env.motion.activities.going import CART_AHEAD_M
+from hrc_env.motion.points import Place
 from hrc_env.motion.schedule import WORK, Job
 from hrc_env.scene.build import build, drawing_model
 from hrc_env.scene.worker_visuals import PARKED_M
@@ -107,7 +108,7 @@ def test_loads_lie_on_each_other_and_the_uppermost_is_taken_first():
 
 
 def test_boards_are_put_flat_to_a_wall_below_each_other_and_stand_elsewhere_on_the_floor():
-    spot = (0.0, 0.0, 0.0, 1.4)
+    spot = Place(0.0, 0.0, 0.0, 1.4)
     rows = np.zeros(2, lying.LOAD)
     first = lying.find_rest_pose(BOARD, "wall", spot, 0.65, rows)
     np.testing.assert_allclose(first, [0.631, 0.0, 1.2, 0.0, np.pi / 2, 0.0])

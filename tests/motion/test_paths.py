@@ -8,16 +8,17 @@ from recorded import begin, standing, started, watched
 
 from hrc_env.motion import state as st
 from hrc_env.motion.paths import average_heading, lay_path, locate_on_path
+from hrc_env.motion.points import Point
 from hrc_env.motion.walk import brake, plan_walk
 from hrc_env.worker.body import SEGMENT
 
 CORNERS = np.array([[2.0, 0.0, 0.6], [2.0, 2.0, 0.6], [4.0, 2.0, 0.3]])
-END = (4.0, 4.0)
+END = Point(4.0, 4.0)
 
 
 def laid(via=CORNERS, end=END):
     me = np.zeros(1, st.WORKER)[0]
-    lay_path((0.0, 0.0), via, end, me)
+    lay_path(Point(0.0, 0.0), via, Point(*end), me)
     return me
 
 
@@ -54,7 +55,7 @@ def test_corners_too_near_each_other_share_the_way_between_them():
 def test_a_walker_who_brakes_stands_soon_and_never_jumps(when_s):
     state, rngs = started(1)
     me = standing(state)
-    lay_path((0.0, 0.0), np.array([[2.5, 0.0, 0.8]]), (2.5, 4.0), me)
+    lay_path(Point(0.0, 0.0), np.array([[2.5, 0.0, 0.8]]), Point(2.5, 4.0), me)
     begin(me, st.WALK, plan_walk(0.0, 1.2, me))
     before = watched(state, rngs, 0.01, round(when_s / 0.01))
     me["duration_s"] = brake(when_s, me)

@@ -22,6 +22,7 @@ from hrc_env.motion.blending import place_standing as settle_at
 from hrc_env.motion.clip import load_clip, save_clip
 from hrc_env.motion.floorplan import make_floorplan
 from hrc_env.motion.paths import lay_path
+from hrc_env.motion.points import Point
 from hrc_env.motion.state import N_ROOTS
 from hrc_env.motion.traffic import find_meeting
 from hrc_env.motion.walk import plan_walk
@@ -141,10 +142,10 @@ def test_who_arrives_early_does_not_stay_in_the_way_of_a_clip(clip):
     player["roots"] = np.column_stack([np.linspace(0.0, 10.0, N_ROOTS), np.zeros(N_ROOTS)])
     for end_y_m, early in ((-0.2, True), (-2.0, False)):
         settle_at(8.0, -4.0, 0.0, walker)
-        lay_path((8.0, -4.0), np.zeros((0, 3)), (8.0, end_y_m), walker)
+        lay_path(Point(8.0, -4.0), np.zeros((0, 3)), Point(8.0, end_y_m), walker)
         begin(walker, st.WALK, plan_walk(0.0, 1.2, walker))
         assert walker["duration_s"] < 8.0  # the player comes by after 16 s
-        assert (find_meeting(1, state.workers[0])[0] > 0.0) == early
+        assert (find_meeting(1, state.workers[0]).time_s > 0.0) == early
 
 
 def test_motions_come_as_paths_or_clips(clip, tmp_path):

@@ -10,7 +10,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.motion import controls as c
 from hrc_env.motion import generator
 from hrc_env.motion.activities.pieces import cut_clips, make_stage
-from hrc_env.motion.anatomy import ANKLE_Z, LEG, N_SIZES, STAND_Z
+from hrc_env.motion.anatomy import ANKLE_Z, LEG, N_SIZES, STAND_Z, measure_bodies
 from hrc_env.motion.clip import RECORDED, Clip, load_clip, save_clip
 from hrc_env.motion.config import PeopleConfig
 from hrc_env.motion.floorplan import CELL_M, count_room, make_floorplan
@@ -18,7 +18,7 @@ from hrc_env.motion.schedule import Job, check_jobs
 from hrc_env.worker.body import load_body
 from hrc_env.world import Grounds, Workplace
 
-SIZE = generator.anatomies(load_body()).lengths[0]
+SIZE = measure_bodies(load_body()).lengths[0]
 STILL = Clip(np.zeros((3, c.N_CONTROLS)), 100.0, np.ones((3, 2), bool), SIZE, "still")
 
 
@@ -314,9 +314,9 @@ def test_people_need_40_cm_beside_a_wall(half_wall_m, taken):
 def test_grounds_are_measured_from_edge_to_edge():
     plan = make_floorplan(grounds_of())
     n = round(4.0 / CELL_M) + 1
-    assert plan.slack.shape == (n, n)
-    assert plan.origin.tolist() == [-2.0, -2.0]
-    assert plan.slack[[0, -1], 0] == pytest.approx(1.1)  # 1.5 m from the wall, less 0.4 m
+    assert plan.grid.slack.shape == (n, n)
+    assert plan.grid.origin.tolist() == [-2.0, -2.0]
+    assert plan.grid.slack[[0, -1], 0] == pytest.approx(1.1)  # 1.5 m from the wall, less 0.4 m
 
 
 def test_as_many_workers_as_fit_are_taken():

@@ -7,6 +7,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.motion import state as st
 from hrc_env.motion.floorplan import BODY_M, count_room, make_floorplan
 from hrc_env.motion.paths import locate_on_path
+from hrc_env.motion.points import Point
 from hrc_env.motion.routes import find_route
 from hrc_env.world import Grounds, Workplace
 
@@ -24,7 +25,7 @@ def grounds(*blocked, places=()):
 def way(plan, start, end, people=NOBODY, bow=0.0):
     """Points of the way every 2 cm; None where there is none."""
     row = np.zeros(1, st.WORKER)[0]
-    if not find_route(start, end, bow, people, plan.slack, plan.origin, row):
+    if not find_route(Point(*start), Point(*end), bow, people, plan.grid, row):
         return None
     return np.array([locate_on_path(s, row) for s in np.arange(0.0, row["length"] + 0.02, 0.02)])
 

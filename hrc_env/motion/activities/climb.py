@@ -33,7 +33,7 @@ def climb(t: float, worker: Worker) -> None:
 
     Args:
         t: time since the activity began [s].
-        worker: record with the plan, whose `q` stands at ease; `q` is changed.
+        worker: record with the plan; its `q`, standing at ease, is changed.
     """
     q = worker.q
     up_s, treads = worker.up_s, worker.treads

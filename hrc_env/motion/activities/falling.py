@@ -144,7 +144,7 @@ def _to_pose_time(since: float, worker: Worker) -> float:
 
 @kernel
 def fall(t: float, clock_s: float, worker: Worker) -> None:
-    """Change the feet, and the whole posture, into those of a worker who falls and gets up again.
+    """Change the feet, and the whole posture, into those of falling and getting up again.
 
     Args:
         t: time since the activity began [s].
@@ -182,7 +182,7 @@ def _fall_trunk(at: float, share: float, worker: Worker) -> None:
     Args:
         at: time in `POSES` [s].
         share: share of the fall in the posture.
-        worker: record whose `q` is changed.
+        worker: record; its `q` is changed.
     """
     q, scale = worker.q, worker.lengths[LEG] / LEG_M
     side = 1.0 - 2.0 * worker.front
@@ -210,7 +210,7 @@ def _fall_foot(at: float, side: int, column: int, sign: float, worker: Worker) -
         side: 0 left, 1 right.
         column: first column of the foot in `POSES`.
         sign: 1 on the left, -1 on the right.
-        worker: record whose `q` is changed.
+        worker: record; its `q` is changed.
     """
     q, ankle = worker.q, c.ANKLE + 6 * side
     scale, length, low = worker.lengths[LEG] / LEG_M, worker.lengths[BALL_X], worker.lengths[BALL_Z]
@@ -316,7 +316,7 @@ def _plan_stumble(step: int, turn: float, grid: FloorGrid, worker: Worker) -> bo
 
 @kernel
 def predict_fallen_root(t: float, worker: Worker) -> Point:
-    """Return the approximate root on the floor of a falling worker at time t, and after the fall."""
+    """Return the approximate root on the floor at time t of a fall, and after it."""
     at = _to_pose_time(t - worker.trip_at, worker)
     if at <= 0.0:
         return locate_on_path(measure_travel(t, worker), worker)

@@ -29,7 +29,7 @@ PUSHING_SHARE = 0.99
 STOOPED_M = 0.4
 """Distance by which a lean of 1 brings the shoulders forward [m]."""
 CART_LEAN = 0.06
-"""Lean of a worker who pushes a cart, at least."""
+"""Least lean in pushing a cart."""
 WHEEL_AHEAD_M = 1.2
 """Distance of a wheelbarrow's axle ahead of its origin [m]."""
 WHEEL_UP_M = 0.17
@@ -147,8 +147,7 @@ def _plan_handles(prop: int, worker: Worker) -> None:
 
 @kernel
 def push(t: float, clock_s: float, worker: Worker) -> None:
-    """Write the control vector, but for the feet, of a worker who takes a handle, pushes and lets
-    go.
+    """Write the control vector, but for the feet, of taking a handle, pushing and letting go.
 
     Args:
         t: time since the activity began [s].
@@ -180,8 +179,7 @@ def push(t: float, clock_s: float, worker: Worker) -> None:
 
 @kernel
 def _tilt_point(back_rad: float, z: float) -> SagittalShift:
-    """Return the displacement of a point at height z [m] when a wheelbarrow tilts back about its
-    axle."""
+    """Return the displacement of a point at height z [m] when a wheelbarrow tilts back."""
     cos, sin = math.cos(back_rad), math.sin(back_rad)
     above = z - WHEEL_UP_M
     ahead = WHEEL_AHEAD_M * (1.0 - cos) - above * sin

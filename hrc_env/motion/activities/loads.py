@@ -61,7 +61,7 @@ def pick_up(t: float, worker: Worker) -> None:
 
     Args:
         t: time since the activity began [s].
-        worker: record with the plan, whose `q` stands at ease; `q` is changed.
+        worker: record with the plan; its `q`, standing at ease, is changed.
     """
     q, yaw = worker.q, worker.start_yaw
     gripped = worker.out_at + worker.out_s
@@ -113,7 +113,7 @@ def plan_pick_up(
 
 @kernel
 def plan_receive(draws: Floats, height: float, worker: Worker) -> float:
-    """Plan to take a box that somebody ahead holds out.
+    """Plan to take a box that another person holds out.
 
     Args:
         draws: uniform draws (N_START,) in [0, 1).
@@ -148,7 +148,7 @@ def plan_set_down(draws: Floats, height: float, worker: Worker) -> float:
 
 @kernel
 def plan_hand_over(draws: Floats, height: float, worker: Worker) -> float:
-    """Plan to hold out the load until somebody has taken it.
+    """Plan to hold out the load until another person has taken it.
 
     Args:
         draws: uniform draws (N_START,) in [0, 1).
@@ -178,7 +178,7 @@ def _plan_carrying(prop: int, on_shoulder: bool, side: int, worker: Worker) -> N
         prop: the load, an index into `PROPS`.
         on_shoulder: whether it is carried on the shoulder.
         side: side of that shoulder, 0 left, 1 right.
-        worker: record whose `load_...` fields are written.
+        worker: record; its `load_...` fields are written.
     """
     at = worker.load_at
     take_load(prop, worker)

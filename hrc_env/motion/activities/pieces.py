@@ -1,6 +1,6 @@
 """Pieces of clips: from one moment on both feet to another, as long as there is room for.
 
-A worker who finishes a job plays a piece on the spot, or goes to a place from which there is room
+After a job a worker plays a piece on the spot, or goes to a place from which there is room
 (`setting_out.begin_clip`).
 """
 
@@ -65,7 +65,7 @@ class Stage:
     plan: Floorplan
     """Free floor of the scene."""
     starts: Floats
-    """Poses (S, 3) of workers who have finished a job: x, y [m], heading [rad]."""
+    """Poses (S, 3) of workers after a job: x, y [m], heading [rad]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,8 +73,7 @@ class Clips:
     """Pieces of clips, one after the other."""
 
     frames: Floats
-    """Frames (n_bodies N, 32) of all pieces, scaled to each body in turn; each piece begins at the
-    origin, towards +x."""
+    """Frames (n_bodies N, 32) of all pieces for each body, from the origin towards +x."""
     row: Ints
     """First row of each piece (n,), of the first body."""
     count: Ints
@@ -249,7 +248,7 @@ def _measure_room(way: Floats, starts: Floats, grid: FloorGrid) -> Ints:
 
 
 def find_piece(clips: Clips, worker: Worker) -> int:
-    """Return the piece whose row a worker has."""
+    """Return the piece that a worker plays or goes to play."""
     return int(np.searchsorted(clips.row, worker.clip_row % clips.n_rows))
 
 

@@ -78,8 +78,7 @@ def clear_plan(worker: Worker) -> None:
 
 @kernel
 def begin_plan(draw: float, worker: Worker) -> int:
-    """Clear the plan, and return the hand that holds the tool, 0 left or 1 right, by a draw in [0,
-    1)."""
+    """Clear the plan, and return the tool's hand, 0 left or 1 right, by a draw in [0, 1)."""
     clear_plan(worker)
     return choose_hand(draw, worker)
 
@@ -223,7 +222,7 @@ def pose_at_work(worker: Worker) -> None:
 
 @kernel
 def finish_plan(peak_m_s: float, worker: Worker) -> float:
-    """Settle trunk and times of work whose hands, strokes and steps are planned.
+    """Plan trunk and times of work, after its hands, strokes and steps.
 
     No plan function calls this kernel, or each would be compiled with all of it once more.
 

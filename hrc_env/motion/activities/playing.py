@@ -81,15 +81,14 @@ def start_clip(piece: int, turn_rad: float, clips: Clips, worker: Worker) -> flo
 
 @kernel
 def _to_clip_time(since: float, worker: Worker) -> float:
-    """Return the time in the recording a time `since` [s] after it began; it gathers and loses
-    pace."""
+    """Return the time in the recording `since` [s] after its slow beginning [s]."""
     slow = worker.clip_s - PACE_S
     return PACE_S * (ramp(since / PACE_S) - ramp((since - slow) / PACE_S))
 
 
 @kernel
 def play(t: float, clock_s: float, frames: Floats, worker: Worker) -> None:
-    """Write the control vector, feet included, of a worker who plays a clip.
+    """Write the control vector, feet included, of playing a clip.
 
     Args:
         t: time since the activity began [s].
@@ -150,7 +149,7 @@ def _play_body(f: float, share: float, frames: Floats, worker: Worker) -> None:
         f: time in frames of the clip.
         share: share of the clip.
         frames: frames of all clips.
-        worker: record whose `q` is changed.
+        worker: record; its `q` is changed.
     """
     q = worker.q
     ahead, left = (
@@ -174,7 +173,7 @@ def _play_foot(f: float, side: int, frames: Floats, worker: Worker) -> None:
         f: time in frames of the clip.
         side: 0 left, 1 right.
         frames: frames of all clips.
-        worker: record whose `q` is written.
+        worker: record; its `q` is written.
     """
     q, at, column = worker.q, c.ANKLE + 6 * side, c.N_BLENDED + 6 * side
     ahead, left = (
@@ -189,8 +188,7 @@ def _play_foot(f: float, side: int, frames: Floats, worker: Worker) -> None:
 
 @kernel
 def predict_clip_root(t: float, worker: Worker) -> Point:
-    """Return the approximate root on the floor of a worker who plays a clip at time t, and after
-    it."""
+    """Return the approximate root on the floor at time t of a clip, and after it."""
     duration_s = worker.clip_s + 2.0 * SETTLE_S
     u = min(max(t / duration_s, 0.0), 1.0) * (N_ROOTS - 1)
     k = min(int(u), N_ROOTS - 2)

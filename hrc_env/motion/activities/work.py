@@ -66,7 +66,7 @@ STEP_SWING_S = 0.38
 
 @kernel
 def get_down(down: float, worker: Worker) -> None:
-    """Lower a standing body by the share `down`, heels included; the steps are planned elsewhere."""
+    """Lower a standing body by a share, heels included; its steps are planned elsewhere."""
     q = worker.q
     shift(q, c.ROOT_X, q[c.HEADING], worker.ahead * down, 0.0)
     kneel, crouch = worker.kneel * down, worker.crouch * down
@@ -139,7 +139,7 @@ def _bulge_way(at: int, goal_z: float, out: float, worker: Worker) -> None:
         at: column of the point's x.
         goal_z: height of its goal [m].
         out: share of the way that is done.
-        worker: record whose `q` is changed.
+        worker: record; its `q` is changed.
     """
     q = worker.q
     high = RISE * max(goal_z - q[c.PELVIS_Z] - 0.3, 0.0)
@@ -195,7 +195,7 @@ def _pass_belly(hand: int, at: int, share: float, worker: Worker) -> None:
         hand: 0 left, 1 right.
         at: column of the target's x.
         share: share of the move.
-        worker: record whose `q` is changed.
+        worker: record; its `q` is changed.
     """
     q, goal = worker.q, worker.target[3 * hand : 3 * hand + 3]
     x, y = locate_from_root(BELLY_AHEAD_M, (1.0 - 2.0 * hand) * BELLY_SIDE_M, worker)
@@ -210,7 +210,7 @@ def work(t: float, worker: Worker) -> None:
 
     Args:
         t: time since the activity began [s].
-        worker: record with the plan, whose `q` stands at ease; `q` is changed.
+        worker: record with the plan; its `q`, standing at ease, is changed.
     """
     near_end = min(t, worker.total_s - t)
     down = min_jerk(near_end / worker.settle_s)

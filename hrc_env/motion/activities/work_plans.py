@@ -44,15 +44,15 @@ BIT_UP_M = 0.09
 THRUST_M = 0.04
 """Depth of a hole, and length of a screw [m]."""
 SCREWS = 4
-"""Number of screws that fix what a robot holds."""
+"""Number of screws in the robot's workpiece."""
 SCREW_PITCH_M = 0.15
 """Distance of a screw below the one before [m]."""
 FIST_AHEAD_M = 0.467
-"""Distance of the fist ahead of the feet of a worker who screws what a robot holds [m]."""
+"""Distance of the fist ahead of the feet in screwing the robot's workpiece [m]."""
 FIST_LEFT_M = 0.127
-"""Distance of the fist to the left of the feet of a worker who screws what a robot holds [m]."""
+"""Distance of the fist to the left of the feet in screwing the robot's workpiece [m]."""
 ASKEW_RAD = -0.25 * math.pi
-"""Yaw of the drill from the heading of a worker who screws what a robot holds [rad]."""
+"""Yaw of the drill from the heading in screwing the robot's workpiece [rad]."""
 CUT_RAD = 0.6
 """Pitch of the blade in the board [rad]; 45 to 60 degrees to it is usual, judgement."""
 SHOULDER_SHARE = 1.50
