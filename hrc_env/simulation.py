@@ -48,7 +48,7 @@ from hrc_env.settings import Settings
 from hrc_env.step_result import Observation, StepResult, agreed
 from hrc_env.tasks import goal
 from hrc_env.tracking import metrics, oracle
-from hrc_env.worker.body import pool, stack, worker_capsules, worker_truth
+from hrc_env.worker.body import load_bodies, select_bodies, worker_capsules, worker_truth
 from hrc_env.world import WorkerProgress, World
 
 CLOSING_M_S = 8.0
@@ -104,7 +104,7 @@ class Simulation(Stateful):
         self.batch, self.config, self.control = batch, config, settings.asked.control
         self.perception, self.shield, self.task = perception, settings.shield, settings.task
         self._wants_pairs = settings.estimator.wants_pairs
-        self.bodies = stack(pool(config.worker))
+        self.bodies = load_bodies(select_bodies(config.worker))
         self._make_people_and_scene(settings)
         if perception in CAMERA_LEVELS:
             n, rigs = len(self.scene.cameras), settings.rigs

@@ -16,7 +16,7 @@ from assets.rotations import matrix_from_quaternion
 from hrc_env.core.typing import Floats, Points3, Rotations
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.mocap.read import read_recording
-from hrc_env.mocap.record import forward
+from hrc_env.mocap.record import compose_tree
 from hrc_env.mocap.retarget import RetargetError, retarget
 from hrc_env.motion.clip import Clip
 from hrc_env.motion.repertoire import REPERTOIRE, make_worker, perform
@@ -117,7 +117,7 @@ def restyled(
         local[:, arm] = about_axis("x", sign * style.apart_rad) @ local[:, arm]
     moving = np.repeat(offset[None], len(position), axis=0)
     moving[:, 0] = position[:, 0] * style.legs
-    placed, turned = forward(PARENT, moving, local)
+    placed, turned = compose_tree(PARENT, moving, local)
     rest = _summed(offset, body.rest_position[0] * style.legs)
     return placed, turned, replace(body, rest_position=rest)
 

@@ -71,9 +71,13 @@ def begin_next_activity(state: MotionState, b: int, w: int, draws: Floats) -> No
 
 
 def begin_episode(
-    state: MotionState, b: int, n_present: int, bodies: Ints, draws: Floats,
+    state: MotionState,
+    b: int,
+    n_present: int,
+    bodies: Ints,
+    draws: Floats,
     activities: Sequence[int] = (),
-) -> None:  # fmt: skip
+) -> None:
     """Put workers of an environment at their places, in the middle of an activity.
 
     Args:

@@ -89,21 +89,38 @@ def _check_ranges(config: "PeopleConfig | MotionConfig") -> None:
 PEOPLE: dict[str, PeopleConfig] = {
     "attentive": PeopleConfig(),
     "hurried": PeopleConfig(
-        notice_m=0.25, fast_m_s=1.0, pause_probability=0.2, step_back_probability=0.05,
-        pause_s=(0.3, 0.8), detour_m=0.3, speed_m_s=(1.2, 1.7), tempo=0.55,
-        sudden_probability=0.12, lunge_probability=0.03, stumble_probability=0.03,
+        notice_m=0.25,
+        fast_m_s=1.0,
+        pause_probability=0.2,
+        step_back_probability=0.05,
+        pause_s=(0.3, 0.8),
+        detour_m=0.3,
+        speed_m_s=(1.2, 1.7),
+        tempo=0.55,
+        sudden_probability=0.12,
+        lunge_probability=0.03,
+        stumble_probability=0.03,
         careless_probability=0.02,
     ),
     "unaware": PeopleConfig(
-        notice_m=0.0, fast_m_s=99.0, pause_probability=0.0, step_back_probability=0.0,
-        detour_m=0.0, sudden_probability=0.08, lunge_probability=0.02,
-        stumble_probability=0.01, careless_probability=0.04,
+        notice_m=0.0,
+        fast_m_s=99.0,
+        pause_probability=0.0,
+        step_back_probability=0.0,
+        detour_m=0.0,
+        sudden_probability=0.08,
+        lunge_probability=0.02,
+        stumble_probability=0.01,
+        careless_probability=0.04,
     ),
     "headlong": PeopleConfig(
-        speed_m_s=(1.1, 1.6), tempo=0.4, stumble_probability=0.1, fall_probability=0.3,
+        speed_m_s=(1.1, 1.6),
+        tempo=0.4,
+        stumble_probability=0.1,
+        fall_probability=0.3,
         run_probability=0.6,
     ),
-}  # fmt: skip
+}
 """Kinds of people by name.
 
 "attentive" workers look out for the robot, "hurried" ones have little time to, "unaware" ones do

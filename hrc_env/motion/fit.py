@@ -7,7 +7,7 @@ from hrc_env.motion.anatomy import measure_bodies
 from hrc_env.motion.clip import Clip
 from hrc_env.motion.config import MotionConfig
 from hrc_env.motion.floorplan import make_floorplan
-from hrc_env.worker.body import pool, stack
+from hrc_env.worker.body import load_bodies, select_bodies
 from hrc_env.world import Grounds
 
 
@@ -28,7 +28,10 @@ def measure_played_s(
     Raises:
         ConfigError: there are no two moments with both feet on the floor, so it is never played.
     """
-    lengths, played_s = measure_bodies(stack(pool(worker))).lengths, dict[str, float]()
+    lengths, played_s = (
+        measure_bodies(load_bodies(select_bodies(worker))).lengths,
+        dict[str, float](),
+    )
     for name, ground in grounds.items():
         stage = make_stage(make_floorplan(ground), config or MotionConfig())
         try:

@@ -43,9 +43,21 @@ from hrc_env.worker.body import N_SEGMENTS, Body
 from hrc_env.world import FOOT_M, Grounds, WorkerProgress, WorkerSignal, Workplace
 
 __all__ = [
-    "ABSENT", "PEOPLE", "Cast", "Clip", "MotionConfig", "MotionState", "PeopleConfig", "activity",
-    "activity_names", "advance", "current", "make_state", "reset", "watch",
-]  # fmt: skip
+    "ABSENT",
+    "PEOPLE",
+    "Cast",
+    "Clip",
+    "MotionConfig",
+    "MotionState",
+    "PeopleConfig",
+    "activity",
+    "activity_names",
+    "advance",
+    "current",
+    "make_state",
+    "reset",
+    "watch",
+]
 
 activity_names: tuple[str, ...] = st.ACTIVITY_NAMES
 """Names of the values of `activity`."""

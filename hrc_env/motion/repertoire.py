@@ -183,7 +183,9 @@ REPERTOIRE: dict[str, tuple[Act, ...]] = {
     "stumble": (_going(st.STUMBLE, 1.2),),
     "lunge": _here(st.LUNGE, 1.1),
     "box from the floor to a table": (
-        _take(BOX, False, FLOOR_M), _CARRY, *_here(st.SET_DOWN, TABLE_M)
+        _take(BOX, False, FLOOR_M),
+        _CARRY,
+        *_here(st.SET_DOWN, TABLE_M),
     ),
     "board in both hands": (_take(BOARD, False, TABLE_M), _CARRY, *_here(st.SET_DOWN, FLOOR_M)),
     "board on the shoulder": (_take(BOARD, True, FLOOR_M), _CARRY, *_here(st.SET_DOWN, FLOOR_M)),
@@ -201,7 +203,7 @@ REPERTOIRE: dict[str, tuple[Act, ...]] = {
     "saw": _here(st.SAW, TABLE_M),
     "measure": _here(st.MEASURE, TABLE_M),
     "climb": _here(st.CLIMB, 0.22),
-}  # fmt: skip
+}
 """Scenes by name."""
 HASTY: dict[str, tuple[Act, ...]] = {
     **{f"run {v} m/s": (_going(st.RUN, v, way_m=FAR_M),) for v in (2.5, 3.0, 3.5)},

@@ -50,53 +50,108 @@ class Job:
 
 
 JOBS: tuple[Job, ...] = (
-    Job("work with the robot", "reach", "robot",
-         (("work with the robot", 0.78), ("wait for the robot", 0.16), ("show where", 0.03),
-          ("watch the robot", 0.03))),
+    Job(
+        "work with the robot",
+        "reach",
+        "robot",
+        (
+            ("work with the robot", 0.78),
+            ("wait for the robot", 0.16),
+            ("show where", 0.03),
+            ("watch the robot", 0.03),
+        ),
+    ),
     Job("wait for the robot", "stand", "robot", (("work with the robot", 1.0),)),
     Job("watch the robot", "look round", "robot", (("work with the robot", 1.0),)),
     Job("show where", "point", "robot", (("work with the robot", 1.0),)),
     Job("fetch a board", "pick up", "pile", (("bring it to the wall", 1.0),), 1.0, "board"),
-    Job("bring it to the wall", "set down", "wall",
-         (("nail it", 0.6), ("screw it on", 0.4))),
-    Job("fetch a box", "pick up", "pile",
-         (("put it on the bench", 0.6), ("put it on the floor", 0.4)), 0.7, "box"),
+    Job("bring it to the wall", "set down", "wall", (("nail it", 0.6), ("screw it on", 0.4))),
+    Job(
+        "fetch a box",
+        "pick up",
+        "pile",
+        (("put it on the bench", 0.6), ("put it on the floor", 0.4)),
+        0.7,
+        "box",
+    ),
     Job("put it on the bench", "set down", "bench", (("work at the bench", 1.0),)),
     Job("put it on the floor", "set down", "floor", (("look about", 1.0),)),
-    Job("move a load", "lift", "floor", (("look about", 0.4), ("move a load", 0.3),
-         ("work on the floor", 0.3)), 0.6),
-    Job("nail it", "hammer", "wall", (("nail it", 0.3), ("measure the wall", 0.3),
-         ("screw it on", 0.2), ("look about", 0.2)), 0.5),
-    Job("screw it on", "drill", "wall", (("nail it", 0.3), ("measure the wall", 0.3),
-         ("look about", 0.4)), 0.4),
-    Job("measure the wall", "measure", "wall", (("nail it", 0.4), ("screw it on", 0.4),
-         ("look about", 0.2)), 0.5),
-    Job("work overhead", "drill overhead", "overhead", (("work overhead", 0.5),
-         ("look about", 0.5)), 0.6),
-    Job("work at the bench", "saw", "bench", (("work at the bench", 0.4), ("tidy the bench", 0.6)),
-         0.5),
-    Job("tidy the bench", "reach", "bench", (("tidy the bench", 0.5), ("work at the bench", 0.3),
-         ("look about", 0.2)), 0.5),
+    Job(
+        "move a load",
+        "lift",
+        "floor",
+        (("look about", 0.4), ("move a load", 0.3), ("work on the floor", 0.3)),
+        0.6,
+    ),
+    Job(
+        "nail it",
+        "hammer",
+        "wall",
+        (("nail it", 0.3), ("measure the wall", 0.3), ("screw it on", 0.2), ("look about", 0.2)),
+        0.5,
+    ),
+    Job(
+        "screw it on",
+        "drill",
+        "wall",
+        (("nail it", 0.3), ("measure the wall", 0.3), ("look about", 0.4)),
+        0.4,
+    ),
+    Job(
+        "measure the wall",
+        "measure",
+        "wall",
+        (("nail it", 0.4), ("screw it on", 0.4), ("look about", 0.2)),
+        0.5,
+    ),
+    Job(
+        "work overhead",
+        "drill overhead",
+        "overhead",
+        (("work overhead", 0.5), ("look about", 0.5)),
+        0.6,
+    ),
+    Job(
+        "work at the bench",
+        "saw",
+        "bench",
+        (("work at the bench", 0.4), ("tidy the bench", 0.6)),
+        0.5,
+    ),
+    Job(
+        "tidy the bench",
+        "reach",
+        "bench",
+        (("tidy the bench", 0.5), ("work at the bench", 0.3), ("look about", 0.2)),
+        0.5,
+    ),
     Job("work on the floor", "kneel", "floor", (("look about", 1.0),), 0.4),
     Job("look at the floor", "squat", "floor", (("look about", 1.0),), 0.3),
     Job("take the cart", "stand", "cart", (("bring the cart", 1.0),), 0.4, "cart"),
     Job("bring the cart", "look round", "cart", (("look about", 1.0),), 0.0, "cart", "push"),
     Job("climb up", "climb", "step", (("look about", 0.6), ("climb up", 0.4)), 0.3),
-    Job("stand about", "stand", "open", (("look about", 0.4), ("stand about", 0.3),
-         ("do something", 0.3)), 0.8),
+    Job(
+        "stand about",
+        "stand",
+        "open",
+        (("look about", 0.4), ("stand about", 0.3), ("do something", 0.3)),
+        0.8,
+    ),
     Job("do something", "reach", "open", (("stand about", 0.5), ("do something", 0.5)), 0.4),
     Job("look about", "look round", HERE),
-)  # fmt: skip
+)
 """Default jobs: framing work beside a robot that holds the workpiece; judgement."""
 
 _LOW = tuple(
     Job(name, activity, "robot", ((JOBS[0].name, 1.0),), height_m=height_m)
     for name, activity, height_m in (
-        ("screw it on below", "drill", 0.35), ("nail it below", "hammer", 0.3),
-        ("fit it below", "kneel", 0.25), ("sort what lies there", "squat", 0.2),
+        ("screw it on below", "drill", 0.35),
+        ("nail it below", "hammer", 0.3),
+        ("fit it below", "kneel", 0.25),
+        ("sort what lies there", "squat", 0.2),
         ("lift what lies there", "lift", 0.0),
     )
-)  # fmt: skip
+)
 """Jobs at knee height or lower: kneeling, on the haunches, bent."""
 _BOARD = (
     Job("wait for the board", "stand", "robot", (("screw the board on", 1.0),)),
@@ -125,12 +180,13 @@ WORK: dict[str, tuple[Job, ...]] = {
     "framing": JOBS,
     "low_work": (
         replace(JOBS[0], then=(*JOBS[0].then, *((job.name, 0.06) for job in _LOW))),
-        *_LOW, *JOBS[1:],
+        *_LOW,
+        *JOBS[1:],
     ),
     "drywall": _BOARD,
     "handover": _TOOL,
     "stack": _STACK,
-}  # fmt: skip
+}
 """Named choices of jobs.
 
 "framing" keeps workers upright at the robot, "low_work" also has jobs at its foot (judgement); the

@@ -334,11 +334,36 @@ PICK_UP, SET_DOWN, HAND_OVER, RECEIVE, SQUATTING, KNEELING, HAMMER, DRILL = rang
 OVERHEAD, SAW, MEASURE, POINT, LUNGE, CLIMB, CLIP, RUN, FALL = range(18, 27)
 SCREW, TAKE = 27, 28
 ACTIVITY_NAMES = (
-    "stand", "walk", "reach", "lift", "turn", "carry", "push", "stumble", "step back",
-    "look round", "pick up", "set down", "hand over", "receive", "squat", "kneel", "hammer",
-    "drill", "drill overhead", "saw", "measure", "point", "lunge", "climb", "clip",
-    "run", "fall", "screw", "take",
-)  # fmt: skip
+    "stand",
+    "walk",
+    "reach",
+    "lift",
+    "turn",
+    "carry",
+    "push",
+    "stumble",
+    "step back",
+    "look round",
+    "pick up",
+    "set down",
+    "hand over",
+    "receive",
+    "squat",
+    "kneel",
+    "hammer",
+    "drill",
+    "drill overhead",
+    "saw",
+    "measure",
+    "point",
+    "lunge",
+    "climb",
+    "clip",
+    "run",
+    "fall",
+    "screw",
+    "take",
+)
 """Name of each activity, by its number."""
 GOING = (WALK, TURN, CARRY, STUMBLE, STEP_BACK)
 """Activities with the closed form of a walk."""

@@ -62,11 +62,11 @@ from hrc_env.geometry.robot_model import RobotModel
 from hrc_env.geometry.rotations import matrix
 from hrc_env.geometry.triangulation import linear_point, triangulate
 from hrc_env.mocap import footing, person, repair, stance
-from hrc_env.mocap.guess import first_guess
-from hrc_env.mocap.poses import joints_in, marks_of, posed
+from hrc_env.mocap.guess import guess_controls
+from hrc_env.mocap.poses import locate_joints, make_marks, pose_segments
 from hrc_env.mocap.read import read_recording as read_capture
 from hrc_env.mocap.record import Capture
-from hrc_env.mocap.retarget import adapted, fitted, retarget
+from hrc_env.mocap.retarget import fit_controls, retarget, scale_joints
 from hrc_env.motion import config as motion_config
 from hrc_env.motion import floorplan, lying, paths, repertoire, routes, schedule, starting, starts
 from hrc_env.motion import generator as motion
@@ -878,7 +878,7 @@ def measure_body(name: str) -> Arrays:
 
 def pose_body(name: str, controls: NDArray[np.float64]) -> Arrays:
     """Return where the segments of a body are in poses (T, controls)."""
-    position, turn, _ = posed(controls, measure_anatomy(bodies.load_body(name)))
+    position, turn, _ = pose_segments(controls, measure_anatomy(bodies.load_body(name)))
     return {"position_m": position, "turn": turn}
 
 
@@ -934,7 +934,7 @@ def _join_films(films: Any) -> Arrays:
 
 def place_body(names: tuple[str, ...], rows: NDArray[np.int64], segments: Arrays) -> Arrays:
     """Return joints, their velocities and capsules of bodies (N,) whose segments are given."""
-    body, now = bodies.stack(names), _motion_of(segments, rows)
+    body, now = bodies.load_bodies(names), _motion_of(segments, rows)
     truth = bodies.worker_truth(body, now)
     path = WorkerPath(now.position_world[:, None], now.quaternion_wxyz[:, None])
     return {
@@ -1038,8 +1038,8 @@ class Floor:
         lying.reset_loads(laid, first, np.random.default_rng(seed))
         return {
             "first": first["pose"].copy(), "shown": laid["shown"].copy(),
-            "stand": laid["stand"].copy(), "at": laid["at"].copy(), "free": lying.find_uncovered(laid),
-            "in_the_way": lying.list_load_discs(laid),
+            "stand": laid["stand"].copy(), "at": laid["at"].copy(),
+            "free": lying.find_uncovered(laid), "in_the_way": lying.list_load_discs(laid),
         }  # fmt: skip
 
     def find_way(
@@ -1091,7 +1091,7 @@ class Crew:
         )
         grounds = dataclasses.replace(grounds, places=(*grounds.places, *more))
         self.robot_m = grounds.robot_xy_m
-        self.names, self._body = names, bodies.stack(names)
+        self.names, self._body = names, bodies.load_bodies(names)
         self._state = motion.make_state(
             batch, n_workers, self._body, config, grounds, fewest, girth_m
         )
@@ -1912,7 +1912,7 @@ def name_joints() -> tuple[str, ...]:
 
 def joints_of_segments(segments: Arrays, body: str) -> NDArray[np.float64]:
     """Return joints (T, 15, 3) as the network means them, of segments (T, 22, ...)."""
-    marks = marks_of(bodies.load_body(body), landmarks=True)
+    marks = make_marks(bodies.load_body(body), landmarks=True)
     arm = matrix(segments["turn"])[:, marks.segment] @ marks.offset[..., None]
     return segments["position_m"][:, marks.segment] + arm[..., 0]
 
@@ -1941,11 +1941,11 @@ def read_recording(
         read = read_capture(path, fps, source_fps, None, is_off_floor_allowed)
     except ConfigError:
         return None
-    facts = read.fps, read.landmarks, len(read.repaired)
+    facts = read.fps, read.are_landmarks, len(read.notes)
     return {
         "joints_m": read.joints_world,
         "facts": np.array([facts], float),
-        "names": np.array(read.found, "U"),
+        "names": np.array(read.node_names, "U"),
     }
 
 
@@ -1970,15 +1970,15 @@ def describe_clip(clip: Any, error: Any) -> Arrays:
 def fit_steps(joints_m: Any, fps: float, body: str) -> Arrays:
     """Return what comes of joints (T, 15, 3) step by step: wished, guessed, fitted, with
     feet locked."""
-    marks = marks_of(bodies.load_body(body), landmarks=True)
-    wished = adapted(np.asarray(joints_m, float), fps, marks)
-    poses = fitted(wished, fps, marks)
-    locked, stands = stance.locked(poses, fps, marks.anatomy.lengths)
+    marks = make_marks(bodies.load_body(body), landmarks=True)
+    wished = scale_joints(np.asarray(joints_m, float), fps, marks)
+    poses = fit_controls(wished, fps, marks)
+    locked, stands = stance.lock_feet(poses, fps, marks.anatomy.lengths)
     return {
-        "wished_m": wished, "guess": first_guess(wished, fps, marks), "poses": poses,
+        "wished_m": wished, "guess": guess_controls(wished, fps, marks), "poses": poses,
         "locked": locked, "stands": stands,
-        "joints_m": joints_in(locked, marks),
-        "slip_m_s": stance.slip(locked, stands, fps, marks.anatomy),
+        "joints_m": locate_joints(locked, marks),
+        "slip_m_s": stance.measure_slip(locked, stands, fps, marks.anatomy),
     }  # fmt: skip
 
 
@@ -2012,23 +2012,27 @@ def cut_clips(clips: Any, names: tuple[str, ...], place: str) -> Arrays | None:
 
 def judge_floor(joints_m: NDArray[np.float64], fps: float) -> Arrays:
     """Return where feet rest, the floor's height, and joints on a level floor."""
-    height, rests = footing.supports(joints_m, fps)
-    levelled, changes = footing.level(joints_m, fps)
-    faults_found = len(footing.off_floor(joints_m, fps))
-    facts = footing.floor_height(joints_m, fps), len(changes), faults_found
+    height, rests = footing.find_support(joints_m, fps)
+    levelled, changes = footing.level_floor(joints_m, fps)
+    faults_found = len(footing.describe_floor_faults(joints_m, fps))
+    facts = footing.measure_floor_height(joints_m, fps), len(changes), faults_found
     return {"height_m": height, "rests": rests, "level_m": levelled, "facts": np.array(facts)}
 
 
 def measure_person(joints_m: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return stature, leg, two bones, and whether the first frame is a rest pose."""
-    bones = (person.length(joints_m, a, b) for a, b in (("shoulder", "elbow"), ("knee", "ankle")))
-    rest = repair.without_rest_pose(joints_m)[0]
-    return np.array([person.stature(joints_m), person.legs(joints_m), *bones, float(rest)])
+    bones = (
+        person.measure_bone(joints_m, a, b) for a, b in (("shoulder", "elbow"), ("knee", "ankle"))
+    )
+    rest = repair.skip_rest_pose(joints_m)[0]
+    return np.array(
+        [person.measure_stature(joints_m), person.measure_legs(joints_m), *bones, float(rest)]
+    )
 
 
 def resample(values: NDArray[np.float64], fps: float, wished_fps: float) -> NDArray[np.float64]:
     """Return values (T, ...) at another rate."""
-    return person.resampled(values, fps, wished_fps)
+    return person.resample(values, fps, wished_fps)
 
 
 # --- The detector (detector.py) ------------------------------------------------------------------

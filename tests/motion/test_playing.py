@@ -10,7 +10,7 @@ from hrc_env.core.batching import one
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import WorkerMotion
 from hrc_env.core.skeleton import JOINTS
-from hrc_env.mocap.poses import posed
+from hrc_env.mocap.poses import pose_segments
 from hrc_env.mocap.record import Capture
 from hrc_env.mocap.retarget import retarget
 from hrc_env.motion import controls as c
@@ -100,7 +100,7 @@ def test_the_recorded_pose_is_the_one_that_is_seen(clip):
     q = np.zeros((1, c.N_CONTROLS))
     q[0, : c.N_BLENDED] = piece.frames[k, : c.N_BLENDED]
     q[0, c.ANKLE : c.ANKLE + 12] = piece.frames[k, c.N_BLENDED :]
-    recorded = posed(q, one(state.mind.anatomy, 0))[0][0]
+    recorded = pose_segments(q, one(state.mind.anatomy, 0))[0][0]
     between = np.linalg.norm(position[:, None] - position[None], axis=-1)
     assert (
         np.abs(between - np.linalg.norm(recorded[:, None] - recorded[None], axis=-1)).max() < 0.02

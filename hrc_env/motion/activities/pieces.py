@@ -144,9 +144,12 @@ def cut_clips(clips: Sequence[Clip], lengths: Floats, stage: Stage) -> Clips:
     count = np.array([last - first + 1 for first, last, _ in pieces], np.int64)
     rates = [clip.fps for clip, parts in zip(clips, cut, strict=True) for _ in parts]
     return Clips(
-        np.ascontiguousarray(np.concatenate(frames)), np.cumsum(count) - count, count,
-        np.array(rates), tuple(piece.starts for piece in pieces),
-    )  # fmt: skip
+        np.ascontiguousarray(np.concatenate(frames)),
+        np.cumsum(count) - count,
+        count,
+        np.array(rates),
+        tuple(piece.starts for piece in pieces),
+    )
 
 
 def _cut_clip(clip: Clip, bodies: list[Floats], stage: Stage) -> list[_Piece]:
