@@ -95,7 +95,7 @@ def test_a_clip_scales_to_another_body(imported):
     other = clip.size * 0.9
     q = scale_clip(clip, other)
     small = dataclasses.replace(
-        measure_body(BODY), offset=0.9 * measure_body(BODY).offset, size=other
+        measure_body(BODY), offset=0.9 * measure_body(BODY).offset, lengths=other
     )
     marks = dataclasses.replace(make_marks(BODY, False), anatomy=small, offset=np.zeros((15, 3)))
     big = dataclasses.replace(make_marks(BODY, False), offset=np.zeros((15, 3)))
