@@ -189,7 +189,7 @@ def test_anatomies_of_a_stack_are_those_of_its_bodies():
         alone = measure_body(load_body(name))
         np.testing.assert_array_equal(together.offset[row], alone.offset)
         np.testing.assert_array_equal(together.frame[row], alone.frame)
-        np.testing.assert_array_equal(together.size[row], alone.size)
+        np.testing.assert_array_equal(together.lengths[row], alone.lengths)
 
 
 @pytest.mark.parametrize("which", [np.full((2, 3), 3), np.full((2, 3), -1)])
