@@ -38,7 +38,7 @@ from hrc_env.tracking.config import ParticleConfig, TrackerConfig, cast_config
 from hrc_env.tracking.estimators import EstimatorSpec
 from hrc_env.tracking.forecast import LONGEST_S
 from hrc_env.tracking.people.association import AssociationConfig
-from hrc_env.worker.body import pool
+from hrc_env.worker.body import select_bodies
 
 
 @answer_unknown_fields
@@ -98,7 +98,7 @@ class HRCConfig:
                 f"forecast_s must be in (0, {LONGEST_S:g}] s each, got {self.forecast_s}."
             )
         check_names("uncertainty", self.uncertainty, UNCERTAINTY)
-        pool(self.worker)
+        select_bodies(self.worker)
         substeps = self.ctrl_dt / self.scene.sim_dt
         if substeps < 0.5 or abs(substeps - round(substeps)) > 1e-6:
             near = max(round(substeps), 1) * self.scene.sim_dt

@@ -15,8 +15,8 @@ from hrc_env.core.typing import Floats, JointAngles
 from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.geometry.chains import SerialChain
 from hrc_env.geometry.reach import check_reach
-from hrc_env.motion.config import PeopleConfig, numbers
-from hrc_env.motion.decision import ANY_ACTIVITY, BehaviourParams, Cast, jobs_by_activity
+from hrc_env.motion.config import PeopleConfig, make_hand_params
+from hrc_env.motion.decision import ANY_ACTIVITY, BehaviourParams, Cast, group_jobs
 from hrc_env.motion.state import ACTIVITY_NAMES
 from hrc_env.perception.faults.fault import FaultConfig, check_cameras
 from hrc_env.pipeline.levels import CAMERA_LEVELS, check_supported
@@ -243,7 +243,7 @@ def _cast(given: Options, room: Room) -> Cast | None:
         check_names("body (config.worker)", bodies, room.bodies)
     activities = _of_each("activity", given.get("activity"), count)
     if activities is not None:
-        valid = sorted(jobs_by_activity(room.mind.schedule))
+        valid = sorted(group_jobs(room.mind.schedule))
         check_names(
             f"activity to begin with in {room.scene.name!r}:",
             [each for each in activities if each is not None],
@@ -279,7 +279,9 @@ def _mind(people: Any, mind: BehaviourParams) -> BehaviourParams | None:
     if people is None:
         return None
     config = replace(mind.config, people=restored(PeopleConfig, people, "people"))
-    return replace(mind, config=config, numbers=numbers(config, mind.plan.grounds.robot_xy_m))
+    return replace(
+        mind, config=config, hand_params=make_hand_params(config, mind.hand_params.robot_xy_m)
+    )
 
 
 def _rig(

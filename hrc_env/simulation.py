@@ -49,7 +49,7 @@ from hrc_env.settings import Settings
 from hrc_env.step_result import Observation, StepResult, agreed
 from hrc_env.tasks import goal
 from hrc_env.tracking import metrics, oracle
-from hrc_env.worker.body import pool, stack, worker_capsules, worker_truth
+from hrc_env.worker.body import load_bodies, select_bodies, worker_capsules, worker_truth
 from hrc_env.world import WorkerProgress, World
 
 CLOSING_M_S = 8.0
@@ -105,7 +105,7 @@ class Simulation(Stateful):
         self.batch, self.config, self.control = batch, config, settings.asked.control
         self.perception, self.shield, self.task = perception, settings.shield, settings.task
         self._wants_pairs = settings.estimator.wants_pairs
-        self.bodies = stack(pool(config.worker))
+        self.bodies = load_bodies(select_bodies(config.worker))
         self._make_people_and_scene(settings)
         if perception in CAMERA_LEVELS:
             n, rigs = len(self.scene.cameras), settings.rigs
@@ -295,7 +295,7 @@ class Simulation(Stateful):
             )  # fmt: skip
         except NoRoomError as error:
             grounds = all_grounds(config.scene)
-            played = fit.played_s(error.clip, grounds, config.worker, config.motion)
+            played = fit.measure_played_s(error.clip, grounds, config.worker, config.motion)
             where = fit.describe_fit(error.clip, played)
             raise ConfigError(f"{error} {where}") from None
         self.scene: Scene = scene_for(n_workers=most)
@@ -316,7 +316,7 @@ class Simulation(Stateful):
         people, task_rngs = (self.motion, self.streams["motion"]), self.streams["task"]
         casts = {b: each.cast for b, each in given.items() if each.cast is not None}
         draw = partial(self._draw_starts, given=given) if given else self._draw_starts
-        q = starts.apart(ids, draw, *people, self.chain, self.bodies, casts)
+        q = starts.begin_apart(ids, draw, *people, self.chain, self.bodies, casts)
         robot = chains.robot_state(self.chain, q, np.zeros_like(q))
         self.task.reset(self.task_state, ids, task_rngs, World(robot, place=self.place))
         for b, each in given.items():
@@ -405,7 +405,7 @@ class Simulation(Stateful):
         ids, sensor = truth.ids, self.pipeline.sensor
         now = SensorInput(ids, self.physics.qpos[ids], truth.motion)
         if sensor.NEEDS_TRUTH:
-            present = self.motion.workers["present"][ids]
+            present = self.motion.workers["is_present"][ids]
             now = TrueSensorInput(ids, now.qpos, now.motion, truth.workers, present)
         sensor.expose(now)
 

@@ -35,7 +35,7 @@ from hrc_env.scene.robot import (
 from hrc_env.scene.robot_chain import reach_m
 from hrc_env.scene.worker import add_worker, capsule_geom_ids, mocap_ids
 from hrc_env.scene.worker_visuals import WorkerVisuals, add_props, add_visuals, visuals_of
-from hrc_env.worker.body import assets_dir, load_body, pool
+from hrc_env.worker.body import assets_dir, load_body, select_bodies
 from hrc_env.worker.mesh import load_mesh
 from hrc_env.worker.props import held_shapes
 from hrc_env.world import NOTHING, Grounds, TaskScene
@@ -186,7 +186,7 @@ def build(
         config = replace(config, cameras=SCENES[name].cameras)
     use = tuple(camera.name for camera in select(config.cameras, cameras))
     robot = robot_called(robot)
-    return _build(Recipe(config, name, n_workers, pool(bodies), use, robot, task_scene))
+    return _build(Recipe(config, name, n_workers, select_bodies(bodies), use, robot, task_scene))
 
 
 def all_grounds(config: SceneConfig | None = None) -> dict[str, Grounds]:

@@ -18,7 +18,7 @@ from hrc_env.core.typing import Bools, Capsules, Floats, Points3
 from hrc_env.geometry.rotations import rotate
 from hrc_env.geometry.shapes import BOX, WIDTH, absent_shape, shape
 from hrc_env.scene.primitives import DECORATION, OBJECT_BIT
-from hrc_env.worker.props import placed
+from hrc_env.worker.props import place_shapes
 from hrc_env.world import TaskScene
 
 PREFIX = "task/"
@@ -121,7 +121,7 @@ def surfaces(objects: Objects, qpos: Floats) -> Floats:
     """(B, O * n, `shapes.WIDTH`) the boxes of all objects where they are, of qpos (B, nq)."""
     poses = objects.poses(qpos)
     kinds = np.tile(np.arange(len(objects.names)), (len(qpos), 1))
-    return placed(kinds, poses[..., :3], poses[..., 3:], objects.parts)
+    return place_shapes(kinds, poses[..., :3], poses[..., 3:], objects.parts)
 
 
 def object_state(objects: Objects, qpos: Floats, qvel: Floats, held: Bools) -> ObjectState:
