@@ -36,7 +36,7 @@ from hrc_env.settings import Settings, settle
 from hrc_env.simulation import Simulation
 from hrc_env.step_result import Observation
 from hrc_env.tasks import DEFAULT, goal
-from hrc_env.tasks.task import TaskType, goal_of
+from hrc_env.tasks.task import TaskType, require_goal
 
 RENDER_MODES = ("rgb_array", "depth_array")
 ENDLESS = 2**62
@@ -73,7 +73,7 @@ class EnvBase(HasSpec, Stateful):
     @property
     def compute_reward(self) -> Callable[[Any, Any, Any], Any]:
         """(achieved_goal, desired_goal, info) -> reward: of one pair (n,) and the info of its step,
-        or of many (B, n) with a list of infos, or a vector's; see `hrc_env.tasks.goal.judged`.
+        or of many (B, n) with a list of infos, or a vector's.
 
         With the info of a step it is the step's reward, bit for bit: the goal's term and those that
         every task shares. Of infos that do not hold these, as HER's own, it is the goal's alone.
@@ -82,10 +82,12 @@ class EnvBase(HasSpec, Stateful):
             NoGoalError: the task has no goals apart from its observation; it is an `AttributeError`
                 too, so that `hasattr` tells who has.
         """
-        apart, others = goal_of(self._task), [term.name for term in rewards.SHARED_TERMS]
+        apart, others = require_goal(self._task), [term.name for term in rewards.SHARED_TERMS]
         others = [term.name for term in self._task.rewards] + others
         factor = self._reward_factor(goal.TERM)
-        return partial(goal.judged, apart, config=self.config.task, others=others, factor=factor)
+        return partial(
+            goal.compute_reward, apart, config=self.config.task, others=others, factor=factor
+        )
 
     @property
     def compute_terminated(self) -> Callable[[Any, Any, Any], Any]:
@@ -98,14 +100,14 @@ class EnvBase(HasSpec, Stateful):
             NoGoalError: as of `compute_reward`.
             NoAttributeError: the task ends episodes itself, by `Task.is_terminal`.
         """
-        apart = goal_of(self._task)
+        apart = require_goal(self._task)
         if self._task.can_end:
             raise NoAttributeError(
                 f"{self._task.id} ends episodes itself (Task.is_terminal), which does not follow "
                 "from goals and infos: read `terminated` of `step`."
             )
         entries = ("cost_contact",) if self.config.cost.contact_terminates else ()
-        return partial(goal.ended, apart, entries=entries)
+        return partial(goal.compute_terminated, apart, entries=entries)
 
     @property
     def compute_truncated(self) -> Callable[[Any, Any, Any], Any]:
@@ -115,7 +117,7 @@ class EnvBase(HasSpec, Stateful):
         Raises:
             NoGoalError: as of `compute_reward`.
         """
-        return partial(goal.ended, goal_of(self._task))
+        return partial(goal.compute_terminated, require_goal(self._task))
 
     def _reward_factor(self, term: str) -> float:
         """The factor on a term of the reward (`set_reward`)."""

@@ -15,7 +15,7 @@ from hrc_env.scene.render import VIEWPOINTS
 from hrc_env.settings import Settings
 from hrc_env.simulation import Simulation
 from hrc_env.tasks.check import check_counts
-from hrc_env.tasks.hooks import Sizes, lent, with_checks
+from hrc_env.tasks.hooks import Sizes, add_checks, protect_arrays
 from hrc_env.tasks.task import is_known
 from hrc_env.tracking.estimators import BUILT_IN, ESTIMATORS
 
@@ -51,7 +51,7 @@ def play_briefly(settings: Settings) -> None:
     config = replace(settings.config, faults=(), appearance=AS_BUILT)
     check_names(f"viewpoint of {settings.task.id}", [settings.task.viewpoint], VIEWPOINTS)
     sizes = Sizes(2, settings.n_workers[1])
-    task = lent(with_checks(settings.task, sizes))
+    task = protect_arrays(add_checks(settings.task, sizes))
     plain = replace(settings, asked=asked, config=config, task=task, images=None, rigs=None)
     with warnings.catch_warnings():  # the environment itself warns
         warnings.simplefilter("ignore")

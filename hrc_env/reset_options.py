@@ -27,7 +27,7 @@ from hrc_env.scene.rig import select
 from hrc_env.scene.rig_distribution import RigDistribution, draw_rig
 from hrc_env.scene.rigs import findings
 from hrc_env.settings import rig_of
-from hrc_env.tasks.hooks import check_places
+from hrc_env.tasks.hooks import check_targets
 from hrc_env.tasks.task import Task
 
 
@@ -200,7 +200,7 @@ def _goal(goal: Any, room: Room) -> Floats | None:
     if not np.isfinite(place).all():
         raise ConfigError(f'options["goal"] must be finite numbers, got {goal!r}.')
     targets = room.task.goal_targets(place)
-    check_places(f"{room.task.id}: goal_targets", targets)
+    check_targets(f"{room.task.id}: goal_targets", targets)
     check_reach(room.task.id, room.scene.robot.name, room.chain, targets)
     return place
 

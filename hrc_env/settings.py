@@ -20,7 +20,7 @@ from hrc_env.scene.rigs import RIGS
 from hrc_env.scene.robot import DEFAULT as DEFAULT_ROBOT
 from hrc_env.scene.robot import ROBOTS, Robot, robot_called
 from hrc_env.tasks.check import check_parts
-from hrc_env.tasks.hooks import lent
+from hrc_env.tasks.hooks import protect_arrays
 from hrc_env.tasks.task import Task, find_task, is_known
 from hrc_env.tracking.estimators import EstimatorSpec, estimator_called
 
@@ -110,7 +110,7 @@ def make_settings(asked: EnvConfig) -> Settings:
     scene = task.scene if asked.scene is None else asked.scene
     n_workers = task.n_workers if asked.n_workers is None else asked.n_workers
     return Settings(
-        asked, lent(task(config.task)), estimator, cameras, scene,
+        asked, protect_arrays(task(config.task)), estimator, cameras, scene,
         robot, _worker_counts(n_workers),
         shield_called(asked.shield), config, images_called(asked.observe_images), rigs,
     )  # fmt: skip

@@ -496,7 +496,7 @@ class Simulation(Stateful):
         flat, apart = observations.observe(belief, self.layout, self.terms), self.task.goal
         if apart is None and self.images is None:
             return flat
-        goals = {} if apart is None else goal.parts(apart, belief)
+        goals = {} if apart is None else goal.observe_goal(apart, belief)
         return {
             **goals,
             **self.cameras.draw_images(self.streams["sensor"]),
