@@ -327,7 +327,7 @@ class Delivery(Task[DeliveryConfig, Records1[DeliveryState]]):
     def advance(
         self, state: Records1[DeliveryState], rngs: Rngs, world: World, dt_s: float
     ) -> Records1[DeliveryStep]:
-        """Judge the places of the bases, and return (B,) what the step brought."""
+        """Judge the places of the bases, and return (B,) the results of the step."""
         site, robot, step = world.place, world.robot, make_records(DeliveryStep, len(state))
         step["progress_m"] = state["way_m"]
         _measure(state, robot, site)
@@ -354,7 +354,7 @@ class Delivery(Task[DeliveryConfig, Records1[DeliveryState]]):
         )
 
     def info(self, state: Records1[DeliveryState]) -> dict[str, Floats]:
-        """Return the results of the episode so far, (B,) each.
+        """Return the results of the episode until now, (B,) each.
 
         A delivery counts as a success only if the base hit neither an obstacle nor a worker.
         """

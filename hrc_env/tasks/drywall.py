@@ -274,7 +274,7 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
         return make_records(DrywallState, batch)
 
     def make_scene(self) -> TaskScene:
-        """Return stack, board and studs, and the place of the worker who drives the screws."""
+        """Return stack, board and studs, and the place of the worker that drives the screws."""
         place = Workplace("board", "task", BESIDE_M, 0.75 * np.pi, SCREWS_M[0][1])
         return TaskScene(
             Path(assets_dir() / "tasks" / "drywall.xml").read_text(),
@@ -314,7 +314,7 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
     def advance(
         self, state: Records1[DrywallState], rngs: Rngs, world: World, dt_s: float
     ) -> Records1[DrywallStep]:
-        """Judge the place of the board and the screws, and return (B,) what the step brought."""
+        """Judge the place of the board and the screws, and return (B,) the results of the step."""
         board, step = needed(world.objects, "A board"), make_records(DrywallStep, len(state))
         off_m, off_rad = measure_offset(board)
         fine = (off_m < self.config.tolerance_m) & (off_rad < self.config.tolerance_rad)
@@ -361,7 +361,7 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
         return (state["pressed_s"] == 0.0)[:, None]
 
     def allowed_contact(self, belief: Belief) -> Bools:
-        """Return the arms whose hands are near the screws while the board is held in place."""
+        """Return the arms with a hand near the screws while the board is held in place."""
         board = needed(belief.objects, "A board")
         is_held_there = board.held[:, 0] & (measure_offset(board).distance_m < AT_PLACE_M)
         screws = np.array([(x, WALL_Y_M, z) for x, z in (SCREWS_M[0], SCREWS_M[-1])])

@@ -1,4 +1,4 @@
-"""Handover: the robot brings a tool to a worker, who comes, puts out a hand and takes it."""
+"""Handover: the robot brings a tool to a worker that comes, puts out a hand and takes it."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -116,11 +116,11 @@ class HandoverState:
     taken_s: float
     """Time since then [s]."""
     by: int
-    """Index of the worker who has taken it."""
+    """Index of the worker that has taken it."""
     push: Annotated[Floats, (6,)]
     """Force [N] and torque [Nm] of the hand at the tool's middle, in the world frame."""
     largest_n: float
-    """Greatest force on the hand so far [N]."""
+    """Greatest force on the hand in this episode [N]."""
     away_s: float
     """Time for which the fingers have left the tool [s]."""
     dropped: bool
@@ -353,7 +353,7 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
     def advance(
         self, state: Records1[HandoverState], rngs: Rngs, world: World, dt_s: float
     ) -> Records1[HandoverStep]:
-        """Judge tool and hand, let the hand close, and return (B,) what the step brought."""
+        """Judge tool and hand, let the hand close, and return (B,) the results of the step."""
         tool, step = needed(world.objects, "A tool"), make_records(HandoverStep, len(state))
         workers = needed(world.workers, "What workers do")
         held, middle, handle = tool.held[:, 0], tool.position_world[:, 0], _find_handle(tool)
@@ -390,7 +390,7 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
         return ~(state["offered"] | state["taken"])[:, None]
 
     def allowed_contact(self, belief: Belief) -> Bools:
-        """Return the arms whose hands are near the handle while the robot brings the tool."""
+        """Return the arms with a hand near the handle while the robot brings the tool."""
         tool = needed(belief.objects, "A tool")
         middle, handle = tool.position_world[:, 0], _find_handle(tool).position_world
         away_m = _measure_fingers_gap(belief.robot.tool_world, middle)

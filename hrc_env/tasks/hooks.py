@@ -34,7 +34,7 @@ Check = Callable[[str, object, Sizes], None]
 
 
 def add_checks(task: AnyTask, sizes: Sizes) -> AnyTask:
-    """Return a task whose hooks check their results, and which is otherwise the same.
+    """Return a copy of a task with hooks that check their results.
 
     They raise `ConfigError` for results of another kind or shape, or that are no numbers.
     """
@@ -143,7 +143,7 @@ CHECKS: dict[str, Check] = {
 WRITERS = ("reset", "set_goal", "advance")
 """Methods that write their first argument, the state; all others only read it."""
 UNPROTECTED = ("make_state", "make_scene", "reach_targets", "counts")
-"""Methods whose arguments are no shared arrays."""
+"""Methods without shared arrays among their arguments."""
 
 
 def protect_arrays(task: AnyTask) -> AnyTask:

@@ -236,7 +236,7 @@ class PickPlace(Task[PlacedConfig, Records1[PickPlaceState]]):
     def advance(
         self, state: Records1[PickPlaceState], rngs: Rngs, world: World, dt_s: float
     ) -> Records1[PickPlaceStep]:
-        """Judge the places of the pieces, and return (B,) what the step brought."""
+        """Judge the places of the pieces, and return (B,) the results of the step."""
         objects = needed(world.objects, "A loose object")
         step = make_records(PickPlaceStep, len(state))
         placed = is_in_place(objects, self.config)

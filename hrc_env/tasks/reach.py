@@ -288,7 +288,7 @@ class Reach(Task[ReachConfig, Records1[ReachState]]):
     def advance(
         self, state: Records1[ReachState], rngs: Rngs, world: World, dt_s: float
     ) -> Records1[ReachStep]:
-        """Judge the goals, replace those that are done, and return (B,) what the step brought."""
+        """Judge the goals, replace those that are done, and return (B,) the results of the step."""
         tool_world, step = world.robot.tool_world, make_records(ReachStep, len(state))
         radius_m, time_limit_s = self.config.radius_m, self.config.time_limit_s
         if _judge_goals(tool_world, dt_s, radius_m, time_limit_s, state, step):

@@ -133,7 +133,7 @@ class Task(Generic[ConfigT, StateT]):
         raise NotImplementedError
 
     def info(self, state: StateT) -> Mapping[str, Floats]:
-        """Return numbers (B,) about the episode so far, by name.
+        """Return numbers (B,) about the episode until now, by name.
 
         Names begin with "task/", except for "is_success": 1 if the episode would be a success if it
         ended now, else 0.
