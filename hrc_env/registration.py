@@ -72,13 +72,13 @@ def register_robot(robot: "Robot") -> None:
     A warning says where its looks, which cameras see, reach out of its capsules, which distances
     count.
     """
-    from hrc_env.scene.robot import ROBOTS, Robot, robot_called
-    from hrc_env.scene.robot_looks import warn_of_looks
+    from hrc_env.scene.robot import ROBOTS, Robot, find_robot
+    from hrc_env.scene.robot_looks import warn_of_mismatch
 
     if not isinstance(robot, Robot):
         raise ConfigError(f"A robot must be a Robot, got {type(robot).__name__}.")
-    robot = robot_called(robot)
-    warn_of_looks(robot)
+    robot = find_robot(robot)
+    warn_of_mismatch(robot)
     if not str(robot.mjcf).lstrip().startswith("<"):  # other processes may work elsewhere
         robot = replace(robot, mjcf=str(Path(robot.mjcf).resolve()))
     _add(ROBOTS, robot.name, robot)

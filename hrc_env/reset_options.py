@@ -25,7 +25,7 @@ from hrc_env.scene.build import Scene, with_rig
 from hrc_env.scene.domain_randomization import AppearanceConfig
 from hrc_env.scene.rig import select
 from hrc_env.scene.rig_distribution import RigDistribution, draw_rig
-from hrc_env.scene.rigs import findings
+from hrc_env.scene.rigs import describe_defects
 from hrc_env.settings import rig_of
 from hrc_env.tasks.hooks import check_targets
 from hrc_env.tasks.task import Task
@@ -143,7 +143,7 @@ class Room:
     bodies: tuple[str, ...]
     mind: BehaviourParams
     """The workers' parameters of decision."""
-    touched_at: Callable[[JointAngles], str | None]
+    find_contact: Callable[[JointAngles], str | None]
     """Returns the name of an obstacle at joint angles; None: none is touched."""
     images: ObservedImages | None = None
     """Draws the images of observations; None: they hold none."""
@@ -219,7 +219,7 @@ def _start_q(start_q: Any, room: Room) -> JointAngles | None:
             raise ConfigError(
                 f"{name}: joint {joint!r} must be from {low:.3f} to {high:.3f}, got {value:.3f}."
             )
-    if touched := room.touched_at(q):
+    if touched := room.find_contact(q):
         raise ConfigError(f"{name}: with these angles {touched} touch; choose others.")
     return q
 
@@ -309,7 +309,7 @@ def _rig(
                 f"{camera.name!r}. Make the environment with cameras= of all of them."
             )
     if rigs is None and room.level in CAMERA_LEVELS:
-        for finding in findings(with_rig(room.scene, rig), room.wants_pairs):
+        for finding in describe_defects(with_rig(room.scene, rig), room.wants_pairs):
             warnings.warn(finding, stacklevel=5)
     return rig, rigs
 

@@ -14,11 +14,11 @@ from hrc_env.env_config import EnvConfig
 from hrc_env.geometry.camera_config import CameraConfig, camera_of, read_rig
 from hrc_env.safety.shield import Shield, shield_called
 from hrc_env.scene.build import Scene
-from hrc_env.scene.camera_images import ImageConfig, images_called
+from hrc_env.scene.camera_images import ImageConfig, parse_images
 from hrc_env.scene.rig_distribution import RigDistribution
 from hrc_env.scene.rigs import RIGS
 from hrc_env.scene.robot import DEFAULT as DEFAULT_ROBOT
-from hrc_env.scene.robot import ROBOTS, Robot, robot_called
+from hrc_env.scene.robot import ROBOTS, Robot, find_robot
 from hrc_env.tasks.check import check_parts
 from hrc_env.tasks.hooks import protect_arrays
 from hrc_env.tasks.task import Task, find_task, is_known
@@ -93,7 +93,7 @@ def make_settings(asked: EnvConfig) -> Settings:
         if (part := getattr(asked, name)) is not None:
             config = _with_part(config, path, part, name)
     named = task.robot if asked.robot is None else asked.robot
-    robot = robot_called(DEFAULT_ROBOT if named is None else named)
+    robot = find_robot(DEFAULT_ROBOT if named is None else named)
     if task.needs_gripper and not robot.grips:
         able = [name for name, each in ROBOTS.items() if each.grips]
         raise ConfigError(
@@ -112,7 +112,7 @@ def make_settings(asked: EnvConfig) -> Settings:
     return Settings(
         asked, protect_arrays(task(config.task)), estimator, cameras, scene,
         robot, _worker_counts(n_workers),
-        shield_called(asked.shield), config, images_called(asked.observe_images), rigs,
+        shield_called(asked.shield), config, parse_images(asked.observe_images), rigs,
     )  # fmt: skip
 
 

@@ -43,7 +43,7 @@ from hrc_env.scene.build import Scene, all_grounds, build
 from hrc_env.scene.domain_randomization import Look
 from hrc_env.scene.limits import object_targets, robot_model
 from hrc_env.scene.physics import Physics
-from hrc_env.scene.rigs import findings
+from hrc_env.scene.rigs import describe_defects
 from hrc_env.settings import Settings
 from hrc_env.step_result import Observation, StepResult, agreed
 from hrc_env.tasks import goal
@@ -109,7 +109,7 @@ class Simulation(Stateful):
         if perception in CAMERA_LEVELS:
             n, rigs = len(self.scene.cameras), settings.rigs
             fewest = n if rigs is None else rigs.counts(n)[0]
-            for finding in findings(self.scene, self._wants_pairs, fewest):
+            for finding in describe_defects(self.scene, self._wants_pairs, fewest):
                 warnings.warn(finding, stacklevel=3)
         self.settings = settings.recorded(batch, self.scene)
         self.chain, n_joints = self.scene.chain, self.scene.chain.n_joints
@@ -145,7 +145,7 @@ class Simulation(Stateful):
         """What is believed of the workers now, and expected at each of `forecast_s`."""
         self.identities, self.keys = metrics.no_identities(batch, self.scene.n_workers), list[str]()
         robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
-        self.measured = handling.world_of(self.physics, self._everyone, robot).objects
+        self.measured = handling.make_world(self.physics, self._everyone, robot).objects
         """The task's loose objects as they were measured last; None: there are none."""
         self.streams = {name: [np.random.default_rng(0)] * batch for name in (*STREAMS, MEASURING)}
 
@@ -176,7 +176,7 @@ class Simulation(Stateful):
         camera_sees = self.config.faults, self.config.appearance
         room = Room(
             self.task, self.scene, self.chain, self.perception, *camera_sees, self.bodies.names,
-            self.motion.mind, self.physics.touched_at, self.images, self._wants_pairs,
+            self.motion.mind, self.physics.find_contact, self.images, self._wants_pairs,
         )  # fmt: skip
         return fix(options, room)
 
@@ -271,7 +271,7 @@ class Simulation(Stateful):
     def belief(self) -> Belief:
         """What every robot believes now."""
         robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
-        world = handling.world_of(self.physics, self._everyone, robot)
+        world = handling.make_world(self.physics, self._everyone, robot)
         return self._believe(self._everyone, self._load(world), self.estimates)
 
     def markers(self, b: int) -> Points3:
@@ -331,7 +331,7 @@ class Simulation(Stateful):
             )
         self.physics.reset(ids, q, self.motion.workers["body"][ids], poses)
         self.cameras.reset(ids, self.streams["sensor"], self.streams["tracker"])
-        world = handling.world_of(self.physics, ids, robot)
+        world = handling.make_world(self.physics, ids, robot)
         motion = generator.current(self.motion, ids)
         return Truth(ids, world, motion, worker_truth(self.bodies, motion))
 
@@ -361,8 +361,10 @@ class Simulation(Stateful):
         workers = worker_truth(self.bodies, motion)
         n = self.chain.n_joints
         robot, arm = chains.robot_along(self.chain, q_path[..., :n], self.physics.qd)
-        world = handling.world_of(self.physics, self._everyone, robot)
-        world, arm = handling.loaded(self.scene, world, arm, q_path, task.is_load(self.task_state))
+        world = handling.make_world(self.physics, self._everyone, robot)
+        world, arm = handling.attach_load(
+            self.scene, world, arm, q_path, task.is_load(self.task_state)
+        )
         progress = self._show_workers(world, motion)
         around = worker_capsules(self.bodies, path, motion.body), workers.capsule_radius_m
         paths = incidents.measured(arm, world.robot.capsule_radius_m, *around)
@@ -394,7 +396,7 @@ class Simulation(Stateful):
                 write_rows(whole, ids, part)
         if truth.world.objects is not None:
             rngs = picked(self.streams[MEASURING], ids)
-            measured = handling.measured(truth.world.objects, rngs, self.config.objects)
+            measured = handling.measure_objects(truth.world.objects, rngs, self.config.objects)
             write_rows(self.measured, ids, measured)
         return self._believe(ids, truth.world, estimates)
 
@@ -489,7 +491,9 @@ class Simulation(Stateful):
     def _load(self, world: World) -> World:
         """Return the world in which loads are parts of robots."""
         arm, qpos = world.robot.capsules_world[:, None], self.physics.qpos[:, None]
-        return handling.loaded(self.scene, world, arm, qpos, self.task.is_load(self.task_state))[0]
+        return handling.attach_load(
+            self.scene, world, arm, qpos, self.task.is_load(self.task_state)
+        ).world
 
     def _observe(self, belief: Belief) -> Observation:
         """Return what robots see: with goals that the task sets apart, and images, by name."""

@@ -16,7 +16,7 @@ from hrc_env.pipeline.tracking import setup_in
 from hrc_env.scene.build import Scene
 from hrc_env.scene.domain_randomization import AS_BUILT, AppearanceConfig, Look, draw_look
 from hrc_env.scene.render import CropRenderer
-from hrc_env.scene.rigs import floor
+from hrc_env.scene.rigs import sample_floor
 from hrc_env.tracking.estimators import Estimator
 
 
@@ -76,7 +76,7 @@ class PixelPipeline(ImageTracking):
         """`like`: a pipeline of the same scene and detector with other cameras, whose renderer and
         networks this one uses."""
         setup = setup_in(scene, config)
-        known = floor(scene.grounds), setup.calibration.sigma
+        known = sample_floor(scene.grounds), setup.calibration.sigma
         looking = Looking(batch, scene.cameras, scene.n_workers, config.detector, *known)
         renderer = None if like is None else like.cameras.renderer
         self.cameras = RenderedCameras(scene, batch, config.appearance, schedule, renderer)
