@@ -49,7 +49,7 @@ class HRCConfig:
     ctrl_dt: float = 0.04
     """Duration of a control step [s], a multiple of `scene.sim_dt`; 0.04 s is 25 Hz."""
     start_spread_rad: tuple[float, ...] = ()
-    """Largest distance of each joint from its home angle at a reset [rad]; empty for the robot's."""
+    """Largest distance of joints from their home angles at a reset [rad]; empty for the robot's."""
     forecast_s: tuple[float, ...] = ()
     """Horizons of the forecast of the workers' joints in the observation, each in (0, 1] [s]; none
     by default. (0.2, 0.4) adds 120 entries a worker."""

@@ -246,8 +246,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
 
     @property
     def faults(self) -> tuple[FaultConfig, ...]:
-        """Faults of this episode's cameras, each with its drawn amount; the robot does not know them.
-        """
+        """Faults of this episode's cameras, each with its drawn amount; no robot knows them."""
         return self.simulation.cameras.faults_of(0)
 
     @property
@@ -261,8 +260,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
 
     @property
     def next_options(self) -> dict[str, Any]:
-        """Options of the next reset alone, beside its argument; vector environments of processes set
-        them."""
+        """Options of the next reset alone, set by vector environments of processes."""
         return dict(self._next_options)
 
     @next_options.setter
@@ -429,8 +427,8 @@ class Spaces(NamedTuple):
 
     observation: Any
     """Space of observations: a `Box`, or a `Dict` with goals or images."""
-    action: Box
-    """Space of actions."""
+    action: Any
+    """Space of actions, a `Box`."""
 
 
 def make_spaces(simulation: Simulation) -> Spaces:
