@@ -101,13 +101,13 @@ from hrc_env.safety.shield import apply_shield, find_shield
 from hrc_env.safety.unseen import find_undetected
 from hrc_env.scene import domain_randomization as looks
 from hrc_env.scene import rigs
-from hrc_env.scene.build import SceneConfig, drawing_model, visuals
+from hrc_env.scene.build import SceneConfig, drawing_model, find_visuals
 from hrc_env.scene.build import build as build_scene
-from hrc_env.scene.objects import held_by
+from hrc_env.scene.objects import find_held
 from hrc_env.scene.render import CropRenderer
 from hrc_env.scene.rig import make_cameras
-from hrc_env.scene.rigs import floor as floor_points
-from hrc_env.scene.robot import ROBOTS, chain_of
+from hrc_env.scene.rigs import sample_floor as floor_points
+from hrc_env.scene.robot import ROBOTS, make_chain
 from hrc_env.settings import settle
 from hrc_env.simulation import Simulation
 from hrc_env.tasks.reach import MIDDLE
@@ -330,22 +330,22 @@ class Env:
     def describe_rig(self) -> dict[str, NDArray[Any]]:
         """Return which places the cameras see, and how many sentences there are on the rig."""
         scene = self._simulation.scene
-        places = rigs.workspace(scene.grounds)
+        places = rigs.sample_workspace(scene.grounds)
         return {
-            "places_m": places, "seen": rigs.sees(scene.cameras, scene.obstacles, places).T,
-            "n_findings": np.array([len(rigs.findings(scene))]),
+            "places_m": places, "seen": rigs.find_visible(scene.cameras, scene.obstacles, places).T,
+            "n_findings": np.array([len(rigs.describe_defects(scene))]),
         }  # fmt: skip
 
     def dress(self, appearance: str, seed: int) -> dict[str, NDArray[Any]]:
         """Return how an episode of an appearance looks to the cameras."""
         scene = self._simulation.scene
-        built, model, worn = drawing_model(scene), drawing_model(scene), visuals(scene)
+        built, model, worn = drawing_model(scene), drawing_model(scene), find_visuals(scene)
         rng = np.random.default_rng([seed, 49])
         look = looks.draw_look(looks.APPEARANCES[appearance], scene.n_workers, rng)
         looks.randomize(model, built, worn, look)
-        looks.take_off_hats(model, worn, look)
+        looks.hide_hats(model, worn, look)
         drawn = mujoco.MjvScene(model, maxgeom=80)
-        looks.strew(drawn, scene.grounds, look)
+        looks.add_litter(drawn, scene.grounds, look)
         litter = np.zeros((looks.MOST_LITTER, 19))
         for row, geom in zip(litter, drawn.geoms[: drawn.ngeom], strict=False):
             row[:] = [*geom.size, *geom.pos, *np.ravel(geom.mat), *geom.rgba]
@@ -524,7 +524,7 @@ def can_reach(
     """Return whether a robot at the origin is thought to get its tool to a place."""
     target = ReachTarget("a place", place_m, along, within_m)
     try:
-        check_reach("a probe", robot, chain_of(ROBOTS[robot], (0.0, 0.0, 0.0)), [target])
+        check_reach("a probe", robot, make_chain(ROBOTS[robot], (0.0, 0.0, 0.0)), [target])
     except ConfigError:
         return False
     return True
@@ -586,7 +586,7 @@ def objects_in_hand(
     away = np.arange(n_objects)[:, None] * [0.02, 0, 0, 0, 0, 0, 0]
     qpos[:, first:] = (poses[:, None] + away).reshape(n, -1)
     held = [
-        held_by(objects, qpos, points_m, HandState(np.zeros(n), np.zeros(n), closed))
+        find_held(objects, qpos, points_m, HandState(np.zeros(n), np.zeros(n), closed))
         for closed in (np.ones(n, bool), np.arange(n) % 2 == 0)
     ]
     env.close()
