@@ -49,7 +49,7 @@ def run(asked: ExportRequest) -> int:
         raise CheckpointError(f"{path} is there already; give another --name, or delete it.")
     console, kwargs = Console(), arguments.keywords()
     make_ready(console, arguments.perception)
-    env = HRCVecEnv(1, **kwargs)
+    env = HRCVecEnv(1, **arguments.batched_keywords())
     try:
         here = env_info(env.simulation)
     finally:
