@@ -1,6 +1,7 @@
 """Runs of `train --engine ray` through the command line: as others, and gone on with by both."""
 
 import json
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,9 @@ from commands import ROOT, called
 
 import hrc_env
 from hrc_env.__main__ import main
+from hrc_env.agents.requests import TrainingRequest
+from hrc_env.agents.rllib.runner_env import make_envs
+from hrc_env.sb3 import HRCVecEnv
 
 pytestmark = pytest.mark.slow
 
@@ -42,6 +46,15 @@ def test_a_run_is_gone_on_with_by_both_libraries(tmp_path):
     assert "--num-envs 4 --engine ray --workers 1" in card["command"]
     assert card["timesteps"] == steps_of(run)[-1]
     assert card["worth"][0]["episodes"] == 2
+
+
+def test_a_policy_of_level_pixels_is_judged_there(weights):
+    asked = TrainingRequest(perception="pixels", engine="ray")
+    assert hrc_env.evaluate("random", 1, max_episode_steps=2, **asked.keywords()).episodes == 1
+    with closing(HRCVecEnv(1, **asked.batched_keywords())) as env:
+        spaces = env.observation_space, env.action_space
+    with closing(make_envs(1, asked.keywords())) as env:
+        assert (env.single_observation_space, env.single_action_space) == spaces
 
 
 def steps_of(run: Path) -> list[float]:
