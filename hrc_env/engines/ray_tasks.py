@@ -1,6 +1,7 @@
 """The engine ray: every call is a task of a cluster."""
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,6 +26,10 @@ class RayTasks:
     note: Callable[[str], None] = print
     """Receives notes on the cluster."""
     is_parallel = True
+
+    def opened(self) -> AbstractContextManager[object]:
+        """As of `Engine`: a connection to the cluster."""
+        return cluster.connected(self.address, self.note)
 
     def run(self, calls: Sequence[Call], tick: Callable[[int, float], None]) -> Iterator[Done]:
         """As of `Engine`."""

@@ -35,6 +35,7 @@ from hrc_env.engines.ray_tasks import RayTasks
 from hrc_env.engines.registrations import pack
 from hrc_env.evaluation.episodes import play_shards
 from hrc_env.experiments.impact.experiment import Impact
+from hrc_env.experiments.price.experiment import Price
 from hrc_env.experiments.runner import cache_of
 from hrc_env.experiments.setups import REFERENCE
 from hrc_env.experiments.site.experiment import Site
@@ -147,6 +148,7 @@ def test_a_worker_that_dies_again_and_again_ends_it_with_its_error(cluster):
         ("raises", "A worker of Ray failed: ValueError: this shield is broken"),
         ("exits", "The worker of call 1 died 3 times"),
     ],
+    ids=["raises", "exits"],
 )
 def test_episodes_that_end_every_worker_end_with_its_error(cluster, shields, capsys, shield, error):
     asked = ["--shield", shield, "--episodes", "7", "--engine", "ray", "--workers", "1"]
@@ -160,6 +162,7 @@ def test_episodes_that_end_every_worker_end_with_its_error(cluster, shields, cap
         ("raises", "The last error: ValueError: this shield is broken. What was learnt is in"),
         ("exits", "The last error: a process that was killed, or ran out of memory"),
     ],
+    ids=["raises", "exits"],
 )
 def test_training_that_ends_every_worker_ends_with_its_error(
     cluster, shields, tmp_path, capsys, monkeypatch, shield, error
@@ -354,8 +357,9 @@ def test_more_workers_than_cores_are_said_and_find_a_place(cluster):
     [
         Impact(n_seeds=3, n_steps=8, policies=("scripted",), setups=("truth", REFERENCE)),
         Site(n_seeds=1, seconds=1.5, n_closed=1, estimators=("particle",)),
+        Price(eyes=("truth", "particle"), n_seeds=2, n_fresh=2, n_search=1, n_pixels=0, n_steps=8),
     ],
-    ids=["impact", "site"],
+    ids=["impact", "site", "price"],
 )
 def test_experiments_have_the_parts_of_one_process(cluster, weights, tmp_path, experiment):
     played = {}
