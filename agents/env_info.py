@@ -1,6 +1,6 @@
 """The protocol of agents, and what they know about their environment."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
@@ -66,6 +66,10 @@ class EnvInfo:
             observation: (..., n), or such arrays by name.
         """
         return split(observation, self.layout)
+
+
+AgentFactory = Callable[[EnvInfo], Agent]
+"""A function that makes an agent for an environment."""
 
 
 def env_info(env: object) -> EnvInfo:

@@ -25,8 +25,15 @@ from hrc_env.core.infos import matching
 from hrc_env.core.mapping import for_json
 from hrc_env.core.progress import progress_bar
 from hrc_env.core.results import provenance, write_whole
-from hrc_env.evaluation.dataset import ABOUT, FORMAT, draft_of, name_of, read_arrays, within
-from hrc_env.evaluation.moments import Kept, Moment, grouped
+from hrc_env.evaluation.dataset import (
+    ABOUT,
+    FORMAT,
+    format_file_name,
+    get_draft_path,
+    read_arrays,
+    select_folder,
+)
+from hrc_env.evaluation.moments import Moment, MomentParts, add_folder
 from hrc_env.evaluation.rollout import Transition, rollout
 from hrc_env.geometry.cameras import projections
 from hrc_env.pipeline.ready import make_ready
@@ -57,19 +64,19 @@ def run(asked: RecordingRequest) -> int:
     minari = _minari() if asked.folder is None else None
     path = _free_folder(asked.folder) if asked.folder else _free(minari, str(asked.out))
     about = _about(asked)
-    draft, console = draft_of(path), Console()
+    draft, console = get_draft_path(path), Console()
     _same_as_before(asked, draft)
     make_ready(console, asked.perception, draws=bool(asked.observe_images))
     firsts = range(0, asked.episodes, asked.num_envs)
     with progress_bar(console, "recording") as say:
         for first in firsts:
             n = min(asked.num_envs, asked.episodes - first)
-            files = [draft / name_of(first + b) for b in range(n)]
+            files = [draft / format_file_name(first + b) for b in range(n)]
             if not all(file.exists() for file in files):
                 for file, episode in zip(files, _played(asked, first, n), strict=True):
                     _keep(file, episode)
             say(1 / len(firsts), "")
-    files = [draft / name_of(k) for k in range(asked.episodes)]
+    files = [draft / format_file_name(k) for k in range(asked.episodes)]
     n_steps = sum(_steps_of(file) for file in files)
     if minari is None:
         write_whole(draft / ABOUT, json.dumps(about, indent=1))
@@ -195,10 +202,10 @@ def _played(asked: RecordingRequest, first: int, n: int) -> list[Episode]:
         agent = make_agent(asked.agent, env_info(env.shards.first), asked.seed + first, asked.trust)
         begun = env.reset(seed=asked.seed + first)
         kept = _kept_of(asked, env, begun[1], n)
-        steps, moments = list[Transition](), [kept.of(env, begun[1])]
+        steps, moments = list[Transition](), [kept.read(env, begun[1])]
         for step in rollout(env, _Clipped(agent), begun[0]):
             steps.append(step)
-            moments.append(kept.of(env, step.info))
+            moments.append(kept.read(env, step.info))
         lengths = np.sum([step.is_playing for step in steps], axis=0)
         seeds = range(asked.seed + first, asked.seed + first + n)
         parts = [(steps[:length], moments[: length + 1]) for length in lengths]
@@ -207,7 +214,9 @@ def _played(asked: RecordingRequest, first: int, n: int) -> list[Episode]:
         env.close()
 
 
-def _kept_of(asked: RecordingRequest, env: HRCVectorEnv, info: Mapping[str, Any], n: int) -> Kept:
+def _kept_of(
+    asked: RecordingRequest, env: HRCVectorEnv, info: Mapping[str, Any], n: int
+) -> MomentParts:
     """Return the requested parts of each moment of `n` episodes side by side, of the infos that
     there are; `ConfigError` for other infos, and for more images than memory holds."""
     there = [name for name in info if not name.startswith("_")]
@@ -222,7 +231,7 @@ def _kept_of(asked: RecordingRequest, env: HRCVectorEnv, info: Mapping[str, Any]
                 f"{MOST_BYTES / 2**30:.0f} are held in memory: observe smaller images, fewer "
                 "cameras, or play fewer environments together (--num-envs)."
             )
-    return Kept(tuple(names), asked.poses, asked.keypoints)
+    return MomentParts(tuple(names), asked.poses, asked.keypoints)
 
 
 class _Clipped:
@@ -298,12 +307,12 @@ def _buffer(k: int, episode: Episode) -> Any:
     """An episode as Minari takes it; belief and other things that were kept are groups of infos."""
     from minari.data_collector import EpisodeBuffer
 
-    seen, infos = within(episode, "observations"), dict[str, Any]()
+    seen, infos = select_folder(episode, "observations"), dict[str, Any]()
     for group in ("belief", "truth", "keypoints"):
-        infos[group] = within(episode, group)
-    infos |= {name: episode[grouped(name)] for name in TOP}
+        infos[group] = select_folder(episode, group)
+    infos |= {name: episode[add_folder(name)] for name in TOP}
     for name in TOP:
-        infos[grouped(name).partition("/")[0]].pop(name)
+        infos[add_folder(name).partition("/")[0]].pop(name)
     return EpisodeBuffer(
         id=k, seed=int(episode["seed"]), observations=seen.get("", seen),
         infos={name: value for name, value in infos.items() if len(value)},

@@ -17,7 +17,7 @@ from hrc_env.core.errors import CheckpointError, RenderingError, learner
 from hrc_env.core.mapping import restored
 from hrc_env.core.progress import Meter, progress_bar
 from hrc_env.core.results import provenance, write_whole
-from hrc_env.evaluation.episodes import Score, contradiction, evaluate
+from hrc_env.evaluation.episodes import Score, describe_contradiction, evaluate
 from hrc_env.pipeline.ready import make_ready
 from hrc_env.sb3 import HRCVecEnv
 from hrc_env.settings import settle
@@ -109,7 +109,7 @@ def judge(arguments: TrainingRequest, folder: Path, console: Console) -> Score:
     )
     for name, value in asdict(score).items():
         console.print(f"  {name + SHARES.get(name, ''):28s} {value:.3f}", highlight=False)
-    if said := contradiction(score):
+    if said := describe_contradiction(score):
         console.print(said, highlight=False, soft_wrap=True)
     return score
 
@@ -263,7 +263,7 @@ def _clone(learner: Any, arguments: Run, env: HRCVecEnv, console: Console) -> No
 
 def film(folder: Path, arguments: TrainingRequest, console: Console) -> bool:
     """Film the policy's closest encounter with the worker; whether this machine can draw."""
-    from hrc_env.evaluation.film import film_episode, nearest_seed
+    from hrc_env.evaluation.film import film_episode, find_nearest_seed
 
     def make(env_info: EnvInfo) -> checkpoints.TrainedAgent:
         return checkpoints.load(folder / "policy.zip", env_info)
@@ -272,7 +272,7 @@ def film(folder: Path, arguments: TrainingRequest, console: Console) -> bool:
     del kwargs["num_threads"]
     try:
         seeds = range(arguments.seed, arguments.seed + FILM_SEEDS)
-        seed = nearest_seed(make, seeds, **kwargs)
+        seed = find_nearest_seed(make, seeds, **kwargs)
         film_episode(make, folder / "policy.mp4", seed, **kwargs)
     except RenderingError as error:
         console.print(f"No film: {error}", markup=False)

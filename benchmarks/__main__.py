@@ -10,10 +10,10 @@ from typing import Annotated, Any
 import tyro
 from rich.console import Console
 
-from hrc_env.cli.checks import at_least, writable_folder
+from hrc_env.cli.checks import check_at_least, check_writable_folder
 from hrc_env.cli.engines import EngineArguments
 from hrc_env.cli.entry import import_first, run_command, show_errors
-from hrc_env.cli.estimators import estimators_named
+from hrc_env.cli.estimators import resolve_estimators
 from hrc_env.cli.show import show
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.progress import progress_bar
@@ -34,7 +34,9 @@ class BenchArguments(EngineArguments):
 
     def show(self, experiment: Experiment[Any]) -> int:
         """Run an experiment, show its tables."""
-        return show(partial(run_experiment, experiment, engine=self.chosen()), self.out, "bench")
+        return show(
+            partial(run_experiment, experiment, engine=self.choose_engine()), self.out, "bench"
+        )
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ class TrackingArguments(BenchArguments):
 
     def run(self) -> int:
         """Run, show the tables."""
-        at_least("--seeds", self.seeds, 1)
+        check_at_least("--seeds", self.seeds, 1)
         if self.real and self.baselines:
             raise ConfigError("--real and --baselines are two parts of the bench; choose one.")
         if (self.real or self.baselines) and (self.estimators or self.sequences):
@@ -79,7 +81,7 @@ class TrackingArguments(BenchArguments):
         from benchmarks.tracking.bench import QUICK, TrackingBench
 
         config = QUICK if self.quick else TrackingBench()
-        names = estimators_named(self.estimators)
+        names = resolve_estimators(self.estimators)
         sequences = tuple(dict.fromkeys(self.sequences))
         config = changed(config, n_seeds=self.seeds)
         return self.show(changed(config, estimators=names, sequences=sequences))
@@ -111,7 +113,7 @@ class SpeedArguments(BenchArguments):
 
     def run(self) -> int:
         """Run, show the tables."""
-        at_least("--rounds", self.rounds, 1)
+        check_at_least("--rounds", self.rounds, 1)
         from benchmarks.speed.bench import QUICK, SpeedBench
 
         config = QUICK if self.quick else SpeedBench()
@@ -129,7 +131,7 @@ class MotionArguments(BenchArguments):
 
     def run(self) -> int:
         """Run, show the tables."""
-        at_least("--seeds", self.seeds, 1)
+        check_at_least("--seeds", self.seeds, 1)
         from benchmarks.motion.bench import QUICK, MotionBench
 
         config = QUICK if self.quick else MotionBench()
@@ -159,7 +161,7 @@ class Gallery:
 
     def run(self) -> int:
         """Draw, tell where."""
-        writable_folder(self.out)
+        check_writable_folder(self.out)
         from benchmarks.gallery.gallery import GalleryConfig, run
 
         console = Console()

@@ -18,7 +18,7 @@ import tyro
 from benchmarks.command import StudyArguments, run_study
 from benchmarks.learning import Training
 from hrc_env.agents.registry import AGENTS
-from hrc_env.cli.checks import at_least
+from hrc_env.cli.checks import check_at_least
 from hrc_env.cli.entry import show_errors
 from hrc_env.evaluation.episodes import EVALUATION_SEED
 from hrc_env.evaluation.sums import ACHIEVED
@@ -60,7 +60,7 @@ class BaselinesArguments(StudyArguments):
     def __post_init__(self) -> None:
         """Raise `ConfigError` for numbers that cannot work."""
         super().__post_init__()
-        at_least("--timesteps", self.timesteps, 1)
+        check_at_least("--timesteps", self.timesteps, 1)
 
 
 def trainings_of(

@@ -308,11 +308,11 @@ def main() -> int:
     import tyro
 
     from hrc_env.cli.entry import show_errors
-    from hrc_env.cli.options import understood
+    from hrc_env.cli.options import normalize_words
     from hrc_env.cli.show import show
 
     def run_asked() -> int:
-        words = understood(Arguments, sys.argv[1:], "python -m benchmarks.cluster")
+        words = normalize_words(Arguments, sys.argv[1:], "python -m benchmarks.cluster")
         asked = tyro.cli(
             Arguments, args=words, default=Arguments(Path("out/cluster")), description=__doc__
         )

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import tyro
 
-from hrc_env.cli.checks import at_least
+from hrc_env.cli.checks import check_at_least
 from hrc_env.cli.engines import EngineArguments
 from hrc_env.cli.entry import show_errors
-from hrc_env.cli.options import understood
+from hrc_env.cli.options import normalize_words
 from hrc_env.cli.show import show
 from hrc_env.experiments.runner import run_experiment
 from hrc_env.experiments.study import Study
@@ -40,14 +40,16 @@ class StudyArguments(Arguments):
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for numbers that cannot work."""
-        at_least("--threads", self.threads, 1)
+        check_at_least("--threads", self.threads, 1)
 
 
 def run_study(study: Study, arguments: StudyArguments) -> int:
     """Run a study as it was asked, and show its report; return the exit status."""
     study = study.select(arguments.only) if arguments.only else study
     study = replace(study.quick() if arguments.quick else study, threads=arguments.threads)
-    run = partial(run_experiment, study, overwrite=arguments.overwrite, engine=arguments.chosen())
+    run = partial(
+        run_experiment, study, overwrite=arguments.overwrite, engine=arguments.choose_engine()
+    )
     return show(run, arguments.out, study.name)
 
 
@@ -62,7 +64,7 @@ def main(make: Callable[[], Study], about: str | None) -> int:
     def run_asked() -> int:
         study = make()
         default = StudyArguments(Path("out") / study.name)
-        words = understood(StudyArguments, sys.argv[1:], f"python -m benchmarks.{study.name}")
+        words = normalize_words(StudyArguments, sys.argv[1:], f"python -m benchmarks.{study.name}")
         return run_study(
             study, tyro.cli(StudyArguments, args=words, default=default, description=about)
         )

@@ -32,7 +32,7 @@ from hrc_env.core.results import Metric
 from hrc_env.core.skeleton import TORSO
 from hrc_env.core.typing import Bools, Floats, Ints, Points3
 from hrc_env.evaluation.counts import ERRORS_M, Bins
-from hrc_env.evaluation.intervals import counted_quantile_over, ratio_over
+from hrc_env.evaluation.intervals import estimate_binned_quantile, estimate_ratio
 from hrc_env.experiments.ablations.play import BODIES, Walks, walks_of
 from hrc_env.experiments.cache import Part, PartCache, PartProgress
 from hrc_env.experiments.columns import Column
@@ -206,7 +206,7 @@ def metrics_of(level: str, n_episodes: int, facing: Facing) -> dict[str, Metric]
     walks = walks_of("lab", 1, seeds, round(facing.seconds / DT_S))
     seen = counted(level, "particle", ALL, walks, seeds)
     for yaw in YAWS:
-        missed = ratio_over(seen[f"missed.{yaw}"], seen[f"free.{yaw}"], "share")
+        missed = estimate_ratio(seen[f"missed.{yaw}"], seen[f"free.{yaw}"], "share")
         metrics[f"missed.{level}.{yaw}"] = missed
         metrics |= _quantiles(f"off_share.{level}.{yaw}", SHARES, seen[f"off_share.{yaw}"], "share")
     for estimator in ESTIMATORS[level]:
@@ -219,7 +219,7 @@ def metrics_of(level: str, n_episodes: int, facing: Facing) -> dict[str, Metric]
 
 def _quantiles(key: str, bins: Bins, counts: Ints, unit: str) -> dict[str, Metric]:
     return {
-        f"{key}.{name}": counted_quantile_over(bins, counts, q, unit)
+        f"{key}.{name}": estimate_binned_quantile(bins, counts, q, unit)
         for name, q in (("median", 0.5), ("p95", 0.95))
     }
 
@@ -258,7 +258,9 @@ def main() -> int:
     """Follow, sort, write, show."""
     arguments = tyro.cli(Arguments, default=Arguments(Path("out/facing")), description=__doc__)
     facing = Facing(episodes=(12, 4)) if arguments.quick else Facing()
-    run = partial(run_experiment, facing, overwrite=arguments.overwrite, engine=arguments.chosen())
+    run = partial(
+        run_experiment, facing, overwrite=arguments.overwrite, engine=arguments.choose_engine()
+    )
     return show(run, arguments.out, "facing")
 
 

@@ -175,7 +175,7 @@ BAD = {
         ["--num-envs", "9", "--observe-images", "1024", "1024"], "at most 4 are held in memory"),
     "keypoints without cameras": (
         ["--keypoints", "--perception", "truth"], "--perception truth has none"),
-    "two places": (["--out", "hrc/reach-v0"], "Say where the data set goes"),
+    "two places": (["--out", "hrc/reach-v0"], "A data set needs one place"),
 }  # fmt: skip
 
 
@@ -190,7 +190,7 @@ def test_what_cannot_be_recorded_is_refused_before_an_episode(name, tmp_path):
 
 def test_a_place_is_needed_and_must_be_free(tmp_path):
     done = hrc("record", "HRCReach-v0")
-    assert "Say where the data set goes" in said(done)
+    assert "A data set needs one place" in said(done)
     assert "is there already" in said(record(tmp_path))
 
 

@@ -97,7 +97,7 @@ def test_paired_gives_the_difference_of_a_statistic_of_one_row():
         np.array([0.5, 1.0, 3.0, 7.0, 8.0, 2.0]),
     )
     both = np.array([*ours, *theirs])
-    found = hrc_env.paired("mean", lambda w: w @ both / w.sum(-1), len(ours), "m")
+    found = hrc_env.compare_paired("mean", lambda w: w @ both / w.sum(-1), len(ours), "m")
     compared = hrc_env.compare_means(ours, theirs, "m")
     assert found["difference.mean"] == compared.difference
     assert found["p.mean"].value == compared.p
@@ -221,7 +221,7 @@ def test_episodes_of_an_evaluation_can_be_compared():
 @pytest.mark.parametrize("exposure", [[1, 2, 3], [[1.0, 2.0]], []])
 def test_rates_are_of_the_same_seeds(exposure):
     with pytest.raises(hrc_env.ConfigError, match=r"same seeds|must have shape"):
-        hrc_env.rate_of([1, 1], exposure)
+        hrc_env.estimate_rate([1, 1], exposure)
     with pytest.raises(hrc_env.ConfigError, match=r"same seeds|must have shape"):
         hrc_env.compare_rates([1, 1], [1, 0], 2.0, exposure)
 

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from hrc_env.evaluation.episodes import contradiction, summarize
+from hrc_env.evaluation.episodes import describe_contradiction, summarize
 
 pytest.importorskip("torch")
 from matplotlib.figure import Figure
@@ -30,9 +30,9 @@ def test_a_task_that_never_succeeded_is_told():
     """Which was reported as a success of 1."""
     never = summarize([episode(3, 0, 0), episode(2, 0, 0)])
     assert (never.success_rate, never.is_success) == (1.0, 0.0)
-    assert "100% of the attempts were achieved" in contradiction(never)
-    assert contradiction(summarize([episode(3, 0, 0), episode(2, 0, 1)])) == ""
-    assert contradiction(summarize([episode(0, 4, 0)])) == ""
+    assert "100% of the attempts were achieved" in describe_contradiction(never)
+    assert describe_contradiction(summarize([episode(3, 0, 0), episode(2, 0, 1)])) == ""
+    assert describe_contradiction(summarize([episode(0, 4, 0)])) == ""
 
 
 def test_a_curve_says_the_weight_that_was_reached():

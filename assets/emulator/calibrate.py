@@ -7,7 +7,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from hrc_env.cli.checks import at_least, writable_file
+from hrc_env.cli.checks import check_at_least, check_writable_file
 from hrc_env.cli.entry import run_command, show_errors
 from hrc_env.core.progress import progress_bar
 
@@ -39,9 +39,9 @@ class CalibrateKeypoints:
 
     def run(self) -> int:
         """Fit; show what came of it."""
-        at_least("--rounds", self.rounds, 0)
-        at_least("--seed", self.seed, 0)
-        writable_file(self.out)
+        check_at_least("--rounds", self.rounds, 0)
+        check_at_least("--seed", self.seed, 0)
+        check_writable_file(self.out)
         from assets.emulator.run import CalibrationRun, calibrate, compare
         from assets.emulator.validate import COLUMNS, table_of
 

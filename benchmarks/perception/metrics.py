@@ -14,10 +14,10 @@ from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.evaluation.intervals import (
     bootstrap,
-    quantile_over,
-    ratio_over,
-    rmse_over,
-    share_of,
+    estimate_quantile,
+    estimate_ratio,
+    estimate_rmse,
+    estimate_share,
 )
 
 PIXELS, EMULATED, NO_FAULT = "pixels", "keypoints", "none"
@@ -87,11 +87,11 @@ def _belief(name: str, episodes: list[Episode]) -> Metrics:
     lost = [float(np.isnan(episode.error_m[:, 0]).sum()) for episode in episodes]
     steps = [float(len(episode.family)) for episode in episodes]
     return {
-        f"error_m.{name}.median": quantile_over(errors, 0.5, "m"),
-        f"error_m.{name}.p95": quantile_over(errors, 0.95, "m"),
-        f"coverage95.{name}": ratio_over(inside, [float(len(each)) for each in errors], "share"),
-        f"std_over_error.{name}": rmse_over(reported, squared, "ratio"),
-        f"lost_steps.{name}": ratio_over(lost, steps, "share"),
+        f"error_m.{name}.median": estimate_quantile(errors, 0.5, "m"),
+        f"error_m.{name}.p95": estimate_quantile(errors, 0.95, "m"),
+        f"coverage95.{name}": estimate_ratio(inside, [float(len(each)) for each in errors], "share"),
+        f"std_over_error.{name}": estimate_rmse(reported, squared, "ratio"),
+        f"lost_steps.{name}": estimate_ratio(lost, steps, "share"),
     }
 
 
@@ -133,7 +133,7 @@ def _detected(episodes: list[Episode], cameras: list[int]) -> Metric:
     """The share of steps in which the camera with the fault reported anybody."""
     pairs = zip(episodes, cameras, strict=True)
     seen = [float(np.isfinite(each.off_px[:, c]).sum()) for each, c in pairs]
-    return ratio_over(seen, [float(len(each.off_px)) for each in episodes], "share")
+    return estimate_ratio(seen, [float(len(each.off_px)) for each in episodes], "share")
 
 
 def _named(start: str, episodes: list[Episode], own: list[int]) -> Metrics:
@@ -146,9 +146,9 @@ def _named(start: str, episodes: list[Episode], own: list[int]) -> Metrics:
     first = [float(np.argmax(each)) * STEP_S for each in mine if each.any()]
     steps = [float(len(each.family)) for each in episodes]
     return {
-        f"{start}.named": share_of([bool(each.any()) for each in mine]),
-        f"{start}.after_s": quantile_over([[each] for each in first], 0.5, "s"),
-        f"{start}.others": ratio_over([float(each.sum()) for each in wrong], steps, "share"),
+        f"{start}.named": estimate_share([bool(each.any()) for each in mine]),
+        f"{start}.after_s": estimate_quantile([[each] for each in first], 0.5, "s"),
+        f"{start}.others": estimate_ratio([float(each.sum()) for each in wrong], steps, "share"),
     }
 
 
@@ -156,11 +156,11 @@ def _views(every: list[View]) -> Metrics:
     metrics: Metrics = {}
     for kind in ROWS:
         for row, views in rows_of(every, kind).items():
-            metrics[f"detected.{kind}.{row}"] = share_of([view.error is not None for view in views])
+            metrics[f"detected.{kind}.{row}"] = estimate_share([view.error is not None for view in views])
             errors = [[view.error] for view in views if view.error is not None]
             for name, q in (("median", 0.5), ("p95", 0.95)):
                 key = f"error_share.{kind}.{row}.{name}"
-                metrics[key] = quantile_over(errors, q, "share of stature")
+                metrics[key] = estimate_quantile(errors, q, "share of stature")
     return metrics
 
 

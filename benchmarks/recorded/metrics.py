@@ -12,7 +12,7 @@ from hrc_env.core.records import PoseEstimate
 from hrc_env.core.results import Metric
 from hrc_env.core.skeleton import BONES, MIRROR
 from hrc_env.core.typing import Bools, Covariances3, Floats, Points3
-from hrc_env.evaluation.intervals import quantile_over, ratio_over
+from hrc_env.evaluation.intervals import estimate_quantile, estimate_ratio
 from hrc_env.geometry.cameras import project
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import ESTIMATORS, make_estimator
@@ -113,13 +113,13 @@ def foretold_metrics(foretold: Foretold) -> dict[str, Metric]:
     drawn anew."""
     n_blocks = max(len(foretold.inside) // _BLOCK, 1)
     out = {
-        f"{kind}.{part}": quantile_over(np.array_split(off, n_blocks), q, "px")
+        f"{kind}.{part}": estimate_quantile(np.array_split(off, n_blocks), q, "px")
         for kind, off in (("px", foretold.off_px), ("either_px", foretold.off_either_px))
         for part, q in (("median", 0.5), ("p95", 0.95))
     }
     inside = np.array_split(foretold.inside, n_blocks)
     counts = [np.isfinite(each).sum() for each in inside]
-    out["coverage95"] = ratio_over([np.nansum(each) for each in inside], counts, "share")
+    out["coverage95"] = estimate_ratio([np.nansum(each) for each in inside], counts, "share")
     return out
 
 

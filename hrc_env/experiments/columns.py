@@ -92,7 +92,7 @@ def mean(
     return _column(
         name or statistic,
         heading,
-        lambda own, _: intervals.mean_over(_values(own, statistic), counted_in),
+        lambda own, _: intervals.estimate_mean(_values(own, statistic), counted_in),
         **shown,
     )
 
@@ -111,12 +111,12 @@ def per_minute(
             (`hrc_env.evaluation.sums.ACHIEVED`) has an exact interval where it is zero.
     """
     check_names("statistic", [statistic], STATISTICS)
-    over = intervals.goals_over if statistic == ACHIEVED else None
+    over = intervals.estimate_goal_rate if statistic == ACHIEVED else None
     counted_in = f"{UNITS.get(statistic, '1')}/min" if unit is None else unit
 
     def measure(own: Episodes, _: Episodes) -> Metric:
         values, minutes = _values(own, statistic), _values(own, "seconds") / 60
-        return over(values, minutes) if over else intervals.ratio_over(values, minutes, counted_in)
+        return over(values, minutes) if over else intervals.estimate_ratio(values, minutes, counted_in)
 
     return _column(name or f"{statistic}_per_minute", heading, measure, **shown)
 
@@ -142,7 +142,7 @@ def rate(
 
     def measure(own: Episodes, _: Episodes) -> Metric:
         counts = np.sum([_values(own, each) for each in names], axis=0)
-        return intervals.rate_of(counts, exposure(own), unit)
+        return intervals.estimate_rate(counts, exposure(own), unit)
 
     return _column(name or names[0], heading, measure, **{"counted": True, **shown})
 
@@ -164,7 +164,7 @@ def share_of_episodes(statistic: str, heading: str = "", **shown: Unpack[Shown])
     check_names("statistic", [statistic], STATISTICS)
 
     def measure(own: Episodes, _: Episodes) -> Metric:
-        return intervals.share_of([bool(each[statistic]) for each in own])
+        return intervals.estimate_share([bool(each[statistic]) for each in own])
 
     return _column(statistic, heading, measure, **shown)
 
@@ -181,8 +181,8 @@ def share_of_tries(heading: str = "", clustered: bool = True, **shown: Unpack[Sh
     def measure(own: Episodes, _: Episodes) -> Metric:
         achieved, failed = _values(own, ACHIEVED), _values(own, FAILED)
         if clustered:
-            return intervals.success_over(achieved, achieved + failed)
-        return intervals.share_of([True] * int(achieved.sum()) + [False] * int(failed.sum()))
+            return intervals.estimate_success(achieved, achieved + failed)
+        return intervals.estimate_share([True] * int(achieved.sum()) + [False] * int(failed.sum()))
 
     return _column("success", heading, measure, **shown)
 
@@ -198,7 +198,7 @@ def share_of_baseline(
     check_names("statistic", [statistic], STATISTICS)
 
     def measure(own: Episodes, theirs: Episodes) -> Metric:
-        return intervals.ratio_over(_values(own, statistic), _values(theirs, statistic), "share")
+        return intervals.estimate_ratio(_values(own, statistic), _values(theirs, statistic), "share")
 
     return _column(name, heading, measure, is_paired=True, **shown)
 
@@ -216,8 +216,8 @@ def less_baseline(
 
     def measure(own: Episodes, theirs: Episodes) -> Metric:
         both = [*_values(own, statistic), *_values(theirs, statistic)]
-        ratio = intervals.ratio_of(both, np.ones(len(both)))
-        return intervals.paired("it", ratio, len(own), unit)["difference.it"]
+        ratio = intervals.make_ratio(both, np.ones(len(both)))
+        return intervals.compare_paired("it", ratio, len(own), unit)["difference.it"]
 
     name = name or f"difference.{statistic}"
     return _column(name, heading, measure, is_paired=True, signed=True, **shown)

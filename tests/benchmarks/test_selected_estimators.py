@@ -7,7 +7,7 @@ import pytest
 from benchmarks.tracking import bench, sequences
 from benchmarks.tracking.bench import TrackingBench
 from benchmarks.tracking.names import DLT, EVERYTHING, SMOOTHER, Selection
-from hrc_env.cli.estimators import estimators_named
+from hrc_env.cli.estimators import resolve_estimators
 from hrc_env.core.errors import ConfigError
 from hrc_env.engines.local import Serial
 from hrc_env.experiments import runner
@@ -118,11 +118,11 @@ def test_a_function_is_registered_by_its_name(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     try:
         for _ in range(2):  # twice the same is once
-            assert estimators_named(["calm_estimators:calm", "ransac"]) == ("calm", "ransac")
+            assert resolve_estimators(["calm_estimators:calm", "ransac"]) == ("calm", "ransac")
         assert bench.own_key("calm", "key") != "key" == bench.own_key("ransac", "key")
         with pytest.raises(ConfigError, match="must be a function of"):
-            estimators_named(["calm_estimators:broken"])
+            resolve_estimators(["calm_estimators:broken"])
         with pytest.raises(ConfigError, match="There is no estimator 'calm_estimators:gone'"):
-            estimators_named(["calm_estimators:gone"])
+            resolve_estimators(["calm_estimators:gone"])
     finally:
         ESTIMATORS.pop("calm", None)

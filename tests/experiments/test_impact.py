@@ -13,7 +13,7 @@ from hrc_env.agents import policies as kept
 from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.core.results import Metric
 from hrc_env.evaluation.counts import GAPS_M, Bins
-from hrc_env.evaluation.intervals import counted_quantile_over
+from hrc_env.evaluation.intervals import estimate_binned_quantile
 from hrc_env.experiments.agents import label_of, labels_of
 from hrc_env.experiments.cache import PartCache
 from hrc_env.experiments.impact import policies
@@ -133,7 +133,7 @@ def test_cost_is_split_by_whether_the_robot_moves_towards_the_worker():
 def test_quantiles_of_bins_are_those_of_the_values():
     rng = np.random.default_rng(0)
     values = rng.normal(0.2, 0.1, (40, 500))
-    found = counted_quantile_over(GAPS_M, GAPS_M.count(values).tolist(), 0.95, "m")
+    found = estimate_binned_quantile(GAPS_M, GAPS_M.count(values).tolist(), 0.95, "m")
     assert found.value == pytest.approx(np.quantile(values, 0.95), abs=0.002)
     assert found.low < found.value < found.high
 

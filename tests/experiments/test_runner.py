@@ -105,7 +105,7 @@ def test_a_full_disk_is_said_and_loses_nothing(tmp_path, monkeypatch):
 
 
 def test_a_rate_of_what_never_happened_says_how_often_it_may():
-    none, some = (intervals.rate_of([k] * 50, 0.05, "per 1000") for k in (0, 1))
+    none, some = (intervals.estimate_rate([k] * 50, 0.05, "per 1000") for k in (0, 1))
     assert (none.value, none.low) == (0.0, 0.0)
     assert none.high == pytest.approx(-np.log(0.025) / 0.05)
     assert (some.value, some.n) == (1000.0, 50)
@@ -117,40 +117,40 @@ def test_a_rate_of_what_never_happened_says_how_often_it_may():
     [(0, 0.0, 3.6889), (1, 0.0253, 5.5716), (2, 0.2422, 7.2247), (10, 4.7954, 18.3904)],
 )
 def test_a_rate_has_the_exact_interval_of_a_poisson_count(count, low, high):
-    found = intervals.rate_of([0, count], [1.0, 1.0], "1/h")
+    found = intervals.estimate_rate([0, count], [1.0, 1.0], "1/h")
     assert (2 * found.value, 2 * found.low, 2 * found.high) == pytest.approx(
         (count, low, high), abs=1e-4
     )
 
 
 def test_a_rate_in_no_time_is_not_known():
-    assert np.isnan(intervals.rate_of([0.0], 0.0, "1/h").value)
+    assert np.isnan(intervals.estimate_rate([0.0], 0.0, "1/h").value)
 
 
 @pytest.mark.parametrize(("k", "n"), [(0, 1), (0, 64), (3, 10), (64, 64)])
 def test_a_share_has_the_exact_interval_of_a_binomial_count(k, n):
-    found = intervals.share_of([True] * k + [False] * (n - k))
+    found = intervals.estimate_share([True] * k + [False] * (n - k))
     exact = stats.binomtest(k, n).proportion_ci(0.95, method="exact")
     assert (found.value, found.low, found.high, found.n) == (k / n, exact.low, exact.high, n)
 
 
 def test_what_always_succeeded_may_fail_as_often_as_seeds_allow():
-    found = intervals.success_over([3.0] * 64, [3.0] * 64)
+    found = intervals.estimate_success([3.0] * 64, [3.0] * 64)
     assert (found.value, found.high, found.n) == (1.0, 1.0, 64)
     assert found.low == pytest.approx(0.025 ** (1 / 64))
-    mixed = intervals.success_over([3.0, 1.0], [3.0, 3.0])
+    mixed = intervals.estimate_success([3.0, 1.0], [3.0, 3.0])
     assert (mixed.value, mixed.low) == (2 / 3, 1 / 3)
 
 
 def test_goals_that_were_never_reached_have_a_bound():
-    none, some = (intervals.goals_over([k] * 30, [1.0] * 30) for k in (0.0, 5.0))
+    none, some = (intervals.estimate_goal_rate([k] * 30, [1.0] * 30) for k in (0.0, 5.0))
     assert none.high == pytest.approx(3.6889 / 30, abs=1e-4)
     assert (some.low, some.high) == (5.0, 5.0)
 
 
 def test_one_rate_less_another_has_a_width_also_where_both_are_zero():
-    zero, five = (intervals.rate_of([k], 15.0, "1/min") for k in (0, 5))
-    same, more = intervals.excess_of(zero, zero), intervals.excess_of(five, zero)
+    zero, five = (intervals.estimate_rate([k], 15.0, "1/min") for k in (0, 5))
+    same, more = intervals.subtract_rates(zero, zero), intervals.subtract_rates(five, zero)
     assert (same.value, -same.low) == (0.0, same.high)
     assert same.high == pytest.approx(3.6889 / 15, abs=1e-4)
     assert more.low < 0.0 < more.value  # five against none is no difference yet: p = 1/16
@@ -159,9 +159,9 @@ def test_one_rate_less_another_has_a_width_also_where_both_are_zero():
 
 @pytest.mark.parametrize("exposure", [1.0, 0.64])
 def test_a_zero_of_a_count_is_shown_with_its_bound(exposure):
-    zero = intervals.rate_of([0] * 64, exposure, "1/h")
+    zero = intervals.estimate_rate([0] * 64, exposure, "1/h")
     assert report.format_metric(zero) == f"0.0 (0.0 to {3.6889 / exposure:.1f})"
-    assert not report.format_metric(intervals.excess_of(zero, zero), signed=True).endswith("+0.0")
+    assert not report.format_metric(intervals.subtract_rates(zero, zero), signed=True).endswith("+0.0")
 
 
 def test_an_interval_without_a_visible_width_is_not_shown():
@@ -173,33 +173,33 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
     rng = np.random.default_rng(0)
     held = [
         interval.low <= 2.0 <= interval.high
-        for interval in (intervals.mean_over(rng.normal(2, 1, 30), "m") for _ in range(60))
+        for interval in (intervals.estimate_mean(rng.normal(2, 1, 30), "m") for _ in range(60))
     ]
     assert 0.85 <= np.mean(held) <= 1.0
 
 
 def test_one_seed_has_no_interval_and_says_so():
-    one = intervals.rmse_over([4.0], [1.0], "m")
+    one = intervals.estimate_rmse([4.0], [1.0], "m")
     assert (one.value, one.low, one.high, one.n) == (2.0, 2.0, 2.0, 1)
 
 
 def test_ratios_of_paired_rows_are_narrower_than_of_strangers():
     rng = np.random.default_rng(1)
     hard = rng.uniform(1, 9, 40)
-    paired = intervals.rmse_over(4 * hard, hard, "ratio")
-    strangers = intervals.rmse_over(4 * hard, rng.permutation(hard), "ratio")
+    paired = intervals.estimate_rmse(4 * hard, hard, "ratio")
+    strangers = intervals.estimate_rmse(4 * hard, rng.permutation(hard), "ratio")
     assert paired.value == pytest.approx(2.0)
     assert paired.high - paired.low < 1e-9 < strangers.high - strangers.low
 
 
 def test_a_ratio_to_nothing_in_some_draws_still_has_an_interval():
-    found = intervals.ratio_over([1.0, 0.0, 2.0], [2.0, 0.0, 4.0], "share")
+    found = intervals.estimate_ratio([1.0, 0.0, 2.0], [2.0, 0.0, 4.0], "share")
     assert (found.value, found.low, found.high) == (0.5, 0.5, 0.5)
 
 
 def test_a_quantile_draws_whole_seeds():
     same = [[1.0, 2.0, 3.0]] * 5
-    found = intervals.quantile_over(same, 0.5, "m")
+    found = intervals.estimate_quantile(same, 0.5, "m")
     assert (found.value, found.low, found.high) == (2.0, 2.0, 2.0)
 
 
@@ -207,12 +207,12 @@ def test_pairs_tell_a_difference_that_strangers_do_not():
     rng = np.random.default_rng(1)
     walks = rng.uniform(1, 9, 20)
     ours, theirs = walks, walks + rng.uniform(0.0, 0.4, 20)
-    mean = intervals.ratio_of([*ours, *theirs], np.ones(40))
-    found = intervals.paired("head", mean, 20, "m")
+    mean = intervals.make_ratio([*ours, *theirs], np.ones(40))
+    found = intervals.compare_paired("head", mean, 20, "m")
     assert found["difference.head"].value == pytest.approx((ours - theirs).mean())
     assert found["difference.head"].high < 0
     assert found["p.head"].value < 0.001
-    assert intervals.mean_over(ours, "m").low < intervals.mean_over(theirs, "m").value
+    assert intervals.estimate_mean(ours, "m").low < intervals.estimate_mean(theirs, "m").value
 
 
 def test_the_test_of_pairs_is_wrong_as_often_as_it_says():
@@ -220,8 +220,8 @@ def test_the_test_of_pairs_is_wrong_as_often_as_it_says():
     p = []
     for _ in range(200):
         squares = rng.exponential(1.0, 24)
-        rmse = intervals.rmse_of(squares, np.ones(24))
-        p.append(intervals.paired("x", rmse, 12, "m", 400)["p.x"].value)
+        rmse = intervals.make_rmse(squares, np.ones(24))
+        p.append(intervals.compare_paired("x", rmse, 12, "m", 400)["p.x"].value)
     assert 0.02 <= np.mean(np.array(p) <= 0.05) <= 0.09
     assert 0.4 <= np.mean(np.array(p) <= 0.5) <= 0.6
 
@@ -231,13 +231,13 @@ def test_a_row_does_not_differ_from_itself(of):
     values = np.random.default_rng(3).uniform(0.1, 2.0, (8, 5))
     both = [*values, *values]
     statistic = {
-        "ratio": lambda: intervals.ratio_of(np.sum(both, 1), np.full(16, 5)),
-        "rmse": lambda: intervals.rmse_of(np.sum(both, 1), np.full(16, 5)),
-        "quantile": lambda: intervals.quantile_of(both, 0.5),
-        "counted": lambda: intervals.counted_quantile_of(ERRORS_M, ERRORS_M.count(np.array(both)),
+        "ratio": lambda: intervals.make_ratio(np.sum(both, 1), np.full(16, 5)),
+        "rmse": lambda: intervals.make_rmse(np.sum(both, 1), np.full(16, 5)),
+        "quantile": lambda: intervals.make_quantile(both, 0.5),
+        "counted": lambda: intervals.make_binned_quantile(ERRORS_M, ERRORS_M.count(np.array(both)),
                                                          0.5),
     }[of]()  # fmt: skip
-    found = intervals.paired("x", statistic, 8, "m", 200)
+    found = intervals.compare_paired("x", statistic, 8, "m", 200)
     off = found["difference.x"]
     assert (off.value, off.low, off.high) == (0.0, 0.0, 0.0)
     assert found["p.x"].value == 1.0

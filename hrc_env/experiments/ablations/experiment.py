@@ -12,9 +12,9 @@ import numpy as np
 from hrc_env.core.errors import ConfigError, check_names
 from hrc_env.core.results import Metric
 from hrc_env.evaluation.counts import ERRORS_M
-from hrc_env.evaluation.intervals import counted_quantile_of as quantile_of
-from hrc_env.evaluation.intervals import counted_quantile_over as quantile_over
-from hrc_env.evaluation.intervals import mean_over, paired, rate_of, ratio_over, rmse_over
+from hrc_env.evaluation.intervals import make_binned_quantile as make_quantile
+from hrc_env.evaluation.intervals import estimate_binned_quantile as estimate_quantile
+from hrc_env.evaluation.intervals import estimate_mean, compare_paired, estimate_rate, estimate_ratio, estimate_rmse
 from hrc_env.experiments.ablations.ablation import Ablation, Setting
 from hrc_env.experiments.ablations.declaration import ABLATIONS, shown
 from hrc_env.experiments.ablations.play import Sums, play, walks_of
@@ -136,17 +136,17 @@ def metrics_of(played: Played) -> dict[str, Metric]:
         for setting, sums in of_settings.items():
             key = f"{name}.{setting}"
             metrics |= _of_joints(key, sums)
-            metrics[f"lost.{key}"] = ratio_over(sums["lost"], sums["frames"], "share")
+            metrics[f"lost.{key}"] = estimate_ratio(sums["lost"], sums["frames"], "share")
             if "idf1" in sums:
                 minutes = np.array(sums["frames"]) * DT_S / 60
-                metrics[f"id_switches.{key}"] = rate_of(sums["id_switches"], minutes, "1/min")
-                metrics[f"idf1.{key}"] = mean_over(sums["idf1"], "share")
+                metrics[f"id_switches.{key}"] = estimate_rate(sums["id_switches"], minutes, "1/min")
+                metrics[f"idf1.{key}"] = estimate_mean(sums["idf1"], "share")
         for each, word in product(ABLATIONS[name].settings, ("median", "p95")):
             pair = each.name, ABLATIONS[name].reference(each)
             if pair[0] != pair[1] and set(pair) <= of_settings.keys():
                 ours, theirs = (of_settings[setting]["errors"] for setting in pair)
-                off = quantile_of(ERRORS_M, [*ours, *theirs], 0.5 if word == "median" else 0.95)
-                metrics |= paired(f"error_m.{name}.{each.name}.{word}", off, len(ours), "m", 1000)
+                off = make_quantile(ERRORS_M, [*ours, *theirs], 0.5 if word == "median" else 0.95)
+                metrics |= compare_paired(f"error_m.{name}.{each.name}.{word}", off, len(ours), "m", 1000)
         for seen, sums in _by_sight(of_settings).items():
             metrics |= _of_joints(f"{name}.{seen}", sums)
     return metrics
@@ -155,10 +155,10 @@ def metrics_of(played: Played) -> dict[str, Metric]:
 def _of_joints(key: str, sums: Mapping[str, Any]) -> dict[str, Metric]:
     """Errors of joints and how well they are reported."""
     return {
-        f"error_m.{key}.median": quantile_over(ERRORS_M, sums["errors"], 0.5, "m"),
-        f"error_m.{key}.p95": quantile_over(ERRORS_M, sums["errors"], 0.95, "m"),
-        f"rmse_m.{key}": rmse_over(sums["squares"], sums["joints"], "m"),
-        f"coverage95.{key}": ratio_over(sums["inside"], sums["joints"], "share"),
+        f"error_m.{key}.median": estimate_quantile(ERRORS_M, sums["errors"], 0.5, "m"),
+        f"error_m.{key}.p95": estimate_quantile(ERRORS_M, sums["errors"], 0.95, "m"),
+        f"rmse_m.{key}": estimate_rmse(sums["squares"], sums["joints"], "m"),
+        f"coverage95.{key}": estimate_ratio(sums["inside"], sums["joints"], "share"),
     }
 
 

@@ -19,7 +19,7 @@ from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.evaluation import intervals
 from hrc_env.evaluation.counts import ERRORS_M, GAPS_M, SPEEDS_MPS
-from hrc_env.evaluation.intervals import paired, rate_of, ratio_of, ratio_over
+from hrc_env.evaluation.intervals import compare_paired, estimate_rate, make_ratio, estimate_ratio
 from hrc_env.evaluation.sums import COST_UNIT
 from hrc_env.experiments.impact.policies import SLOWED, Policy
 from hrc_env.experiments.report import Metrics
@@ -58,7 +58,7 @@ COMPARED = (
 
 def metrics_of(table: Played, margins_m: Sequence[float]) -> dict[str, Metric]:
     """By `<policy>.<setup>.<what>`, `difference.<policy>.<setup>.<what>`, `p.` the same (see
-    `intervals.paired`) and `lateness.<setup>.<how>`."""
+    `intervals.compare_paired`) and `lateness.<setup>.<how>`."""
     metrics: dict[str, Metric] = {}
     for (policy, setup), row in table.items():
         for what, metric in _of_row(row).items():
@@ -85,25 +85,25 @@ def _differences(name: str, row: Row, reference: Row) -> Metrics:
     found: dict[str, Metric] = {}
     for what in COMPARED:
         (above, below, unit), (above_1, below_1, _) = ours[what], theirs[what]
-        ratio = ratio_of([*above, *above_1[:n]], [*below, *below_1[:n]])
-        found |= paired(f"{name}.{what}", ratio, n, unit, 2000)
+        ratio = make_ratio([*above, *above_1[:n]], [*below, *below_1[:n]])
+        found |= compare_paired(f"{name}.{what}", ratio, n, unit, 2000)
         if what in CONTACTS:
-            rates = rate_of(above, below, unit), rate_of(above_1[:n], below_1[:n], unit)
-            found[f"difference.{name}.{what}"] = intervals.excess_of(*rates)
+            rates = estimate_rate(above, below, unit), estimate_rate(above_1[:n], below_1[:n], unit)
+            found[f"difference.{name}.{what}"] = intervals.subtract_rates(*rates)
     bins, counted, q, unit = QUANTILES["z_d_m"]
     counts = [*row[f"{counted}_counts"], *reference[f"{counted}_counts"][:n]]
-    both = intervals.counted_quantile_of(bins, counts, q)
-    return found | paired(f"{name}.z_d_m", both, n, unit, 400)
+    both = intervals.make_binned_quantile(bins, counts, q)
+    return found | compare_paired(f"{name}.z_d_m", both, n, unit, 400)
 
 
 def _of_row(row: Row) -> dict[str, Metric]:
     """What the episodes of a row came to."""
     ratios = _ratios(row)
-    found = {what: (rate_of if what in CONTACTS else ratio_over)(*ratios[what]) for what in ratios}
-    found["goals_per_min"] = intervals.goals_over(*ratios["goals_per_min"][:2])
-    found["separation_min_m"] = intervals.iqm_over(row["separation_min_m"], "m")
+    found = {what: (estimate_rate if what in CONTACTS else estimate_ratio)(*ratios[what]) for what in ratios}
+    found["goals_per_min"] = intervals.estimate_goal_rate(*ratios["goals_per_min"][:2])
+    found["separation_min_m"] = intervals.estimate_iqm(row["separation_min_m"], "m")
     for what, (bins, name, q, unit) in QUANTILES.items():
-        found[what] = intervals.counted_quantile_over(bins, row[f"{name}_counts"], q, unit)
+        found[what] = intervals.estimate_binned_quantile(bins, row[f"{name}_counts"], q, unit)
     return found
 
 
@@ -162,6 +162,6 @@ def margin_needed(rows: Sequence[Row], margins_m: Floats, reference: Row) -> Met
 
     def needed(weights: Ints) -> Floats:
         shares = np.nan_to_num((weights @ missed) / (weights @ called))
-        return np.array([intervals.crossing(margins_m, share[:-1], share[-1]) for share in shares])
+        return np.array([intervals.find_crossing(margins_m, share[:-1], share[-1]) for share in shares])
 
     return intervals.bootstrap(needed, len(missed), "m", 1000)

@@ -12,7 +12,7 @@ import numpy as np
 from hrc_env.config import HRCConfig
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Bools, Floats
-from hrc_env.evaluation.intervals import paired, quantile_of, quantile_over, ratio_over
+from hrc_env.evaluation.intervals import compare_paired, make_quantile, estimate_quantile, estimate_ratio
 from hrc_env.experiments.cache import Part, PartCache, PartProgress
 from hrc_env.experiments.lab.declaration import ALL, ERRORS, ESTIMATORS, SINGLE
 from hrc_env.experiments.lab.motions import MOTIONS, play
@@ -153,14 +153,14 @@ def metrics_of(played: Films) -> dict[str, Metric]:
         for key in (f"{name}.{column}" for name in ESTIMATORS for column in SPOKEN):
             errors = [_errors_m(each, key).ravel() for each in films]
             for word, q in QUANTILES.items():
-                metrics[f"error_m.{key}.{motion}.{word}"] = quantile_over(errors, q, "m")
+                metrics[f"error_m.{key}.{motion}.{word}"] = estimate_quantile(errors, q, "m")
         metrics |= _misses(films, motion)
     for column in SPOKEN:
         errors = [_errors_m(each, f"{ESTIMATORS[0]}.{column}") for each in played.values()]
         for other, (word, q) in product(ESTIMATORS[1:], QUANTILES.items()):
             theirs = [_errors_m(each, f"{other}.{column}") for each in played.values()]
-            both = quantile_of([each.ravel() for each in (*errors, *theirs)], q)
-            metrics |= paired(f"error_m.{other}.{column}.{word}", both, len(errors), "m", 400)
+            both = make_quantile([each.ravel() for each in (*errors, *theirs)], q)
+            metrics |= compare_paired(f"error_m.{other}.{column}.{word}", both, len(errors), "m", 400)
     return metrics
 
 
@@ -172,10 +172,10 @@ def _misses(films: Sequence[Film], motion: str) -> dict[str, Metric]:
         for what, above, below in (
             ("missed", missed, n), ("missed_far", far, away), ("recovered_far", back, far),
         ):  # fmt: skip
-            metrics[f"{what}.{column}.{motion}"] = ratio_over(above, below, "share")
+            metrics[f"{what}.{column}.{motion}"] = estimate_ratio(above, below, "share")
     known = [_known(each) for each in films]
     lost, total = [(~each).sum() for each in known], [each.size for each in known]
-    return metrics | {f"missed.multi.{motion}": ratio_over(lost, total, "share")}
+    return metrics | {f"missed.multi.{motion}": estimate_ratio(lost, total, "share")}
 
 
 def _joints_counted(film: Film) -> Floats:

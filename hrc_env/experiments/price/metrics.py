@@ -11,7 +11,7 @@ import numpy as np
 
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats
-from hrc_env.evaluation.intervals import crossing, goals_over, rate_of, ratio_over
+from hrc_env.evaluation.intervals import find_crossing, estimate_goal_rate, estimate_rate, estimate_ratio
 from hrc_env.evaluation.sums import COST_UNIT
 from hrc_env.experiments.price.episodes import CONTACTS
 from hrc_env.experiments.price.eyes import ELSEWHERE, FOUR, ONE, TRUTH
@@ -98,7 +98,7 @@ def supposed_m(tried: Mapping[float, Rows], level: float) -> float:
         np.array([np.sum(tried[m][name]) for m in margins_m]) for name in ("towards", "minutes")
     )
     curve = falling(events, minutes)
-    return round(crossing(np.array(margins_m), curve, np.log(level / PER)), 3)
+    return round(find_crossing(np.array(margins_m), curve, np.log(level / PER)), 3)
 
 
 def metrics_of(
@@ -135,11 +135,11 @@ def metrics_of(
 def _rates(rows: Rows) -> Metrics:
     """What is counted in episodes."""
     per = np.array(rows["minutes"]) / PER
-    contacts = {kind: rate_of(rows[kind], per, UNIT) for kind in CONTACTS}
+    contacts = {kind: estimate_rate(rows[kind], per, UNIT) for kind in CONTACTS}
     return {
         **contacts,
-        "goals_per_min": goals_over(rows["achieved"], rows["minutes"]),
-        "cost": ratio_over(rows["cost"], 1000 * per, f"{COST_UNIT} per episode of 10 s"),
+        "goals_per_min": estimate_goal_rate(rows["achieved"], rows["minutes"]),
+        "cost": estimate_ratio(rows["cost"], 1000 * per, f"{COST_UNIT} per episode of 10 s"),
     }
 
 

@@ -16,7 +16,7 @@ from scipy.optimize import isotonic_regression
 
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.evaluation import intervals
-from hrc_env.evaluation.intervals import crossing
+from hrc_env.evaluation.intervals import find_crossing
 
 HALF = 0.5
 """Of an event, added to counts whose logarithm is asked for."""
@@ -79,7 +79,7 @@ class Tried:
         height = np.log((fresh @ self.fresh_events + HALF) / fresh_minutes)
         found = np.empty((len(drawn), 2))
         for r, curve in enumerate(map(falling, events, minutes)):
-            margin_m = crossing(m, curve + height[r] - np.interp(m_0, m, curve), level)
+            margin_m = find_crossing(m, curve + height[r] - np.interp(m_0, m, curve), level)
             there, here = np.interp([margin_m, m_0], m, achieved[r])
             found[r] = margin_m, there / here if here else 1.0
         found[:, 1] *= fresh @ self.fresh_achieved / fresh_minutes
@@ -90,6 +90,6 @@ def draws(n: int, m: int, n_draws: int) -> tuple[Ints, Ints]:
     """(1 + R, n) and (1 + R, m) how often seeds are drawn: first each once, then at random, always
     the same, so that what shares its seeds is compared draw by draw."""
     sizes = (n, m)
-    tried, fresh = (np.vstack([np.ones((1, k), int), intervals.draws(k, n_draws, stream)])
+    tried, fresh = (np.vstack([np.ones((1, k), int), intervals.draw_seeds(k, n_draws, stream)])
                     for stream, k in enumerate(sizes))  # fmt: skip
     return tried, fresh

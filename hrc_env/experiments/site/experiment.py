@@ -15,7 +15,7 @@ from hrc_env.core.records import PoseEstimate
 from hrc_env.core.results import Metric
 from hrc_env.core.skeleton import JOINT
 from hrc_env.core.typing import Floats
-from hrc_env.evaluation.intervals import mean_over, paired, rmse_of, rmse_over
+from hrc_env.evaluation.intervals import estimate_mean, compare_paired, make_rmse, estimate_rmse
 from hrc_env.experiments.cache import Part as CachedPart
 from hrc_env.experiments.cache import PartCache, PartProgress
 from hrc_env.experiments.recording import Recording, record, replay
@@ -187,23 +187,23 @@ def metrics_of(config: Site, played: Played) -> dict[str, Metric]:
     for name, row in product(config.everybody, ROWS):
         for key in (f"{name}.{row}", f"{ALONE}{name}.{row}"):
             if key in squared:
-                metrics[f"rmse_m.{key}"] = rmse_over(squared[key], n_judged, "m")
+                metrics[f"rmse_m.{key}"] = estimate_rmse(squared[key], n_judged, "m")
                 tracked = [float(np.mean(each["rows"][key]["tracked"])) for each in films.values()]
-                metrics[f"tracked.{key}"] = mean_over(tracked, "share")
+                metrics[f"tracked.{key}"] = estimate_mean(tracked, "share")
         if row != MULTI:
             one, multi = (squared[f"{name}.{each}"] for each in (row, MULTI))
-            metrics[f"over_multi.{name}.{row}"] = rmse_over(one, multi, "ratio")
+            metrics[f"over_multi.{name}.{row}"] = estimate_rmse(one, multi, "ratio")
     first, *others = config.everybody
     for name, row, start in product(others, ROWS, ("", ALONE)):
         ours, theirs = f"{start}{first}.{row}", f"{start}{name}.{row}"
         if theirs in squared:
             both = np.concatenate([squared[ours], squared[theirs]])
-            off = rmse_of(both, np.tile(n_judged, 2))
-            metrics |= paired(f"rmse_m.{theirs}", off, len(films), "m")
+            off = make_rmse(both, np.tile(n_judged, 2))
+            metrics |= compare_paired(f"rmse_m.{theirs}", off, len(films), "m")
     for key, own in closed.items():
         squares = [_squared_m2(films[seed], said) for seed, said in own.items()]
         sums, counts = zip(*((each.sum(), len(each)) for each in squares), strict=True)
-        metrics[f"closed_rmse_m.{key}"] = rmse_over(sums, counts, "m")
+        metrics[f"closed_rmse_m.{key}"] = estimate_rmse(sums, counts, "m")
     return metrics
 
 
