@@ -21,7 +21,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.progress import Meter
 from hrc_env.core.results import write_whole
 from hrc_env.evaluation.episodes import summarize
-from hrc_env.experiments.plots import label, new_figure, save
+from hrc_env.experiments.plots import label_axes, make_figure, save
 from hrc_env.sb3 import HRCVecEnv
 
 from . import checkpoints
@@ -257,7 +257,7 @@ def plot_curve(curve: Curve, path: Path, title: str) -> None:
     growing = steps[(share > 0) & (share < 1)]
     limited = bool(curve) and "limit" in curve[-1]
     panels = PANELS | (LIMITED if limited else {})
-    figure = new_figure(9, 9 if limited else 6)
+    figure = make_figure(9, 9 if limited else 6)
     axes = figure.subplots(len(panels) // 2, 2, sharex=True)
     for axis, (name, (words, colour)) in zip(axes.ravel(), panels.items(), strict=True):
         axis.plot(steps, [point[name] for point in curve], color=colour)
@@ -266,7 +266,7 @@ def plot_curve(curve: Curve, path: Path, title: str) -> None:
             axis.plot(steps, succeeded, color=colour, linestyle="--")
         if name == "cost":
             axis.axhline(curve[-1]["limit"], color="grey", linestyle="--")
-        label(axis, "environment steps", textwrap.fill(words, Y_WIDTH))
+        label_axes(axis, "environment steps", textwrap.fill(words, Y_WIDTH))
         axis.set_ylim(bottom=0)
         axis.xaxis.set_major_formatter(EngFormatter(sep=" "))
         if len(growing):

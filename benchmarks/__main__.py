@@ -17,7 +17,7 @@ from hrc_env.cli.estimators import resolve_estimators
 from hrc_env.cli.show import show
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.progress import progress_bar
-from hrc_env.experiments.runner import Experiment, changed, run_experiment
+from hrc_env.experiments.runner import Experiment, override, run_experiment
 
 PROGRAM = "python -m benchmarks"
 
@@ -83,8 +83,8 @@ class TrackingArguments(BenchArguments):
         config = QUICK if self.quick else TrackingBench()
         names = resolve_estimators(self.estimators)
         sequences = tuple(dict.fromkeys(self.sequences))
-        config = changed(config, n_seeds=self.seeds)
-        return self.show(changed(config, estimators=names, sequences=sequences))
+        config = override(config, n_seeds=self.seeds)
+        return self.show(override(config, estimators=names, sequences=sequences))
 
     def _beside(self, ending: str) -> BenchArguments:
         """The same in a folder of its own, unless one was given."""
@@ -117,7 +117,7 @@ class SpeedArguments(BenchArguments):
         from benchmarks.speed.bench import QUICK, SpeedBench
 
         config = QUICK if self.quick else SpeedBench()
-        return self.show(changed(config, n_rounds=self.rounds, task=self.task, shield=self.shield))
+        return self.show(override(config, n_rounds=self.rounds, task=self.task, shield=self.shield))
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ class MotionArguments(BenchArguments):
         from benchmarks.motion.bench import QUICK, MotionBench
 
         config = QUICK if self.quick else MotionBench()
-        return self.show(changed(config, n_seeds=self.seeds))
+        return self.show(override(config, n_seeds=self.seeds))
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from hrc_env.experiments.columns import mean, per_minute, rate
 from hrc_env.experiments.report import Table
 from hrc_env.experiments.setups import PerceptionSetup
 from hrc_env.experiments.study import Row, Study
-from hrc_env.experiments.versions import key_of
+from hrc_env.experiments.versions import make_key
 
 TRAINED_ON = ("env", "tracker", "emulator", "motion", "agents")
 """Subsystems that policies depend on."""
@@ -72,7 +72,7 @@ def trainings_of(
     both policies are.
     """
     timesteps, found = 4096 if arguments.quick else arguments.timesteps, {}
-    key = key_of({"timesteps": timesteps}, TRAINED_ON)
+    key = make_key({"timesteps": timesteps}, TRAINED_ON)
     for level, (name, (_, weight)) in product(levels, PPO.items()):
         on, weight = "keypoints" if level == "pixels" else level, 0.0 if level == "none" else weight
         options = {"timesteps": timesteps, "perception": on, "proximity": weight}

@@ -26,8 +26,8 @@ from hrc_env.core.machine import n_cores
 from hrc_env.core.results import Metric, over
 from hrc_env.experiments.cache import PartCache, PartProgress
 from hrc_env.experiments.columns import Column
-from hrc_env.experiments.plots import label, new_figure, save
-from hrc_env.experiments.report import Metrics, Report, Table, picture
+from hrc_env.experiments.plots import label_axes, make_figure, save
+from hrc_env.experiments.report import Metrics, Report, Table, format_picture
 from hrc_env.experiments.runner import run_experiment
 
 KEYWORDS: Mapping[str, Any] = {"task": "HRCReach-v0", "perception": "keypoints"}
@@ -113,8 +113,8 @@ class ClusterBench:
 
     def play(self, cache: PartCache) -> Played:
         """Return the times of every round, and what Ray's metrics showed of a run."""
-        times = cache.part("times", self._times)
-        return times | cache.part("watched", self._watched)
+        times = cache.make_part("times", self._times)
+        return times | cache.make_part("watched", self._watched)
 
     def _times(self, tick: PartProgress) -> dict[str, Any]:
         with _workers() as learners, _alone() as alone:
@@ -159,7 +159,7 @@ class ClusterBench:
         """Draw what Ray showed; return the table beside it."""
         drawn = _draw(played, figures / "metrics.png")
         about = (__doc__ or "").partition("\n")[2].strip()
-        parts = [TABLE.markdown(metrics), picture(drawn, "A run of two workers, as Ray exports it")]
+        parts = [TABLE.to_markdown(metrics), format_picture(drawn, "A run of two workers, as Ray exports it")]
         return Report("Workers of RLlib", about, parts, "smallest and largest rounds")
 
 
@@ -240,11 +240,11 @@ def _exported() -> dict[str, float]:
 
 def _draw(played: Played, path: Path) -> Path:
     """Draw what Ray showed over the time of the run."""
-    figure = new_figure(9, 6)
+    figure = make_figure(9, 6)
     panels = figure.subplots(2, 2, sharex=True).ravel()
     for axis, (name, words) in zip(panels, SHOWN.items(), strict=True):
         axis.plot(played["watched_s"], played[name], drawstyle="steps-post")
-        label(axis, "time [s]", words)
+        label_axes(axis, "time [s]", words)
         axis.set_ylim(bottom=0)
     save(figure, path)
     return path

@@ -46,7 +46,7 @@ class StudyArguments(Arguments):
 def run_study(study: Study, arguments: StudyArguments) -> int:
     """Run a study as it was asked, and show its report; return the exit status."""
     study = study.select(arguments.only) if arguments.only else study
-    study = replace(study.quick() if arguments.quick else study, threads=arguments.threads)
+    study = replace(study.shorten() if arguments.quick else study, threads=arguments.threads)
     run = partial(
         run_experiment, study, overwrite=arguments.overwrite, engine=arguments.choose_engine()
     )

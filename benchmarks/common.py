@@ -6,7 +6,7 @@ import numpy as np
 
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Covariances3, Floats, Points3
-from hrc_env.experiments.report import with_interval
+from hrc_env.experiments.report import format_interval
 from hrc_env.tasks import BUILT_IN
 
 TASKS = tuple(dict.fromkeys((
@@ -33,9 +33,9 @@ def keys(metrics: Iterable[str], start: str) -> list[str]:
     return [name.removeprefix(start) for name in metrics if name.startswith(start)]
 
 
-def cell(metric: Metric | None, scale: float = 1.0, digits: int = 1, interval: bool = False) -> str:
+def format_cell(metric: Metric | None, scale: float = 1.0, digits: int = 1, interval: bool = False) -> str:
     """A number as tables show it, with its interval if asked; nothing of what is not known."""
     if metric is None:
         return ""
     ends = (metric.low, metric.high) if interval else (metric.value, metric.value)
-    return with_interval([scale * each for each in (metric.value, *ends)], digits)
+    return format_interval(*(scale * each for each in (metric.value, *ends)), digits)

@@ -33,14 +33,14 @@ from hrc_env.core.skeleton import TORSO
 from hrc_env.core.typing import Bools, Floats, Ints, Points3
 from hrc_env.evaluation.counts import ERRORS_M, Bins
 from hrc_env.evaluation.intervals import estimate_binned_quantile, estimate_ratio
-from hrc_env.experiments.ablations.play import BODIES, Walks, walks_of
+from hrc_env.experiments.ablations.play import BODIES, Walks, make_walks
 from hrc_env.experiments.cache import Part, PartCache, PartProgress
 from hrc_env.experiments.columns import Column
 from hrc_env.experiments.lab.sides import MISSED_CONFIDENCE, MISSED_SHARE
-from hrc_env.experiments.report import Metrics, Report, Table, quick_words
-from hrc_env.experiments.rigs import ALL, DT_S, N_WARM_UP, SINGLE, Rig, left_with
+from hrc_env.experiments.report import Metrics, Report, Table, describe_quick_run
+from hrc_env.experiments.rigs import ALL, DT_S, N_WARM_UP, SINGLE, Rig, keep_cameras
 from hrc_env.experiments.runner import run_experiment
-from hrc_env.experiments.versions import key_of
+from hrc_env.experiments.versions import make_key
 from hrc_env.geometry.cameras import project, projections
 from hrc_env.geometry.sight import hidden
 from hrc_env.pipeline.levels import make_pipeline
@@ -84,7 +84,7 @@ class Facing:
     def quick_note(self) -> str:
         """The warning on tables and figures of a short run; "" if it is long enough."""
         is_short = max(self.episodes) < max(Facing().episodes)
-        return quick_words(max(self.episodes), self.seconds) if is_short else ""
+        return describe_quick_run(max(self.episodes), self.seconds) if is_short else ""
 
     def settings(self) -> dict[str, Any]:
         """Return what all numbers depend on."""
@@ -92,13 +92,13 @@ class Facing:
 
     def play(self, cache: PartCache) -> dict[str, Metric]:
         """Return the numbers of both levels, each from the cache or anew."""
-        key = key_of({"seconds": self.seconds, "seed": self.seed}, self.depends)
+        key = make_key({"seconds": self.seconds, "seed": self.seed}, self.depends)
         metrics: dict[str, Metric] = {}
         parts = [
             Part(f"{level}.{n}", partial(self._measure, level, n), key)
             for level, n in zip(ESTIMATORS, self.episodes, strict=True)
         ]
-        for part in cache.parts(parts, one_core=True):
+        for part in cache.make_parts(parts, one_core=True):
             metrics |= {name: Metric(**each) for name, each in part.items()}
         return metrics
 
@@ -116,7 +116,7 @@ class Facing:
 
     def report(self, played: dict[str, Metric], metrics: Metrics, figures: Path) -> Report:
         """Return the table."""
-        return Report("Facing the camera", (__doc__ or "").strip(), [TABLE.markdown(metrics)])
+        return Report("Facing the camera", (__doc__ or "").strip(), [TABLE.to_markdown(metrics)])
 
 
 class Frame(NamedTuple):
@@ -135,7 +135,7 @@ def frames(
     level: str, estimator: str, kept: Rig, walks: Walks, seeds: Sequence[int], ids: Ints
 ) -> Iterator[Frame]:
     """What the cameras `kept` and the estimator make of episodes `ids`, after the warm-up."""
-    turn, batch = left_with(RIGS["lab"], kept), np.arange(len(ids))
+    turn, batch = keep_cameras(RIGS["lab"], kept), np.arange(len(ids))
     config = HRCConfig(worker=BODIES, faults=turn.faults)
     scene = build(config.scene, "lab", 1, walks.bodies.names)
     pipeline = make_pipeline(level, estimator, scene, len(ids), config)
@@ -203,7 +203,7 @@ def counted(level: str, estimator: str, kept: Rig, walks: Walks, seeds: Sequence
 def metrics_of(level: str, n_episodes: int, facing: Facing) -> dict[str, Metric]:
     """Every number of a level, with its interval over episodes."""
     seeds, metrics = tuple(range(facing.seed, facing.seed + n_episodes)), {}
-    walks = walks_of("lab", 1, seeds, round(facing.seconds / DT_S))
+    walks = make_walks("lab", 1, seeds, round(facing.seconds / DT_S))
     seen = counted(level, "particle", ALL, walks, seeds)
     for yaw in YAWS:
         missed = estimate_ratio(seen[f"missed.{yaw}"], seen[f"free.{yaw}"], "share")

@@ -28,7 +28,7 @@ from hrc_env.evaluation.episodes import EVALUATION_SEED
 from hrc_env.experiments.columns import Column, mean, rate, share_of_tries
 from hrc_env.experiments.report import Metrics, Table
 from hrc_env.experiments.study import Row, Study
-from hrc_env.experiments.versions import key_of
+from hrc_env.experiments.versions import make_key
 from hrc_env.tasks import BUILT_IN
 
 DEPENDS = ("env", "tracker", "emulator", "motion", "agents")
@@ -57,7 +57,7 @@ class LearnersArguments(StudyArguments):
 
 def trainings_of(arguments: LearnersArguments) -> Trainings:
     """Return the trainings of every task."""
-    key = key_of({"quick": arguments.quick}, DEPENDS)
+    key = make_key({"quick": arguments.quick}, DEPENDS)
     more: dict[str, Any] = {} if arguments.threads is None else {"threads": arguments.threads}
     if arguments.quick:
         more |= {"timesteps": 4096, "num-envs": 8, "demonstrations": 0}

@@ -29,7 +29,7 @@ from hrc_env.evaluation.sums import ACHIEVED, COST_UNIT
 from hrc_env.experiments.columns import Column, mean, per_minute, rate
 from hrc_env.experiments.report import Metrics, Table
 from hrc_env.experiments.study import Row, Study
-from hrc_env.experiments.versions import key_of
+from hrc_env.experiments.versions import make_key
 
 TRAINED_ON = ("env", "tracker", "emulator", "motion", "agents")
 """Subsystems that policies depend on."""
@@ -74,7 +74,7 @@ def trainings_of(arguments: LimitedArguments) -> Trainings:
         ):
             timesteps = 8192 if arguments.quick else timesteps
             made_of = {"timesteps": timesteps, "cost_limit": options.get("cost-limit")}
-            folder = arguments.out / f"{name}-{seed}-{key_of(made_of, TRAINED_ON)}"
+            folder = arguments.out / f"{name}-{seed}-{make_key(made_of, TRAINED_ON)}"
             given = {**options, "seed": seed, "timesteps": timesteps}
             found[name, seed] = Training(folder, given)
     return found

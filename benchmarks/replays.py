@@ -14,7 +14,7 @@ from typing import Any
 
 from benchmarks.studies import COMMANDS
 from hrc_env.experiments.cache import PartCache
-from hrc_env.experiments.runner import Experiment, cache_of
+from hrc_env.experiments.runner import Experiment, make_cache
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +60,7 @@ class Replay:
 
 def walk(experiment: Experiment[Any], given: Replayed) -> None:
     """Play an experiment with the cache of a replay."""
-    usual = cache_of(experiment, given.cache.folder, given.cache.progress)
+    usual = make_cache(experiment, given.cache.folder, given.cache.progress)
     experiment.play(replace(given.cache, key=usual.key, n_parts=usual.n_parts))
 
 

@@ -36,9 +36,9 @@ from benchmarks.studies import COMMANDS, STUDIES, Command, commands_of
 from docs import generate, tables
 from hrc_env.core.errors import HRCError
 from hrc_env.core.results import provenance
-from hrc_env.experiments.cache import disown
-from hrc_env.experiments.runner import settings_of
-from hrc_env.experiments.versions import versions_of
+from hrc_env.experiments.cache import release_folder
+from hrc_env.experiments.runner import describe_experiment
+from hrc_env.experiments.versions import select_versions
 
 ROOT = Path(__file__).resolve().parent.parent
 OUT, QUICK_OUT = ROOT / "out" / "results", ROOT / "out" / "results_quick"
@@ -136,7 +136,7 @@ def why_stale(name: str) -> str:
         return "no record of the versions that it was made at"
     found = [
         f"{subsystem} {before.get(subsystem, 'not recorded')} -> {version}"
-        for subsystem, version in versions_of(command.depends).items()
+        for subsystem, version in select_versions(command.depends).items()
         if before.get(subsystem) != version
     ]
     if made.get("command") != command.command:
@@ -153,7 +153,9 @@ def why_stale(name: str) -> str:
 def current_settings(name: str) -> dict[str, Any]:
     """Return the settings of a command as its results.json has them; empty where it has none."""
     made = COMMANDS[name].made
-    return {} if made is None else json.loads(json.dumps(settings_of(made.make(OUT / name))))
+    return (
+        {} if made is None else json.loads(json.dumps(describe_experiment(made.make(OUT / name))))
+    )
 
 
 def changed_settings(recorded: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
@@ -182,7 +184,7 @@ def made_by(name: str) -> dict[str, Any]:
     command = COMMANDS[name]
     return {
         "command": command.command,
-        "depends": versions_of(command.depends),
+        "depends": select_versions(command.depends),
         "spoiled": records.read(name).spoiled,
     }
 
@@ -216,7 +218,7 @@ def call(command: Command, out: Path, more: str, until_s: float = float("inf")) 
     """Call a study's command: its status, None if it was stopped as the time was up."""
     words = [sys.executable, *command.command.split()[1:], *more.split()]
     words += ["--out", str(out)] if command.tables else []
-    disown(out)  # settings may have changed; the parts know with which they were made
+    release_folder(out)  # settings may have changed; the parts know with which they were made
     process = subprocess.Popen(words, cwd=ROOT, start_new_session=True)
     left_s = until_s - time.monotonic()
     try:

@@ -237,8 +237,8 @@ def test_margins_of_equal_contacts_can_be_set():
 
 
 def test_intervals_below_zero_can_be_read():
-    assert report.with_interval([-0.15, -0.193, -0.144], 3) == "-0.150 (-0.193 to -0.144)"
-    assert report.with_interval([0.15, 0.1, 0.2], 1) == "0.1 (0.1 to 0.2)"
+    assert report.format_interval(-0.15, -0.193, -0.144, 3) == "-0.150 (-0.193 to -0.144)"
+    assert report.format_interval(0.15, 0.1, 0.2, 1) == "0.1 (0.1 to 0.2)"
 
 
 @pytest.mark.parametrize("name", ["", " "])

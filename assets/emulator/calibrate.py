@@ -43,7 +43,7 @@ class CalibrateKeypoints:
         check_at_least("--seed", self.seed, 0)
         check_writable_file(self.out)
         from assets.emulator.run import CalibrationRun, calibrate, compare
-        from assets.emulator.validate import COLUMNS, table_of
+        from assets.emulator.validate import COLUMNS, format_metrics
 
         usual = 0 if self.quick else 4
         rounds = usual if self.rounds is None else self.rounds
@@ -56,7 +56,7 @@ class CalibrateKeypoints:
             with progress_bar(console, "unseen clips") as say:
                 seen = compare(run, self.out, say)
             table = Table(*COLUMNS, title="pixels / emulator, on clips that the fit has not seen")
-            for row in table_of(seen.outcomes):
+            for row in format_metrics(seen.outcomes):
                 table.add_row(*row)
             console.print(table)
             console.print(f"In [bold]{self.out.with_suffix('.png')}[/]: distributions of both")

@@ -43,7 +43,7 @@ from hrc_env.core.results import Metric, write_results
 from hrc_env.experiments.cache import PartCache, PartProgress
 from hrc_env.experiments.columns import Column
 from hrc_env.experiments.report import Table
-from hrc_env.experiments.versions import key_of
+from hrc_env.experiments.versions import make_key
 from hrc_env.perception.emulator import EmulatorConfig
 from hrc_env.worker.body import Body, load_body, worker_names
 
@@ -151,7 +151,7 @@ def judged(
     """
     metrics = dict[str, Metric]()
     digest = hashlib.sha256(Path(config.emulator.calibration).read_bytes()).hexdigest()
-    key = key_of({"calibration": digest, "rounds": rounds}, DEPENDS)
+    key = make_key({"calibration": digest, "rounds": rounds}, DEPENDS)
     for name, sample in SAMPLES.items():
 
         def make(tick: PartProgress, sample: Sample = sample) -> dict[str, Any]:
@@ -166,7 +166,7 @@ def judged(
 
 def calibration_of(out: Path, rounds: int) -> Path:
     """Return the path of the calibration that is fitted to what is not held out."""
-    return out / f"keypoints-{key_of({'rounds': rounds}, DEPENDS)}.json"
+    return out / f"keypoints-{make_key({'rounds': rounds}, DEPENDS)}.json"
 
 
 def joints_of(name: str) -> Body:

@@ -10,7 +10,7 @@ from assets.emulator.clips import Clip
 from assets.emulator.watch import BodyOf, Watched, load, save, watch
 from hrc_env.config import HRCConfig
 from hrc_env.core.typing import Floats
-from hrc_env.experiments.versions import key_of
+from hrc_env.experiments.versions import make_key
 from hrc_env.worker.body import load_body
 
 DEPENDS = ("env", "tracker", "emulator", "detector", "motion")
@@ -35,7 +35,7 @@ def kept(
     known = config.emulator.calibrated()
     told = _digest(known.sigma, known.offset_m, known.wander_m, known.between_m)
     settings = {"level": level, "detector": asdict(config.detector), "told": told}
-    key = key_of(settings, DEPENDS)
+    key = make_key(settings, DEPENDS)
     joints = {clip.body: _digest(body_of(clip.body).joint_offset) for clip in clips}
     paths = [folder / f"{_name(clip, key + joints[clip.body])}.npz" for clip in clips]
     todo = [clip for clip, path in zip(clips, paths, strict=True) if not path.exists()]

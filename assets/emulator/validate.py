@@ -279,7 +279,7 @@ def exchanging(watched: Sequence[Watched]) -> float:
     return exchanged / max(looks, 1)
 
 
-def table_of(seen: dict[str, tuple[StepResult, StepResult]]) -> Iterator[tuple[str, ...]]:
+def format_metrics(seen: dict[str, tuple[StepResult, StepResult]]) -> Iterator[tuple[str, ...]]:
     """Rows of text: family, then each number as "pixels / emulator"."""
     for family, (a, b) in seen.items():
         yield (

@@ -12,8 +12,8 @@ from benchmarks.motion.statistics import gait_of, statistics_of
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric, over
 from hrc_env.experiments.cache import PartCache
-from hrc_env.experiments.report import Metrics, Report, quick_words
-from hrc_env.experiments.runner import at_least_one, is_as_short
+from hrc_env.experiments.report import Metrics, Report, describe_quick_run
+from hrc_env.experiments.runner import check_at_least_one, is_as_short
 from hrc_env.motion import state as st
 from hrc_env.motion.repertoire import SCENES, Film, alone, perform
 from hrc_env.worker.body import Body, load_body, worker_names
@@ -36,7 +36,7 @@ class MotionBench:
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for numbers that cannot work."""
-        at_least_one(self, "n_seeds")
+        check_at_least_one(self, "n_seeds")
         if not self.bodies:
             raise ConfigError(f"bodies must name some of {worker_names()}.")
 
@@ -65,7 +65,7 @@ class MotionBench:
         """Return the tables."""
         seconds = [each.value for name, each in metrics.items() if name.endswith(".seconds")]
         lasting = min(seconds), max(seconds)
-        short = quick_words(self.n_seeds, lasting) if is_as_short(self, QUICK) else ""
+        short = describe_quick_run(self.n_seeds, lasting) if is_as_short(self, QUICK) else ""
         return replace(report(metrics), quick=short)
 
 

@@ -3,7 +3,7 @@
 from benchmarks.motion.targets import ANY, Target, targets_of
 from hrc_env.core.results import Metric
 from hrc_env.experiments.columns import Column
-from hrc_env.experiments.report import Metrics, Report, format_metric, table, table_of
+from hrc_env.experiments.report import Metrics, Report, format_metric, format_table, format_metrics
 
 COLUMNS = (
     Column("{}.seconds", "s"),
@@ -30,7 +30,7 @@ def report(metrics: Metrics) -> Report:
     asked = (f"`{each.statistic}` <= {each.high:g} ({each.source})" for each in targets_of(ANY))
     return Report("Motion bench", lead, (
         "## Beside what is known of people", _targets(scenes, metrics),
-        "## Every scene", table_of("scene", {each: each for each in scenes}, COLUMNS, metrics),
+        "## Every scene", format_metrics("scene", {each: each for each in scenes}, COLUMNS, metrics),
         f"Everywhere: {'; '.join(asked)}.",
     ), "the smallest and the largest body's")  # fmt: skip
 
@@ -50,4 +50,4 @@ def _targets(scenes: list[str], metrics: Metrics) -> str:
                 band = f"{target.low:.3g}-{target.high:.3g}"
                 measured = format_metric(metric, 1, 3)
                 lines.append([scene, target.statistic, measured, band, verdict, target.source])
-    return table(["scene", "statistic", "measured", "target", "", "source"], lines)
+    return format_table(["scene", "statistic", "measured", "target", "", "source"], lines)

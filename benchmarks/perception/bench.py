@@ -24,9 +24,9 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric
 from hrc_env.engines.local import Serial
 from hrc_env.experiments.cache import Part, PartCache, PartProgress
-from hrc_env.experiments.report import Metrics, Report, Table, quick_words
+from hrc_env.experiments.report import Metrics, Report, Table, describe_quick_run
 from hrc_env.experiments.rigs import DT_S
-from hrc_env.experiments.runner import at_least_one, is_as_short
+from hrc_env.experiments.runner import check_at_least_one, is_as_short
 from hrc_env.perception import vino
 from hrc_env.perception.faults.fault import IMAGE, KINDS, FaultConfig
 from hrc_env.scene.build import SCENES, Scene, SceneConfig, build
@@ -80,7 +80,7 @@ class PerceptionBench:
     def __post_init__(self) -> None:
         """Raise `ConfigError` for numbers that cannot work."""
         counts = ("n_steps", "n_faults", "fault_steps", "n_emulated", "n_instants", "speed_steps")
-        at_least_one(self, *counts)
+        check_at_least_one(self, *counts)
         if self.n_faults > dict(self.episodes).get("lab", 0) or self.fault_steps > self.n_steps:
             raise ConfigError(
                 "Faults are compared with the lab's first episodes: n_faults must not exceed their "
@@ -103,7 +103,7 @@ class PerceptionBench:
     def quick_note(self) -> str:
         """The warning on tables and figures of a short run; "" if it is long enough."""
         is_short = is_as_short(self, QUICK)
-        return quick_words(self.n_emulated, self.n_steps * DT_S) if is_short else ""
+        return describe_quick_run(self.n_emulated, self.n_steps * DT_S) if is_short else ""
 
     def settings(self) -> dict[str, Any]:
         """Return what all numbers depend on."""
@@ -114,7 +114,7 @@ class PerceptionBench:
         tasks = list(tasks_of(self, cache.folder.parent / "figures"))
         cache = replace(cache, n_parts=sum(task.cost for task in tasks))
         away = [task for task in tasks if not task.is_here]
-        parts = cache.parts([task.part for task in away], one_core=True)
+        parts = cache.make_parts([task.part for task in away], one_core=True)
         played = {task.label: part for task, part in zip(away, parts, strict=True)}
         here = replace(cache, engine=Serial())
         for task in tasks:

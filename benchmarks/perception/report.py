@@ -21,7 +21,7 @@ from benchmarks.perception.declaration import (
 from benchmarks.perception.speed import REST, STAGES
 from benchmarks.perception.views import ROWS
 from hrc_env.experiments.columns import Column
-from hrc_env.experiments.report import Metrics, Report, table_of
+from hrc_env.experiments.report import Metrics, Report, format_metrics
 
 _LEAD = """\
 Intervals of shares are exact. Level `pixels` unless it says otherwise; every camera looks in every
@@ -68,21 +68,21 @@ def report(config: Any, found: Any, metrics: Metrics, figures: Path) -> Report:
     stages = [Column(f"stage_ms.{each}.{{}}", f"{each} [ms]") for each in (*STAGES, REST)]
     less = Column("emulator_coverage_difference.{}", "coverage less pixels'", 3, signed=True)
     parts = (
-        "## Speed", SPEED.markdown(metrics),
-        table_of("cameras.workers", paces, [Column("steps_per_s.{}", "steps [1/s]"), *stages],
+        "## Speed", SPEED.to_markdown(metrics),
+        format_metrics("cameras.workers", paces, [Column("steps_per_s.{}", "steps [1/s]"), *stages],
                  metrics),
         _ABOUT_SPEED,
-        "## Error of the estimate", ACCURACY.markdown(metrics),
-        table_of("", estimates, [*belief().values()], metrics), _ABOUT_ERRORS,
+        "## Error of the estimate", ACCURACY.to_markdown(metrics),
+        format_metrics("", estimates, [*belief().values()], metrics), _ABOUT_ERRORS,
         "## Faults of one of four cameras, lab",
-        table_of("", kinds, faults, metrics), _ABOUT_FAULTS,
-        "## Cameras named as miscalibrated", replace(NAMED, rows=FAULTS).markdown(metrics),
-        "## Single crops", table_of("", views, [
+        format_metrics("", kinds, faults, metrics), _ABOUT_FAULTS,
+        "## Cameras named as miscalibrated", replace(NAMED, rows=FAULTS).to_markdown(metrics),
+        "## Single crops", format_metrics("", views, [
             DETECTED, ERROR_SHARE, Column("error_share.{}.p95", "95 % [% of stature]", 1, 100),
         ], metrics), _ABOUT_CROPS,
         "## The emulator beside the pixels",
-        replace(EMULATOR, columns=(*EMULATOR.columns, less)).markdown(metrics),
-        LASTING.markdown(metrics), _ABOUT_THE_EMULATOR,
+        replace(EMULATOR, columns=(*EMULATOR.columns, less)).to_markdown(metrics),
+        LASTING.to_markdown(metrics), _ABOUT_THE_EMULATOR,
     )  # fmt: skip
     spread = "95 % intervals over episodes, crops or clips"
     return Report("Perception bench", _LEAD, [*filter(None, parts)], spread)

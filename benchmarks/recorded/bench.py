@@ -117,6 +117,6 @@ def _of_estimator(
 
 def report(metrics: Metrics) -> Report:
     """Return the table, a row for each estimator."""
-    parts = [FOOTAGE.markdown(metrics)]
+    parts = [FOOTAGE.to_markdown(metrics)]
     spread = "95 % intervals over blocks of frames, those of bones and jerk with least and largest"
     return Report("Tracking on recorded films", _LEAD, parts, spread)

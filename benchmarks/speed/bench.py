@@ -22,8 +22,8 @@ from hrc_env.config import HRCConfig
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric, over
 from hrc_env.experiments.cache import PartCache, Progress
-from hrc_env.experiments.report import Metrics, Report, Table, quick_words
-from hrc_env.experiments.runner import at_least_one, is_as_short
+from hrc_env.experiments.report import Metrics, Report, Table, describe_quick_run
+from hrc_env.experiments.runner import check_at_least_one, is_as_short
 from hrc_env.safety.shield import shield_called
 from hrc_env.tasks.task import find_task
 
@@ -75,7 +75,7 @@ class SpeedBench:
         shield_called(self.shield)
         if self.task != EVERY:
             find_task(self.task)
-        at_least_one(self, "n_rounds", "least_steps", "n_resets", "task_steps")
+        check_at_least_one(self, "n_rounds", "least_steps", "n_resets", "task_steps")
         if WATCHED not in self.levels:
             raise ConfigError(f"levels must have {WATCHED!r} in them, got {self.levels}.")
 
@@ -83,7 +83,7 @@ class SpeedBench:
     def quick_note(self) -> str:
         """The warning on tables and figures of a short run; "" if it is long enough."""
         seconds = HRCConfig().ctrl_dt * self.least_steps
-        return quick_words(self.n_rounds, seconds, "round") if is_as_short(self, QUICK) else ""
+        return describe_quick_run(self.n_rounds, seconds, "round") if is_as_short(self, QUICK) else ""
 
     def settings(self) -> dict[str, Any]:
         """Return what all numbers depend on."""

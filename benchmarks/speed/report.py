@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 from benchmarks.common import keys
 from benchmarks.speed.declaration import ASKED, REACHER, SINGLE, TASKS, organs_of, steps_of, title
 from benchmarks.speed.organs import ORGANS, REST, TOTAL
-from hrc_env.experiments.plots import label, new_figure, save
-from hrc_env.experiments.report import Metrics, Report, picture
+from hrc_env.experiments.plots import label_axes, make_figure, save
+from hrc_env.experiments.report import Metrics, Report, format_picture
 
 _COLOURS = (*(f"C{k}" for k in range(7)), "gold", "C9", "0.75")
 """Of the organs, of resets and of the rest."""
@@ -29,7 +29,7 @@ def report(metrics: Metrics, figures: Path) -> Report:
         metrics: of the bench.
         figures: folder.
     """
-    tasks = TASKS.markdown(metrics)
+    tasks = TASKS.to_markdown(metrics)
     if f"env_steps_per_s.{REACHER}.{SINGLE}" not in metrics:
         return Report("Speed of every id", ASKED, [tasks], SPREAD)
     plot_organs(figures / "organs.png", metrics)
@@ -37,9 +37,9 @@ def report(metrics: Metrics, figures: Path) -> Report:
     levels = dict.fromkeys(level for level, _ in pairs if level != REACHER)
     sizes = sorted({configuration for _, configuration in pairs}, key=_size)
     return Report("Speed bench", ASKED, (
-        steps_of([*levels], sizes).markdown(metrics),
-        organs_of(keys(metrics, f"us_per_env_step.{TOTAL}.")).markdown(metrics), _ABOUT_THE_ORGANS,
-        picture(figures / "organs.png", "What a step costs, level `keypoints` (on the wall)."),
+        steps_of([*levels], sizes).to_markdown(metrics),
+        organs_of(keys(metrics, f"us_per_env_step.{TOTAL}.")).to_markdown(metrics), _ABOUT_THE_ORGANS,
+        format_picture(figures / "organs.png", "What a step costs, level `keypoints` (on the wall)."),
         tasks,
     ), SPREAD)  # fmt: skip
 
@@ -56,13 +56,13 @@ def plot_organs(path: Path, metrics: Metrics) -> None:
     for each in keys(metrics, f"us_per_env_step.{TOTAL}."):
         groups[each != SINGLE and not each.startswith("1.")].append(each)
     shown = [group for group in groups if group]
-    figure = new_figure(12.5, 7)
+    figure = make_figure(12.5, 7)
     axes = figure.subplots(
         1, len(shown), squeeze=False, width_ratios=[len(group) + 0.6 for group in shown]
     )[0]
     for axis, group in zip(axes, shown, strict=True):
         _stack(axis, group, metrics)
-    label(axes[0], y="microseconds per environment and step", grid="y")
+    label_axes(axes[0], y="microseconds per environment and step", grid="y")
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles[::-1], labels[::-1], loc="outside right center", frameon=False)
     save(figure, path)

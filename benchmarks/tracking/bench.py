@@ -22,9 +22,9 @@ from benchmarks.tracking.sequences import MATCHED, Sequences, lasting, make_sequ
 from benchmarks.tracking.timing import BATCH, time_estimator
 from hrc_env.core.results import Metric
 from hrc_env.experiments.cache import Part, PartCache, PartProgress
-from hrc_env.experiments.report import Metrics, Report, Table, quick_words
-from hrc_env.experiments.runner import at_least_one, is_as_short
-from hrc_env.experiments.versions import key_of, source_digest
+from hrc_env.experiments.report import Metrics, Report, Table, describe_quick_run
+from hrc_env.experiments.runner import check_at_least_one, is_as_short
+from hrc_env.experiments.versions import make_key, hash_source
 from hrc_env.tracking.estimators import ESTIMATORS
 
 
@@ -52,7 +52,7 @@ class TrackingBench:
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for numbers that cannot work."""
-        at_least_one(self, "n_seeds", "n_matched", "n_smoothed", "timing_repeats")
+        check_at_least_one(self, "n_seeds", "n_matched", "n_smoothed", "timing_repeats")
         self.selection.check()
 
     @property
@@ -74,7 +74,7 @@ class TrackingBench:
     @property
     def quick_note(self) -> str:
         """The warning on tables and figures of a short run; "" if it is long enough."""
-        return quick_words(self.n_seeds, lasting()) if is_as_short(self, QUICK) else ""
+        return describe_quick_run(self.n_seeds, lasting()) if is_as_short(self, QUICK) else ""
 
     def settings(self) -> dict[str, Any]:
         """Return what all numbers depend on."""
@@ -94,10 +94,10 @@ class TrackingBench:
         """Return every estimator on everything, which is the same whatever else is run; times are
         taken alone, at the end."""
         whole = {"experiment": self.name, **replace(self, estimators=(), sequences=()).settings()}
-        cache, run = replace(cache, key=key_of(whole, self.depends)), self.selection
+        cache, run = replace(cache, key=make_key(whole, self.depends)), self.selection
         asked = [(*each, name) for each in run.conditions() for name in run.names_of(each[1])]
         parts = [cell_of(self, *each, cache.key) for each in asked]
-        played: Parts = dict(zip(asked, cache.parts(parts, one_core=True), strict=True))
+        played: Parts = dict(zip(asked, cache.make_parts(parts, one_core=True), strict=True))
         return played | _timing(self, cache)
 
     def metrics(self, played: Parts) -> dict[str, Metric]:
@@ -141,7 +141,7 @@ def _made(rig_name: str, condition: str, seeds: tuple[int, ...]) -> tuple[Rig, S
 
 def own_key(name: str, key: str) -> str:
     """Return the key of an estimator's parts: of one of the user's own also its file counts."""
-    source = source_digest(ESTIMATORS[name].make) if name in ESTIMATORS else ""
+    source = hash_source(ESTIMATORS[name].make) if name in ESTIMATORS else ""
     return hashlib.sha256(f"{key} {source}".encode()).hexdigest()[:16] if source else key
 
 

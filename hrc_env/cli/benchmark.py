@@ -59,6 +59,6 @@ class Benchmark(EngineArguments):
         run = partial(runner.run_experiment, study, overwrite=self.overwrite, engine=engine)
         status = show(run, out, "benchmark")
         if self.enter is not None:
-            leaderboard.enter(self.enter, self.policy, out / "results.json")
+            leaderboard.add_entry(self.enter, self.policy, out / "results.json")
             print(f"Entered: {self.enter}")
         return status

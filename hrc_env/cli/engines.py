@@ -1,4 +1,4 @@
-"""Options of the commands whose work an engine computes, and the choice of that engine."""
+"""Options of commands that compute by an engine, and the choice of that engine."""
 
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar

@@ -88,7 +88,7 @@ class ImpactExperiment(AnyExperiment):
     first: any of these, random, hrc://ID/NAME, files (.zip, .safetensors) or MODULE:FUNCTION, as
     in play."""
     control: str | None = None
-    """Control of policies whose files do not name one: joint (default), tool or twist."""
+    """Control of policies without one in their files: joint (default), tool or twist."""
     trust: bool = False
     """Load pickles in their checkpoints, which can run arbitrary code; see play."""
 

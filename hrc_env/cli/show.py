@@ -37,7 +37,7 @@ def print_report(console: Console, text: str) -> None:
 
 
 def align_tables(text: str) -> str:
-    """Return Markdown whose tables have cells of one width per column."""
+    """Return Markdown with all cells of a table column padded to one width."""
     blocks = groupby(text.splitlines(), key=lambda line: line.startswith("|"))
     return "\n".join(
         line for is_table, lines in blocks for line in (_align([*lines]) if is_table else lines)

@@ -43,7 +43,7 @@ class Score:
     success_rate: float
     """Share of attempts that were achieved (`Task.achieved` and `Task.failed`)."""
     is_success: float
-    """Share of episodes whose last `info["is_success"]` is 1."""
+    """Share of episodes that end with `info["is_success"]` of 1."""
     goals_per_minute: float
     """Goals reached per minute, of all episodes together [1/min]."""
     contacts_per_episode: float

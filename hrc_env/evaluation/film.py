@@ -74,7 +74,7 @@ def film_episode(
 def find_nearest_seed(
     make: AgentFactory, seeds: Iterable[int], n_steps: int | None = None, **kwargs: Any
 ) -> int:
-    """Return the seed whose episode comes closest to the worker without a near miss.
+    """Return the seed of the episode that comes closest to the worker without a near miss.
 
     Nothing is drawn: "pixels" is played as "keypoints", so the film's episode may differ.
     """

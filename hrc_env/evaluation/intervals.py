@@ -227,7 +227,7 @@ def estimate_rate(counts: Numbers, exposure: Numbers | float, unit: str = "1") -
 
 
 def estimate_share(outcomes: Sequence[bool] | Bools) -> Metric:
-    """Return the share of trials whose outcome is true, with its exact 95 % interval.
+    """Return the share of trials with a true outcome, with its exact 95 % interval.
 
     The interval is binomial (Clopper and Pearson 1934, doi:10.1093/biomet/26.4.404); the share of
     no trials is NaN.

@@ -20,7 +20,7 @@ class Steppable(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """One control step of an environment, or of a batch, whose arrays begin with (B,)."""
+    """One control step of an environment, or of a batch, with arrays that begin with (B,)."""
 
     action: Any
     """Action of the agent (..., A)."""

@@ -14,7 +14,7 @@ COSTS = ("cost", "cost_proximity", "cost_contact")
 SUMS = np.dtype(
     [(name, "f8") for name in ("steps", "reward", *COSTS, "contacts", "touching", "nearest_m")]
 )
-"""Sums of an episode so far; a lasting contact counts once."""
+"""Sums of the current episode; a lasting contact counts once."""
 ACHIEVED, FAILED = "goals_reached", "goals_missed"
 """Names of an episode's numbers of achieved and failed attempts (`Task.achieved`,
 `Task.failed`)."""

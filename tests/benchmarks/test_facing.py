@@ -6,7 +6,7 @@ import pytest
 from benchmarks import facing
 from benchmarks.facing import YAWS, counted, metrics_of, yaw_of
 from hrc_env.core.skeleton import JOINTS, N_JOINTS
-from hrc_env.experiments.ablations.play import walks_of
+from hrc_env.experiments.ablations.play import make_walks
 from hrc_env.experiments.rigs import ALL, N_WARM_UP
 from hrc_env.geometry.rotations import about_axis
 
@@ -34,7 +34,7 @@ def test_a_body_is_sorted_by_its_angle_to_the_camera_on_either_side(yaw_deg, exp
 
 
 def test_every_joint_that_is_free_counts_once_at_its_yaw():
-    walks = walks_of("lab", 1, SEEDS, N_WARM_UP + 4)
+    walks = make_walks("lab", 1, SEEDS, N_WARM_UP + 4)
     all_four = counted("keypoints", "kalman", ALL, walks, SEEDS)
     free = sum(all_four[f"free.{yaw}"] for yaw in YAWS)
     assert (free <= 4 * 4 * N_JOINTS).all()

@@ -58,7 +58,7 @@ def desk(tmp_path, monkeypatch):
     monkeypatch.setattr(tables, "RESULTS", tmp_path)
     monkeypatch.setattr(results.generate, "main", lambda: None)
     monkeypatch.setattr(results, "provenance", lambda: {"git": "abc1234"})
-    monkeypatch.setattr(results, "versions_of", lambda names: dict.fromkeys(names, 1))
+    monkeypatch.setattr(results, "select_versions", lambda names: dict.fromkeys(names, 1))
     monkeypatch.setitem(sys.modules, "made_tables", SimpleNamespace(TABLES=[TABLE]))
     tables.declared.cache_clear()
 
@@ -82,7 +82,7 @@ def test_numbers_pictures_and_what_they_depend_on_reach_the_documentation(desk):
     folder = desk()
     assert main(Arguments()) == 0
     result = tables.read("found")
-    assert "| lab | 25 (20 to 30) |" in result.table.markdown(result.metrics)
+    assert "| lab | 25 (20 to 30) |" in result.table.to_markdown(result.metrics)
     assert (result.version, result.machine) == ("0.2.0", "2 cores, no GPU")
     whole = json.loads((folder / "whole" / "one.json").read_text())
     assert result.depends == whole["depends"] == {"env": 1}
@@ -114,7 +114,7 @@ def test_only_what_is_stale_is_run_unless_it_is_named(desk, monkeypatch):
     assert n_runs(folder) == 1
     main(Arguments(only=("one",)))
     assert n_runs(folder) == 2
-    monkeypatch.setattr(results, "versions_of", lambda names: dict.fromkeys(names, 2))
+    monkeypatch.setattr(results, "select_versions", lambda names: dict.fromkeys(names, 2))
     assert why_stale("one") == "env 1 -> 2"
     main(Arguments())
     assert n_runs(folder) == 3

@@ -12,8 +12,8 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.engines.local import Serial
 from hrc_env.experiments import runner
 from hrc_env.experiments.cache import PartCache
-from hrc_env.experiments.runner import settings_of
-from hrc_env.experiments.versions import key_of
+from hrc_env.experiments.runner import describe_experiment
+from hrc_env.experiments.versions import make_key
 from hrc_env.tracking.estimators import ESTIMATORS
 
 TINY = TrackingBench(n_seeds=2, n_matched=2, n_smoothed=1, timing_repeats=1)
@@ -78,14 +78,14 @@ def test_parts_are_the_same_whatever_else_is_run(tmp_path, monkeypatch):
     monkeypatch.setattr(bench, "time_estimator", lambda *a: a[-1](1.0) or times)
     whole = PartCache(
         tmp_path / "parts",
-        key_of(settings_of(TINY), TINY.depends),
+        make_key(describe_experiment(TINY), TINY.depends),
         1,
         lambda *a: None,
         engine=Serial(),
     )
     own = replace(TINY, estimators=("ransac",))
     names = own.selection.names_of("clean")
-    whole.parts([bench.cell_of(own, "lab", "clean", name, whole.key) for name in names])
+    whole.make_parts([bench.cell_of(own, "lab", "clean", name, whole.key) for name in names])
     made = {path: path.stat().st_mtime_ns for path in (tmp_path / "parts").iterdir()}
     assert {path.name for path in made} == {"lab.clean.particle.json", "lab.clean.ransac.json"}
     some = replace(TINY, estimators=("ransac",), sequences=("lab.clean", "site.matched"))

@@ -12,7 +12,7 @@ from benchmarks.studies import COMMANDS, Command
 from benchmarks.verify import Arguments, draw, found_share, main
 from docs import tables
 from hrc_env.core.errors import ConfigError, DownloadError
-from hrc_env.experiments.runner import cache_of
+from hrc_env.experiments.runner import make_cache
 
 ROWS = ("lab", "site")
 SEEDS = range(5)
@@ -42,8 +42,8 @@ class Toy:
                     values = (self.n * values).tolist()
                     return {"t": [float(seed)], "values": values, "row": row}
 
-                found[row, seed] = cache.part(f"{row}.{seed}", make)
-        found["learnt"] = cache.part("training.0", lambda tick: {"sha256": "abc"})
+                found[row, seed] = cache.make_part(f"{row}.{seed}", make)
+        found["learnt"] = cache.make_part("training.0", lambda tick: {"sha256": "abc"})
         return found
 
 
@@ -64,8 +64,8 @@ def toy(tmp_path, monkeypatch):
             lambda given: walk(config, given), trainings=("training.",), **changes
         )
 
-    Toy().play(cache_of(Toy(), tmp_path / "made", lambda share, label: None))
-    versions = results.versions_of(Toy.depends)
+    Toy().play(make_cache(Toy(), tmp_path / "made", lambda share, label: None))
+    versions = results.select_versions(Toy.depends)
     records.write("toy", versions, tmp_path / "made", 0.0)
     (tmp_path / "results" / "whole").mkdir(parents=True)
     whole = {"command": "python -m toy", "depends": versions}

@@ -16,7 +16,9 @@ NAMES = check.NAMES
 def quick(monkeypatch):
     """Every finding at once, and fine."""
     for name in NAMES:
-        monkeypatch.setattr(check, f"_check_{name.lower()}", lambda name=name: check.Finding(True, f"{name} [fine]"))
+        monkeypatch.setattr(
+            check, f"_check_{name.lower()}", lambda name=name: check.Finding(True, f"{name} [fine]")
+        )
 
 
 def test_every_line_is_ok_where_all_is_well(quick, capsys):

@@ -73,9 +73,9 @@ def test_rates_are_compared_exactly():
         (lambda: estimate_rate([-1], 1.0), "counts must be whole numbers"),
         (lambda: estimate_rate([np.nan], 1.0), "counts must be whole numbers"),
         (lambda: estimate_rate([1], -1.0), "exposure must not be negative"),
-        (lambda: estimate_share([0.5]), "seen must be true or false"),
-        (lambda: estimate_share([np.nan]), "seen must be true or false"),
-        (lambda: compare_means([1.0], [1.0, 2.0]), "of the same seeds, got 1 and 2"),
+        (lambda: estimate_share([0.5]), "outcomes must be true or false"),
+        (lambda: estimate_share([np.nan]), "outcomes must be true or false"),
+        (lambda: compare_means([1.0], [1.0, 2.0]), "must have the same seeds, got 1 and 2"),
         (lambda: compare_rates([0.5], [1], 1.0, 1.0), "counts must be whole numbers"),
     ],
 )

@@ -33,8 +33,8 @@ from benchmarks.tracking.sequences import Sequences, lasting, make_sequences
 from hrc_env.core.results import Metric, over
 from hrc_env.core.typing import Floats, Points2, Points3
 from hrc_env.experiments.cache import PartCache, PartProgress
-from hrc_env.experiments.report import Metrics, Report, quick_words, table
-from hrc_env.experiments.runner import at_least_one
+from hrc_env.experiments.report import Metrics, Report, describe_quick_run, format_table
+from hrc_env.experiments.runner import check_at_least_one
 
 LIBRARIES = ("aniposelib", "particles", "filterpy")
 INSTALL = 'pip install -c constraints.txt -e ".[baselines]"'
@@ -60,7 +60,7 @@ class BaselinesBench:
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for numbers that cannot work."""
-        at_least_one(self, "n_seeds")
+        check_at_least_one(self, "n_seeds")
 
     @property
     def seeds(self) -> list[int]:
@@ -75,7 +75,7 @@ class BaselinesBench:
     @property
     def quick_note(self) -> str:
         """The warning on tables of a short run; "" if it is long enough."""
-        return quick_words(self.n_seeds, lasting()) if self.n_seeds <= N_QUICK else ""
+        return describe_quick_run(self.n_seeds, lasting()) if self.n_seeds <= N_QUICK else ""
 
     def settings(self) -> dict[str, Any]:
         """Return what all numbers depend on."""
@@ -88,7 +88,7 @@ class BaselinesBench:
         for rig, condition in product(map(make_rig, RIGS), CONDITIONS):
             for seed, name in product(self.seeds, names()):
                 make = partial(_part, name, rig, condition, seed)
-                part = cache.part(f"{rig.name}.{condition}.{name}.{seed}", make)
+                part = cache.make_part(f"{rig.name}.{condition}.{name}.{seed}", make)
                 for window, sums in part.items():
                     cells.setdefault((f"{rig.name}.{window}", name), []).append(sums)
         return cells
@@ -157,13 +157,13 @@ def metrics_of(played: Played) -> dict[str, Metric]:
 def report(metrics: Metrics) -> Report:
     """Return the table of errors and times, and who is missing."""
     lines = [
-        [row, *(cell(metrics[f"rmse_m.{row}.{name}"], 100) for name in names())]
+        [row, *(format_cell(metrics[f"rmse_m.{row}.{name}"], 100) for name in names())]
         for row in (f"{rig}.{window}" for rig in RIGS for window in ROWS)
     ]
-    times = [cell(metrics[f"update_us.{name}.1"], 1, 0) for name in names()]
+    times = [format_cell(metrics[f"update_us.{name}.1"], 1, 0) for name in names()]
     header = ["RMSE in cm", *names()]
     return Report("Other people's code on the same sequences", missing_sentence(), [
-        table(header, [*lines, ["us per update of a worker", *times]]),
+        format_table(header, [*lines, ["us per update of a worker", *times]]),
         "aniposelib is offline: it sees the whole clip at once, frames to come included; its time "
         "is the clip's over its frames. Low and high in results.json are the best and the worst "
         "sequence.",

@@ -1,15 +1,16 @@
-"""The margin at which something falls to a level, by bisection, and what else is true there.
+"""The search of the margin at which a rate falls to a level, by bisection, and its evaluation.
 
-A search evaluates margins on the same seeds, so that one margin differs from another by what it
-does and not by who was drawn (common random numbers): it halves a bracket until noise is wider, and
-takes a margin on either side. Where the level seems to be, fresh seeds are played. These say how
-much there is there; the search says how it changes beside it: y(m) = y_fresh(m_0) y_search(m) /
-y_search(m_0), a ratio estimator of two samples (Cochran 1977, Sampling Techniques, ch. 12). As the
-search chose the margin, its own seeds have no say in the height of the curve.
+A search evaluates margins on the same seeds, so that margins differ by their effect and not by
+their draws (common random numbers): it halves a bracket until noise is wider, and takes a margin on
+either side. At the margin found, fresh seeds are played. These give the height of the curve there;
+the search gives its shape beside it: y(m) = y_fresh(m_0) y_search(m) / y_search(m_0), a ratio
+estimator of two samples (Cochran 1977, Sampling Techniques, ch. 12). As the search chose the
+margin, its own seeds do not affect the height of the curve.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import isotonic_regression
@@ -19,14 +20,24 @@ from hrc_env.evaluation import intervals
 from hrc_env.evaluation.intervals import find_crossing
 
 HALF = 0.5
-"""Of an event, added to counts whose logarithm is asked for."""
+"""Events added to counts before their logarithm is taken."""
 
 
-def searched(
+def search(
     rate: Callable[[float], float], low: float, high: float, level: float, n_steps: int
 ) -> list[float]:
-    """The arguments that were tried of a falling rate: `n_steps` that halve the bracket round the
-    level, and one as wide as what is left of it on either side."""
+    """Evaluate a falling rate at `n_steps` bisections of a bracket and at margins beside it.
+
+    Args:
+        rate: evaluates the rate at an argument.
+        low: lower end of the bracket.
+        high: upper end of the bracket.
+        level: level to which the rate falls.
+        n_steps: number of bisections.
+
+    Returns:
+        All arguments that were tried; the last are the ends of the bracket and one beyond either.
+    """
     tried: list[float] = []
     for _ in range(n_steps):
         tried.append(middle := 0.5 * (low + high))
@@ -42,54 +53,72 @@ def searched(
     return tried
 
 
-def falling(events: Floats, minutes: Floats) -> Floats:
-    """(K,) logarithms of rates, the nearest that fall, of counts in so many minutes (K,)."""
+def fit_falling_rates(events: Floats, minutes: Floats) -> Floats:
+    """Return logarithms of rates (K,), fitted so that they fall, from counts and minutes (K,)."""
     rates = np.log((events + HALF) / minutes)
     return np.asarray(isotonic_regression(rates, increasing=False).x)
 
 
 @dataclass(frozen=True, slots=True)
-class Tried:
-    """Sums of episodes, a seed a column."""
+class MarginSearch:
+    """Sums of the episodes of a search, one column per seed."""
 
     margins_m: Floats
-    """(K,) that grow."""
+    """Margins (K,) in increasing order [m]."""
     events: Floats
-    """(K, n) what has to fall."""
+    """Events (K, n), which become rarer as the margin grows."""
     achieved: Floats
-    """(K, n)."""
+    """Goals (K, n)."""
     minutes: Floats
-    """(K, n)."""
+    """Durations (K, n) [min]."""
     fresh_margin_m: float
-    """With which fresh seeds were played."""
+    """Margin of the fresh seeds [m]."""
     fresh_events: Floats
-    """(m,)."""
+    """Events of fresh seeds (m,)."""
     fresh_achieved: Floats
-    """(m,)."""
+    """Goals of fresh seeds (m,)."""
     fresh_minutes: Floats
-    """(m,)."""
+    """Durations of fresh seeds (m,) [min]."""
 
-    def at(self, level_per_min: float, drawn: Ints, fresh: Ints) -> Floats:
-        """(R, 2) the margin [m] at which events come down to the level, and what is achieved a
-        minute there, for how often seeds are drawn (R, n) and (R, m). A margin beyond those that
-        were tried is the last of them."""
+    def evaluate(self, level_per_min: float, drawn: Ints, fresh: Ints) -> Floats:
+        """Return the margin [m] at which events fall to a level, and goals per minute there (R, 2).
+
+        A margin beyond those that were tried is the last of them.
+
+        Args:
+            level_per_min: events per minute.
+            drawn: number of times that each seed of the search counts (R, n).
+            fresh: number of times that each fresh seed counts (R, m).
+        """
         m, m_0, level = self.margins_m, self.fresh_margin_m, np.log(level_per_min)
         minutes, fresh_minutes = drawn @ self.minutes.T, fresh @ self.fresh_minutes
         events, achieved = drawn @ self.events.T, drawn @ self.achieved.T / minutes
         height = np.log((fresh @ self.fresh_events + HALF) / fresh_minutes)
-        found = np.empty((len(drawn), 2))
-        for r, curve in enumerate(map(falling, events, minutes)):
+        results = np.empty((len(drawn), 2))
+        for r, curve in enumerate(map(fit_falling_rates, events, minutes)):
             margin_m = find_crossing(m, curve + height[r] - np.interp(m_0, m, curve), level)
             there, here = np.interp([margin_m, m_0], m, achieved[r])
-            found[r] = margin_m, there / here if here else 1.0
-        found[:, 1] *= fresh @ self.fresh_achieved / fresh_minutes
-        return found
+            results[r] = margin_m, there / here if here else 1.0
+        results[:, 1] *= fresh @ self.fresh_achieved / fresh_minutes
+        return results
 
 
-def draws(n: int, m: int, n_draws: int) -> tuple[Ints, Ints]:
-    """(1 + R, n) and (1 + R, m) how often seeds are drawn: first each once, then at random, always
-    the same, so that what shares its seeds is compared draw by draw."""
-    sizes = (n, m)
-    tried, fresh = (np.vstack([np.ones((1, k), int), intervals.draw_seeds(k, n_draws, stream)])
-                    for stream, k in enumerate(sizes))  # fmt: skip
-    return tried, fresh
+class SeedWeights(NamedTuple):
+    """The number of times that each seed counts, in 1 + R draws; in the first each counts once."""
+
+    search: Ints
+    """Seeds of the search (1 + R, n)."""
+    fresh: Ints
+    """Fresh seeds (1 + R, m)."""
+
+
+def draw_seeds(n: int, m: int, n_draws: int) -> SeedWeights:
+    """Return draws of n seeds of a search and of m fresh ones, the same in every call.
+
+    Rows that share their seeds can therefore be compared draw by draw.
+    """
+    weights = (
+        np.vstack([np.ones((1, k), int), intervals.draw_seeds(k, n_draws, stream)])
+        for stream, k in enumerate((n, m))
+    )
+    return SeedWeights(*weights)
