@@ -159,7 +159,10 @@ class ClusterBench:
         """Draw what Ray showed; return the table beside it."""
         drawn = _draw(played, figures / "metrics.png")
         about = (__doc__ or "").partition("\n")[2].strip()
-        parts = [TABLE.to_markdown(metrics), format_picture(drawn, "A run of two workers, as Ray exports it")]
+        parts = [
+            TABLE.to_markdown(metrics),
+            format_picture(drawn, "A run of two workers, as Ray exports it"),
+        ]
         return Report("Workers of RLlib", about, parts, "smallest and largest rounds")
 
 

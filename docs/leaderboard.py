@@ -65,4 +65,5 @@ def _section(task: str, everybody: Mapping[str, Entry]) -> str:
            for what in ENTRY_METRICS))
         for name, scores in here for k, key in enumerate(keys)
     ]  # fmt: skip
-    return f"## {task}\n\n{format_table(('policy', 'shield', 'episodes', *ENTRY_METRICS.values()), rows)}\n"
+    heads = ("policy", "shield", "episodes", *ENTRY_METRICS.values())
+    return f"## {task}\n\n{format_table(heads, rows)}\n"

@@ -101,7 +101,7 @@ def test_a_table_finds_a_number_for_every_column(name):
 
 
 def test_a_table_shows_the_numbers_of_the_last_run():
-    result, whole = tables.read("shielded"), results.whole("shielded")
+    result, whole = tables.read("shielded"), results.read_results("shielded")
     four = whole["metrics"]["four.share"]
     line = next(each for each in result.table.to_markdown(result.metrics).splitlines()
                 if each.startswith("| four cameras |"))  # fmt: skip

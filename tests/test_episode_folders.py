@@ -146,7 +146,7 @@ def test_drawn_rigs_differ_between_environments_of_a_batch():
 
 
 def test_what_is_finished_when_it_is_killed_is_not_played_again(tmp_path, monkeypatch):
-    once, plays = recording._played, []
+    once, plays = recording._play, []
 
     def counted(asked, first, n):
         plays.append(first)
@@ -154,7 +154,7 @@ def test_what_is_finished_when_it_is_killed_is_not_played_again(tmp_path, monkey
             raise KeyboardInterrupt
         return once(asked, first, n)
 
-    monkeypatch.setattr(recording, "_played", counted)
+    monkeypatch.setattr(recording, "_play", counted)
     words = ["--perception", "truth"]
     assert record(tmp_path / "set", *words).returncode == 130
     assert not (tmp_path / "set").exists()
@@ -191,7 +191,7 @@ def test_what_cannot_be_recorded_is_refused_before_an_episode(name, tmp_path):
 def test_a_place_is_needed_and_must_be_free(tmp_path):
     done = hrc("record", "HRCReach-v0")
     assert "A data set needs one place" in said(done)
-    assert "is there already" in said(record(tmp_path))
+    assert "exists already" in said(record(tmp_path))
 
 
 def test_what_is_no_data_set_is_refused_in_words(tmp_path):
@@ -199,7 +199,7 @@ def test_what_is_no_data_set_is_refused_in_words(tmp_path):
         (None, "is no folder of recorded episodes"),
         ("{", "cannot be read"),
         ("{}", "cannot be read: KeyError"),
-        (json.dumps({"format": 9, "hrc_env": "9.0"}), "is of form 9"),
+        (json.dumps({"format": 9, "hrc_env": "9.0"}), "has format 9"),
     ):
         if content is not None:
             (tmp_path / "dataset.json").write_text(content)

@@ -13,7 +13,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 import hrc_env
 from hrc_env.__main__ import main
 from hrc_env.agents import acting, callbacks, checkpoints
-from hrc_env.agents.registry import control_of
+from hrc_env.agents.registry import find_control
 from hrc_env.core.errors import CheckpointError
 from hrc_env.experiments import leaderboard, report
 from hrc_env.experiments.impact import experiment
@@ -107,7 +107,7 @@ def test_actions_of_another_control_are_told_from_those_of_this_one(tmp_path):
     model = PPO("MlpPolicy", hrc_env.HRCVecEnv(2, perception="none", control="twist"), n_steps=8)
     model.save(tmp_path / "plain.zip")
     name = str(tmp_path / "plain.zip")
-    assert control_of(name) == "twist"
+    assert find_control(name) == "twist"
     joint = hrc_env.env_info(hrc_env.HRCVectorEnv(1, perception="none"))
     with pytest.raises(CheckpointError, match=r"acts by control='twist'.*--control twist"):
         hrc_env.make_agent(name, joint)
@@ -160,7 +160,7 @@ def test_a_ramp_of_ones_own_lets_the_proximity_term_grow():
     model = PPO("MlpPolicy", VecNormalize(env, norm_obs=False), n_steps=8, batch_size=16)
     model.learn(64, callback=[hrc_env.ProximityRamp(32), Watch()])
     assert weights == [0.0, 1.5, 3.0, 3.0]
-    with pytest.raises(hrc_env.ConfigError, match="wants an HRCVecEnv, got DummyVecEnv"):
+    with pytest.raises(hrc_env.ConfigError, match="needs an HRCVecEnv, got DummyVecEnv"):
         PPO("MlpPolicy", "CartPole-v1", n_steps=8, batch_size=8).learn(
             8, callback=hrc_env.ProximityRamp()
         )

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from hrc_env.__main__ import main
 from hrc_env.agents.callbacks import plot_curve
-from hrc_env.agents.training import weight_reached
+from hrc_env.agents.training import describe_weight
 
 
 def episode(reached: float, missed: float, success: float) -> dict[str, float]:
@@ -36,11 +36,11 @@ def test_a_task_that_never_succeeded_is_told():
 
 
 def test_a_curve_says_the_weight_that_was_reached():
-    assert weight_reached([{"proximity": 0.5}], 2.0) == (
-        "proximity weight 0.5 of 2: the ramp was not over"
+    assert describe_weight([{"proximity": 0.5}], 2.0) == (
+        "proximity weight 0.5 of 2: the ramp was not finished"
     )
-    assert weight_reached([{"proximity": 2.0}], 2.0) == "proximity weight 2"
-    assert weight_reached([], 2.0) == "proximity weight 2"
+    assert describe_weight([{"proximity": 2.0}], 2.0) == "proximity weight 2"
+    assert describe_weight([], 2.0) == "proximity weight 2"
 
 
 def test_a_curve_shows_successes_beside_attempts(tmp_path, monkeypatch):

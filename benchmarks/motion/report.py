@@ -3,7 +3,7 @@
 from benchmarks.motion.targets import ANY, Target, targets_of
 from hrc_env.core.results import Metric
 from hrc_env.experiments.columns import Column
-from hrc_env.experiments.report import Metrics, Report, format_metric, format_table, format_metrics
+from hrc_env.experiments.report import Metrics, Report, format_metric, format_metrics, format_table
 
 COLUMNS = (
     Column("{}.seconds", "s"),
@@ -30,7 +30,8 @@ def report(metrics: Metrics) -> Report:
     asked = (f"`{each.statistic}` <= {each.high:g} ({each.source})" for each in targets_of(ANY))
     return Report("Motion bench", lead, (
         "## Beside what is known of people", _targets(scenes, metrics),
-        "## Every scene", format_metrics("scene", {each: each for each in scenes}, COLUMNS, metrics),
+        "## Every scene",
+        format_metrics("scene", {each: each for each in scenes}, COLUMNS, metrics),
         f"Everywhere: {'; '.join(asked)}.",
     ), "the smallest and the largest body's")  # fmt: skip
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.common import CHI2_95_3D, normalised_square
+from benchmarks.common import CHI2_95_3D, compute_normalized_square
 from benchmarks.perception.views import family_index
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Floats, Ints
@@ -89,7 +89,7 @@ def _episode(env: HRCEnv, seed: int, n_steps: int) -> Episode:
             offset, cov = estimate.mean_world[0, 0] - joints, estimate.cov_world[0, 0]
             error[t] = np.linalg.norm(offset, axis=-1)
             std[t] = np.sqrt(np.trace(cov, axis1=-2, axis2=-1))
-            inside[t] = np.count_nonzero(normalised_square(offset, cov) < CHI2_95_3D)
+            inside[t] = np.count_nonzero(compute_normalized_square(offset, cov) < CHI2_95_3D)
     return Episode(error, std, inside, off_px, family, named)
 
 

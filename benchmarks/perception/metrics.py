@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.common import exactly
+from benchmarks.common import make_exact
 from benchmarks.perception.crops import STEP_S
 from benchmarks.perception.episodes import Episode, episode_of, some_steps
 from benchmarks.perception.speed import ROUNDS
@@ -56,12 +56,12 @@ def _speed(found: Found) -> Metrics:
     for label, part in found.items():
         kind, _, key = label.partition(".")
         if kind == "network":
-            metrics[f"network_ms.{key}"] = exactly(part["ms"], "ms", ROUNDS)
+            metrics[f"network_ms.{key}"] = make_exact(part["ms"], "ms", ROUNDS)
         elif kind == "speed":
-            metrics[f"steps_per_s.{key}"] = exactly(part["steps_per_s"], "1/s", part["n"])
-            metrics[f"step_ms.{key}"] = exactly(1e3 / part["steps_per_s"], "ms", part["n"])
+            metrics[f"steps_per_s.{key}"] = make_exact(part["steps_per_s"], "1/s", part["n"])
+            metrics[f"step_ms.{key}"] = make_exact(1e3 / part["steps_per_s"], "ms", part["n"])
             for stage, ms in part["stages"].items():
-                metrics[f"stage_ms.{stage}.{key}"] = exactly(ms, "ms", part["n"])
+                metrics[f"stage_ms.{stage}.{key}"] = make_exact(ms, "ms", part["n"])
     return metrics
 
 
@@ -89,7 +89,9 @@ def _belief(name: str, episodes: list[Episode]) -> Metrics:
     return {
         f"error_m.{name}.median": estimate_quantile(errors, 0.5, "m"),
         f"error_m.{name}.p95": estimate_quantile(errors, 0.95, "m"),
-        f"coverage95.{name}": estimate_ratio(inside, [float(len(each)) for each in errors], "share"),
+        f"coverage95.{name}": estimate_ratio(
+            inside, [float(len(each)) for each in errors], "share"
+        ),
         f"std_over_error.{name}": estimate_rmse(reported, squared, "ratio"),
         f"lost_steps.{name}": estimate_ratio(lost, steps, "share"),
     }
@@ -156,7 +158,9 @@ def _views(every: list[View]) -> Metrics:
     metrics: Metrics = {}
     for kind in ROWS:
         for row, views in rows_of(every, kind).items():
-            metrics[f"detected.{kind}.{row}"] = estimate_share([view.error is not None for view in views])
+            metrics[f"detected.{kind}.{row}"] = estimate_share(
+                [view.error is not None for view in views]
+            )
             errors = [[view.error] for view in views if view.error is not None]
             for name, q in (("median", 0.5), ("p95", 0.95)):
                 key = f"error_share.{kind}.{row}.{name}"

@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from benchmarks.common import keys
+from benchmarks.common import list_endings
 from benchmarks.perception.declaration import (
     ACCURACY,
     DETECTED,
@@ -59,10 +59,10 @@ def report(config: Any, found: Any, metrics: Metrics, figures: Path) -> Report:
     views = {
         f"{kind}.{row}": f"{kind}: {row.replace('_', ' ')}"
         for kind in ROWS
-        for row in keys(metrics, f"detected.{kind}.")
+        for row in list_endings(metrics, f"detected.{kind}.")
     }
-    paces = {name: name for name in keys(metrics, "steps_per_s.")}
-    names = keys(metrics, "lost_steps.")
+    paces = {name: name for name in list_endings(metrics, "steps_per_s.")}
+    names = list_endings(metrics, "lost_steps.")
     estimates = {name: name.replace(".", ": ") for name in names if not name.startswith("fault.")}
     faults = [each for level in LEVELS for name, each in of_fault(level).items() if name != "lost"]
     stages = [Column(f"stage_ms.{each}.{{}}", f"{each} [ms]") for each in (*STAGES, REST)]

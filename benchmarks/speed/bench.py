@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from benchmarks.common import keys
+from benchmarks.common import list_endings
 from benchmarks.speed.contenders import OURS, PEER, Contender, Single, Starts, Vector
 from benchmarks.speed.declaration import REACHER, SHOWN, SINGLE, TASKS, organs_of, steps_of
 from benchmarks.speed.organs import Organs
@@ -83,7 +83,9 @@ class SpeedBench:
     def quick_note(self) -> str:
         """The warning on tables and figures of a short run; "" if it is long enough."""
         seconds = HRCConfig().ctrl_dt * self.least_steps
-        return describe_quick_run(self.n_rounds, seconds, "round") if is_as_short(self, QUICK) else ""
+        return (
+            describe_quick_run(self.n_rounds, seconds, "round") if is_as_short(self, QUICK) else ""
+        )
 
     def settings(self) -> dict[str, Any]:
         """Return what all numbers depend on."""
@@ -207,6 +209,8 @@ def _turns(config: SpeedBench, exits: ExitStack, progress: Progress) -> Iterator
 def metrics_of(measured: Measured) -> dict[str, Metric]:
     """Medians over rounds with smallest and largest."""
     own = {name: values for name, values in measured.items() if not name.startswith(BY_TASK)}
-    by_task = {name: measured[f"{BY_TASK}.{name}"] for name in keys(measured, f"{BY_TASK}.")}
+    by_task = {
+        name: measured[f"{BY_TASK}.{name}"] for name in list_endings(measured, f"{BY_TASK}.")
+    }
     found = {name: over(values, UNITS[name.split(".")[0]]) for name, values in own.items()}
     return found | (shares(by_task) if by_task else {})

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
-from benchmarks.common import keys
+from benchmarks.common import list_endings
 from benchmarks.speed.declaration import ASKED, REACHER, SINGLE, TASKS, organs_of, steps_of, title
 from benchmarks.speed.organs import ORGANS, REST, TOTAL
 from hrc_env.experiments.plots import label_axes, make_figure, save
@@ -33,13 +33,14 @@ def report(metrics: Metrics, figures: Path) -> Report:
     if f"env_steps_per_s.{REACHER}.{SINGLE}" not in metrics:
         return Report("Speed of every id", ASKED, [tasks], SPREAD)
     plot_organs(figures / "organs.png", metrics)
-    pairs = [name.split(".", 1) for name in keys(metrics, "env_steps_per_s.")]
+    pairs = [name.split(".", 1) for name in list_endings(metrics, "env_steps_per_s.")]
     levels = dict.fromkeys(level for level, _ in pairs if level != REACHER)
     sizes = sorted({configuration for _, configuration in pairs}, key=_size)
     return Report("Speed bench", ASKED, (
         steps_of([*levels], sizes).to_markdown(metrics),
-        organs_of(keys(metrics, f"us_per_env_step.{TOTAL}.")).to_markdown(metrics), _ABOUT_THE_ORGANS,
-        format_picture(figures / "organs.png", "What a step costs, level `keypoints` (on the wall)."),
+        organs_of(list_endings(metrics, f"us_per_env_step.{TOTAL}.")).to_markdown(metrics),
+        _ABOUT_THE_ORGANS,
+        format_picture(figures / "organs.png", "Time of a step by part, level `keypoints` (wall)."),
         tasks,
     ), SPREAD)  # fmt: skip
 
@@ -53,7 +54,7 @@ def _size(configuration: str) -> tuple[int, str]:
 def plot_organs(path: Path, metrics: Metrics) -> None:
     """Bars of microseconds per environment and step; one environment apart from many."""
     groups: tuple[list[str], list[str]] = ([], [])
-    for each in keys(metrics, f"us_per_env_step.{TOTAL}."):
+    for each in list_endings(metrics, f"us_per_env_step.{TOTAL}."):
         groups[each != SINGLE and not each.startswith("1.")].append(each)
     shown = [group for group in groups if group]
     figure = make_figure(12.5, 7)

@@ -24,7 +24,7 @@ from hrc_env.core.results import Metric
 from hrc_env.experiments.cache import Part, PartCache, PartProgress
 from hrc_env.experiments.report import Metrics, Report, Table, describe_quick_run
 from hrc_env.experiments.runner import check_at_least_one, is_as_short
-from hrc_env.experiments.versions import make_key, hash_source
+from hrc_env.experiments.versions import hash_source, make_key
 from hrc_env.tracking.estimators import ESTIMATORS
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from itertools import product
 
-from benchmarks.common import cell
+from benchmarks.common import format_number
 from benchmarks.tracking.declaration import BENCH, KINDS, table_of_kind, times
 from benchmarks.tracking.env_sequences import ENV
 from benchmarks.tracking.names import DEFAULT, DLT, EVERYTHING, SMOOTHER, Selection
@@ -56,16 +56,16 @@ def _lead(metrics: Metrics, selection: Selection) -> str:
         key = f"{rig}.{window}"
         line = [
             f"{rig} {window}",
-            format_cell(metrics[f"rmse_m.{key}.{DEFAULT}"], 100, 2, True),
-            format_cell(metrics[f"coverage95.{key}.{DEFAULT}"], 1, 3),
-            format_cell(metrics[f"std_over_rmse.{key}.{DEFAULT}"], 1, 2),
+            format_number(metrics[f"rmse_m.{key}.{DEFAULT}"], 100, 2, True),
+            format_number(metrics[f"coverage95.{key}.{DEFAULT}"], 1, 3),
+            format_number(metrics[f"std_over_rmse.{key}.{DEFAULT}"], 1, 2),
         ]
         if "paper" in rivals:
-            line.append(format_cell(metrics[f"rmse_m.{key}.paper"], 100, 2))
+            line.append(format_number(metrics[f"rmse_m.{key}.paper"], 100, 2))
         if rivals:
             best = min(rivals, key=lambda name: metrics[f"rmse_m.{key}.{name}"].value)
-            line.append(f"{format_cell(metrics[f'rmse_m.{key}.{best}'], 100, 2)} {best}")
-            line.append(format_cell(metrics[f"default_over.{key}.{best}"], 1, 3, True))
+            line.append(f"{format_number(metrics[f'rmse_m.{key}.{best}'], 100, 2)} {best}")
+            line.append(format_number(metrics[f"default_over.{key}.{best}"], 1, 3, True))
         lines.append(line)
     return format_table(header, lines)
 
@@ -82,13 +82,16 @@ def _by_rig(
     for rig, (title, key) in product(rigs, kinds.items()):
         scale, digits = (100, 2) if key.startswith("rmse_m") else (1, 3)
         found = (metrics.get(key.format(rig=rig, name=name)) for name in names)
-        lines.append([rig + title, *(format_cell(each, scale, digits, True) for each in found)])
+        lines.append([rig + title, *(format_number(each, scale, digits, True) for each in found)])
     return format_table(["", *names], lines)
 
 
 def _bound(metrics: Metrics, selection: Selection, rigs: Sequence[str]) -> str:
     names = selection.names_of(MATCHED)
-    both = ["both rigs", *(format_cell(metrics[f"ratio_to_bound.{name}"], 1, 3, True) for name in names)]
+    both = [
+        "both rigs",
+        *(format_number(metrics[f"ratio_to_bound.{name}"], 1, 3, True) for name in names),
+    ]
     kinds = {
         "": "ratio_to_bound_in.{rig}.{name}",
         ": coverage": f"coverage95.{{rig}}.{MATCHED}.{{name}}",

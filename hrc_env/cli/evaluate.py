@@ -53,7 +53,7 @@ class Evaluate(EnvironmentArguments, EngineArguments):
         engine, console = self.choose_engine(), Console()
         from hrc_env.agents.registry import (
             check_agent,
-            control_of,
+            find_control,
             make_agent,
         )  # no simulator for --help
         from hrc_env.core.results import provenance, write_whole
@@ -64,7 +64,7 @@ class Evaluate(EnvironmentArguments, EngineArguments):
         check_agent(self.agent)
         make = partial(make_agent, carried(self.agent), trust=self.trust)
         make_ready(console, self.perception)
-        keywords = replace(self, control=self.control or control_of(self.agent)).keywords()
+        keywords = replace(self, control=self.control or find_control(self.agent)).keywords()
         with Meter(console, "episodes", self.episodes, "episodes") as meter:
 
             def tick(share: float) -> None:

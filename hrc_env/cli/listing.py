@@ -40,7 +40,7 @@ class List(EnvironmentArguments):
             "robot": ROBOTS, "cameras": [camera.name for camera in LAB_CAMERAS],
             "control": CONTROLS, "shield": SHIELDS,
             "agent": (
-                *AGENTS, *policies.names(), "a checkpoint: PATH.zip",
+                *AGENTS, *policies.list_names(), "a checkpoint: PATH.zip",
                 "a policy: PATH.safetensors", "a function: MODULE:FUNCTION",
             ),
         }  # fmt: skip

@@ -51,9 +51,9 @@ class Play(EnvironmentArguments):
         check_names("environment", [self.task], hrc_env.IDS)
         check_at_least("--episodes", self.episodes, 1)
         check_at_least("--seed", self.seed, 0)
-        from hrc_env.agents.registry import control_of  # here: --help imports no simulator
+        from hrc_env.agents.registry import find_control  # here: --help imports no simulator
 
-        arguments = replace(self, control=self.control or control_of(self.agent))
+        arguments = replace(self, control=self.control or find_control(self.agent))
         if self.video is not None:
             check_writable_file(self.video, ".mp4", "--video")
             film_agent(arguments, self.agent, self.video, trust=self.trust)

@@ -26,13 +26,13 @@ class Train(TrainingRequest):
         Raises:
             ConfigError: a number or a name with which no policy can be trained.
         """
-        from hrc_env.agents.recipes import filled  # here: --help imports no simulator
+        from hrc_env.agents.recipes import fill_in  # here: --help imports no simulator
 
         for name in ("num_envs", "threads", "episodes"):
             check_at_least(f"--{name.replace('_', '-')}", getattr(self, name), 1)
         for name in ("seed", "proximity", "ramp", "demonstrations"):
             check_at_least(f"--{name}", getattr(self, name), 0)
-        mine = filled(self)
+        mine = fill_in(self)
         check_at_least("--timesteps", mine.timesteps, 0 if mine.demonstrations else 1)
         check_names("algorithm", [mine.algorithm], ALGORITHMS)
         _check_limit(self.cost_limit, mine.algorithm)

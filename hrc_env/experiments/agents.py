@@ -8,7 +8,7 @@ from typing import Any
 
 from hrc_env.agents import policies
 from hrc_env.agents.env_info import AgentFactory
-from hrc_env.agents.registry import AGENTS, OTHERS, check_agent, function_of, make_agent
+from hrc_env.agents.registry import AGENTS, OTHERS, check_agent, find_function, make_agent
 from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.experiments.versions import hash_file, hash_source
 
@@ -44,11 +44,11 @@ def describe_agent(agent: AgentChoice) -> Any:
         name = getattr(agent, "__qualname__", type(agent).__qualname__)
         return {"function": name, "source": hash_source(agent)}
     if agent.startswith(policies.PREFIX):
-        return {"policy": agent, "sha256": policies.read(policies.path_of(agent))[0].sha256}
+        return {"policy": agent, "sha256": policies.read(policies.find_path(agent))[0].sha256}
     if Path(agent).is_file():
         return {"policy": hash_file(Path(agent))[:12]}
     if agent not in AGENTS and ":" in agent:
-        return {"function": agent, "source": hash_source(function_of(agent))}
+        return {"function": agent, "source": hash_source(find_function(agent))}
     return agent
 
 

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from hrc_env.agents.registry import control_of
+from hrc_env.agents.registry import find_control
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric, provenance, write_whole
 from hrc_env.evaluation.sums import ACHIEVED
@@ -110,7 +110,7 @@ def make_study(
     """
     for task in ids:
         find_task(task)
-    control = control or control_of(policy)
+    control = control or find_control(policy)
     env = {} if control is None else {"control": control}
     rows = {
         f"{task}.{name}": Row(

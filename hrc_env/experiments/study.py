@@ -229,8 +229,7 @@ class Study:
         return {"first_seed": self.first_seed, "rows": rows}
 
     def select(self, beginnings: Sequence[str]) -> "Study":
-        """Return the study of the rows whose names begin with one of `beginnings`, and of their
-        baselines.
+        """Return the study of rows with the given beginnings of names, and their baselines.
 
         Raises:
             ConfigError: no row begins with one of them.

@@ -44,7 +44,7 @@ def test_a_study_makes_every_number_of_its_table(name):
 
 def test_every_policy_of_the_package_is_judged_with_and_without_a_shield():
     found = {(row.agent, row.env["shield"]) for row in STUDIES["kept"].rows.values()}
-    assert found == {(name, shield) for name in policies.names() for shield in (None, "qp")}
+    assert found == {(name, shield) for name in policies.list_names() for shield in (None, "qp")}
     assert {agent.split("/")[2] for agent, _ in found} == set(hrc_env.IDS)
 
 
@@ -54,7 +54,7 @@ def test_nobody_hands_over_alone():
 
 
 def test_a_policy_is_judged_at_the_level_it_learnt_at_but_at_pixels(tmp_path):
-    trainings = baselines.trainings_of(baselines.BaselinesArguments(tmp_path))
+    trainings = baselines.make_trainings(baselines.BaselinesArguments(tmp_path))
     assert trainings["pixels", "ppo"] == trainings["keypoints", "ppo"]
     assert trainings["none", "ppo"] == trainings["none", "ppo_safety"]
     assert len({each.folder for each in trainings.values()}) == 5

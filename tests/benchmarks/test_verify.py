@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from benchmarks import records, results, verify
-from benchmarks.replays import Replay, row_of, walk
+from benchmarks.replays import Replay, find_row, walk
 from benchmarks.studies import COMMANDS, Command
-from benchmarks.verify import Arguments, draw, found_share, main
+from benchmarks.verify import Arguments, compute_found_share, draw, main
 from docs import tables
 from hrc_env.core.errors import ConfigError, DownloadError
 from hrc_env.experiments.runner import make_cache
@@ -87,7 +87,7 @@ def test_parts_that_come_out_again_leave_a_study_fresh(toy, tmp_path, capsys):
     assert outcome["n_parts"] == 10  # a training is not played
     assert len(outcome["drawn"]["toy"]) >= 3
     assert outcome["spoiled"] == outcome["skipped"] == outcome["lacking"] == {}
-    assert results.why_stale("toy") == ""
+    assert results.explain_stale("toy") == ""
     assert "0 differ" in capsys.readouterr().out
 
 
@@ -104,7 +104,9 @@ def test_a_spoiled_part_is_found_and_makes_its_study_stale(toy, tmp_path, capsys
     status, outcome = verified(tmp_path, share=1.0)
     assert status == 1
     assert outcome["spoiled"]["toy"].keys() == {"site.3"}
-    assert results.why_stale("toy").startswith("replayed, part site.3 differs: values* has mean")
+    assert results.explain_stale("toy").startswith(
+        "replayed, part site.3 differs: values* has mean"
+    )
     assert "toy is stale: 1 of its parts differ" in capsys.readouterr().out
     status, outcome = verified(tmp_path, share=1.0)
     assert "it is stale already: replayed, part site.3" in outcome["skipped"]["toy"]
@@ -115,8 +117,8 @@ def test_other_behaviour_is_found_by_the_first_part(toy, tmp_path):
     status, outcome = verified(tmp_path, share=0.0)
     assert status == 1
     assert len(outcome["spoiled"]["toy"]) == 2
-    assert "part lab." in results.why_stale("toy")
-    assert "(and 1 more)" in results.why_stale("toy")
+    assert "part lab." in results.explain_stale("toy")
+    assert "(and 1 more)" in results.explain_stale("toy")
 
 
 def test_a_part_with_other_settings_or_that_is_no_longer_made_or_fails_is_found(toy, tmp_path):
@@ -147,7 +149,7 @@ def test_what_a_machine_lacks_spoils_nothing_and_is_named(toy, tmp_path, monkeyp
 
 
 def test_a_study_without_recorded_parts_is_named_and_fails_only_if_strict(toy, tmp_path, capsys):
-    records.path_of("toy").unlink()
+    records.get_path("toy").unlink()
     status, outcome = verified(tmp_path)
     assert status == 0
     assert "the next `make results` records them" in outcome["skipped"]["toy"]
@@ -174,9 +176,9 @@ def test_a_draw_is_the_same_for_a_seed_and_covers_the_share():
 
 
 def test_the_share_that_is_found_is_exact():
-    assert found_share(10, 10) == 0.1
-    assert found_share(10, 0) is None
-    share = found_share(100, 10)
+    assert compute_found_share(10, 10) == 0.1
+    assert compute_found_share(10, 0) is None
+    share = compute_found_share(100, 10)
     rng, n_spoiled = np.random.default_rng(0), round(100 * share)
     found = [rng.choice(100, 10, replace=False).min() < n_spoiled for _ in range(4000)]
     assert 0.94 < np.mean(found) < 0.975
@@ -224,8 +226,8 @@ def test_arguments_that_cannot_work_are_refused_in_words(given, words):
 
 
 def test_rows_are_those_of_the_tables():
-    assert row_of("site", "one_camera.3") == "one_camera"
-    assert row_of("price", "HRCReach-v0.one_camera.fresh.-1980") == "HRCReach-v0.one_camera"
-    assert row_of("kept", "HRCReach-v0.limited.qp.1000000") == "HRCReach-v0.limited.qp"
-    recorded = {row_of("kept", label) for label in records.read("kept").parts}
+    assert find_row("site", "one_camera.3") == "one_camera"
+    assert find_row("price", "HRCReach-v0.one_camera.fresh.-1980") == "HRCReach-v0.one_camera"
+    assert find_row("kept", "HRCReach-v0.limited.qp.1000000") == "HRCReach-v0.limited.qp"
+    recorded = {find_row("kept", label) for label in records.read("kept").parts}
     assert len(recorded) == len(records.read("kept").parts)

@@ -361,7 +361,7 @@ def test_ones_own_robot_is_played_and_nothing_learns(tmp_path, monkeypatch):
 
 
 def test_robots_by_their_file_act_as_they_learnt_to(tmp_path):
-    name = next(each for each in kept.names() if each.startswith("hrc://HRCReach-v0/"))
+    name = next(each for each in kept.list_names() if each.startswith("hrc://HRCReach-v0/"))
     config = replace(
         make_experiment(quick=True, seeds=1, robots=[name], control="twist"),
         n_steps=4, setups=("none", REFERENCE),

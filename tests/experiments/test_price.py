@@ -21,7 +21,13 @@ from hrc_env.experiments.price.experiment import (
     make_experiment,
 )
 from hrc_env.experiments.price.eyes import ELSEWHERE, QUICK, find_eyes, list_eyes
-from hrc_env.experiments.price.metrics import CONTRASTS, Played, Row, compute_metrics, suppose_margin_m
+from hrc_env.experiments.price.metrics import (
+    CONTRASTS,
+    Played,
+    Row,
+    compute_metrics,
+    suppose_margin_m,
+)
 from hrc_env.experiments.price.report import choose_bars
 from hrc_env.experiments.price.search import MarginSearch, draw_seeds, search
 from hrc_env.experiments.price.shield import Widened
@@ -147,7 +153,10 @@ def test_eyes_are_what_their_names_say():
     ("change", "words"),
     [
         ({"n_seeds": 0}, "--seeds must be at least 1"),
-        ({"eyes": ("one_camara",)}, "Unknown perception setup 'one_camara'. Did you mean 'one_camera'"),
+        (
+            {"eyes": ("one_camara",)},
+            "Unknown perception setup 'one_camara'. Did you mean 'one_camera'",
+        ),
         ({"eyes": ()}, "No perception setup to compare"),
         ({"bracket_m": (0.1, 0.1)}, "bracket_m must be"),
         ({"level": 0.0}, "level must be positive"),
@@ -161,7 +170,7 @@ def test_what_cannot_be_played_is_refused(change, words):
 
 def test_a_task_that_nobody_has_scripted_is_refused(monkeypatch):
     monkeypatch.delitem(experts.EXPERTS, "HRCHandover-v0")
-    with pytest.raises(ConfigError, match="there is none for HRCHandover-v0; there is one for HRCR"):
+    with pytest.raises(ConfigError, match="none for HRCHandover-v0; there is one for HRCR"):
         replace(TINY, task="HRCHandover-v0")
 
 

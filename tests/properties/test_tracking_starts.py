@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from figures import Figure, count
 
-from benchmarks.common import exactly
+from benchmarks.common import make_exact
 from benchmarks.tracking.cells import beliefs, run_cell
 from benchmarks.tracking.detections import Damage, detect
 from benchmarks.tracking.metrics import STATISTICS, drawn_sums, metric
@@ -88,7 +88,7 @@ def test_one_view_is_worse_than_all_and_all_make_it_good():
 def test_algorithm_1_locks_on(rig, design, figures):
     locked, first = find_locks(make_rig(rig), design, SEEDS)
     share = count(int((~locked).sum()), len(SEEDS))
-    most = exactly(float(first.max()), "frames", len(SEEDS))
+    most = make_exact(float(first.max()), "frames", len(SEEDS))
     figures.hold(
         Figure(f"locks.{rig}.{design}.missed", share, most=0.05),
         Figure(f"locks.{rig}.{design}.most_frames", most, most=LOCKED[rig][0]),

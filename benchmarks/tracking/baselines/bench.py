@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.common import cell
+from benchmarks.common import format_number
 from benchmarks.tracking.cells import beliefs
 from benchmarks.tracking.names import DEFAULT, DLT
 from benchmarks.tracking.rigs import RIGS, Rig, make_rig
@@ -157,10 +157,10 @@ def metrics_of(played: Played) -> dict[str, Metric]:
 def report(metrics: Metrics) -> Report:
     """Return the table of errors and times, and who is missing."""
     lines = [
-        [row, *(format_cell(metrics[f"rmse_m.{row}.{name}"], 100) for name in names())]
+        [row, *(format_number(metrics[f"rmse_m.{row}.{name}"], 100) for name in names())]
         for row in (f"{rig}.{window}" for rig in RIGS for window in ROWS)
     ]
-    times = [format_cell(metrics[f"update_us.{name}.1"], 1, 0) for name in names()]
+    times = [format_number(metrics[f"update_us.{name}.1"], 1, 0) for name in names()]
     header = ["RMSE in cm", *names()]
     return Report("Other people's code on the same sequences", missing_sentence(), [
         format_table(header, [*lines, ["us per update of a worker", *times]]),

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from hrc_env.agents.env_info import Agent, env_info
-from hrc_env.agents.experts import expert
-from hrc_env.agents.registry import control_of, make_agent
+from hrc_env.agents.experts import make_expert
+from hrc_env.agents.registry import find_control, make_agent
 from hrc_env.agents.scripted import Yielding
 from hrc_env.core.machine import n_cores
 from hrc_env.engines.files import carried
@@ -76,7 +76,7 @@ def choose_control(policy: Policy, control: str | None) -> str | None:
     """
     if policy.name == PPO:
         return None
-    return control if policy.name in POLICIES else control_of(policy.name) or control
+    return control if policy.name in POLICIES else find_control(policy.name) or control
 
 
 def get_maker(policy: Policy, checkpoint: Path, trust: bool = False) -> MakeAgent:
@@ -89,7 +89,7 @@ def get_maker(policy: Policy, checkpoint: Path, trust: bool = False) -> MakeAgen
 
 def _make_slowed(margin_m: float, part: Simulation) -> Agent:
     """Return the scripted agent with a margin added to its limits."""
-    return expert(env_info(part), Yielding(STOP_M + margin_m, SLOW_M + margin_m))
+    return make_expert(env_info(part), Yielding(STOP_M + margin_m, SLOW_M + margin_m))
 
 
 def _make_agent(name: str, trust: bool, part: Simulation) -> Agent:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.agents.env_info import Agent, env_info
-from hrc_env.agents.registry import control_of, make_agent
+from hrc_env.agents.registry import find_control, make_agent
 from hrc_env.core.typing import Points3
 from hrc_env.evaluation.rollout import rollout
 from hrc_env.experiments.agents import describe_agent
@@ -63,7 +63,7 @@ class Driver:
     @property
     def env_arguments(self) -> dict[str, Any]:
         """Argument of the environment that sets the control."""
-        control = control_of(self.agent) or self.control
+        control = find_control(self.agent) or self.control
         return {} if control is None else {"control": control}
 
     def settings(self) -> dict[str, Any]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hrc_env.core.kernels import kernel
-from hrc_env.core.kernels.digest import hash_file
+from hrc_env.core.kernels.digest import digest_of
 
 PLAIN = """
 FACTOR = 2.0
@@ -21,7 +21,7 @@ def caller(x):
 def digest(source: str, name: str = "caller", module: str = __name__) -> str:
     scope = {"np": np, "kernel": kernel, "__name__": module}
     exec(source, scope)
-    return hash_file(scope[name])
+    return digest_of(scope[name])
 
 
 @pytest.mark.parametrize(
@@ -63,8 +63,8 @@ def test_it_is_the_same_in_every_process(process):
     program = (
         "import hrc_env.simulation\n"
         "from hrc_env.core.kernels import KERNELS\n"
-        "from hrc_env.core.kernels.digest import hash_file\n"
-        "print(sorted((name, hash_file(each)) for name, each in KERNELS.items()))"
+        "from hrc_env.core.kernels.digest import digest_of\n"
+        "print(sorted((name, digest_of(each)) for name, each in KERNELS.items()))"
     )
     told = [process("-c", program, PYTHONHASHSEED=seed).stdout for seed in ("1", "2")]
     assert told[0] == told[1]
