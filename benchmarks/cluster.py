@@ -148,7 +148,7 @@ class ClusterBench:
         return found
 
     def metrics(self, played: Played) -> dict[str, Metric]:
-        """Return every number."""
+        """Return all metrics by name."""
         return metrics_of(played)
 
     def shown_tables(self) -> tuple[Table, ...]:

@@ -158,7 +158,7 @@ def test_what_is_finished_when_it_is_killed_is_not_played_again(tmp_path, monkey
     words = ["--perception", "truth"]
     assert record(tmp_path / "set", *words).returncode == 130
     assert not (tmp_path / "set").exists()
-    with pytest.raises(hrc_env.ConfigError, match="the same command goes on"):
+    with pytest.raises(hrc_env.ConfigError, match="the same command continues"):
         hrc_env.load_episodes(tmp_path / "set")
     assert record(tmp_path / "set", *words).returncode == 0
     assert plays == [0, 2, 2]

@@ -111,7 +111,7 @@ def test_a_data_set_that_there_is_stays_as_it_is(root, capsys):
     before = {path: path.stat().st_mtime_ns for path in root.rglob("*")}
     assert record("HRCReachGoal-v0") == 2
     said = " ".join(capsys.readouterr().err.split())
-    assert f"There is a data set '{NAME}' already" in said
+    assert f"The data set '{NAME}' exists already" in said
     assert "hrc/reach/scripted-v1" in said
     assert {path: path.stat().st_mtime_ns for path in root.rglob("*")} == before
 

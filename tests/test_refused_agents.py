@@ -89,7 +89,7 @@ def test_what_is_no_checkpoint_says_so(tmp_path):
         acting.describe(tmp_path / "none.zip")
     (tmp_path / "junk.zip").write_text("junk")
     for path in (tmp_path / "junk.zip", made(None, tmp_path / "other.zip")):
-        with pytest.raises(CheckpointError, match=f"{path.name} neither a checkpoint of hrc_env"):
+        with pytest.raises(CheckpointError, match=f"{path.name} is not a checkpoint of hrc_env"):
             acting.describe(path)
 
 
@@ -101,7 +101,7 @@ def test_a_run_goes_on_where_there_is_more_to_learn(tmp_path):
     made(read_meta(), tmp_path / "policy.zip")
     assert restore_arguments(TrainingRequest(timesteps=513), tmp_path).timesteps == 513
     for wanted in (512, 1, None):
-        with pytest.raises(CheckpointError, match="has learnt 512 steps already"):
+        with pytest.raises(CheckpointError, match="was trained for 512 steps already"):
             restore_arguments(TrainingRequest(timesteps=wanted), tmp_path)
     made(read_meta(num_timesteps=511), tmp_path / "policy.zip")
     assert restore_arguments(TrainingRequest(), tmp_path).timesteps == 512

@@ -269,7 +269,7 @@ def test_statistics_beside_a_policy_want_trust(name, tmp_path):
     wrapper.obs_rms.mean[:] = 0.25
     wrapper.save(str(tmp_path / name))
     with pytest.raises(
-        CheckpointError, match=rf"{name}.*pickle, which run arbitrary code.*--trust.*move"
+        CheckpointError, match=rf"{name}.*pickle, which can run arbitrary code.*--trust.*move"
     ):
         make_agent(str(path), here())
     agent, seen = make_agent(str(path), here(), trust=True), env().observation_space.sample()

@@ -1,4 +1,4 @@
-"""The motion bench as people read it."""
+"""The report of the motion benchmark."""
 
 from benchmarks.motion.targets import ANY, Target, targets_of
 from hrc_env.core.results import Metric
@@ -17,11 +17,11 @@ COLUMNS = (
     Column("{}.grip_missed_share", "grips missed", 3),
     Column("{}.inside_itself_share", "in itself", 3),
 )
-"""Of the table of everything."""
+"""Columns of the table of all scenes."""
 
 
 def report(metrics: Metrics) -> Report:
-    """What is to be read."""
+    """Return the report."""
     scenes = [name.rsplit(".", 1)[0] for name in metrics if name.endswith(".seconds")]
     lead = (
         "Medians over bodies, smallest and largest in brackets; the first table has the targets of "
@@ -37,7 +37,7 @@ def report(metrics: Metrics) -> Report:
 
 
 def inside(target: Target, metric: Metric) -> bool:
-    """Whether the median body is in the band."""
+    """Return whether the median body is in the band."""
     return target.low <= metric.value <= target.high
 
 

@@ -1,7 +1,7 @@
-"""The perception bench: how fast detection is, how well workers are seen, and what goes wrong.
+"""The perception benchmark: speed of detection, accuracy, and effects of faults.
 
-Each part is written to DIR/parts as soon as it is done, so that a bench that was stopped goes on
-where it was; parts made at other versions or settings are made anew. Times are taken last.
+Each part is written to DIR/parts as soon as it is complete, so a run that was stopped continues
+there; parts of other versions or settings are computed again. Times are measured last.
 """
 
 import zlib
@@ -35,47 +35,51 @@ from hrc_env.scene.rigs import RIGS
 from hrc_env.worker.body import worker_names
 
 LENSES = {"pinhole": "lab", "fisheye": "lab_gopro"}
-"""Rigs that hang in the same places, by the rows that their crops make."""
+"""Rigs with cameras in the same places, by the rows of their crops."""
 FIRST_SEED = 500
-"""Of episodes, and of resets after which the worker is looked for; the others count up."""
+"""First seed of episodes, and of crops."""
 BLOCK = 5
-"""Episodes of a part: so many are lost at most when the bench is stopped."""
+"""Number of episodes in a part, which bounds the loss when a run is stopped."""
 
 Parts = dict[str, dict[str, Any]]
-"""By label."""
+"""Finished parts by label."""
 
 
 @dataclass(frozen=True, slots=True)
 class PerceptionBench:
-    """The experiment, and how much is measured."""
+    """The experiment, and the amount of data that is measured."""
 
     name = "bench perception"
     depends = ("env", "tracker", "emulator", "detector", "motion")
     episodes: tuple[tuple[str, int], ...] = (("lab", 15), ("site", 8))
-    """Episodes at `pixels`, scene by scene; faults are compared with the lab's first ones."""
+    """Number of episodes at `pixels` by scene; faults are compared with the first ones of the
+    lab."""
     n_steps: int = 250
-    """Steps of each."""
+    """Steps of these episodes."""
     n_faults: int = 4
-    """Episodes of every fault at `pixels`; the four cameras have it in turns."""
+    """Number of episodes of every fault at `pixels`; the four cameras have it in turns."""
     fault_steps: int = 150
-    """Steps of each."""
+    """Steps of these episodes."""
     n_emulated: int = 20
-    """Episodes of every fault at `keypoints`, of `n_steps` each."""
+    """Number of episodes of every fault at `keypoints`, of `n_steps` each."""
     kinds: tuple[str, ...] = tuple(KINDS)
-    """Which faults."""
+    """Names of the faults."""
     bodies: tuple[str, ...] = worker_names()
-    """Whose crops are looked at."""
+    """Names of the bodies on crops."""
     n_instants: int = 15
-    """Moments of each body in each scene, and of each lens; four crops each."""
+    """Number of moments of each body in each scene, and of each lens; four crops each."""
     emulator_rounds: int | None = 2
-    """How often each motion is rendered in each scene to hold the emulator against pixels; 0: once,
-    in one of them; None: not at all."""
+    """Number of times that each motion is rendered in each scene to compare the emulator with
+    pixels.
+
+    0: once, in one scene; None: not at all.
+    """
     cameras: tuple[int, ...] = (1, 2, 4)
-    """Numbers of cameras whose speed is taken."""
+    """Numbers of cameras at which speed is measured."""
     workers: tuple[int, ...] = (1, 2)
-    """Numbers of workers likewise."""
+    """Numbers of workers at which speed is measured."""
     speed_steps: int = 200
-    """Steps by which it is."""
+    """Number of steps in a measurement of speed."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for numbers that cannot work."""
@@ -91,12 +95,12 @@ class PerceptionBench:
 
     @property
     def seeds(self) -> list[int]:
-        """One an episode."""
+        """Seeds, one per episode."""
         return [FIRST_SEED + k for k in range(max(n for _, n in self.episodes))]
 
     @property
     def n_parts(self) -> int:
-        """Tasks."""
+        """Number of parts."""
         return len(list(tasks_of(self)))
 
     @property
@@ -106,7 +110,7 @@ class PerceptionBench:
         return describe_quick_run(self.n_emulated, self.n_steps * DT_S) if is_short else ""
 
     def settings(self) -> dict[str, Any]:
-        """Return what all numbers depend on."""
+        """Return the settings that all numbers depend on."""
         return {"bench": asdict(self)}
 
     def play(self, cache: PartCache) -> Parts:
@@ -119,11 +123,11 @@ class PerceptionBench:
         here = replace(cache, engine=Serial())
         for task in tasks:
             if task.is_here:
-                (played[task.label],) = here.parts([task.part])
+                (played[task.label],) = here.make_parts([task.part])
         return played
 
     def metrics(self, played: Parts) -> dict[str, Metric]:
-        """Return every number."""
+        """Return all metrics by name."""
         return metrics_of(played, self.n_faults, self.fault_steps)
 
     def shown_tables(self) -> tuple[Table, ...]:
@@ -131,7 +135,7 @@ class PerceptionBench:
         return TABLES
 
     def report(self, played: Parts, metrics: Metrics, figures: Path) -> Report:
-        """Return the tables."""
+        """Return the report."""
         return report(self, played, metrics, figures)
 
 
@@ -140,18 +144,18 @@ QUICK = PerceptionBench(
     n_emulated=8, bodies=("worker_1", "worker_2"), n_instants=10, emulator_rounds=0,
     speed_steps=30,
 )  # fmt: skip
-"""Every number, from little."""
+"""The quick form: every number, from little data."""
 
 
 class Task(NamedTuple):
-    """One part of the bench."""
+    """One part of the benchmark."""
 
     label: str
     cost: float
-    """How long it takes beside the others, roughly [s]."""
+    """Approximate time that it takes relative to others [s]."""
     make: Callable[[PartProgress], dict[str, Any]]
     is_here: bool = False
-    """Whether it is made in this process, alone: it takes times, or draws."""
+    """Whether it runs in this process, alone: it measures time, or draws."""
 
     @property
     def part(self) -> Part:
@@ -160,7 +164,7 @@ class Task(NamedTuple):
 
 
 def tasks_of(config: PerceptionBench, figures: Path | None = None) -> Iterator[Task]:
-    """All parts, times last; the emulator's plot is drawn into a folder."""
+    """Yield all parts, time measurements last; the plot of the emulator is drawn into a folder."""
     yield from _crops(config)
     yield from _episodes(config)
     yield from _faults(config)
@@ -171,7 +175,8 @@ def tasks_of(config: PerceptionBench, figures: Path | None = None) -> Iterator[T
 
 
 def _speeds(config: PerceptionBench) -> Iterator[Task]:
-    """The lab in all sizes; its largest rig once more on the site and on the other runtime."""
+    """Yield speeds of the lab in all sizes, and its largest rig on the site and on the other
+    runtime."""
     most, fewest = max(config.cameras), min(config.workers)
     runtimes = (speed.LITERT, speed.OPENVINO) if vino.installed() else (speed.LITERT,)
     settings = [
@@ -198,7 +203,7 @@ def _episodes(config: PerceptionBench) -> Iterator[Task]:
 
 
 def _faults(config: PerceptionBench) -> Iterator[Task]:
-    """Every fault at the levels that know it; at `keypoints` also the same without."""
+    """Yield every fault at the levels that have it, and for `keypoints` the same without faults."""
     for kind in config.kinds:
         make = partial(_play_fault, kind, config.n_faults, config.fault_steps, PIXELS)
         slow = 3.0 if kind == "motion_blur" else 1.2
@@ -217,7 +222,7 @@ def _play(seeds: list[int], n_steps: int, tick: PartProgress, **arguments: Any) 
 
 
 def _play_fault(kind: str, n: int, n_steps: int, level: str, tick: PartProgress) -> dict[str, Any]:
-    """Episodes in which the cameras have a fault in turns."""
+    """Return episodes in which the cameras have a fault in turns."""
     played: list[dict[str, Any]] = [{}] * n
     n_cameras = len(SCENES["lab"].cameras)
     for c in range(min(n_cameras, n)):
@@ -232,7 +237,7 @@ def _play_fault(kind: str, n: int, n_steps: int, level: str, tick: PartProgress)
 
 
 def _crops(config: PerceptionBench) -> Iterator[Task]:
-    """Crops of every body in every scene; of one body through every lens, in every appearance."""
+    """Yield crops of every body in every scene, and of one body with every lens and appearance."""
     n, first = config.n_instants, config.bodies[0]
     cost = 3 + 0.12 * n
     for name, _ in config.episodes:
@@ -248,7 +253,7 @@ def _crops(config: PerceptionBench) -> Iterator[Task]:
 
 
 def _look(variant: str, make: Callable[[], Scene], n: int, tick: PartProgress) -> dict[str, Any]:
-    """n moments; every activity has its turn."""
+    """Return n moments, in which every activity has its turn."""
     scene, views = make(), list[View]()
     rng = np.random.default_rng(zlib.crc32(f"{scene.name} {scene.bodies[0]}".encode()))
     appearance = APPEARANCES.get(variant.removeprefix("appearance "), AS_BUILT)

@@ -1,4 +1,4 @@
-"""The perception bench as it is declared: rows, columns and tables."""
+"""The declaration of the perception benchmark: rows, columns and tables."""
 
 from dataclasses import replace
 
@@ -8,23 +8,23 @@ from hrc_env.perception.faults.fault import KINDS
 from hrc_env.scene.domain_randomization import APPEARANCES
 
 LEVELS = {"pixels": "", "keypoints": "keypoints."}
-"""Perception levels, and what begins the names of their metrics."""
+"""Perception levels, with the prefixes of their metrics."""
 FAULTS = {
     "none": ("no fault",), **{kind: (f"`{kind}`",) for kind in KINDS},
 }  # fmt: skip
 POSTURES = {each: (each,) for each in ("stand", "walk", "carry", "work", "fold", "all")}
 SHOWN = ("none", "wrong_rotation", "wrong_translation", "wrong_focal", "knocked", "noise",
          "exposure")  # fmt: skip
-"""Faults by which the documentation shows how cameras are named as miscalibrated."""
+"""Faults for which the documentation shows the reports of miscalibrated cameras."""
 
 
 def belief(start: str = "", words: str = "", key: str = "{}") -> dict[str, Column]:
     """Return columns of the error of estimates and of their reported deviations.
 
     Args:
-        start: of the names of metrics.
-        words: before the headings.
-        key: the row's, in the names of metrics.
+        start: prefix of the metrics.
+        words: prefix of the headings.
+        key: key of the row in the names of metrics.
     """
     return {
         "median": Column(f"{start}error_m.{key}.median", f"{words}median [mm]", 1, 1000),
@@ -36,7 +36,7 @@ def belief(start: str = "", words: str = "", key: str = "{}") -> dict[str, Colum
 
 
 def of_fault(level: str) -> dict[str, Column]:
-    """Return columns of a level's faults."""
+    """Return the columns of a level's faults."""
     start, words = LEVELS[level], f"`{level}`: "
     return {
         "ratio": Column(f"{start}error_ratio.{{}}", f"{words}ratio", 2),
@@ -46,7 +46,7 @@ def of_fault(level: str) -> dict[str, Column]:
 
 
 def of_names(level: str) -> tuple[Column, ...]:
-    """Return columns of how a level's cameras are named as miscalibrated."""
+    """Return the columns of a level's reports of miscalibrated cameras."""
     key, words = f"{LEVELS[level]}miscalibrated.{{}}.", f"`{level}`: "
     return (
         Column(f"{key}named", f"{words}named", shows="count"),
@@ -154,4 +154,4 @@ SPEED = Table(
     "anything.",
 )
 TABLES = (SPEED, ACCURACY, COST, NAMED, APPEARANCE, EMULATOR, LASTING)
-"""Of the documentation."""
+"""Tables of the documentation."""

@@ -1,8 +1,8 @@
-"""The pose network on dark and dull pictures: python -m benchmarks.perception.dim
+"""Accuracy of the pose network on dark and dull pictures: python -m benchmarks.perception.dim
 
-The same moments are drawn in usual light and with each of `PICTURES`, and every camera sees the
-worker as if for the first time. The deviations of `hrc_env.perception.exposure` were fitted to this
-table.
+The same moments are rendered in normal light and with each of `PICTURES`, and every camera detects
+the worker without a former track. The deviations of `hrc_env.perception.exposure` were fitted to
+this table.
 """
 
 from collections.abc import Callable, Sequence
@@ -30,18 +30,18 @@ from hrc_env.scene.render import CropRenderer
 from hrc_env.worker.body import load_body, worker_truth
 
 GROSS = 8.0
-"""Errors count as at most this number of deviations, so that single gross ones do not decide."""
+"""Greatest error that counts, in deviations, so that single gross errors do not dominate."""
 
 
 class Picture(NamedTuple):
-    """A way to spoil pictures."""
+    """A kind of degraded picture."""
 
     light: float = 1.0
-    """As of `AppearanceConfig`."""
+    """Light, as in `AppearanceConfig`."""
     darkness: float = 1.0
     """Amount of the fault."""
     contrast: float = 1.0
-    """Distance from a middle grey is multiplied by it."""
+    """Factor on the difference from middle grey."""
 
 
 PICTURES: dict[str, Picture] = {
@@ -57,7 +57,7 @@ class Arguments:
     """Settings of the measurement."""
 
     moments: int = 40
-    """Of each body in each scene."""
+    """Number of moments of each body in each scene."""
     bodies: tuple[str, ...] = ("worker_1", "worker_3")
     scenes: tuple[str, ...] = ("lab", "site")
     seed: int = 1
@@ -71,7 +71,7 @@ class _Seen(NamedTuple):
 
 
 class _Spoilt:
-    """An image source with spoilt pictures."""
+    """An image source with degraded pictures."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.renderer = scene, CropRenderer(scene)
@@ -79,7 +79,7 @@ class _Spoilt:
         self.picture, self.count = Picture(), 0
 
     def crop(self, camera_index: int, window: Roi) -> Image:
-        """The window of a camera's image."""
+        """Return the window of a camera's image."""
         image, kind = self.source.crop(camera_index, window), self.picture
         self.count += 1
         if kind.contrast < 1.0:
@@ -90,7 +90,7 @@ class _Spoilt:
         return image
 
     def show(self, now: Instant, picture: Picture, seed: Sequence[int]) -> None:
-        """Draw a moment from now on, with a picture's light and faults."""
+        """Show a moment from now on, with a picture's light and faults."""
         light = AppearanceConfig(light=(picture.light, picture.light))
         self.picture = picture
         self.renderer.randomize(draw_look(light, 1, np.random.default_rng(seed)))
@@ -127,9 +127,12 @@ def _compared(found: Detection, windows: Views, true_px: Floats) -> list[_Seen]:
 
 
 def row_of(usual: Sequence[_Seen], dim: Sequence[_Seen]) -> tuple[int, int, float, float]:
-    """Return the number of crops that showed the worker in usual light, and in this picture too; of
-    the latter the median error, and the root mean square of error over deviation, both as factors
-    on those in usual light."""
+    """Return the comparison of a degraded picture with normal light.
+
+    These are the number of crops that showed the worker in normal light, and in this picture too;
+    of the latter the median error, and the root mean square of error over deviation, both as
+    factors on those in normal light.
+    """
     known = [pair for pair in zip(usual, dim, strict=True) if np.isfinite(pair[0].error_px).all()]
     both = [pair for pair in known if np.isfinite(pair[1].error_px).all()]
 

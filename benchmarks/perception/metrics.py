@@ -1,4 +1,4 @@
-"""The numbers that come of what the perception bench played."""
+"""Metrics of the parts of the perception benchmark."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -24,12 +24,17 @@ PIXELS, EMULATED, NO_FAULT = "pixels", "keypoints", "none"
 N_DRAWS = 200
 Metrics = dict[str, Metric]
 Found = Mapping[str, dict[str, Any]]
-"""Finished parts by their labels: see `bench.tasks_of`."""
+"""Finished parts by label, as of `bench.tasks_of`."""
 
 
 def metrics_of(found: Found, n_faults: int, fault_steps: int) -> Metrics:
-    """Every number by its name; faults are compared with so many of the lab's first episodes, cut
-    to so many steps."""
+    """Return all metrics by name.
+
+    Args:
+        found: finished parts.
+        n_faults: number of the lab's first episodes with which faults are compared.
+        fault_steps: number of steps to which these are cut.
+    """
     played = {
         label: [episode_of(each) for each in part["episodes"]]
         for label, part in found.items()
@@ -79,7 +84,7 @@ def _loops(loops: dict[str, list[Episode]]) -> Metrics:
 
 
 def _belief(name: str, episodes: list[Episode]) -> Metrics:
-    """Error, coverage, reported deviation and lost steps of some episodes."""
+    """Return error, coverage, reported deviation and lost steps of episodes."""
     errors = [_known(episode.error_m) for episode in episodes]
     squared = [float((each**2).sum()) for each in errors]
     reported = [float((_known(episode.std_m) ** 2).sum()) for episode in episodes]
@@ -98,7 +103,8 @@ def _belief(name: str, episodes: list[Episode]) -> Metrics:
 
 
 def _faults(faults: dict[tuple[str, str], list[Episode]]) -> Metrics:
-    """Beside the same seeds without; the cameras have the fault in turns, episode by episode."""
+    """Return metrics of faults relative to the same seeds without; cameras have the fault in
+    turns."""
     metrics: Metrics = {}
     for (level, kind), episodes in faults.items():
         start = "" if level == PIXELS else f"{level}."
@@ -116,7 +122,8 @@ def _faults(faults: dict[tuple[str, str], list[Episode]]) -> Metrics:
 
 
 def _ratio(episodes: list[Episode], base: list[Episode]) -> Metric:
-    """Median error over that of the same seeds without the fault; seeds are drawn anew."""
+    """Return the median error over that of the same seeds without the fault, by bootstrap over
+    seeds."""
     above, below = ([_known(each.error_m) for each in some] for some in (episodes, base))
 
     def ratio(weights: Ints) -> Floats:
@@ -132,14 +139,14 @@ def _median(values: list[Floats], which: Ints) -> float:
 
 
 def _detected(episodes: list[Episode], cameras: list[int]) -> Metric:
-    """The share of steps in which the camera with the fault reported anybody."""
+    """Return the share of steps in which the camera with the fault detected the worker."""
     pairs = zip(episodes, cameras, strict=True)
     seen = [float(np.isfinite(each.off_px[:, c]).sum()) for each, c in pairs]
     return estimate_ratio(seen, [float(len(each.off_px)) for each in episodes], "share")
 
 
 def _named(start: str, episodes: list[Episode], own: list[int]) -> Metrics:
-    """How often, and how soon, the camera with the fault is named as miscalibrated, and others."""
+    """Return the share and the delay of reports of the camera with the fault, and of others."""
     cameras = [np.arange(each.named.shape[1]) for each in episodes]
     mine = [each.named[:, c == k].any(1) for each, c, k in zip(episodes, cameras, own, strict=True)]
     wrong = [
@@ -169,5 +176,5 @@ def _views(every: list[View]) -> Metrics:
 
 
 def _known(values: np.ndarray) -> np.ndarray:
-    """Those of single joints, while the worker was tracked."""
+    """Return the values of single joints while the worker was tracked."""
     return values[np.isfinite(values)]

@@ -1,4 +1,4 @@
-"""The perception bench as people read it."""
+"""The report of the perception benchmark."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -46,13 +46,13 @@ emulator's calibration has not seen, by family of motions (`assets.emulator`).""
 
 
 def report(config: Any, found: Any, metrics: Metrics, figures: Path) -> Report:
-    """Return the tables.
+    """Return the report.
 
     Args:
-        config: of the bench.
+        config: settings of the benchmark.
         found: its parts.
-        metrics: of the bench.
-        figures: folder.
+        metrics: metrics by name.
+        figures: folder of figures.
     """
     del config, found, figures
     kinds = {kind: words for kind, (words,) in FAULTS.items()}

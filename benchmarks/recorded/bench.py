@@ -1,4 +1,4 @@
-"""The tracking bench on recorded films: every estimator on the same detections."""
+"""The tracking benchmark on recorded films: every estimator on the same detections."""
 
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -27,7 +27,7 @@ from hrc_env.geometry.cameras import projections
 from hrc_env.tracking.config import TrackerConfig
 
 _DETECTING = 0.5
-"""Its share of the work."""
+"""Share of the progress for detection."""
 _LEAD = """\
 Leave-one-camera-out reprojection [px]; `renamed`: where it fits better, the held-out detector is
 taken to have exchanged left and right. Coverage: share of held-out detections within the 95 %
@@ -65,15 +65,15 @@ class RecordedBench:
     n_parts = 1
 
     def settings(self) -> dict[str, Any]:
-        """Return what all numbers depend on."""
+        """Return the settings that all numbers depend on."""
         return {"recording": POSE2SIM.requirement, "follower": FOLLOWER}
 
     def play(self, cache: PartCache) -> dict[str, Metric]:
-        """Fetch, detect, estimate; detections that are there already are not made again.
+        """Fetch and detect, then run all estimators; existing detections are used.
 
         Raises:
-            DownloadError: the recording is not there and cannot be fetched.
-            WeightsError: the pose network's weights are not there.
+            DownloadError: the recording is missing and cannot be fetched.
+            WeightsError: the weights of the pose network are missing.
         """
         recording = fetch_recording(lambda sentence: cache.progress(0.0, sentence))
         with closing(Films(recording.films)) as films:
@@ -88,7 +88,7 @@ class RecordedBench:
         return dict(sorted(metrics.items()))
 
     def metrics(self, played: dict[str, Metric]) -> dict[str, Metric]:
-        """Return every number."""
+        """Return all metrics by name."""
         return played
 
     def shown_tables(self) -> tuple[Table, ...]:
@@ -96,14 +96,14 @@ class RecordedBench:
         return (FOOTAGE,)
 
     def report(self, played: dict[str, Metric], metrics: Metrics, figures: Path) -> Report:
-        """Return the table."""
+        """Return the report."""
         return report(metrics)
 
 
 def _of_estimator(
     name: str, P: Floats, config: TrackerConfig, detections: Detections
 ) -> dict[str, Metric]:
-    """Everything about one estimator."""
+    """Return the metrics of one estimator."""
     metrics = {}
     for kind, metric in foretold_metrics(foretell(name, P, config, detections)).items():
         measure, *part = kind.split(".")
@@ -116,7 +116,7 @@ def _of_estimator(
 
 
 def report(metrics: Metrics) -> Report:
-    """Return the table, a row for each estimator."""
+    """Return the report, with one row per estimator."""
     parts = [FOOTAGE.to_markdown(metrics)]
     spread = "95 % intervals over blocks of frames, those of bones and jerk with least and largest"
     return Report("Tracking on recorded films", _LEAD, parts, spread)

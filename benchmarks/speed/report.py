@@ -1,4 +1,4 @@
-"""The speed bench as people read it: tables, and a picture of where the time goes."""
+"""The report of the speed benchmark: tables, and a figure of the parts of a step."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from hrc_env.experiments.plots import label_axes, make_figure, save
 from hrc_env.experiments.report import Metrics, Report, format_picture
 
 _COLOURS = (*(f"C{k}" for k in range(7)), "gold", "C9", "0.75")
-"""Of the organs, of resets and of the rest."""
+"""Colours of the parts, of resets and of the rest."""
 SPREAD = "the smallest and the largest of all rounds"
 _ABOUT_THE_ORGANS = """\
 Taken in runs of their own with a stopwatch round each organ's functions, which itself costs about
@@ -23,11 +23,11 @@ bodies, `reward` the task, `reset` all organs' work in resets, `rest` everything
 
 
 def report(metrics: Metrics, figures: Path) -> Report:
-    """Draw organs.png; return the tables beside it.
+    """Draw organs.png and return the report.
 
     Args:
-        metrics: of the bench.
-        figures: folder.
+        metrics: metrics by name.
+        figures: folder of the figure.
     """
     tasks = TASKS.to_markdown(metrics)
     if f"env_steps_per_s.{REACHER}.{SINGLE}" not in metrics:
@@ -46,13 +46,13 @@ def report(metrics: Metrics, figures: Path) -> Report:
 
 
 def _size(configuration: str) -> tuple[int, str]:
-    """By what configurations are sorted."""
+    """Return the sort key of a configuration."""
     size, _, how = configuration.partition(".")
     return (0, "") if configuration == SINGLE else (int(size), how)
 
 
 def plot_organs(path: Path, metrics: Metrics) -> None:
-    """Bars of microseconds per environment and step; one environment apart from many."""
+    """Draw bars of microseconds per environment and step; one environment is apart from many."""
     groups: tuple[list[str], list[str]] = ([], [])
     for each in list_endings(metrics, f"us_per_env_step.{TOTAL}."):
         groups[each != SINGLE and not each.startswith("1.")].append(each)
@@ -70,7 +70,7 @@ def plot_organs(path: Path, metrics: Metrics) -> None:
 
 
 def _stack(axis: Axes, group: list[str], metrics: Metrics) -> None:
-    """A bar for each configuration, organ upon organ, the sum above it."""
+    """Draw a bar for each configuration, with its parts stacked and the sum above."""
     x, foot = np.arange(len(group)), np.zeros(len(group))
     for organ, colour in zip((*ORGANS, REST), _COLOURS, strict=True):
         us = np.array([metrics[f"us_per_env_step.{organ}.{each}"].value for each in group])

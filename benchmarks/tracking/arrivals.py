@@ -1,4 +1,4 @@
-"""When frames arrive: every camera late in its own way, one at half the rate, some not at all."""
+"""Arrival times of frames: constant and random latencies, a lower frame rate, and losses."""
 
 import numpy as np
 
@@ -6,22 +6,26 @@ from benchmarks.tracking.rigs import DT_S
 from hrc_env.core.typing import Floats, Points2
 
 LONGEST_DELAY_S = 0.5
-"""How late a frame may be for the estimators' memory [s]."""
+"""Greatest delay of a frame that the estimators' memory covers [s]."""
 _LATENCY_S = (0.04, 0.20)
 _JITTER_S = 0.02
 _DROPPED = 0.05
 
 
 def delivered(px: Points2, seeds: list[int]) -> tuple[Points2, Floats]:
-    """What cameras deliver in each step, of frames (T, S, C, J, 2) taken at its end.
+    """Return the frames that cameras deliver in each step, from frames taken at its end.
 
     Every camera has a constant latency of 40 to 200 ms and, for each frame, up to 20 ms more; one
-    in four sequence by sequence takes every other frame only; one frame in twenty is lost. Of
+    in four, sequence by sequence, takes only every other frame; one frame in twenty is lost. Of
     frames that arrive in the same step the newest is delivered.
 
+    Args:
+        px: frames (T, S, C, J, 2).
+        seeds: seeds of the sequences.
+
     Returns:
-        pixels (T, S, C, J, 2), NaN where nothing arrived, and times (T, S, C) at which they were
-        taken [s], NaN likewise, on a clock that is 0.04 s at the first frame.
+        Pixels (T, S, C, J, 2), NaN without a frame, and times (T, S, C) at which they were taken
+            [s], NaN without a frame, on a clock that is 0.04 s at the first frame.
     """
     out = np.full(px.shape, np.nan)
     time_s = np.full(px.shape[:3], np.nan)
@@ -40,7 +44,7 @@ def delivered(px: Points2, seeds: list[int]) -> tuple[Points2, Floats]:
 
 
 def in_time(px: Points2, time_s: Floats) -> Points2:
-    """Delivered frames (T, S, C, ...) put back to the steps in which they were taken."""
+    """Return delivered frames (T, S, C, ...) in the steps in which they were taken."""
     out = np.full(px.shape, np.nan)
     now, s, c = np.nonzero(np.isfinite(time_s))
     out[np.rint(time_s[now, s, c] / DT_S).astype(int) - 1, s, c] = px[now, s, c]

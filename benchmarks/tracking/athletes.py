@@ -1,6 +1,6 @@
 """People who run, spin, turn over and fall: motions that estimators do not expect.
 
-Bodies are those of `walks`; who turns over or falls is turned about the middle of the hips.
+Bodies are those of `walks`; people who turn over or fall are rotated about the middle of the hips.
 """
 
 from dataclasses import dataclass, replace
@@ -14,31 +14,32 @@ from hrc_env.core.typing import Floats, Points3
 from hrc_env.geometry.rotations import about_axis
 
 FALLS_S, LIES_S = 2.0, 3.0
-"""When people fall, and by when they lie."""
+"""Times at which people fall, and at which they lie [s]."""
 _GROUND_M, _HOP_M = 0.02, 0.4
 _PAUSE_S, _TRICK_S = (0.5, 1.5), (1.0, 1.4)
-"""Between two tricks; how long one takes."""
+"""Time between two turns, and duration of one [s]."""
 _LIES_PACE, _ROLL_RAD, _ROLL_S = 0.4, 1.5, (2.5, 5.0)
-"""Limbs of who lies go on so much slower; they roll over so far to either side, in such a time."""
+"""Factor on the speed of a lying person's limbs, angle of rolling to either side [rad], its time
+[s]."""
 _LIES_LOWER_M = 0.75
 SPINS_S, _EASED_S, _SPIN_RAD_S, _STEPS_HZ = 1.2, 0.4, (4.0, 8.0), 1.5
-"""When people begin to spin, how long until they do, how fast, and their steps."""
+"""Start of spinning [s], duration of its start [s], rates [rad/s], and frequency of steps [Hz]."""
 _ON_THE_SPOT = Gait((0.1, 0.3, 0.5), thigh_rad=0.15, knee_rad=0.2)
 
 
 @dataclass(frozen=True, slots=True)
 class Turns:
-    """How bodies (T, S) are turned about their hips [rad], and how much higher these are [m]."""
+    """Rotations of bodies (T, S) about their hips [rad], and the height added to these [m]."""
 
     forward: Floats
     aside: Floats
     roll: Floats
-    """About the line from the feet to the head."""
+    """Rotation about the line from the feet to the head."""
     up_m: Floats
 
 
 def run(walk_m: tuple[float, float], seeds: list[int], n_frames: int, speed_m_s: float) -> Points3:
-    """Joints (T, S, J, 3) [m] of runners; wrists and feet have 30 m/s2 and more."""
+    """Return joints (T, S, J, 3) [m] of runners; wrists and feet have 30 m/s2 and more."""
     return walk(walk_m, seeds, n_frames, _runs(speed_m_s))
 
 
@@ -50,14 +51,14 @@ def _runs(speed_m_s: float) -> Gait:
 
 
 def tumble(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
-    """Joints (T, S, J, 3) [m] of walkers who turn over in the air every second or so."""
+    """Return joints (T, S, J, 3) [m] of walkers who turn over in the air about every second."""
     joints = walk(walk_m, seeds, n_frames)
     tricks = [_tricks(np.random.default_rng([seed, 7]), n_frames) for seed in seeds]
     return turned(joints, Turns(*np.stack(tricks, -1)))
 
 
 def fall(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
-    """Joints (T, S, J, 3) [m] of walkers who fall, lie there and roll from side to side."""
+    """Return joints (T, S, J, 3) [m] of walkers who fall, lie and roll from side to side."""
     path = steer(walk_m, seeds, n_frames)
     time_s = DT_S * np.arange(n_frames, dtype=float)[:, None]
     lying = _eased((time_s - FALLS_S) / (LIES_S - FALLS_S))
@@ -78,8 +79,10 @@ def fall(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points
 
 
 def spin(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
-    """Joints (T, S, J, 3) [m] of people who stand, and from `SPINS_S` on spin on the spot at 4 to
-    8 rad/s while they gesture."""
+    """Return joints (T, S, J, 3) [m] of people who stand and gesture, and spin from `SPINS_S` on.
+
+    They spin on the spot at 4 to 8 rad/s.
+    """
     rngs = [np.random.default_rng([seed, 21]) for seed in seeds]
     rate, begin, x, y = np.array([
         (rng.uniform(*_SPIN_RAD_S) * rng.choice([-1, 1]), rng.uniform(-np.pi, np.pi),
@@ -99,7 +102,8 @@ def spin(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points
 def circle(
     walk_m: tuple[float, float], seeds: list[int], n_frames: int, radius_m: float, speed_m_s: float
 ) -> Points3:
-    """Joints (T, S, J, 3) [m] of people who run in a circle near the middle, either way round."""
+    """Return joints (T, S, J, 3) [m] of people who run in a circle near the middle, in either
+    direction."""
     rngs = [np.random.default_rng([seed, 22]) for seed in seeds]
     way = np.array([rng.choice([-1.0, 1.0]) for rng in rngs])
     begin = np.array([rng.uniform(-np.pi, np.pi) for rng in rngs])
@@ -114,7 +118,7 @@ def circle(
 
 
 def turned(joints: Points3, turns: Turns) -> Points3:
-    """Joints (T, S, J, 3) turned, and lifted where they would be below the ground."""
+    """Return joints (T, S, J, 3) rotated, and raised if they would be below the ground."""
     left, right = joints[..., JOINT["left_hip"], :], joints[..., JOINT["right_hip"], :]
     hips, across = 0.5 * (left + right)[..., None, :], left - right
     level = about_axis("z", np.arctan2(across[..., 1], across[..., 0]) - np.pi / 2)
@@ -129,20 +133,20 @@ def turned(joints: Points3, turns: Turns) -> Points3:
 
 
 def _eased(share: Floats) -> Floats:
-    """From 0 to 1, at rest at both ends."""
+    """Return a smooth step from 0 to 1 that is at rest at both ends."""
     share = np.clip(share, 0.0, 1.0)
     return share**2 * (3 - 2 * share)
 
 
 def _at(values: Floats, frame: Floats) -> Floats:
-    """(T, ...) values at frames (T,) that are no whole numbers."""
+    """Return values (T, ...) interpolated at fractional frames (T,)."""
     whole = frame.astype(int)
     part = (frame - whole).reshape(-1, *(1,) * (values.ndim - 1))
     return (1 - part) * values[whole] + part * values[np.minimum(whole + 1, len(values) - 1)]
 
 
 def _tricks(rng: np.random.Generator, n_frames: int) -> Floats:
-    """(4, T) `Turns` of one body."""
+    """Return the `Turns` of one body (4, T)."""
     turns = np.zeros((4, n_frames))
     begin_s = rng.uniform(*_PAUSE_S)
     while begin_s < n_frames * DT_S:

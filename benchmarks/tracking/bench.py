@@ -1,7 +1,7 @@
-"""The tracking bench: every estimator on the same sequences, beside the bound.
+"""The tracking benchmark: every estimator on the same sequences, compared with the bound.
 
-Each (rig, condition, estimator) is written to DIR/parts as soon as it is done, so that a bench
-that was stopped goes on where it was; parts made at other versions or settings are made anew.
+Each (rig, condition, estimator) is written to DIR/parts as soon as it is complete, so a run that
+was stopped continues there; parts of other versions or settings are computed again.
 """
 
 import hashlib
@@ -30,25 +30,28 @@ from hrc_env.tracking.estimators import ESTIMATORS
 
 @dataclass(frozen=True, slots=True)
 class TrackingBench:
-    """The experiment, and how much is run."""
+    """The experiment, and the amount of data that is used."""
 
     name = "bench tracking"
     depends = ("env", "tracker", "emulator", "motion")
     n_seeds: int = 70
     """Sequences per rig and condition."""
     first_seed: int = 20_000
-    """Seed of the first sequence; the others count up. No setting was chosen on these: seeds
-    1000 to 1023, 5000 to 5023 and 7000 to 7023 served for that."""
+    """Seed of the first sequence; later ones count up.
+
+    No setting was chosen on these: seeds 1000 to 1023, 5000 to 5023 and 7000 to 7023 served for
+    that.
+    """
     n_matched: int = 140
     """Matched sequences per rig."""
     n_smoothed: int = 18
-    """Sequences per rig and condition for the smoother, which is slow; the first ones."""
+    """Number of sequences per rig and condition for the smoother, which is slow; the first ones."""
     timing_repeats: int = 7
-    """How often the time per update is taken."""
+    """Number of measurements of the time per update."""
     estimators: tuple[str, ...] = ()
-    """Who is run beside the default, as of `Selection`."""
+    """Estimators besides the default, as in `Selection`."""
     sequences: tuple[str, ...] = ()
-    """On what, as of `Selection`."""
+    """Sequences, as in `Selection`."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for numbers that cannot work."""
@@ -57,17 +60,17 @@ class TrackingBench:
 
     @property
     def selection(self) -> Selection:
-        """The part of the bench that is run."""
+        """The part of the benchmark that is run."""
         return Selection(self.estimators, self.sequences)
 
     @property
     def seeds(self) -> list[int]:
-        """Of sequences that are not matched."""
+        """Seeds of sequences that are not matched."""
         return seeds_of(self)
 
     @property
     def n_parts(self) -> int:
-        """Estimators on every condition, and their times."""
+        """Number of parts: estimators on every condition, and their times."""
         run = self.selection
         return sum(len(run.names_of(each)) for _, each in run.conditions()) + len(run.timed())
 
@@ -77,7 +80,7 @@ class TrackingBench:
         return describe_quick_run(self.n_seeds, lasting()) if is_as_short(self, QUICK) else ""
 
     def settings(self) -> dict[str, Any]:
-        """Return what all numbers depend on."""
+        """Return the settings that all numbers depend on."""
         bench = asdict(self)
         for name in ("estimators", "sequences"):
             if not bench[name]:
@@ -91,8 +94,10 @@ class TrackingBench:
         }
 
     def play(self, cache: PartCache) -> Parts:
-        """Return every estimator on everything, which is the same whatever else is run; times are
-        taken alone, at the end."""
+        """Return the parts of all estimators; times are measured alone, at the end.
+
+        A part does not depend on the selection of others.
+        """
         whole = {"experiment": self.name, **replace(self, estimators=(), sequences=()).settings()}
         cache, run = replace(cache, key=make_key(whole, self.depends)), self.selection
         asked = [(*each, name) for each in run.conditions() for name in run.names_of(each[1])]
@@ -101,7 +106,7 @@ class TrackingBench:
         return played | _timing(self, cache)
 
     def metrics(self, played: Parts) -> dict[str, Metric]:
-        """Return every number."""
+        """Return all metrics by name."""
         return metrics_of(played, self.selection)
 
     def shown_tables(self) -> tuple[Table, ...]:
@@ -109,12 +114,12 @@ class TrackingBench:
         return (BENCH, times(self.selection.timed()))
 
     def report(self, played: Parts, metrics: Metrics, figures: Path) -> Report:
-        """Return the tables."""
+        """Return the report."""
         return report(metrics, self.selection)
 
 
 QUICK = TrackingBench(n_seeds=8, n_matched=30, n_smoothed=2, timing_repeats=2)
-"""Every number, from fewer sequences."""
+"""The quick form: every number, from fewer sequences."""
 
 
 def cell_of(config: TrackingBench, rig_name: str, condition: str, name: str, key: str) -> Part:
@@ -134,19 +139,19 @@ def _run(
 
 @lru_cache(maxsize=1)
 def _made(rig_name: str, condition: str, seeds: tuple[int, ...]) -> tuple[Rig, Sequences]:
-    """Return the sequences of a condition, which its estimators share; the last ones are kept."""
+    """Return the sequences of a condition, which its estimators share; the last ones are cached."""
     rig = _rig(rig_name)
     return rig, make_sequences(rig, condition, list(seeds))
 
 
 def own_key(name: str, key: str) -> str:
-    """Return the key of an estimator's parts: of one of the user's own also its file counts."""
+    """Return the key of an estimator's parts, which for users' estimators contains their file."""
     source = hash_source(ESTIMATORS[name].make) if name in ESTIMATORS else ""
     return hashlib.sha256(f"{key} {source}".encode()).hexdigest()[:16] if source else key
 
 
 def seeds_of(config: TrackingBench, condition: str = "clean") -> list[int]:
-    """Of a condition's sequences."""
+    """Return the seeds of a condition's sequences."""
     n = config.n_matched if condition == MATCHED else config.n_seeds
     return [config.first_seed + k for k in range(n)]
 
@@ -156,7 +161,7 @@ def _rig(name: str) -> Rig:
 
 
 def _timing(config: TrackingBench, parts: PartCache) -> Parts:
-    """Microseconds per update of every estimator, on the lab's sequences."""
+    """Return microseconds per update of every estimator, on the lab's sequences."""
     rig = make_rig("lab")
     frames = cache(lambda kind: make_sequences(rig, kind, list(range(BATCH))))
     repeats = config.timing_repeats
@@ -165,7 +170,7 @@ def _timing(config: TrackingBench, parts: PartCache) -> Parts:
         return time_estimator(name, rig, frames("clean"), frames("hard"), repeats, tick)
 
     return {
-        ("lab", TIMING, name): parts.part(
+        ("lab", TIMING, name): parts.make_part(
             f"{TIMING}.{name}", partial(make, name), own_key(name, parts.key)
         )
         for name in config.selection.timed()

@@ -1,4 +1,4 @@
-"""A second, independent source of motion: the environment's own worker and its detector.
+"""An independent second source of motion: the environment's own worker and its detector.
 
 The bench's walkers (`walks`) and the environment's worker (`hrc_env.motion`) share no
 code, and neither do the bench's white detections and the environment's emulator, whose errors
@@ -24,17 +24,20 @@ from hrc_env.tracking.config import ParticleConfig, of_kind
 from hrc_env.worker.body import worker_truth
 
 ENV = "env"
-"""Name of the rig: the environment's room and its four cameras."""
+"""Name of the rig with the environment's room and its four cameras."""
 ENV_CONDITIONS = ("four_cameras", "two_cameras", "one_camera", "occluded")
-"""With nothing in the way: all cameras, the first two, and all but for 4 s, in which one is
-left; then all with the room and a moving robot in the way of their lines of sight."""
+"""Conditions of the rig.
+
+Without obstacles: all cameras, the first two, and all but for 4 s with only one; then all with the
+room and a moving robot in their lines of sight.
+"""
 ENV_FRAMES = 150
 ALONE_FRAMES = slice(25, 125)
 _SLOWNESS = 0.95
 
 
 def make_env_rig() -> Rig:
-    """The environment's cameras and tracker settings."""
+    """Return the environment's cameras and tracker settings."""
     simulation = simulate(1)
     P = projections(simulation.scene.cameras)
     simulation.close()
@@ -42,7 +45,8 @@ def make_env_rig() -> Rig:
 
 
 def record(condition: str, seeds: list[int]) -> tuple[Points3, Keypoints]:
-    """Joints (T, S, 1, J, 3) [m] and keypoints (T, S, C, 1, J, ...), one episode per seed."""
+    """Return joints (T, S, 1, J, 3) [m] and keypoints (T, S, C, 1, J, ...), one episode per
+    seed."""
     joints, free, hidden = _episodes(tuple(seeds))
     if condition == "occluded":
         return joints, hidden
@@ -57,7 +61,7 @@ def record(condition: str, seeds: list[int]) -> tuple[Points3, Keypoints]:
 
 
 def without(keypoints: Keypoints, blind: Bools) -> Keypoints:
-    """Keypoints less those that are `blind` (..., C, W, J)."""
+    """Return keypoints without those that are `blind` (..., C, W, J)."""
     return Keypoints(
         np.where(blind[..., None], np.nan, keypoints.px),
         np.where(blind, 0.0, keypoints.confidence),
@@ -68,7 +72,7 @@ def without(keypoints: Keypoints, blind: Bools) -> Keypoints:
 def watch(
     simulation: Simulation, seeds: Sequence[int], pushes: list[np.random.Generator], n_frames: int
 ) -> Iterator[tuple[WorkerTruth, Surroundings]]:
-    """The workers, and what hides them, while the robot moves about slowly, as `pushes` draw."""
+    """Yield the workers and their surroundings, while the robot moves slowly as `pushes` draw."""
     simulation.reset(np.arange(len(seeds)), [np.random.default_rng([seed, 9]) for seed in seeds])
     action = np.zeros((len(seeds), simulation.n_actions))
     for _ in range(n_frames):
@@ -91,14 +95,15 @@ class EmulatedDetector:
         emulator.reset(self.state, np.arange(len(rngs)), rngs)
 
     def detect(self, truth: WorkerTruth, between: Surroundings) -> Keypoints:
-        """What the detector would say, with so much in the way."""
+        """Return the detections of the truth with the given surroundings."""
         settings = self.config.emulator
         return emulator.emulate(self.state, self.rngs, truth, between, self.cameras, settings)
 
 
 @lru_cache(maxsize=1)
 def _episodes(seeds: tuple[int, ...]) -> tuple[Points3, Keypoints, Keypoints]:
-    """Joints, keypoints with free lines of sight, and keypoints with the robot in the way."""
+    """Return joints, keypoints with free lines of sight, and keypoints with the robot in the
+    way."""
     simulation = simulate(len(seeds))
     free, hidden, pushes = (
         [np.random.default_rng([seed, 10, k]) for seed in seeds] for k in range(3)
@@ -125,6 +130,6 @@ def _stacked(records: list[Keypoints]) -> Keypoints:
 
 
 def simulate(batch: int, config: HRCConfig | None = None) -> Simulation:
-    """Environments whose cameras nobody looks through."""
+    """Return environments without rendered cameras."""
     config = config or HRCConfig()
     return Simulation(batch, settle(perception="none", estimator="triangulation", config=config))

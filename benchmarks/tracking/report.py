@@ -1,4 +1,4 @@
-"""The tracking bench as people read it."""
+"""The report of the tracking benchmark."""
 
 from collections.abc import Mapping, Sequence
 from itertools import product
@@ -26,7 +26,7 @@ and still learn the joints' places on the body. The bound is that of each sequen
 
 
 def report(metrics: Metrics, selection: Selection = EVERYTHING) -> Report:
-    """Return the report; sections of which nothing was run are left out."""
+    """Return the report; sections without results are left out."""
     rivals = [DEFAULT, *selection.rivals()]
     with_names = [name for name in rivals if name != DLT]
     swaps = {"": f"identity_swaps.{{rig}}.{TWO_WORKERS}.{{name}}"}
@@ -47,7 +47,7 @@ def report(metrics: Metrics, selection: Selection = EVERYTHING) -> Report:
 
 
 def _lead(metrics: Metrics, selection: Selection) -> str:
-    """The default, row by row, beside the paper's algorithm and the best of the others."""
+    """Return the default row by row, beside the paper's algorithm and the best of the others."""
     lines, rivals = list[list[str]](), selection.rivals()
     header = ["", "RMSE, cm", "coverage", "std/RMSE"]
     header += ["paper, cm"] if "paper" in rivals else []
@@ -77,7 +77,10 @@ def _by_rig(
     kinds: Mapping[str, str],
     *above: list[str],
 ) -> str:
-    """Rows per rig and title, columns per estimator; of each title a pattern of keys."""
+    """Return a table with one row per rig and title and one column per estimator.
+
+    Each title has a pattern of keys.
+    """
     lines = list(above)
     for rig, (title, key) in product(rigs, kinds.items()):
         scale, digits = (100, 2) if key.startswith("rmse_m") else (1, 3)

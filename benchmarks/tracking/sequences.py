@@ -1,4 +1,4 @@
-"""The sequences of the tracking bench: what all estimators are given and held against."""
+"""The sequences of the tracking benchmark: input and truth of all estimators."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
@@ -22,9 +22,12 @@ from hrc_env.tracking.config import TrackerConfig
 
 MATCHED, TWO_WORKERS, LATE = "matched", "two_workers", "late"
 SIMULATED = (*CONDITIONS, LATE, TWO_WORKERS, MATCHED)
-"""Conditions of the rigs lab and site; of `matched` the least mean squared error is known."""
+"""Conditions of the rigs lab and site; for `matched` the least mean squared error is known."""
 MATCHED_ROOT_ACCELERATION = 0.05
-"""Of the matched sequences and of the estimators on them, so that they stay in view [m^2/s^3]."""
+"""Acceleration of the root in matched sequences and in the estimators on them [m^2/s^3].
+
+It is small, so that bodies stay in view.
+"""
 MOTIONS: dict[str, Callable[[tuple[float, float], list[int], int], Points3]] = {
     "running": partial(run, speed_m_s=3.0),
     "running_fast": partial(run, speed_m_s=3.5),
@@ -39,7 +42,7 @@ MOTIONS: dict[str, Callable[[tuple[float, float], list[int], int], Points3]] = {
     "worker_falls": fall_and_get_up,
     "worker_falls_one_camera": fall_and_get_up,
 }
-"""What people do where they do not walk."""
+"""Motions of people who do not walk, by condition."""
 N_FRAMES = {
     **dict.fromkeys(("clean", "occluded", "hard", "drifting"), 500),
     "one_camera": 175, LATE: 175, TWO_WORKERS: 125, MATCHED: 40, "mirrored_start": 50,
@@ -48,7 +51,7 @@ N_FRAMES = {
 
 
 def lasting() -> tuple[float, float]:
-    """Return how long the shortest and the longest sequences last [s]."""
+    """Return the durations of the shortest and the longest sequences [s]."""
     return DT_S * min(N_FRAMES.values()), DT_S * max(N_FRAMES.values())
 
 
@@ -80,14 +83,17 @@ WINDOWS: dict[str, dict[str, tuple[int, int]]] = {
     "worker_falls_one_camera": {"worker_falls_one_camera": (50, 150)},
     "fallen_one_camera": {"fallen_one_camera": (50, 150), "fallen_after_return": (160, 200)},
 }
-"""Frames that count: after the first second; while one camera sees, and from one second after
-the others' return; from half a second on after a mirrored start; from the fall on; matched
-sequences are short, lest the drifting body leave the images."""
+"""Frames that count, by condition.
+
+They begin after the first second; while one camera sees, and one second after the others' return;
+half a second after a mirrored start; at the fall. Matched sequences are short, so that the drifting
+body stays in the images.
+"""
 ENV_WINDOWS = {
     **{name: {name: (25, ENV_FRAMES)} for name in ENV_CONDITIONS},
     "one_camera": {"one_camera": (25, 125), "after_return": (135, ENV_FRAMES)},
 }
-"""The same of the environment's own motion; its return is looked at after 0.4 s."""
+"""Frames that count for the environment's own motion; its return counts after 0.4 s."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,32 +101,32 @@ class Sequences:
     """S sequences of T frames with W people."""
 
     joints: Points3
-    """(T, S, W, J, 3) [m]."""
+    """True joints (T, S, W, J, 3) [m]."""
     px: Points2
-    """(T, S, C, W, J, 2), by person."""
+    """Pixels by person (T, S, C, W, J, 2)."""
     windows: dict[str, tuple[int, int]]
-    """Name of each window and its frames."""
+    """Frames of each window by name."""
     config: TrackerConfig
     confidence: Floats | None = None
-    """(T, S, C, W, J); None: 0.9 where there is a pixel."""
+    """Confidence (T, S, C, W, J); None: 0.9 for each pixel."""
     sigma_px: Floats | None = None
-    """(T, S, C, W, J); None: `SIGMA_PX` where there is a pixel."""
+    """Standard deviation (T, S, C, W, J) [px]; None: `SIGMA_PX` for each pixel."""
     order: Ints | None = None
-    """(T, S, C, W) in which order cameras report people, whose names they do not know; None:
-    there is one."""
+    """Order in which cameras report people, without labels (T, S, C, W); None: there is one
+    person."""
     time_s: Floats | None = None
-    """(T, S, C) when the frame was taken that each camera delivers [s], as in `Keypoints`; None:
-    all are of now."""
+    """Time at which each delivered frame was taken (T, S, C) [s], as in `Keypoints`; None: all are
+    current."""
     bound_m2: Floats | None = None
-    """(T, S, J) the least mean squared error, where it is known."""
+    """Least mean squared error (T, S, J) if it is known [m^2]."""
 
     @property
     def has_bones(self) -> bool:
-        """Whether distances between neighbouring joints stay as they are."""
+        """Whether distances between neighbouring joints are constant."""
         return self.bound_m2 is None
 
     def first(self, n: int) -> "Sequences":
-        """The first n sequences."""
+        """Return the first n sequences."""
         arrays = {
             each.name: getattr(self, each.name)[:, :n]
             for each in fields(self)
@@ -129,7 +135,7 @@ class Sequences:
         return replace(self, **arrays)
 
     def keypoints(self, t: int) -> Keypoints:
-        """What cameras report of frame t."""
+        """Return the keypoints that cameras report of frame t."""
         px = self.px[t]
         seen = np.isfinite(px[..., 0])
         if self.confidence is None or self.sigma_px is None:
@@ -146,7 +152,8 @@ class Sequences:
 
 
 def make_sequences(rig: Rig, condition: str, seeds: list[int]) -> Sequences:
-    """Sequences of a rig and a condition, one per seed, each depending on its own seed only."""
+    """Return sequences of a rig and a condition, one per seed, each depending on its own seed
+    only."""
     if rig.name == ENV:
         joints, seen = record(condition, seeds)
         given = (seen.confidence, seen.sigma_px)
@@ -169,10 +176,10 @@ def make_sequences(rig: Rig, condition: str, seeds: list[int]) -> Sequences:
 
 
 def _matched(rig: Rig, seeds: list[int]) -> Sequences:
-    """Sequences from the estimators' own model, of which they are told what can be told.
+    """Return sequences from the estimators' own model, with estimators that know its parameters.
 
-    That is: the shared acceleration, no outliers, no exchanged sides, detections as good as they
-    say, no bones, no floor, and that a body may be of any size.
+    These are the shared acceleration, no outliers, no exchanged sides, detections with the reported
+    noise, no bones, no floor, and bodies of any size.
     """
     config = replace(
         rig.tracker,

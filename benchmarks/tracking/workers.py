@@ -1,6 +1,6 @@
-"""The environment's own workers, running and falling: such motion a second time, beside `athletes`.
+"""The environment's own workers that run and fall: a second source of the motions of `athletes`.
 
-Their bodies are the eight baked ones, in turns; they share no code with the bench's walkers.
+Bodies are the eight baked ones, in turns; they share no code with the benchmark's walkers.
 """
 
 import numpy as np
@@ -16,11 +16,12 @@ from hrc_env.motion.state import Worker
 from hrc_env.worker.body import load_body, worker_names, worker_truth
 
 _FASTEST_M_S, _WALK_M_S, _LIES_S, _WAY_M = 3.5, 1.3, (2.0, 4.0), 4.0
-"""Speeds; how long they lie; how far they want to walk who fall."""
+"""Speeds of running and walking [m/s], time of lying [s], and desired length of a walk [m]."""
 
 
 def run_to_and_fro(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
-    """Joints (T, S, J, 3) [m] of workers who run from corner to corner, as fast as the way lets."""
+    """Return joints (T, S, J, 3) [m] of workers who run from corner to corner as fast as they
+    can."""
 
     def run(draws: Floats, height_m: float, me: Worker) -> float:
         yaw = _across(me)
@@ -30,7 +31,7 @@ def run_to_and_fro(walk_m: tuple[float, float], seeds: list[int], n_frames: int)
 
 
 def fall_and_get_up(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
-    """Joints (T, S, J, 3) [m] of workers who walk, fall, lie for 2 to 4 s and get up."""
+    """Return joints (T, S, J, 3) [m] of workers who walk, fall, lie for 2 to 4 s and get up."""
 
     def fall(draws: Floats, height_m: float, me: Worker) -> float:
         yaw = _across(me, _WAY_M)
@@ -41,7 +42,7 @@ def fall_and_get_up(walk_m: tuple[float, float], seeds: list[int], n_frames: int
 
 
 def _across(me: Worker, most_m: float = np.inf) -> float:
-    """Lay a path past the middle, as far as it is to there; its direction [rad]."""
+    """Plan a path past the middle, as long as the distance to it; return its direction [rad]."""
     x, y = float(me["start_x"]), float(me["start_y"])
     share = min(2.0, most_m / np.hypot(x, y))
     lay_path((x, y), np.zeros((0, 3)), (x - share * x, y - share * y), me)
@@ -49,7 +50,7 @@ def _across(me: Worker, most_m: float = np.inf) -> float:
 
 
 def _played(act: Act, walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
-    """Joints (T, S, J, 3) of workers who begin in a corner and do it, and again, and so on."""
+    """Return joints (T, S, J, 3) of workers who start in a corner and repeat an activity."""
     sequences = []
     for seed in seeds:
         rng = np.random.default_rng([seed, 11])

@@ -141,7 +141,7 @@ def test_another_value_of_a_setting_makes_a_study_stale_and_another_name_does_no
     config = {"n_seeds": 10, "bench": {"levels": ["truth"], "old_name": 3}}
     path.write_text(json.dumps(json.loads(path.read_text()) | {"config": config}))
     now = {"n_seeds": 10, "bench": {"levels": ["truth"], "new_name": 3}, "added": 1}
-    monkeypatch.setattr(results, "current_settings", lambda name: now)
+    monkeypatch.setattr(results, "read_settings", lambda name: now)
     assert explain_stale("one") == ""
     now["bench"]["levels"] = ["truth", "none"]
     now["n_seeds"] = 9
@@ -167,7 +167,7 @@ def test_a_part_that_came_out_otherwise_makes_a_study_stale_and_all_its_parts_an
     assert explain_stale("one") == ""
 
 
-def test_a_run_that_is_out_of_time_is_stopped_and_goes_on(desk):
+def test_a_run_that_is_out_of_time_is_stopped_and_resumable(desk):
     folder = desk(60.0)
     main(Arguments(hours=5.0 / 3600))
     assert n_runs(folder) == 1
@@ -179,21 +179,21 @@ def test_a_run_that_is_out_of_time_is_stopped_and_goes_on(desk):
     assert json.loads((folder / "whole" / "one.json").read_text())["minutes"] > spent > 0
 
 
-@pytest.mark.parametrize("goes_on", [True, False])
-def test_how_long_a_study_takes_is_what_it_takes_from_nothing(desk, goes_on):
-    folder = desk(goes_on=goes_on)
+@pytest.mark.parametrize("is_resumable", [True, False])
+def test_how_long_a_study_takes_is_what_it_takes_from_nothing(desk, is_resumable):
+    folder = desk(is_resumable=is_resumable)
     (folder / "whole").mkdir()
     whole = folder / "whole" / "one.json"
     earlier = {"minutes": 42.0, "config": {"asked": 1}}  # parts of that run may be used again
     whole.write_text(json.dumps(earlier))
     main(Arguments())
     took = results.read_results("one")["minutes"]
-    assert took == 42.0 if goes_on else took < 1.0
+    assert took == 42.0 if is_resumable else took < 1.0
     mark = folder / "out" / "one" / results.MARK
     mark.write_text(json.dumps(json.loads(mark.read_text()) | {"minutes": 60.0}))
     main(Arguments(only=("one",)))
     took = results.read_results("one")["minutes"]
-    assert took > 60.0 if goes_on else took < 1.0
+    assert took > 60.0 if is_resumable else took < 1.0
 
 
 def test_what_does_not_stop_when_asked_is_killed(desk):
@@ -208,7 +208,7 @@ def test_what_does_not_stop_when_asked_is_killed(desk):
 
 
 def test_what_keeps_nothing_is_not_begun_without_the_time_for_it(desk):
-    folder = desk(goes_on=False, minutes=60)
+    folder = desk(is_resumable=False, minutes=60)
     main(Arguments(hours=0.5))
     assert n_runs(folder) == 0
     main(Arguments(hours=1.5))
@@ -269,7 +269,7 @@ def test_the_plan_names_every_study_and_sums_what_is_stale():
     said = console.export_text()
     assert "stale: tracker 1 -> 2" in said
     assert "fresh" in said
-    assert "20 min for what is stale, 30 min from nothing" in said
+    assert "20 min for stale studies, 30 min for all" in said
 
 
 def test_ten_studies_take_three_and_a_half_hours_without_trainings():

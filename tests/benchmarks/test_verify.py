@@ -127,7 +127,7 @@ def test_a_part_with_other_settings_or_that_is_no_longer_made_or_fails_is_found(
              "gone.0": record.parts["lab.0"]}  # fmt: skip
     records.save("toy", replace(record, parts=parts))
     _, outcome = verified(tmp_path)
-    assert "other settings" in outcome["spoiled"]["toy"]["lab.0"]
+    assert "its settings are not those of its record" in outcome["spoiled"]["toy"]["lab.0"]
     assert "no longer makes it" in outcome["spoiled"]["toy"]["gone.0"]
     records.save("toy", record)
     toy(Toy("not a number"))
@@ -153,7 +153,7 @@ def test_a_study_without_recorded_parts_is_named_and_fails_only_if_strict(toy, t
     status, outcome = verified(tmp_path)
     assert status == 0
     assert "the next `make results` records them" in outcome["skipped"]["toy"]
-    assert "toy: not replayed, no parts of it are recorded" in capsys.readouterr().out
+    assert "toy: not replayed, it has no recorded parts" in capsys.readouterr().out
     assert verified(tmp_path, strict=True)[0] == 1
 
 
@@ -207,7 +207,7 @@ def test_a_summary_forgives_rounding_and_forgets_the_clock():
     now = records.summarize({"episodes": [{"r": float(v + 1e-7), "t": 9.0} for v in values]})
     assert before.keys() == {"episodes*/r"}
     assert records.describe_difference(before, now) == ""
-    assert "no longer there" in records.describe_difference(before, {})
+    assert "is missing" in records.describe_difference(before, {})
     words = records.summarize({"row": "lab"}), records.summarize({"row": "site"})
     assert records.describe_difference(*words)
 

@@ -1,10 +1,6 @@
-"""The tracking bench with other people's code, on the same sequences.
+"""The tracking benchmark with other libraries, on the same sequences.
 
-| library | what is run |
-|---|---|
-| `aniposelib` | its optimiser of a whole clip (`optim_points`): smooth, bones of constant length |
-| `particles` | its bootstrap filter, 1000 particles, one for each joint |
-| `filterpy` | its unscented Kalman filter, one for each joint |
+| library | method |
 
 The two filters are what a user of these libraries would write: constant velocity, pixels as
 measurements, and a defence against gross errors (a likelihood with outliers; a gate, and a
@@ -42,19 +38,19 @@ CONDITIONS = ("clean", "occluded", "hard", "one_camera")
 ROWS = (*CONDITIONS, "after_return")
 OURS = (DEFAULT, DLT)
 N_QUICK = 1
-"""Sequences per rig and condition of the short form."""
+"""Number of sequences per rig and condition in the quick form."""
 Played = Mapping[tuple[str, str], list[dict[str, float]]]
-"""(rig and window, name) to what each sequence gave."""
+"""Results of each sequence by rig and window, and name."""
 
 
 @dataclass(frozen=True, slots=True)
 class BaselinesBench:
-    """The experiment, and how much is run."""
+    """The experiment, and the amount of data that is used."""
 
     name = "bench baselines"
     depends = ("tracker",)
     n_seeds: int = 5
-    """Sequences per rig and condition; these libraries take about a minute for each."""
+    """Number of sequences per rig and condition; these libraries take about a minute for each."""
     first_seed: int = 1000
     """Seed of the first sequence."""
 
@@ -64,12 +60,12 @@ class BaselinesBench:
 
     @property
     def seeds(self) -> list[int]:
-        """One a sequence."""
+        """Seeds, one per sequence."""
         return [self.first_seed + k for k in range(self.n_seeds)]
 
     @property
     def n_parts(self) -> int:
-        """Sequences of everybody."""
+        """Number of sequences of all libraries."""
         return len(RIGS) * len(CONDITIONS) * len(names()) * self.n_seeds
 
     @property
@@ -78,12 +74,12 @@ class BaselinesBench:
         return describe_quick_run(self.n_seeds, lasting()) if self.n_seeds <= N_QUICK else ""
 
     def settings(self) -> dict[str, Any]:
-        """Return what all numbers depend on."""
+        """Return the settings that all numbers depend on."""
         versions = {name: version(name) for name in LIBRARIES if installed(name)}
         return {"baselines": asdict(self), "versions": versions, "missing": missing()}
 
     def play(self, cache: PartCache) -> Played:
-        """Return what everybody made of every sequence."""
+        """Return the results of all libraries on every sequence."""
         cells: dict[tuple[str, str], list[dict[str, float]]] = {}
         for rig, condition in product(map(make_rig, RIGS), CONDITIONS):
             for seed, name in product(self.seeds, names()):
@@ -94,31 +90,35 @@ class BaselinesBench:
         return cells
 
     def metrics(self, played: Played) -> dict[str, Metric]:
-        """Return every number."""
+        """Return all metrics by name."""
         return metrics_of(played)
 
     def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
-        """Return the table."""
+        """Return the report."""
         return report(metrics)
 
 
 def installed(name: str) -> bool:
-    """Whether a library can be run here."""
+    """Return whether a library is installed."""
     return find_spec(name) is not None
 
 
 def follow_of(name: str) -> Callable[[Floats, Points2, int], Points3]:
-    """Joints (T, J, 3) [m] from P (C, 3, 4), px (T, C, J, 2) with NaN, and a seed."""
+    """Return the function of a library: joints (T, J, 3) [m] from P (C, 3, 4), px (T, C, J, 2), a
+    seed.
+
+    Missing pixels are NaN.
+    """
     return import_module(f"benchmarks.tracking.baselines.{name}").follow
 
 
 def names() -> list[str]:
-    """Who is run."""
+    """Return the names of the libraries that run."""
     return [*OURS, *filter(installed, LIBRARIES)]
 
 
 def _part(name: str, rig: Rig, condition: str, seed: int, tick: PartProgress) -> dict[str, Any]:
-    """One sequence: squared errors and time of each window."""
+    """Return squared errors and time of each window of one sequence."""
     sequences = make_sequences(rig, condition, [seed])
     if name in LIBRARIES:
         follow_of(name)(rig.P, sequences.px[:30, 0, :, 0], seed)  # compiles
@@ -135,14 +135,14 @@ def _part(name: str, rig: Rig, condition: str, seed: int, tick: PartProgress) ->
 
 
 def _joints(name: str, rig: Rig, sequences: Sequences, seed: int) -> Points3:
-    """(T, J, 3) of a sequence with one person."""
+    """Return the joints (T, J, 3) of a sequence with one person."""
     if name in LIBRARIES:
         return follow_of(name)(rig.P, sequences.px[:, 0, :, 0], seed)
     return np.stack([mean[0, 0] for mean, _ in beliefs(name, rig, sequences, [seed])])
 
 
 def metrics_of(played: Played) -> dict[str, Metric]:
-    """RMSE over all sequences with the best and the worst; microseconds per update."""
+    """Return RMSE over all sequences with the best and the worst; microseconds per update."""
     metrics: dict[str, Metric] = {}
     times: dict[str, list[float]] = {}
     for (row, name), parts in played.items():
@@ -155,7 +155,7 @@ def metrics_of(played: Played) -> dict[str, Metric]:
 
 
 def report(metrics: Metrics) -> Report:
-    """Return the table of errors and times, and who is missing."""
+    """Return the report with errors and times, and the missing libraries."""
     lines = [
         [row, *(format_number(metrics[f"rmse_m.{row}.{name}"], 100) for name in names())]
         for row in (f"{rig}.{window}" for rig in RIGS for window in ROWS)
@@ -171,12 +171,12 @@ def report(metrics: Metrics) -> Report:
 
 
 def missing() -> list[str]:
-    """Libraries that are not there."""
+    """Return the libraries that are missing."""
     return [name for name in LIBRARIES if not installed(name)]
 
 
 def missing_sentence() -> str:
-    """Which libraries are missing, and how to get them."""
+    """Return a sentence with the missing libraries and their installation."""
     if not missing():
         return "All libraries are installed."
     return f"Not installed, so not run: {', '.join(missing())}. Get them with: {INSTALL}"
