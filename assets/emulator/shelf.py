@@ -1,4 +1,4 @@
-"""Clips that were rendered stay on disk, so that whoever is stopped goes on where he was."""
+"""Cache of rendered clips on disk, from which an interrupted run continues."""
 
 import hashlib
 import json
@@ -14,7 +14,7 @@ from hrc_env.experiments.versions import make_key
 from hrc_env.worker.body import load_body
 
 DEPENDS = ("env", "tracker", "emulator", "detector", "motion")
-"""Subsystems that decide what is seen of clips."""
+"""Subsystems that decide the detections of clips."""
 
 
 def kept(
@@ -24,10 +24,11 @@ def kept(
     folder: Path | None,
     body_of: BodyOf = load_body,
 ) -> Iterator[Watched]:
-    """What a level saw of clips, from the folder where it is there, else played and put there.
+    """Yield the detections of clips at a level, from the folder if present, else played and saved
+    there.
 
-    What other versions or settings saw does not count, nor what was seen when the tracker was told
-    other deviations or offsets of joints, or that these are elsewhere in a body (`watch`).
+    Clips of other versions or settings do not count. Neither do clips with other reported
+    deviations, other offsets of joints or other joint positions in a body (`watch`).
     """
     if folder is None:
         yield from watch(level, clips, config, body_of)
