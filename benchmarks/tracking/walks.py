@@ -1,4 +1,4 @@
-"""People who walk and gesture: the tracking benchmark's own motion, seeded, with rigid bones.
+"""People walking and gesturing: the tracking benchmark's own motion, seeded, with rigid bones.
 
 It is independent of the package's motion, with which estimators were tuned. A walker steers through
 the area at 0.9 to 1.5 m/s and turns back before its edge; legs swing with the stride; arms gesture

@@ -20,7 +20,7 @@ _FASTEST_M_S, _WALK_M_S, _LIES_S, _WAY_M = 3.5, 1.3, (2.0, 4.0), 4.0
 
 
 def run_to_and_fro(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
-    """Return joints (T, S, J, 3) [m] of workers who run from corner to corner as fast as they
+    """Return joints (T, S, J, 3) [m] of workers that run from corner to corner as fast as they
     can."""
 
     def run(draws: Floats, height_m: float, me: Worker) -> float:
@@ -31,7 +31,7 @@ def run_to_and_fro(walk_m: tuple[float, float], seeds: list[int], n_frames: int)
 
 
 def fall_and_get_up(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
-    """Return joints (T, S, J, 3) [m] of workers who walk, fall, lie for 2 to 4 s and get up."""
+    """Return joints (T, S, J, 3) [m] of workers that walk, fall, lie for 2 to 4 s and get up."""
 
     def fall(draws: Floats, height_m: float, me: Worker) -> float:
         yaw = _across(me, _WAY_M)
@@ -50,7 +50,7 @@ def _across(me: Worker, most_m: float = np.inf) -> float:
 
 
 def _played(act: Act, walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
-    """Return joints (T, S, J, 3) of workers who start in a corner and repeat an activity."""
+    """Return joints (T, S, J, 3) of workers that start in a corner and repeat an activity."""
     sequences = []
     for seed in seeds:
         rng = np.random.default_rng([seed, 11])

@@ -2,10 +2,10 @@
 
 | library | method |
 
-The two filters are what a user of these libraries would write: constant velocity, pixels as
-measurements, and a defence against gross errors (a likelihood with outliers; a gate, and a
-joint that is begun anew when the gate has shut it out). All are given every camera's pixels
-of every frame and the detector's true standard deviation. None can say which side is which.
+The two filters follow the libraries' documentation: constant velocity, pixels as measurements, and
+a defence against outliers (a likelihood with outliers; a gate, with a new start of a joint that the
+gate has excluded). All receive every camera's pixels of every frame and the detector's true standard
+deviation. None can distinguish left from right.
 """
 
 import time
