@@ -4,8 +4,8 @@
 
 The two filters follow the libraries' documentation: constant velocity, pixels as measurements, and
 a defence against outliers (a likelihood with outliers; a gate, with a new start of a joint that the
-gate has excluded). All receive every camera's pixels of every frame and the detector's true standard
-deviation. None can distinguish left from right.
+gate has excluded). All receive every camera's pixels of every frame and the detector's true
+standard deviation. None can distinguish left from right.
 """
 
 import time
