@@ -62,7 +62,7 @@ def test_every_table_is_shown_with_where_it_comes_from():
 def test_the_baselines_are_in_the_readme_and_in_learning():
     for page in (README, ROOT / "docs" / "learning.md"):
         text = page.read_text()
-        assert "| `pixels` | PPO with it |" in text
+        assert "| `pixels` | PPO with the safety term |" in text
         assert tables.filled(text.replace("| `random` |", "| `other` |")) == text
 
 
