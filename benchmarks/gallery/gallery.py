@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import imageio.v2 as imageio
 
-from benchmarks.gallery.motions import strip
+from benchmarks.gallery.motions import draw_strip
 from benchmarks.gallery.still import CASTS, portrait, views
 from hrc_env.core.errors import check_names
 from hrc_env.core.typing import Image
@@ -78,7 +78,7 @@ def run(config: GalleryConfig, out: Path, say: Progress) -> list[Exhibit]:
     bodies = config.bodies or worker_names()
     for k, body in enumerate(bodies):  # strips of one worker are drawn one after another
         for name in config.motions[k :: len(bodies)]:
-            hang(strip(name, body), "Motions", name, f"by {body.replace('_', ' ')}", True)
+            hang(draw_strip(name, body), "Motions", name, f"by {body.replace('_', ' ')}", True)
     write_page(shown, out, "python -m benchmarks gallery")
     return shown
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.gallery.still import camera_at
+from benchmarks.gallery.still import make_camera
 from hrc_env.core.batching import one
 from hrc_env.core.typing import Image
 from hrc_env.motion.repertoire import SCENES, alone, perform
@@ -54,20 +54,20 @@ STAGED: dict[str, tuple[str, float, float]] = {
 """Scenes at a workplace of the site: its name, direction and distance of the camera."""
 
 
-def strip(name: str, body_name: str, seed: int = 0) -> Image:
+def draw_strip(name: str, body_name: str, seed: int = 0) -> Image:
     """Return a scene of the repertoire as a film strip, an image (420, about 1800, 3)."""
     scene = build(name="site", n_workers=1, bodies=body_name)
-    stage = stage_of(name)
+    stage = make_stage(name)
     me = alone(load_body(body_name), stage.xy_m, stage.yaw_rad)
     films = perform(SCENES[name], me, np.random.default_rng(seed), DT_S)
     renderer = PictureRenderer(scene, *FRAME_PX)
     frames, turn = [], stage.yaw_rad + stage.aside_rad
     lengths = [len(film.time_s) for film in films]
-    for k, row in moments(lengths):
+    for k, row in spread_frames(lengths):
         motion = one(films[k].motion, row)
         root = motion.position_world[0, SEGMENT["pelvis"]]
         target = np.array([*root[:2], TARGET_M])
-        camera = camera_at(target, turn, stage.away_m, HFOV_DEG, FRAME_PX)
+        camera = make_camera(target, turn, stage.away_m, HFOV_DEG, FRAME_PX)
         frame = np.array(renderer.picture(scene.home_q, motion, camera), np.uint8)
         overlay.label(frame, f"{DT_S * (sum(lengths[:k]) + row):.1f} s", (8, 8), 14)
         frames.append(frame)
@@ -75,7 +75,7 @@ def strip(name: str, body_name: str, seed: int = 0) -> Image:
     return overlay.tile(frames, FRAMES)
 
 
-def stage_of(name: str) -> Stage:
+def make_stage(name: str) -> Stage:
     """Return the stage of a scene."""
     if name in STAGED:
         where, aside_rad, away_m = STAGED[name]
@@ -86,7 +86,7 @@ def stage_of(name: str) -> Stage:
     return LONG if name.startswith(("walk", "stumble", "run", "fall")) else OPEN
 
 
-def moments(lengths: Sequence[int]) -> list[tuple[int, int]]:
+def spread_frames(lengths: Sequence[int]) -> list[tuple[int, int]]:
     """Return evenly spread frames of films of given lengths, as pairs of film and row."""
     rows = [(film, row) for film, length in enumerate(lengths) for row in range(length)]
     shares = (np.arange(FRAMES) + 0.5) / FRAMES

@@ -33,7 +33,7 @@ OVERVIEW = {"lab": "room", "site": "overview"}
 """Name of the view that shows most of a scene."""
 
 
-def camera_at(
+def make_camera(
     target_world: Points3, turn_rad: float, away_m: float, hfov_deg: float, size_px: tuple[int, int]
 ) -> PinholeCamera:
     """Return a camera that looks at a point (3,) [m] from a direction and a horizontal distance.
@@ -51,7 +51,7 @@ def portrait(body_name: str, seed: int = 1) -> Image:
     x, y, yaw = SITTING
     me = alone(load_body(body_name), (x, y), yaw)
     film = perform(REPERTOIRE["stand"], me, np.random.default_rng(seed), 0.1)[0]
-    camera = camera_at(np.array([x, y, 1.0]), yaw + 0.4, 2.1, 40.5, PORTRAIT_PX)
+    camera = make_camera(np.array([x, y, 1.0]), yaw + 0.4, 2.1, 40.5, PORTRAIT_PX)
     renderer = PictureRenderer(scene, *PORTRAIT_PX)
     picture = np.array(renderer.picture(scene.home_q, one(film.motion, 10), camera), np.uint8)
     renderer.close()
@@ -63,7 +63,7 @@ def views(scene_name: str, body_name: str) -> dict[str, Image]:
     camera."""
     cast = CASTS[scene_name]
     scene = build(name=scene_name, n_workers=len(cast), bodies=body_name)
-    motion = _together([_at_work(scene, body_name, *role) for role in cast])
+    motion = _stack_workers([_move_at_work(scene, body_name, *role) for role in cast])
     renderer = PictureRenderer(scene, *PLACE_PX)
     names = (OVERVIEW[scene_name], *(camera.name for camera in scene.cameras))
     found = {
@@ -73,7 +73,7 @@ def views(scene_name: str, body_name: str) -> dict[str, Image]:
     return found
 
 
-def _at_work(
+def _move_at_work(
     scene: Scene, body_name: str, place_name: str, doing: str, share: float
 ) -> WorkerMotion:
     """Return the motion of one worker (1, ...) at a share of an activity at a place."""
@@ -84,7 +84,7 @@ def _at_work(
     return one(rows, int(share * len(rows.position_world)))
 
 
-def _together(workers: list[WorkerMotion]) -> WorkerMotion:
+def _stack_workers(workers: list[WorkerMotion]) -> WorkerMotion:
     """Return several workers, each with arrays (1, ...), as one record (W, ...)."""
 
     def joined(records: Sequence[Any], *names: str) -> list[Any]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.motion.report import report
-from benchmarks.motion.statistics import gait_of, statistics_of
+from benchmarks.motion.statistics import compute_gait, compute_statistics
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric, over
 from hrc_env.experiments.cache import PartCache
@@ -80,10 +80,10 @@ def _measure(scene: str, config: MotionBench) -> dict[str, Metric]:
     for name in config.bodies:
         body = load_body(name)
         films = [film for seed in range(config.n_seeds) for film in _play(scene, seed, body)]
-        numbers = statistics_of(films, body)
+        numbers = compute_statistics(films, body)
         numbers["seconds"] = sum(film.time_s[-1] for film in films) / config.n_seeds
         if films[0].activity == st.WALK:
-            gaits = [gait_of(film) for film in films]
+            gaits = [compute_gait(film) for film in films]
             numbers |= {key: float(np.median([g[key] for g in gaits])) for key in gaits[0]}
         by_body.append(numbers)
     n = config.n_seeds * len(config.bodies)

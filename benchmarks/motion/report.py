@@ -1,6 +1,6 @@
 """The report of the motion benchmark."""
 
-from benchmarks.motion.targets import ANY, Target, targets_of
+from benchmarks.motion.targets import ANY, Target, list_targets
 from hrc_env.core.results import Metric
 from hrc_env.experiments.columns import Column
 from hrc_env.experiments.report import Metrics, Report, format_metric, format_metrics, format_table
@@ -27,7 +27,7 @@ def report(metrics: Metrics) -> Report:
         "Medians over bodies, smallest and largest in brackets; the first table has the targets of "
         "single scenes, the second what all scenes have (speeds in m/s)."
     )
-    asked = (f"`{each.statistic}` <= {each.high:g} ({each.source})" for each in targets_of(ANY))
+    asked = (f"`{each.statistic}` <= {each.high:g} ({each.source})" for each in list_targets(ANY))
     return Report("Motion bench", lead, (
         "## Beside what is known of people", _targets(scenes, metrics),
         "## Every scene",
@@ -44,7 +44,7 @@ def inside(target: Target, metric: Metric) -> bool:
 def _targets(scenes: list[str], metrics: Metrics) -> str:
     lines = []
     for scene in scenes:
-        for target in targets_of(scene):
+        for target in list_targets(scene):
             metric = metrics[f"{scene}.{target.statistic}"]
             if target.scene != ANY or not inside(target, metric):
                 verdict = "" if inside(target, metric) else "**outside**"

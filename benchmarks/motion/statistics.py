@@ -28,7 +28,7 @@ DEEP_M = 0.05
 yields."""
 
 
-def statistics_of(films: Sequence[Film], body: Body) -> dict[str, float]:
+def compute_statistics(films: Sequence[Film], body: Body) -> dict[str, float]:
     """Return the statistics of all frames of the films of one scene."""
     numbers: dict[str, float] = {}
     for name, which in (("wrist", WRISTS), ("ankle", ANKLES), ("head", HEAD)):
@@ -41,10 +41,12 @@ def statistics_of(films: Sequence[Film], body: Body) -> dict[str, float]:
         numbers[f"{name}_p999_m_s2"] = float(np.percentile(rates, 99.9))
     pelvis = np.concatenate([film.motion.position_world[:, 0, 0, 2] for film in films])
     numbers["pelvis_low_m"] = float(pelvis.min())
-    numbers["slip_p95_m_s"] = _percentile(np.concatenate([slips(film) for film in films]), 95)
-    missed = np.concatenate([misses(film) for film in films])
+    numbers["slip_p95_m_s"] = _percentile(
+        np.concatenate([compute_slips(film) for film in films]), 95
+    )
+    missed = np.concatenate([compute_misses(film) for film in films])
     numbers["grip_missed_share"] = float((missed > MISSED_M).mean()) if missed.size else 0.0
-    inside = np.concatenate([depths(film, body) > DEEP_M for film in films])
+    inside = np.concatenate([compute_depths(film, body) > DEEP_M for film in films])
     numbers["inside_itself_share"] = float(inside.mean())
     return numbers
 
@@ -65,7 +67,7 @@ def _accelerations(film: Film, which: list[int]) -> Floats:
     return np.linalg.norm(change, axis=-1).ravel()
 
 
-def slips(film: Film) -> Floats:
+def compute_slips(film: Film) -> Floats:
     """Return the speeds over the floor of the balls of feet that bear weight [m/s]."""
     grounds = np.unique(np.round([0.0, *film.worker.prints[:, 4]], 4))
     found = []
@@ -79,7 +81,7 @@ def slips(film: Film) -> Floats:
     return np.concatenate(found)
 
 
-def grips(film: Film) -> Floats:
+def compute_grips(film: Film) -> Floats:
     """Return the positions (T, 2, 3) of the hands' grips, beyond the wrist along the forearm
     [m]."""
     place = film.motion.position_world[:, 0]
@@ -91,19 +93,19 @@ def grips(film: Film) -> Floats:
     return np.stack(both, 1)
 
 
-def wholly_there(film: Film) -> Bools:
+def find_arrivals(film: Film) -> Bools:
     """Return when each hand should be at its target (T, 2)."""
     return film.controls[:, c.HAND_SHARE : c.HAND_SHARE + 2] > 1.0 - 1e-9
 
 
-def misses(film: Film) -> Floats:
+def compute_misses(film: Film) -> Floats:
     """Return the distances of hands from their targets, in all frames in which they have one
     [m]."""
     wished = film.controls[:, c.HAND_TARGET : c.HAND_TARGET + 6].reshape(-1, 2, 3)
-    return np.linalg.norm(grips(film) - wished, axis=-1)[wholly_there(film)]
+    return np.linalg.norm(compute_grips(film) - wished, axis=-1)[find_arrivals(film)]
 
 
-def depths(film: Film, body: Body) -> Floats:
+def compute_depths(film: Film, body: Body) -> Floats:
     """Return the greatest depth (T,) to which limbs intersect other parts [m]; negative: the
     clearance."""
     truth = worker_truth(body, film.motion)
@@ -132,7 +134,7 @@ def _pairs(body: Body) -> list[tuple[int, int]]:
     return [(at[a], at[b]) for a, b in named if a in at and b in at]
 
 
-def gait_of(film: Film) -> dict[str, float]:
+def compute_gait(film: Film) -> dict[str, float]:
     """Return cadence, step length and width, bob and knee flexion of a straight walk."""
     place, rate = film.motion.position_world[:, 0], film.motion.velocity_world[:, 0]
     ahead = place[-1, 0, :2] - place[0, 0, :2]

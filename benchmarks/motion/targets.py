@@ -25,7 +25,7 @@ class Target:
 
 def _walk(speed: float) -> list[Target]:
     """Return the bands of a walk at a speed [m/s]: within 10 % of the fits."""
-    name = walk_name(speed)
+    name = format_walk(speed)
     cadence, length = 96.2 * speed**0.468, 0.345 + 0.286 * speed
     return [
         Target(name, "cadence_per_min", 0.9 * cadence, 1.1 * cadence, CMU),
@@ -38,14 +38,14 @@ def _walk(speed: float) -> list[Target]:
 
 def _limbs(speed: float, wrist: float, ankle: float) -> list[Target]:
     """Return the bands of wrists and ankles in a walk: 10 % around their 95th percentiles [m/s]."""
-    name = walk_name(speed)
+    name = format_walk(speed)
     return [
         Target(name, "wrist_p95_m_s", 0.9 * wrist, 1.1 * wrist, CMU),
         Target(name, "ankle_p95_m_s", 0.9 * ankle, 1.1 * ankle, CMU),
     ]
 
 
-def walk_name(speed_m_s: float) -> str:
+def format_walk(speed_m_s: float) -> str:
     """Return the name of the scene of a walk."""
     return f"walk {speed_m_s:.1f} m/s"
 
@@ -73,6 +73,6 @@ TARGETS: tuple[Target, ...] = (
 )
 
 
-def targets_of(scene: str) -> list[Target]:
+def list_targets(scene: str) -> list[Target]:
     """Return the bands of a scene."""
     return [target for target in TARGETS if target.scene in (scene, ANY)]

@@ -17,9 +17,9 @@ from assets.emulator.validate import error_ratios
 from benchmarks.perception import episodes, speed
 from benchmarks.perception.crops import Looker, instants
 from benchmarks.perception.declaration import TABLES
-from benchmarks.perception.metrics import EMULATED, NO_FAULT, PIXELS, metrics_of
+from benchmarks.perception.metrics import EMULATED, NO_FAULT, PIXELS, compute_metrics
 from benchmarks.perception.report import report
-from benchmarks.perception.views import PLAIN, View, in_turns
+from benchmarks.perception.views import PLAIN, View, list_activities
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric
 from hrc_env.engines.local import Serial
@@ -101,7 +101,7 @@ class PerceptionBench:
     @property
     def n_parts(self) -> int:
         """Number of parts."""
-        return len(list(tasks_of(self)))
+        return len(list(make_tasks(self)))
 
     @property
     def quick_note(self) -> str:
@@ -115,7 +115,7 @@ class PerceptionBench:
 
     def play(self, cache: PartCache) -> Parts:
         """Return all parts by their labels."""
-        tasks = list(tasks_of(self, cache.folder.parent / "figures"))
+        tasks = list(make_tasks(self, cache.folder.parent / "figures"))
         cache = replace(cache, n_parts=sum(task.cost for task in tasks))
         away = [task for task in tasks if not task.is_here]
         parts = cache.make_parts([task.part for task in away], one_core=True)
@@ -128,7 +128,7 @@ class PerceptionBench:
 
     def metrics(self, played: Parts) -> dict[str, Metric]:
         """Return all metrics by name."""
-        return metrics_of(played, self.n_faults, self.fault_steps)
+        return compute_metrics(played, self.n_faults, self.fault_steps)
 
     def shown_tables(self) -> tuple[Table, ...]:
         """Return the tables of the documentation."""
@@ -163,7 +163,7 @@ class Task(NamedTuple):
         return Part(self.label, self.make, weight=self.cost)
 
 
-def tasks_of(config: PerceptionBench, figures: Path | None = None) -> Iterator[Task]:
+def make_tasks(config: PerceptionBench, figures: Path | None = None) -> Iterator[Task]:
     """Yield all parts, time measurements last; the plot of the emulator is drawn into a folder."""
     yield from _crops(config)
     yield from _episodes(config)
@@ -258,7 +258,7 @@ def _look(variant: str, make: Callable[[], Scene], n: int, tick: PartProgress) -
     rng = np.random.default_rng(zlib.crc32(f"{scene.name} {scene.bodies[0]}".encode()))
     appearance = APPEARANCES.get(variant.removeprefix("appearance "), AS_BUILT)
     looker = Looker(scene)
-    for k, now in enumerate(instants(scene, n, rng, in_turns())):
+    for k, now in enumerate(instants(scene, n, rng, list_activities())):
         if appearance != AS_BUILT:
             looker.randomize(draw_look(appearance, 1, np.random.default_rng([FIRST_SEED, k])))
         looked = looker.detect(now)

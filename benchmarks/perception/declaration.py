@@ -35,7 +35,7 @@ def belief(start: str = "", words: str = "", key: str = "{}") -> dict[str, Colum
     }
 
 
-def of_fault(level: str) -> dict[str, Column]:
+def make_fault_columns(level: str) -> dict[str, Column]:
     """Return the columns of a level's faults."""
     start, words = LEVELS[level], f"`{level}`: "
     return {
@@ -45,7 +45,7 @@ def of_fault(level: str) -> dict[str, Column]:
     }
 
 
-def of_names(level: str) -> tuple[Column, ...]:
+def make_name_columns(level: str) -> tuple[Column, ...]:
     """Return the columns of a level's reports of miscalibrated cameras."""
     key, words = f"{LEVELS[level]}miscalibrated.{{}}.", f"`{level}`: "
     return (
@@ -55,7 +55,7 @@ def of_names(level: str) -> tuple[Column, ...]:
     )
 
 
-PIXELS, EMULATED = of_fault("pixels"), of_fault("keypoints")
+PIXELS, EMULATED = make_fault_columns("pixels"), make_fault_columns("keypoints")
 DETECTED = Column("detected.{}", "detected [%]", 1, 100)
 ERROR_SHARE = Column("error_share.{}.median", "median error [% of stature]", 1, 100)
 ACCURACY = Table(
@@ -88,7 +88,7 @@ NAMED = Table(
     "miscalibration",
     "Miscalibrated cameras",
     {kind: FAULTS[kind] for kind in SHOWN},
-    (*of_names("pixels"), *of_names("keypoints")),
+    (*make_name_columns("pixels"), *make_name_columns("keypoints")),
     ("fault of one camera",),
     "Episodes in which the camera was named, after how long, and the share of steps in which "
     "another one was; lab, arm at rest, 6 s an episode at `pixels`, 10 s at `keypoints`. Other "

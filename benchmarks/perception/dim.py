@@ -13,7 +13,7 @@ import numpy as np
 import tyro
 
 from benchmarks.perception.crops import Instant, instants
-from benchmarks.perception.views import in_turns
+from benchmarks.perception.views import list_activities
 from hrc_env.core.batching import one
 from hrc_env.core.records import Roi
 from hrc_env.core.typing import Floats, Image
@@ -103,7 +103,7 @@ def look(name: str, body: str, asked: Arguments) -> dict[str, list[_Seen]]:
     spoilt, detector = _Spoilt(scene), PoseDetector(scene.cameras)
     seen: dict[str, list[_Seen]] = {kind: [] for kind in PICTURES}
     rng = np.random.default_rng(asked.seed)
-    for k, now in enumerate(instants(scene, asked.moments, rng, in_turns())):
+    for k, now in enumerate(instants(scene, asked.moments, rng, list_activities())):
         joints = worker_truth(load_body(body), now.motion).joints_world[0]
         px, depth_m = (values[0] for values in project(projections(scene.cameras), joints))
         views = zip(px, depth_m, scene.cameras, strict=True)
@@ -115,24 +115,32 @@ def look(name: str, body: str, asked: Arguments) -> dict[str, list[_Seen]]:
             spoilt.show(now, picture, [asked.seed, k])
             detector.forget(0)
             found = detector.detect(spoilt, windows)
-            seen[kind] += _compared(found, windows, true_px)
+            seen[kind] += _compare(found, windows, true_px)
     detector.close()
     spoilt.renderer.close()
     return seen
 
 
-def _compared(found: Detection, windows: Views, true_px: Floats) -> list[_Seen]:
+def _compare(found: Detection, windows: Views, true_px: Floats) -> list[_Seen]:
     off = np.linalg.norm(found.px - true_px, axis=-1)
     return [_Seen(off[c], found.sigma_px[c]) for c, w in enumerate(windows) if w is not None]
 
 
-def row_of(usual: Sequence[_Seen], dim: Sequence[_Seen]) -> tuple[int, int, float, float]:
-    """Return the comparison of a degraded picture with normal light.
+class Row(NamedTuple):
+    """Comparison of a degraded picture with normal light."""
 
-    These are the number of crops that showed the worker in normal light, and in this picture too;
-    of the latter the median error, and the root mean square of error over deviation, both as
-    factors on those in normal light.
-    """
+    n_known: int
+    """Number of crops with a detection in normal light."""
+    n_both: int
+    """Number of these crops with a detection in this picture too."""
+    error: float
+    """Median error in the latter crops, as a factor on that in normal light."""
+    spread: float
+    """Root mean square of error over deviation, as a factor on that in normal light."""
+
+
+def make_row(usual: Sequence[_Seen], dim: Sequence[_Seen]) -> Row:
+    """Compare a degraded picture with normal light."""
     known = [pair for pair in zip(usual, dim, strict=True) if np.isfinite(pair[0].error_px).all()]
     both = [pair for pair in known if np.isfinite(pair[1].error_px).all()]
 
@@ -143,7 +151,7 @@ def row_of(usual: Sequence[_Seen], dim: Sequence[_Seen]) -> tuple[int, int, floa
         share = np.array([pair[which].error_px / pair[which].sigma_px for pair in both])
         return float(np.sqrt(np.mean(np.minimum(share, GROSS) ** 2)))
 
-    return len(known), len(both), median(1) / median(0), spread(1) / spread(0)
+    return Row(len(known), len(both), median(1) / median(0), spread(1) / spread(0))
 
 
 def main(asked: Arguments, say: Callable[[str], None] = print) -> None:
@@ -153,8 +161,8 @@ def main(asked: Arguments, say: Callable[[str], None] = print) -> None:
         seen = {kind: [view for part in parts for view in part[kind]] for kind in PICTURES}
         say(f"\n| {name} | found | of | error | error / deviation |\n|---|---:|---:|---:|---:|")
         for kind in PICTURES:
-            known, both, error, spread = row_of(seen["usual"], seen[kind])
-            say(f"| {kind} | {both} | {known} | {error:.2f} | {spread:.2f} |")
+            row = make_row(seen["usual"], seen[kind])
+            say(f"| {kind} | {row.n_both} | {row.n_known} | {row.error:.2f} | {row.spread:.2f} |")
 
 
 if __name__ == "__main__":

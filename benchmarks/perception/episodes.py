@@ -45,13 +45,13 @@ class Episode:
         return {name: np.round(values, 4).tolist() for name, values in arrays.items()}
 
 
-def episode_of(content: dict[str, Any]) -> Episode:
+def read_episode(content: dict[str, Any]) -> Episode:
     """Return an episode from the content of `Episode.to_json`."""
     arrays = {name: np.array(values, float) for name, values in content.items()}
     return Episode(**{**arrays, "named": arrays["named"] > 0})
 
 
-def some_steps(episode: Episode, steps: Bools | slice) -> Episode:
+def select_steps(episode: Episode, steps: Bools | slice) -> Episode:
     """Return some steps of an episode."""
     names = [each.name for each in fields(Episode)]
     return Episode(*(getattr(episode, name)[steps] for name in names))
@@ -86,7 +86,7 @@ def _episode(env: HRCEnv, seed: int, n_steps: int) -> Episode:
         truth = worker_truth(simulation.bodies, generator.current(simulation.motion))
         joints, estimate = truth.joints_world[0, 0], simulation.estimate
         family[t] = family_index(int(generator.activity(simulation.motion)[0, 0]))
-        off_px[t] = _off_px(env, joints)
+        off_px[t] = _measure_error_px(env, joints)
         named[t] = simulation.pipeline.suspected(np.array([0]))[0]
         if estimate.tracked[0, 0]:
             offset, cov = estimate.mean_world[0, 0] - joints, estimate.cov_world[0, 0]
@@ -96,7 +96,7 @@ def _episode(env: HRCEnv, seed: int, n_steps: int) -> Episode:
     return Episode(error, std, inside, off_px, family, named)
 
 
-def _off_px(env: HRCEnv, joints_world: Floats) -> Floats:
+def _measure_error_px(env: HRCEnv, joints_world: Floats) -> Floats:
     """Return the distance of this step's keypoints from the truth (C,) [px]; NaN: no detection."""
     keypoints, _ = env.simulation.pipeline.last_detections(0)
     cameras = env.simulation.scene.cameras

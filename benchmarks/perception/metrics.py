@@ -7,9 +7,9 @@ import numpy as np
 
 from benchmarks.common import make_exact
 from benchmarks.perception.crops import STEP_S
-from benchmarks.perception.episodes import Episode, episode_of, some_steps
+from benchmarks.perception.episodes import Episode, read_episode, select_steps
 from benchmarks.perception.speed import ROUNDS
-from benchmarks.perception.views import FAMILIES, ROWS, View, rows_of
+from benchmarks.perception.views import FAMILIES, ROWS, View, group_rows
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.evaluation.intervals import (
@@ -27,7 +27,7 @@ Found = Mapping[str, dict[str, Any]]
 """Finished parts by label, as of `bench.tasks_of`."""
 
 
-def metrics_of(found: Found, n_faults: int, fault_steps: int) -> Metrics:
+def compute_metrics(found: Found, n_faults: int, fault_steps: int) -> Metrics:
     """Return all metrics by name.
 
     Args:
@@ -36,7 +36,7 @@ def metrics_of(found: Found, n_faults: int, fault_steps: int) -> Metrics:
         fault_steps: number of steps to which these are cut.
     """
     played = {
-        label: [episode_of(each) for each in part["episodes"]]
+        label: [read_episode(each) for each in part["episodes"]]
         for label, part in found.items()
         if "episodes" in part
     }
@@ -48,7 +48,7 @@ def metrics_of(found: Found, n_faults: int, fault_steps: int) -> Metrics:
             loops.setdefault(first, []).extend(episodes)
         else:
             faults[first, second] = episodes
-    base = [some_steps(each, slice(fault_steps)) for each in loops["lab"][:n_faults]]
+    base = [select_steps(each, slice(fault_steps)) for each in loops["lab"][:n_faults]]
     faults[PIXELS, NO_FAULT] = base
     views = [View(**view) for part in found.values() for view in part.get("views", ())]
     metrics = {**_speed(found), **_loops(loops), **_faults(faults), **_views(views)}
@@ -76,7 +76,7 @@ def _loops(loops: dict[str, list[Episode]]) -> Metrics:
         metrics |= _belief(scene, episodes)
     everything = [episode for episodes in loops.values() for episode in episodes]
     for k, family in enumerate(FAMILIES):
-        those = [some_steps(episode, episode.family == k) for episode in everything]
+        those = [select_steps(episode, episode.family == k) for episode in everything]
         those = [episode for episode in those if len(episode.family)]
         if those:
             metrics |= _belief(f"pose.{family}", those)
@@ -85,9 +85,9 @@ def _loops(loops: dict[str, list[Episode]]) -> Metrics:
 
 def _belief(name: str, episodes: list[Episode]) -> Metrics:
     """Return error, coverage, reported deviation and lost steps of episodes."""
-    errors = [_known(episode.error_m) for episode in episodes]
+    errors = [_select_tracked(episode.error_m) for episode in episodes]
     squared = [float((each**2).sum()) for each in errors]
-    reported = [float((_known(episode.std_m) ** 2).sum()) for episode in episodes]
+    reported = [float((_select_tracked(episode.std_m) ** 2).sum()) for episode in episodes]
     inside = [float(episode.inside95.sum()) for episode in episodes]
     lost = [float(np.isnan(episode.error_m[:, 0]).sum()) for episode in episodes]
     steps = [float(len(episode.family)) for episode in episodes]
@@ -115,8 +115,8 @@ def _faults(faults: dict[tuple[str, str], list[Episode]]) -> Metrics:
             own = [-1] * len(episodes)
         else:
             found[f"error_ratio.{kind}"] = _ratio(episodes, base)
-            found[f"detected.fault.{kind}"] = _detected(episodes, own)
-        found |= _named(f"miscalibrated.{kind}", episodes, own)
+            found[f"detected.fault.{kind}"] = _rate_detections(episodes, own)
+        found |= _rate_reports(f"miscalibrated.{kind}", episodes, own)
         metrics |= {start + name: metric for name, metric in found.items()}
     return metrics
 
@@ -124,7 +124,7 @@ def _faults(faults: dict[tuple[str, str], list[Episode]]) -> Metrics:
 def _ratio(episodes: list[Episode], base: list[Episode]) -> Metric:
     """Return the median error over that of the same seeds without the fault, by bootstrap over
     seeds."""
-    above, below = ([_known(each.error_m) for each in some] for some in (episodes, base))
+    above, below = ([_select_tracked(each.error_m) for each in some] for some in (episodes, base))
 
     def ratio(weights: Ints) -> Floats:
         drawn = [np.repeat(np.arange(len(each)), each) for each in weights]
@@ -138,14 +138,14 @@ def _median(values: list[Floats], which: Ints) -> float:
     return float(np.median(together)) if together.size else np.nan
 
 
-def _detected(episodes: list[Episode], cameras: list[int]) -> Metric:
+def _rate_detections(episodes: list[Episode], cameras: list[int]) -> Metric:
     """Return the share of steps in which the camera with the fault detected the worker."""
     pairs = zip(episodes, cameras, strict=True)
     seen = [float(np.isfinite(each.off_px[:, c]).sum()) for each, c in pairs]
     return estimate_ratio(seen, [float(len(each.off_px)) for each in episodes], "share")
 
 
-def _named(start: str, episodes: list[Episode], own: list[int]) -> Metrics:
+def _rate_reports(start: str, episodes: list[Episode], own: list[int]) -> Metrics:
     """Return the share and the delay of reports of the camera with the fault, and of others."""
     cameras = [np.arange(each.named.shape[1]) for each in episodes]
     mine = [each.named[:, c == k].any(1) for each, c, k in zip(episodes, cameras, own, strict=True)]
@@ -164,7 +164,7 @@ def _named(start: str, episodes: list[Episode], own: list[int]) -> Metrics:
 def _views(every: list[View]) -> Metrics:
     metrics: Metrics = {}
     for kind in ROWS:
-        for row, views in rows_of(every, kind).items():
+        for row, views in group_rows(every, kind).items():
             metrics[f"detected.{kind}.{row}"] = estimate_share(
                 [view.error is not None for view in views]
             )
@@ -175,6 +175,6 @@ def _views(every: list[View]) -> Metrics:
     return metrics
 
 
-def _known(values: np.ndarray) -> np.ndarray:
+def _select_tracked(values: np.ndarray) -> np.ndarray:
     """Return the values of single joints while the worker was tracked."""
     return values[np.isfinite(values)]

@@ -16,7 +16,7 @@ from benchmarks.perception.declaration import (
     NAMED,
     SPEED,
     belief,
-    of_fault,
+    make_fault_columns,
 )
 from benchmarks.perception.speed import REST, STAGES
 from benchmarks.perception.views import ROWS
@@ -64,7 +64,12 @@ def report(config: Any, found: Any, metrics: Metrics, figures: Path) -> Report:
     paces = {name: name for name in list_endings(metrics, "steps_per_s.")}
     names = list_endings(metrics, "lost_steps.")
     estimates = {name: name.replace(".", ": ") for name in names if not name.startswith("fault.")}
-    faults = [each for level in LEVELS for name, each in of_fault(level).items() if name != "lost"]
+    faults = [
+        each
+        for level in LEVELS
+        for name, each in make_fault_columns(level).items()
+        if name != "lost"
+    ]
     stages = [Column(f"stage_ms.{each}.{{}}", f"{each} [ms]") for each in (*STAGES, REST)]
     less = Column("emulator_coverage_difference.{}", "coverage less pixels'", 3, signed=True)
     parts = (

@@ -57,7 +57,7 @@ PLAIN = "plain"
 """Variant of the scenes without changes."""
 
 
-def rows_of(views: list[View], kind: str) -> dict[str, list[View]]:
+def group_rows(views: list[View], kind: str) -> dict[str, list[View]]:
     """Return the crops of a kind by row, in the order of the table."""
     name = ROWS[kind]
     compared = kind in COMPARED
@@ -66,7 +66,7 @@ def rows_of(views: list[View], kind: str) -> dict[str, list[View]]:
     return {row: [view for view in chosen if name(view) == row] for row in found}
 
 
-def in_turns() -> tuple[str, ...]:
+def list_activities() -> tuple[str, ...]:
     """Return every activity that a worker does on its own, with the families in turns."""
     kinds = [[each for each in names if each != "clip"] for names in FAMILIES.values()]
     longest = max(map(len, kinds))

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.recorded.calibration import read_calibration, tracker_config
-from benchmarks.recorded.detections import FOLLOWER, Detections, detections_of
+from benchmarks.recorded.detections import FOLLOWER, Detections, make_detections
 from benchmarks.recorded.fetch import POSE2SIM, fetch_recording
 from benchmarks.recorded.films import Films
 from benchmarks.recorded.metrics import (
@@ -15,8 +15,8 @@ from benchmarks.recorded.metrics import (
     bone_std,
     follow,
     foretell,
-    foretold_metrics,
     jerk,
+    summarize_foretold,
 )
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats
@@ -78,7 +78,7 @@ class RecordedBench:
         recording = fetch_recording(lambda sentence: cache.progress(0.0, sentence))
         with closing(Films(recording.films)) as films:
             cameras = read_calibration(recording.calibration, films.sizes_px)
-            detections = detections_of(films, cameras, replace(cache, n_parts=1 / _DETECTING))
+            detections = make_detections(films, cameras, replace(cache, n_parts=1 / _DETECTING))
         pinholes = [replace(camera, lens=None) for camera in cameras]
         P, tracker = projections(tuple(pinholes)), tracker_config(pinholes)
         metrics: dict[str, Metric] = {}
@@ -105,7 +105,7 @@ def _of_estimator(
 ) -> dict[str, Metric]:
     """Return the metrics of one estimator."""
     metrics = {}
-    for kind, metric in foretold_metrics(foretell(name, P, config, detections)).items():
+    for kind, metric in summarize_foretold(foretell(name, P, config, detections)).items():
         measure, *part = kind.split(".")
         label = f"reprojection_{measure}" if part else measure
         metrics[".".join([f"real_{label}", name, *part])] = metric

@@ -28,7 +28,7 @@ def read_calibration(path: Path, sizes_px: list[tuple[int, int]]) -> list[Pinhol
     return [_camera(camera, size) for camera, size in zip(found, sizes_px, strict=True)]
 
 
-def meeting_point(cameras: list[PinholeCamera]) -> Points3:
+def find_meeting_point(cameras: list[PinholeCamera]) -> Points3:
     """Return the point (3,) that is closest to all optical axes, which are not parallel [m]."""
     normal, rhs = np.zeros((3, 3)), np.zeros(3)
     for camera in cameras:
@@ -45,7 +45,7 @@ def tracker_config(cameras: list[PinholeCamera]) -> ParticleConfig:
     The standard deviation of the prior is half the mean distance; the file has no height of the
     floor.
     """
-    point = meeting_point(cameras)
+    point = find_meeting_point(cameras)
     distances_m = [float(np.linalg.norm(camera.eye_world - point)) for camera in cameras]
     x, y, z = (float(value) for value in point)
     return ParticleConfig(

@@ -44,7 +44,7 @@ class Detections:
         return Keypoints(px, confidence, sigma)
 
 
-def detections_of(films: Films, cameras: list[PinholeCamera], parts: PartCache) -> Detections:
+def make_detections(films: Films, cameras: list[PinholeCamera], parts: PartCache) -> Detections:
     """Return the detections of all films, from the cache or computed."""
 
     def make(tick: PartProgress) -> dict[str, Any]:

@@ -109,7 +109,7 @@ def _inside(P: Floats, track: Track, detections: Detections, camera: int) -> Boo
     return np.einsum("tji,tjik,tjk->tj", off, np.linalg.inv(cov), off) < CHI2_95_2D
 
 
-def foretold_metrics(foretold: Foretold) -> dict[str, Metric]:
+def summarize_foretold(foretold: Foretold) -> dict[str, Metric]:
     """Return median and 95th percentile [px], also with exchanged sides, and coverage.
 
     Intervals are by bootstrap over blocks of frames.

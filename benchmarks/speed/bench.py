@@ -14,7 +14,14 @@ from typing import Any
 
 from benchmarks.common import list_endings
 from benchmarks.speed.contenders import OURS, PEER, Contender, Single, Starts, Vector
-from benchmarks.speed.declaration import REACHER, SHOWN, SINGLE, TASKS, organs_of, steps_of
+from benchmarks.speed.declaration import (
+    REACHER,
+    SHOWN,
+    SINGLE,
+    TASKS,
+    make_organs_table,
+    make_steps_table,
+)
 from benchmarks.speed.organs import Organs
 from benchmarks.speed.report import report
 from benchmarks.speed.tasks import Tasks, shares
@@ -106,7 +113,7 @@ class SpeedBench:
 
     def metrics(self, played: Measured) -> dict[str, Metric]:
         """Return all metrics by name."""
-        return metrics_of(played)
+        return compute_metrics(played)
 
     @property
     def vectors(self) -> list[tuple[int, int]]:
@@ -116,7 +123,7 @@ class SpeedBench:
     def shown_tables(self) -> tuple[Table, ...]:
         """Return the tables of the documentation."""
         configurations = (SINGLE, *(f"{size}.{threads}" for size, threads in self.vectors))
-        return (steps_of(self.levels, configurations), organs_of(SHOWN), TASKS)
+        return (make_steps_table(self.levels, configurations), make_organs_table(SHOWN), TASKS)
 
     def report(self, played: Measured, metrics: Metrics, figures: Path) -> Report:
         """Draw the figure and return the report."""
@@ -206,7 +213,7 @@ def _turns(config: SpeedBench, exits: ExitStack, progress: Progress) -> Iterator
             yield turn(level, f"{size}.{threads}", threads, contender)
 
 
-def metrics_of(measured: Measured) -> dict[str, Metric]:
+def compute_metrics(measured: Measured) -> dict[str, Metric]:
     """Return medians over rounds with the smallest and the largest."""
     own = {name: values for name, values in measured.items() if not name.startswith(BY_TASK)}
     by_task = {

@@ -44,7 +44,7 @@ def title(configuration: str) -> str:
     return f"{size} on {threads} thread{'s' if threads != '1' else ''}"
 
 
-def steps_of(levels: Sequence[str], configurations: Iterable[str]) -> Table:
+def make_steps_table(levels: Sequence[str], configurations: Iterable[str]) -> Table:
     """Return the table of steps a second.
 
     Args:
@@ -64,7 +64,7 @@ def steps_of(levels: Sequence[str], configurations: Iterable[str]) -> Table:
     )
 
 
-def organs_of(configurations: Iterable[str]) -> Table:
+def make_organs_table(configurations: Iterable[str]) -> Table:
     """Return the table of the time of a step, by part.
 
     Args:

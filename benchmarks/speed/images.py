@@ -51,11 +51,11 @@ def contenders(arguments: Arguments, exits: ExitStack) -> dict[str, Callable[[],
         env.reset(seed=0)
         return env.unwrapped
 
-    def stepped(env: Any) -> Callable[[], Any]:
+    def make_step(env: Any) -> Callable[[], Any]:
         rng, n = np.random.default_rng(0), env.action_space.shape
         return lambda: env.step(rng.uniform(-1, 1, n).astype(np.float32))
 
-    def drawn(env: Any) -> Callable[[], Any]:
+    def make_draw(env: Any) -> Callable[[], Any]:
         return env.simulation.draw_images
 
     one = make(observe_images={"height": size, "width": size, "cameras": [0]})
@@ -63,11 +63,11 @@ def contenders(arguments: Arguments, exits: ExitStack) -> dict[str, Callable[[],
     shown = make(render_mode="rgb_array", width=size, height=size)
     rig = [resized(camera, size, size) for camera in shown.simulation.scene.cameras]
     return {
-        STEP: stepped(shown),
-        "a step with one image": stepped(one),
-        "a step with all images": stepped(every),
-        "one image": drawn(one),
-        "all images": drawn(every),
+        STEP: make_step(shown),
+        "a step with one image": make_step(one),
+        "a step with all images": make_step(every),
+        "one image": make_draw(one),
+        "all images": make_draw(every),
         RENDER: shown.render,
         "all cameras as for people": lambda: shown.views._drawn(rig, shown.views.glance()),
     }

@@ -6,7 +6,15 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from benchmarks.common import list_endings
-from benchmarks.speed.declaration import ASKED, REACHER, SINGLE, TASKS, organs_of, steps_of, title
+from benchmarks.speed.declaration import (
+    ASKED,
+    REACHER,
+    SINGLE,
+    TASKS,
+    make_organs_table,
+    make_steps_table,
+    title,
+)
 from benchmarks.speed.organs import ORGANS, REST, TOTAL
 from hrc_env.experiments.plots import label_axes, make_figure, save
 from hrc_env.experiments.report import Metrics, Report, format_picture
@@ -37,8 +45,8 @@ def report(metrics: Metrics, figures: Path) -> Report:
     levels = dict.fromkeys(level for level, _ in pairs if level != REACHER)
     sizes = sorted({configuration for _, configuration in pairs}, key=_size)
     return Report("Speed bench", ASKED, (
-        steps_of([*levels], sizes).to_markdown(metrics),
-        organs_of(list_endings(metrics, f"us_per_env_step.{TOTAL}.")).to_markdown(metrics),
+        make_steps_table([*levels], sizes).to_markdown(metrics),
+        make_organs_table(list_endings(metrics, f"us_per_env_step.{TOTAL}.")).to_markdown(metrics),
         _ABOUT_THE_ORGANS,
         format_picture(figures / "organs.png", "Time of a step by part, level `keypoints` (wall)."),
         tasks,

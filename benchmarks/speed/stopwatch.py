@@ -44,7 +44,7 @@ class Stopwatch:
     @property
     def idle(self) -> list[str]:
         """Return the functions that were never called."""
-        places = [name_of(place) for each in self.organs.values() for place in each]
+        places = [format_name(place) for each in self.organs.values() for place in each]
         return [name for name in places if not any(hand.calls[name] for hand in self._hands)]
 
     @contextmanager
@@ -56,13 +56,13 @@ class Stopwatch:
                 for owner, name in places:
                     function = vars(owner)[name]
                     kept.append((owner, name, function))
-                    setattr(owner, name, self._timed(organ, name_of((owner, name)), function))
+                    setattr(owner, name, self._wrap(organ, format_name((owner, name)), function))
             yield
         finally:
             for owner, name, function in kept:
                 setattr(owner, name, function)
 
-    def _timed(self, organ: str, place: str, function: Callable[..., Any]) -> Callable[..., Any]:
+    def _wrap(self, organ: str, place: str, function: Callable[..., Any]) -> Callable[..., Any]:
         """Return a function that is timed."""
         closes = organ in self.whole
 
@@ -95,7 +95,7 @@ class Stopwatch:
             return hand
 
 
-def name_of(place: Place) -> str:
+def format_name(place: Place) -> str:
     """Return the full name of a function, as "hrc_env.scene.physics.Physics.step"."""
     owner, name = place
     room = f"{owner.__module__}." if isinstance(owner, type) else ""

@@ -1,5 +1,7 @@
 """Arrival times of frames: constant and random latencies, a lower frame rate, and losses."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from benchmarks.tracking.rigs import DT_S
@@ -12,7 +14,17 @@ _JITTER_S = 0.02
 _DROPPED = 0.05
 
 
-def delivered(px: Points2, seeds: list[int]) -> tuple[Points2, Floats]:
+class Delivered(NamedTuple):
+    """Frames by the step in which cameras deliver them."""
+
+    px: Points2
+    """Pixels (T, S, C, J, 2); NaN without a frame."""
+    time_s: Floats
+    """Times (T, S, C) at which the frames were taken [s], on a clock that is 0.04 s at the first
+    frame; NaN without a frame."""
+
+
+def deliver(px: Points2, seeds: list[int]) -> Delivered:
     """Return the frames that cameras deliver in each step, from frames taken at its end.
 
     Every camera has a constant latency of 40 to 200 ms and, for each frame, up to 20 ms more; one
@@ -22,10 +34,6 @@ def delivered(px: Points2, seeds: list[int]) -> tuple[Points2, Floats]:
     Args:
         px: frames (T, S, C, J, 2).
         seeds: seeds of the sequences.
-
-    Returns:
-        Pixels (T, S, C, J, 2), NaN without a frame, and times (T, S, C) at which they were taken
-            [s], NaN without a frame, on a clock that is 0.04 s at the first frame.
     """
     out = np.full(px.shape, np.nan)
     time_s = np.full(px.shape[:3], np.nan)
@@ -40,10 +48,10 @@ def delivered(px: Points2, seeds: list[int]) -> tuple[Points2, Floats]:
         for taken, c in np.argwhere(~lost & (step < n_frames)):  # later ones replace earlier ones
             now = step[taken, c]
             out[now, s, c], time_s[now, s, c] = px[taken, s, c], (taken + 1) * DT_S
-    return out, time_s
+    return Delivered(out, time_s)
 
 
-def in_time(px: Points2, time_s: Floats) -> Points2:
+def restore_times(px: Points2, time_s: Floats) -> Points2:
     """Return delivered frames (T, S, C, ...) in the steps in which they were taken."""
     out = np.full(px.shape, np.nan)
     now, s, c = np.nonzero(np.isfinite(time_s))

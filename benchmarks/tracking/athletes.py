@@ -1,6 +1,7 @@
 """People running, spinning, turning over and falling: motions that estimators do not expect.
 
-Bodies are those of `walks`; people turning over or falling are rotated about the middle of the hips.
+Bodies are those of `walks`; people turning over or falling are rotated about the middle of the
+hips.
 """
 
 from dataclasses import dataclass, replace
@@ -8,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from benchmarks.tracking.rigs import DT_S
-from benchmarks.tracking.walks import Gait, Path, bodies_along, steer, walk
+from benchmarks.tracking.walks import Gait, Path, steer, walk, walk_along
 from hrc_env.core.skeleton import JOINT
 from hrc_env.core.typing import Floats, Points3
 from hrc_env.geometry.rotations import about_axis
@@ -54,14 +55,14 @@ def tumble(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Poin
     """Return joints (T, S, J, 3) [m] of walkers that turn over in the air about every second."""
     joints = walk(walk_m, seeds, n_frames)
     tricks = [_tricks(np.random.default_rng([seed, 7]), n_frames) for seed in seeds]
-    return turned(joints, Turns(*np.stack(tricks, -1)))
+    return rotate(joints, Turns(*np.stack(tricks, -1)))
 
 
 def fall(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
     """Return joints (T, S, J, 3) [m] of walkers that fall, lie and roll from side to side."""
     path = steer(walk_m, seeds, n_frames)
     time_s = DT_S * np.arange(n_frames, dtype=float)[:, None]
-    lying = _eased((time_s - FALLS_S) / (LIES_S - FALLS_S))
+    lying = _ease((time_s - FALLS_S) / (LIES_S - FALLS_S))
     walked = np.cumsum(1 - lying[:, 0]) - 1  # so many frames of their walk, then no further
     path = replace(
         path,
@@ -75,7 +76,7 @@ def fall(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points
     down = 0.5 * np.pi * lying
     roll = _ROLL_RAD * lying * np.sin(2 * np.pi * np.maximum(time_s - LIES_S, 0.0) / period_s)
     low = np.broadcast_to(-_LIES_LOWER_M * lying, roll.shape)
-    return turned(bodies_along(path), Turns(down * np.cos(way), down * np.sin(way), roll, low))
+    return rotate(walk_along(path), Turns(down * np.cos(way), down * np.sin(way), roll, low))
 
 
 def spin(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
@@ -90,13 +91,13 @@ def spin(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points
         for rng in rngs
     ]).T  # fmt: skip
     time_s = DT_S * np.arange(n_frames, dtype=float)[:, None]
-    heading = begin + DT_S * np.cumsum(_eased((time_s - SPINS_S) / _EASED_S) * rate, 0)
+    heading = begin + DT_S * np.cumsum(_ease((time_s - SPINS_S) / _EASED_S) * rate, 0)
     ground = np.broadcast_to(np.stack([x, y], -1), (*heading.shape, 2))
     gesture = np.clip(0.6 + 0.4 * np.sin(np.pi * time_s + begin), 0.0, 1.0)
     stride = np.broadcast_to(2 * np.pi * _STEPS_HZ * time_s, heading.shape)
     lean = np.full(heading.shape, 0.08)
     gestures = np.stack([gesture, gesture], -1)
-    return bodies_along(Path(ground, heading, stride, lean, gestures, _ON_THE_SPOT))
+    return walk_along(Path(ground, heading, stride, lean, gestures, _ON_THE_SPOT))
 
 
 def circle(
@@ -114,10 +115,10 @@ def circle(
     ground = middle + radius_m * np.stack([np.cos(angle), np.sin(angle)], -1)
     stride = np.broadcast_to(2 * np.pi * gait.cycles_per_m * way_m, angle.shape)
     lean, still = np.full(angle.shape, 0.2), np.zeros((*angle.shape, 2))
-    return bodies_along(Path(ground, angle + way * np.pi / 2, stride, lean, still, gait))
+    return walk_along(Path(ground, angle + way * np.pi / 2, stride, lean, still, gait))
 
 
-def turned(joints: Points3, turns: Turns) -> Points3:
+def rotate(joints: Points3, turns: Turns) -> Points3:
     """Return joints (T, S, J, 3) rotated, and raised if they would be below the ground."""
     left, right = joints[..., JOINT["left_hip"], :], joints[..., JOINT["right_hip"], :]
     hips, across = 0.5 * (left + right)[..., None, :], left - right
@@ -132,7 +133,7 @@ def turned(joints: Points3, turns: Turns) -> Points3:
     return body
 
 
-def _eased(share: Floats) -> Floats:
+def _ease(share: Floats) -> Floats:
     """Return a smooth step from 0 to 1 that is at rest at both ends."""
     share = np.clip(share, 0.0, 1.0)
     return share**2 * (3 - 2 * share)
@@ -152,7 +153,7 @@ def _tricks(rng: np.random.Generator, n_frames: int) -> Floats:
     while begin_s < n_frames * DT_S:
         lasts_s, way = rng.uniform(*_TRICK_S), rng.choice([-np.pi, -np.pi / 2, 0.0, np.pi / 2])
         share = (DT_S * np.arange(n_frames, dtype=float) - begin_s) / lasts_s
-        over = 2 * np.pi * _eased(share) * (share < 1)
+        over = 2 * np.pi * _ease(share) * (share < 1)
         turns[0] += over * np.cos(way)
         turns[1] += over * np.sin(way)
         turns[3] += _HOP_M * np.sin(np.pi * np.clip(share, 0.0, 1.0)) ** 2

@@ -14,11 +14,11 @@ from benchmarks.tracking.cells import run_cell
 from benchmarks.tracking.declaration import BENCH, times
 from benchmarks.tracking.detections import CONDITIONS
 from benchmarks.tracking.env_sequences import ENV, make_env_rig
-from benchmarks.tracking.metrics import TIMING, Parts, metrics_of
+from benchmarks.tracking.metrics import TIMING, Parts, compute_metrics
 from benchmarks.tracking.names import DEFAULT, SMOOTHER, Selection
 from benchmarks.tracking.report import report
 from benchmarks.tracking.rigs import RIGS, SIGMA_PX, Rig, make_rig
-from benchmarks.tracking.sequences import MATCHED, Sequences, lasting, make_sequences
+from benchmarks.tracking.sequences import MATCHED, Sequences, find_durations, make_sequences
 from benchmarks.tracking.timing import BATCH, time_estimator
 from hrc_env.core.results import Metric
 from hrc_env.experiments.cache import Part, PartCache, PartProgress
@@ -66,7 +66,7 @@ class TrackingBench:
     @property
     def seeds(self) -> list[int]:
         """Seeds of sequences that are not matched."""
-        return seeds_of(self)
+        return list_seeds(self)
 
     @property
     def n_parts(self) -> int:
@@ -77,7 +77,9 @@ class TrackingBench:
     @property
     def quick_note(self) -> str:
         """The warning on tables and figures of a short run; "" if it is long enough."""
-        return describe_quick_run(self.n_seeds, lasting()) if is_as_short(self, QUICK) else ""
+        return (
+            describe_quick_run(self.n_seeds, find_durations()) if is_as_short(self, QUICK) else ""
+        )
 
     def settings(self) -> dict[str, Any]:
         """Return the settings that all numbers depend on."""
@@ -101,13 +103,13 @@ class TrackingBench:
         whole = {"experiment": self.name, **replace(self, estimators=(), sequences=()).settings()}
         cache, run = replace(cache, key=make_key(whole, self.depends)), self.selection
         asked = [(*each, name) for each in run.conditions() for name in run.names_of(each[1])]
-        parts = [cell_of(self, *each, cache.key) for each in asked]
+        parts = [make_part(self, *each, cache.key) for each in asked]
         played: Parts = dict(zip(asked, cache.make_parts(parts, one_core=True), strict=True))
         return played | _timing(self, cache)
 
     def metrics(self, played: Parts) -> dict[str, Metric]:
         """Return all metrics by name."""
-        return metrics_of(played, self.selection)
+        return compute_metrics(played, self.selection)
 
     def shown_tables(self) -> tuple[Table, ...]:
         """Return the tables of the documentation."""
@@ -122,40 +124,40 @@ QUICK = TrackingBench(n_seeds=8, n_matched=30, n_smoothed=2, timing_repeats=2)
 """The quick form: every number, from fewer sequences."""
 
 
-def cell_of(config: TrackingBench, rig_name: str, condition: str, name: str, key: str) -> Part:
+def make_part(config: TrackingBench, rig_name: str, condition: str, name: str, key: str) -> Part:
     """Return the part of an estimator on one rig and condition."""
-    seeds = seeds_of(config, condition)
+    seeds = list_seeds(config, condition)
     n = min(config.n_smoothed, len(seeds)) if name == SMOOTHER else len(seeds)
     make = partial(_run, rig_name, condition, tuple(seeds), n, name)
-    return Part(f"{rig_name}.{condition}.{name}", make, own_key(name, key))
+    return Part(f"{rig_name}.{condition}.{name}", make, extend_key(name, key))
 
 
 def _run(
     rig_name: str, condition: str, seeds: tuple[int, ...], n: int, name: str, tick: PartProgress
 ) -> dict[str, Any]:
-    rig, given = _made(rig_name, condition, seeds)
-    return run_cell(name, rig, given.first(n), list(seeds[:n]), tick)
+    given = _make_sequences(rig_name, condition, seeds)
+    return run_cell(name, _rig(rig_name), given.first(n), list(seeds[:n]), tick)
 
 
 @lru_cache(maxsize=1)
-def _made(rig_name: str, condition: str, seeds: tuple[int, ...]) -> tuple[Rig, Sequences]:
+def _make_sequences(rig_name: str, condition: str, seeds: tuple[int, ...]) -> Sequences:
     """Return the sequences of a condition, which its estimators share; the last ones are cached."""
-    rig = _rig(rig_name)
-    return rig, make_sequences(rig, condition, list(seeds))
+    return make_sequences(_rig(rig_name), condition, list(seeds))
 
 
-def own_key(name: str, key: str) -> str:
+def extend_key(name: str, key: str) -> str:
     """Return the key of an estimator's parts, which for users' estimators contains their file."""
     source = hash_source(ESTIMATORS[name].make) if name in ESTIMATORS else ""
     return hashlib.sha256(f"{key} {source}".encode()).hexdigest()[:16] if source else key
 
 
-def seeds_of(config: TrackingBench, condition: str = "clean") -> list[int]:
+def list_seeds(config: TrackingBench, condition: str = "clean") -> list[int]:
     """Return the seeds of a condition's sequences."""
     n = config.n_matched if condition == MATCHED else config.n_seeds
     return [config.first_seed + k for k in range(n)]
 
 
+@cache
 def _rig(name: str) -> Rig:
     return make_env_rig() if name == ENV else make_rig(name)
 
@@ -171,7 +173,7 @@ def _timing(config: TrackingBench, parts: PartCache) -> Parts:
 
     return {
         ("lab", TIMING, name): parts.make_part(
-            f"{TIMING}.{name}", partial(make, name), own_key(name, parts.key)
+            f"{TIMING}.{name}", partial(make, name), extend_key(name, parts.key)
         )
         for name in config.selection.timed()
     }

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.common import CHI2_95_3D
-from benchmarks.tracking.arrivals import in_time
-from benchmarks.tracking.couples import identities
+from benchmarks.tracking.arrivals import restore_times
+from benchmarks.tracking.couples import match_identities
 from benchmarks.tracking.dlt import triangulate_frame
 from benchmarks.tracking.names import DLT, SMOOTHER
 from benchmarks.tracking.rigs import DT_S, Rig
@@ -34,15 +34,15 @@ def beliefs(
 ) -> Iterator[tuple[Points3, Covariances3 | None]]:
     """Yield mean (S, W, J, 3) and covariance (S, W, J, 3, 3) after each frame; DLT has none."""
     if name == DLT:
-        yield from _triangulated(rig, sequences)
+        yield from _triangulate(rig, sequences)
     elif name == SMOOTHER:
-        yield from _smoothed(rig, sequences, seeds)
+        yield from _smooth(rig, sequences, seeds)
     else:
-        for _, belief in _estimated(name, rig, sequences, seeds):
+        for _, belief in _estimate(name, rig, sequences, seeds):
             yield belief.mean_world, belief.cov_world
 
 
-def _triangulated(rig: Rig, sequences: Sequences) -> Iterator[tuple[Points3, None]]:
+def _triangulate(rig: Rig, sequences: Sequences) -> Iterator[tuple[Points3, None]]:
     shape = sequences.joints.shape[1:]
     last = np.tile(sequences.config.prior_mean_world, (shape[0], shape[1] * shape[2], 1))
     for px in sequences.px:
@@ -50,7 +50,7 @@ def _triangulated(rig: Rig, sequences: Sequences) -> Iterator[tuple[Points3, Non
         yield last.reshape(shape), None
 
 
-def _estimated(
+def _estimate(
     name: str, rig: Rig, sequences: Sequences, seeds: list[int]
 ) -> Iterator[tuple[Keypoints, PoseEstimate]]:
     """Yield the input and the estimate of an estimator that runs as in an environment.
@@ -73,7 +73,7 @@ def _estimated(
         yield keypoints, estimator.estimate(state)
 
 
-def _smoothed(
+def _smooth(
     rig: Rig, sequences: Sequences, seeds: list[int]
 ) -> Iterator[tuple[Points3, Covariances3]]:
     """Yield the results of the smoother, some sequences at once; late frames are used at their
@@ -82,13 +82,13 @@ def _smoothed(
     With several people it smooths the tracks to which `kalman` assigned the poses.
     """
     if sequences.time_s is not None:
-        px = in_time(sequences.px, sequences.time_s)
+        px = restore_times(sequences.px, sequences.time_s)
         config = replace(sequences.config, longest_delay_s=0.0)
         sequences = replace(sequences, px=px, time_s=None, config=config)
     if sequences.order is None:
         clip = [sequences.keypoints(t) for t in range(len(sequences.px))]
     else:
-        clip = [given for given, _ in _estimated("kalman", rig, sequences, seeds)]
+        clip = [given for given, _ in _estimate("kalman", rig, sequences, seeds)]
     parts = []
     for begin in range(0, len(seeds), _AT_ONCE):
         some = np.arange(begin, min(begin + _AT_ONCE, len(seeds)))
@@ -134,7 +134,7 @@ def _window(
     cov = None if covs is None else covs[frames]
     swaps = None
     if sequences.order is not None:
-        track, swaps = identities(truth, mean)
+        track, swaps = match_identities(truth, mean)
         mean = np.take_along_axis(mean, track[None, :, :, None, None], 2)
         if cov is not None:
             cov = np.take_along_axis(cov, track[None, :, :, None, None, None], 2)

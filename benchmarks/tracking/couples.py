@@ -1,12 +1,13 @@
 """Two people walking past each other, and detections that are not labelled by person."""
 
 import itertools
+from typing import NamedTuple
 
 import numpy as np
 
 from benchmarks.tracking.detections import Damage, detect
 from benchmarks.tracking.rigs import DT_S
-from benchmarks.tracking.walks import Path, bodies_along
+from benchmarks.tracking.walks import Path, walk_along
 from hrc_env.core.skeleton import JOINT
 from hrc_env.core.typing import Bools, Floats, Ints, Points2, Points3
 
@@ -19,7 +20,7 @@ _LOST_EVERY_S, _LOST_S = 4.0, (0.2, 0.8)
 _SURE_M = 0.3
 
 
-def couples(seeds: list[int], n_frames: int) -> Points3:
+def walk_couples(seeds: list[int], n_frames: int) -> Points3:
     """Return joints (T, S, 2, J, 3) [m] of two walkers on parallel lines, in opposite
     directions."""
     rngs = [np.random.default_rng([seed, 6]) for seed in seeds]
@@ -43,7 +44,7 @@ def couples(seeds: list[int], n_frames: int) -> Points3:
             lean=np.full(stride.shape, 0.08),
             gesture=waving * gesture[:, k],
         )
-        people.append(bodies_along(path))
+        people.append(walk_along(path))
     return np.stack(people, 2)
 
 
@@ -57,22 +58,31 @@ def detect_couples(P: Floats, joints: Points3, seeds: list[int]) -> Points2:
     px = np.stack(
         [detect(P, joints[:, :, k], damage, [2 * seed + k for seed in seeds]) for k in (0, 1)], 3
     )
-    seen = np.isfinite(px[..., 0]) & ~_hidden_by_each_other(P, joints)
+    seen = np.isfinite(px[..., 0]) & ~_find_hidden(P, joints)
     for s, seed in enumerate(seeds):
         rng = np.random.default_rng([seed, 7])
-        seen[:, s] &= ~_lost(rng, seen.shape[0], seen.shape[2])[..., None]
+        seen[:, s] &= ~_draw_losses(rng, seen.shape[0], seen.shape[2])[..., None]
     seen &= seen.sum(-1, keepdims=True) >= _LEAST_JOINTS
     return np.where(seen[..., None], px, np.nan)
 
 
-def shuffles(seeds: list[int], n_frames: int, n_cameras: int, n_people: int) -> Ints:
+def draw_shuffles(seeds: list[int], n_frames: int, n_cameras: int, n_people: int) -> Ints:
     """Return the order in which each camera reports people (T, S, C, D), drawn in every frame."""
     one = np.tile(np.arange(n_people), (n_frames, n_cameras, 1))
     return np.stack([np.random.default_rng([seed, 8]).permuted(one, axis=-1) for seed in seeds], 1)
 
 
-def identities(truth: Points3, mean: Points3) -> tuple[Ints, Floats]:
-    """Return the track (S, W) of each person, and the number of later changes (S,).
+class Identities(NamedTuple):
+    """Tracks of the people in some sequences."""
+
+    track: Ints
+    """Track of each person in the first frame, (S, W)."""
+    n_changes: Floats
+    """Number of later changes of the assignment, (S,)."""
+
+
+def match_identities(truth: Points3, mean: Points3) -> Identities:
+    """Assign tracks to people, and count later changes of the assignment.
 
     Tracks are those nearest in the first frame, all together; changes are to tracks that are nearer
     by more than 0.3 m. People and tracks are (T, S, W, J, 3).
@@ -89,10 +99,10 @@ def identities(truth: Points3, mean: Points3) -> tuple[Ints, Floats]:
         surely = now[every, best] + _SURE_M < now[every, current]
         swaps += surely
         current = np.where(surely, best, current)
-    return first, swaps
+    return Identities(first, swaps)
 
 
-def _hidden_by_each_other(P: Floats, joints: Points3) -> Bools:
+def _find_hidden(P: Floats, joints: Points3) -> Bools:
     """Return joints with lines of sight that pass the other person's trunk (T, S, C, 2, J)."""
     hidden = np.zeros((*joints.shape[:2], len(P), *joints.shape[2:4]), bool)
     for c, camera in enumerate(P):
@@ -117,7 +127,7 @@ def _passes(to_joints: Points3, to_other: Points3) -> Bools:
     return out
 
 
-def _lost(rng: np.random.Generator, n_frames: int, n_cameras: int) -> Bools:
+def _draw_losses(rng: np.random.Generator, n_frames: int, n_cameras: int) -> Bools:
     """Return whether a camera has lost a person (T, C, 2)."""
     lost = np.zeros((n_frames, n_cameras, 2), bool)
     for c, k in itertools.product(range(n_cameras), (0, 1)):

@@ -59,7 +59,7 @@ WORDS = {
 BATCHES = {"64": "batch of 64 [us]", "hard_64": "the same, `hard` walks [us]", "1": "alone [us]"}
 
 
-def rows_of(selection: Selection) -> dict[str, Cells]:
+def describe_rows(selection: Selection) -> dict[str, Cells]:
     """Return the descriptions of every row by its key."""
     return {
         f"{rig}.{window}": (f"{rig} {WORDS.get(window, window.replace('_', ' '))}",)
@@ -77,7 +77,7 @@ def table_of_kind(metric: str, names: Sequence[str], selection: Selection) -> Ta
     """
     kind = KINDS[metric]
     columns = [kind.column(metric, each, each) for each in names]
-    return Table(metric, kind.title, rows_of(selection), columns)
+    return Table(metric, kind.title, describe_rows(selection), columns)
 
 
 def times(names: Sequence[str]) -> Table:
@@ -100,7 +100,11 @@ def times(names: Sequence[str]) -> Table:
 BENCH = Table(
     "tracking",
     "Tracking bench",
-    {row: words for row, words in rows_of(EVERYTHING).items() if not str(row).endswith(MATCHED)},
+    {
+        row: words
+        for row, words in describe_rows(EVERYTHING).items()
+        if not str(row).endswith(MATCHED)
+    },
     [KINDS[metric].column(metric, name, heading) for metric, name, heading in SHOWN],
     ("sequence",),
     "RMSE of a joint, share of joints within the reported 95 % region, reported standard deviation "

@@ -79,11 +79,11 @@ def detect(P: Floats, joints: Points3, damage: Damage, seeds: list[int]) -> Poin
     in_view = inside & (depth > 0.1)
     px = np.empty_like(exact)
     for s, seed in enumerate(seeds):
-        px[:, s] = _damaged(exact[:, s], in_view[:, s], damage, seed)
+        px[:, s] = _damage(exact[:, s], in_view[:, s], damage, seed)
     return px
 
 
-def _damaged(exact: Points2, in_view: Bools, damage: Damage, seed: int) -> Points2:
+def _damage(exact: Points2, in_view: Bools, damage: Damage, seed: int) -> Points2:
     """Return the pixels of one sequence, from (T, C, J, 2) and (T, C, J)."""
     rngs = [np.random.default_rng([seed, 2, kind]) for kind in range(5)]
     px = exact + damage.sigma_px * rngs[0].standard_normal(exact.shape)

@@ -7,6 +7,7 @@ last for half a second, have heavy tails and come with honest or dishonest confi
 
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -44,23 +45,31 @@ def make_env_rig() -> Rig:
     return Rig(ENV, P, (np.nan, np.nan), of_kind(HRCConfig().tracker, ParticleConfig))
 
 
-def record(condition: str, seeds: list[int]) -> tuple[Points3, Keypoints]:
-    """Return joints (T, S, 1, J, 3) [m] and keypoints (T, S, C, 1, J, ...), one episode per
-    seed."""
-    joints, free, hidden = _episodes(tuple(seeds))
+class EnvSequences(NamedTuple):
+    """One episode of the environment per seed."""
+
+    joints_world: Points3
+    """Joints, (T, S, 1, J, 3) [m]."""
+    keypoints: Keypoints
+    """Keypoints, (T, S, C, 1, J, ...)."""
+
+
+def record(condition: str, seeds: list[int]) -> EnvSequences:
+    """Return the sequences of a condition."""
+    episodes = _play_episodes(tuple(seeds))
     if condition == "occluded":
-        return joints, hidden
-    blind: Bools = np.zeros(free.confidence.shape, bool)
+        return EnvSequences(episodes.joints_world, episodes.hidden)
+    blind: Bools = np.zeros(episodes.free.confidence.shape, bool)
     if condition == "two_cameras":
         blind[:, :, 2:] = True
     elif condition == "one_camera":
         left = np.array(seeds) % blind.shape[2]
         others = np.arange(blind.shape[2]) != left[:, None]
         blind[ALONE_FRAMES] = others[:, :, None, None]
-    return joints, without(free, blind)
+    return EnvSequences(episodes.joints_world, remove_blind(episodes.free, blind))
 
 
-def without(keypoints: Keypoints, blind: Bools) -> Keypoints:
+def remove_blind(keypoints: Keypoints, blind: Bools) -> Keypoints:
     """Return keypoints without those that are `blind` (..., C, W, J)."""
     return Keypoints(
         np.where(blind[..., None], np.nan, keypoints.px),
@@ -100,10 +109,20 @@ class EmulatedDetector:
         return emulator.emulate(self.state, self.rngs, truth, between, self.cameras, settings)
 
 
+class _Episodes(NamedTuple):
+    """Episodes of the environment with both kinds of keypoints."""
+
+    joints_world: Points3
+    """Joints, (T, S, 1, J, 3) [m]."""
+    free: Keypoints
+    """Keypoints with free lines of sight."""
+    hidden: Keypoints
+    """Keypoints occluded by the robot and the scene."""
+
+
 @lru_cache(maxsize=1)
-def _episodes(seeds: tuple[int, ...]) -> tuple[Points3, Keypoints, Keypoints]:
-    """Return joints, keypoints with free lines of sight, and keypoints with the robot in the
-    way."""
+def _play_episodes(seeds: tuple[int, ...]) -> _Episodes:
+    """Play one episode per seed; the last episodes are cached."""
     simulation = simulate(len(seeds))
     free, hidden, pushes = (
         [np.random.default_rng([seed, 10, k]) for seed in seeds] for k in range(3)
@@ -113,15 +132,15 @@ def _episodes(seeds: tuple[int, ...]) -> tuple[Points3, Keypoints, Keypoints]:
     seen: tuple[list[Keypoints], list[Keypoints]] = ([], [])
     for truth, lab in watch(simulation, seeds, pushes, ENV_FRAMES):
         joints.append(truth.joints_world.copy())
-        for said, detector, between in zip(
+        for frames, detector, between in zip(
             seen, detectors, (nothing(len(seeds)), lab), strict=True
         ):
-            said.append(detector.detect(truth, between))
+            frames.append(detector.detect(truth, between))
     simulation.close()
-    return np.stack(joints), _stacked(seen[0]), _stacked(seen[1])
+    return _Episodes(np.stack(joints), _stack(seen[0]), _stack(seen[1]))
 
 
-def _stacked(records: list[Keypoints]) -> Keypoints:
+def _stack(records: list[Keypoints]) -> Keypoints:
     px, confidence, sigma_px = (
         np.stack([getattr(each, name) for each in records])
         for name in ("px", "confidence", "sigma_px")

@@ -39,7 +39,7 @@ class MatchedModel:
     """Places on the body (J, 3): forward, left and up of the root [m]."""
 
 
-def matched_model(damping: float, root_acceleration: float) -> MatchedModel:
+def make_matched_model(damping: float, root_acceleration: float) -> MatchedModel:
     """Return the motion model of `tracking.tree.predict` as one of the whole body at 25 Hz.
 
     The settings are those of `ParticleConfig`.
@@ -80,13 +80,13 @@ def draw(model: MatchedModel, seeds: list[int], n_frames: int) -> Points3:
         noise = np.stack([rng.standard_normal(N_STATES) for rng in rngs])
         state = advance(model, state) + noise @ factor.T
         if t < 0:
-            state = _centred(state)
+            state = _centre(state)
         else:
             joints[t] = state[:, :N_PLACES].reshape(-1, N_JOINTS, 3)
     return joints
 
 
-def _centred(state: Floats) -> Floats:
+def _centre(state: Floats) -> Floats:
     """Return the state with the root over the origin and at rest; f allows to shift all joints
     alike."""
     body = state.reshape(len(state), 2, N_JOINTS, 3)
@@ -99,7 +99,7 @@ def advance(model: MatchedModel, state: Floats) -> Floats:
     """Return f, the expected state (S, 90) one frame later."""
     body = state.reshape(-1, 2, N_JOINTS, 3)
     root = body[:, :, TORSO].mean(2, keepdims=True)
-    anchor = root[:, 0] + _turned(model.offset, heading(body[:, 0]))
+    anchor = root[:, 0] + _rotate(model.offset, heading(body[:, 0]))
     place, speed = body[:, 0] - anchor, body[:, 1] - root[:, 1]
     F = model.F[..., None]
     moved = np.stack(
@@ -121,7 +121,7 @@ def transition(model: MatchedModel, joints: Points3) -> Floats:
     by_place[..., 0] = _LEFT_RIGHT * (-left[:, 1] / width2)[:, None]
     by_place[..., 1] = _LEFT_RIGHT * (left[:, 0] / width2)[:, None]
     level = np.array([1.0, 1.0, 0.0])
-    turning = _turned(model.offset * level, angle + np.pi / 2)
+    turning = _rotate(model.offset * level, angle + np.pi / 2)
     F = model.F[..., None]
     by_angle = np.stack([(1 - F[:, 0, 0]) * turning, -F[:, 1, 0] * turning], 1)
     n = len(joints)
@@ -136,7 +136,7 @@ def heading(joints: Points3) -> Floats:
     return np.arctan2(left[:, 1], left[:, 0]) - np.pi / 2
 
 
-def _turned(offset: Floats, angle: Floats) -> Floats:
+def _rotate(offset: Floats, angle: Floats) -> Floats:
     """Return offsets (S, J, 3) rotated about the vertical."""
     cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
     x, y, z = offset.T

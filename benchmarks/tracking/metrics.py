@@ -18,12 +18,12 @@ N_RESAMPLED = 1000
 _Sums: TypeAlias = Mapping[str, Floats]
 
 
-def metrics_of(parts: Parts, selection: Selection = EVERYTHING) -> dict[str, Metric]:
+def compute_metrics(parts: Parts, selection: Selection = EVERYTHING) -> dict[str, Metric]:
     """Return all metrics of the benchmark by their dotted names."""
     metrics = _times(parts)
     for rig, condition, window in selection.rows():
         drawn = {
-            name: drawn_sums(parts[rig, condition, name][window])
+            name: resample_sums(parts[rig, condition, name][window])
             for name in selection.names_of(condition)
         }
         for name, sums in drawn.items():
@@ -66,7 +66,7 @@ _NEEDS = {
 }
 
 
-def drawn_sums(sums: Mapping[str, Any]) -> dict[str, Floats]:
+def resample_sums(sums: Mapping[str, Any]) -> dict[str, Floats]:
     """Return sums over all sequences, and over 1000 draws with replacement: (1001, ...).
 
     The draws depend on the number of sequences only, so those of two estimators are the same.
@@ -99,7 +99,7 @@ def _times(parts: Parts) -> dict[str, Metric]:
 
 def _bounds(parts: Parts, name: str, rigs: Sequence[str]) -> dict[str, Metric]:
     """Return RMSE over its bound: the root mean square of the ratios over rigs, and each."""
-    drawn = {rig: drawn_sums(parts[rig, MATCHED, name][MATCHED]) for rig in rigs}
+    drawn = {rig: resample_sums(parts[rig, MATCHED, name][MATCHED]) for rig in rigs}
     squared = {rig: sums["squared"] / sums["bound"] for rig, sums in drawn.items()}
     both = np.sqrt(np.mean(list(squared.values()), axis=0))
     return {

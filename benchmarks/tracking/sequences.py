@@ -6,13 +6,13 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.tracking.arrivals import LONGEST_DELAY_S, delivered
+from benchmarks.tracking.arrivals import LONGEST_DELAY_S, deliver
 from benchmarks.tracking.athletes import circle, fall, run, spin, tumble
 from benchmarks.tracking.bound import posterior_bound
-from benchmarks.tracking.couples import couples, detect_couples, shuffles
+from benchmarks.tracking.couples import detect_couples, draw_shuffles, walk_couples
 from benchmarks.tracking.detections import CONDITIONS, SURPRISES, Damage, detect
 from benchmarks.tracking.env_sequences import ENV, ENV_CONDITIONS, ENV_FRAMES, record
-from benchmarks.tracking.matched import draw, matched_model
+from benchmarks.tracking.matched import draw, make_matched_model
 from benchmarks.tracking.rigs import DT_S, SIGMA_PX, Rig
 from benchmarks.tracking.walks import walk
 from benchmarks.tracking.workers import fall_and_get_up, run_to_and_fro
@@ -50,7 +50,7 @@ N_FRAMES = {
 }  # fmt: skip
 
 
-def lasting() -> tuple[float, float]:
+def find_durations() -> tuple[float, float]:
     """Return the durations of the shortest and the longest sequences [s]."""
     return DT_S * min(N_FRAMES.values()), DT_S * max(N_FRAMES.values())
 
@@ -159,23 +159,23 @@ def make_sequences(rig: Rig, condition: str, seeds: list[int]) -> Sequences:
         given = (seen.confidence, seen.sigma_px)
         return Sequences(joints, seen.px, ENV_WINDOWS[condition], rig.tracker, *given)
     if condition == MATCHED:
-        return _matched(rig, seeds)
+        return _make_matched(rig, seeds)
     n_frames, windows = N_FRAMES[condition], WINDOWS[condition]
     if condition == TWO_WORKERS:
-        joints = couples(seeds, n_frames)
+        joints = walk_couples(seeds, n_frames)
         px = detect_couples(rig.P, joints, seeds)
-        order = shuffles(seeds, n_frames, len(rig.P), joints.shape[2])
+        order = draw_shuffles(seeds, n_frames, len(rig.P), joints.shape[2])
         return Sequences(joints, px, windows, rig.tracker, order=order)
     joints = MOTIONS.get(condition, walk)(rig.walk_m, seeds, n_frames)
     if condition == LATE:
-        px, time_s = delivered(detect(rig.P, joints, Damage(), seeds), seeds)
+        px, time_s = deliver(detect(rig.P, joints, Damage(), seeds), seeds)
         config = replace(rig.tracker, longest_delay_s=LONGEST_DELAY_S)
         return Sequences(joints[:, :, None], px[:, :, :, None], windows, config, time_s=time_s)
     px = detect(rig.P, joints, (CONDITIONS | SURPRISES)[condition], seeds)
     return Sequences(joints[:, :, None], px[:, :, :, None], windows, rig.tracker)
 
 
-def _matched(rig: Rig, seeds: list[int]) -> Sequences:
+def _make_matched(rig: Rig, seeds: list[int]) -> Sequences:
     """Return sequences from the estimators' own model, with estimators that know its parameters.
 
     These are the shared acceleration, no outliers, no exchanged sides, detections with the reported
@@ -191,7 +191,7 @@ def _matched(rig: Rig, seeds: list[int]) -> Sequences:
         floor_std_m=np.inf,
         body_radius_m=10.0,
     )
-    model = matched_model(config.damping, config.root_acceleration)
+    model = make_matched_model(config.damping, config.root_acceleration)
     joints = draw(model, seeds, N_FRAMES[MATCHED])
     px = detect(rig.P, joints, Damage(), seeds)
     bound = posterior_bound(rig.P, model, joints, np.isfinite(px[..., 0]), SIGMA_PX)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.tracking.detections import CONDITIONS, detect
-from benchmarks.tracking.env_sequences import EmulatedDetector, simulate, watch, without
+from benchmarks.tracking.env_sequences import EmulatedDetector, remove_blind, simulate, watch
 from benchmarks.tracking.rigs import DT_S, SIGMA_PX, make_rig
 from benchmarks.tracking.walks import walk
 from hrc_env.config import HRCConfig
@@ -43,7 +43,7 @@ class Tracks:
     """Results of `look` for the estimator and its state after each frame."""
 
 
-def _nothing(estimator: Estimator[Any], state: Any) -> None:
+def _report_nothing(estimator: Estimator[Any], state: Any) -> None:
     """Return nothing."""
 
 
@@ -66,7 +66,7 @@ class _Follower:
 
 
 def follow_walkers(
-    seeds: list[int], n_frames: int, condition: str, look: Look = _nothing
+    seeds: list[int], n_frames: int, condition: str, look: Look = _report_nothing
 ) -> Tracks:
     """Return the benchmark's walkers in its lab, under one of `tracking.detections.CONDITIONS`."""
     rig = make_rig("lab")
@@ -86,7 +86,7 @@ def follow_env(
     n_frames: int,
     lively: bool = False,
     failing: bool = False,
-    look: Look = _nothing,
+    look: Look = _report_nothing,
 ) -> Tracks:
     """Return the environment's own worker at the level `keypoints`, one episode per seed.
 
@@ -108,7 +108,7 @@ def follow_env(
     blind = _failures(seeds, n_frames, len(P), failing)[..., None, None]
     for t, (truth, between) in enumerate(watch(simulation, seeds, pushes, n_frames)):
         tracks.truth[t], tracks.speed[t] = truth.joints_world[:, 0], truth.velocity_world[:, 0]
-        follower.take(without(detector.detect(truth, between), blind[t]))
+        follower.take(remove_blind(detector.detect(truth, between), blind[t]))
     simulation.close()
     return tracks
 

@@ -70,10 +70,10 @@ def walk(
 
     The area around the origin has twice the size `walk_m` (length, width).
     """
-    return bodies_along(steer(walk_m, seeds, max(n_frames, _SHORTEST), gait))[:n_frames]
+    return walk_along(steer(walk_m, seeds, max(n_frames, _SHORTEST), gait))[:n_frames]
 
 
-def bodies_along(path: Path) -> Points3:
+def walk_along(path: Path) -> Points3:
     """Return joints (T, S, J, 3) [m] of walkers along `path`."""
     body = _body(path)
     joints = np.einsum("tsij,tskj->tski", about_axis("z", path.heading), body)

@@ -24,24 +24,24 @@ def run_to_and_fro(walk_m: tuple[float, float], seeds: list[int], n_frames: int)
     can."""
 
     def run(draws: Floats, height_m: float, me: Worker) -> float:
-        yaw = _across(me)
+        yaw = _plan_across(me)
         return plan_run(yaw, fastest(_FASTEST_M_S, me), me)
 
-    return _played((st.RUN, run, 0.0), walk_m, seeds, n_frames)
+    return _play_act((st.RUN, run, 0.0), walk_m, seeds, n_frames)
 
 
 def fall_and_get_up(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
     """Return joints (T, S, J, 3) [m] of workers that walk, fall, lie for 2 to 4 s and get up."""
 
     def fall(draws: Floats, height_m: float, me: Worker) -> float:
-        yaw = _across(me, _WAY_M)
+        yaw = _plan_across(me, _WAY_M)
         lies_s = _LIES_S[0] + draws.item(4) * (_LIES_S[1] - _LIES_S[0])
         return plan_fall(draws, yaw, _WALK_M_S, lies_s, *OPEN, me)
 
-    return _played((st.FALL, fall, 0.0), walk_m, seeds, n_frames)
+    return _play_act((st.FALL, fall, 0.0), walk_m, seeds, n_frames)
 
 
-def _across(me: Worker, most_m: float = np.inf) -> float:
+def _plan_across(me: Worker, most_m: float = np.inf) -> float:
     """Plan a path past the middle, as long as the distance to it; return its direction [rad]."""
     x, y = float(me["start_x"]), float(me["start_y"])
     share = min(2.0, most_m / np.hypot(x, y))
@@ -49,7 +49,7 @@ def _across(me: Worker, most_m: float = np.inf) -> float:
     return float(np.arctan2(-y, -x))
 
 
-def _played(act: Act, walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
+def _play_act(act: Act, walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
     """Return joints (T, S, J, 3) of workers that start in a corner and repeat an activity."""
     sequences = []
     for seed in seeds:

@@ -85,7 +85,7 @@ def test_parts_are_the_same_whatever_else_is_run(tmp_path, monkeypatch):
     )
     own = replace(TINY, estimators=("ransac",))
     names = own.selection.names_of("clean")
-    whole.make_parts([bench.cell_of(own, "lab", "clean", name, whole.key) for name in names])
+    whole.make_parts([bench.make_part(own, "lab", "clean", name, whole.key) for name in names])
     made = {path: path.stat().st_mtime_ns for path in (tmp_path / "parts").iterdir()}
     assert {path.name for path in made} == {"lab.clean.particle.json", "lab.clean.ransac.json"}
     some = replace(TINY, estimators=("ransac",), sequences=("lab.clean", "site.matched"))
@@ -119,7 +119,7 @@ def test_a_function_is_registered_by_its_name(tmp_path, monkeypatch):
     try:
         for _ in range(2):  # twice the same is once
             assert resolve_estimators(["calm_estimators:calm", "ransac"]) == ("calm", "ransac")
-        assert bench.own_key("calm", "key") != "key" == bench.own_key("ransac", "key")
+        assert bench.extend_key("calm", "key") != "key" == bench.extend_key("ransac", "key")
         with pytest.raises(ConfigError, match="must be a function of"):
             resolve_estimators(["calm_estimators:broken"])
         with pytest.raises(ConfigError, match="There is no estimator 'calm_estimators:gone'"):

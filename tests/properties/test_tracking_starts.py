@@ -14,7 +14,7 @@ from figures import Figure, count
 from benchmarks.common import make_exact
 from benchmarks.tracking.cells import beliefs, run_cell
 from benchmarks.tracking.detections import Damage, detect
-from benchmarks.tracking.metrics import STATISTICS, drawn_sums, metric
+from benchmarks.tracking.metrics import STATISTICS, metric, resample_sums
 from benchmarks.tracking.rigs import RIGS, Rig, make_rig
 from benchmarks.tracking.sequences import Sequences
 from benchmarks.tracking.walks import walk
@@ -63,7 +63,7 @@ def track_one_view(rig: Rig, start: str, seeds: list[int]) -> dict[str, Metric]:
     given = Sequences(joints[:, :, None], px[:, :, :, None], WINDOWS, rig.tracker)
     metrics = {}
     for window, sums in run_cell("particle", rig, given, seeds, lambda _: None).items():
-        drawn = drawn_sums(sums)
+        drawn = resample_sums(sums)
         for kind in ("rmse_m", "coverage95"):
             unit, statistic = STATISTICS[kind]
             metrics[f"{kind}.{window}"] = metric(statistic(drawn), unit, drawn)

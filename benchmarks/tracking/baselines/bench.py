@@ -25,7 +25,7 @@ from benchmarks.common import format_number
 from benchmarks.tracking.cells import beliefs
 from benchmarks.tracking.names import DEFAULT, DLT
 from benchmarks.tracking.rigs import RIGS, Rig, make_rig
-from benchmarks.tracking.sequences import Sequences, lasting, make_sequences
+from benchmarks.tracking.sequences import Sequences, find_durations, make_sequences
 from hrc_env.core.results import Metric, over
 from hrc_env.core.typing import Floats, Points2, Points3
 from hrc_env.experiments.cache import PartCache, PartProgress
@@ -71,12 +71,12 @@ class BaselinesBench:
     @property
     def quick_note(self) -> str:
         """The warning on tables of a short run; "" if it is long enough."""
-        return describe_quick_run(self.n_seeds, lasting()) if self.n_seeds <= N_QUICK else ""
+        return describe_quick_run(self.n_seeds, find_durations()) if self.n_seeds <= N_QUICK else ""
 
     def settings(self) -> dict[str, Any]:
         """Return the settings that all numbers depend on."""
-        versions = {name: version(name) for name in LIBRARIES if installed(name)}
-        return {"baselines": asdict(self), "versions": versions, "missing": missing()}
+        versions = {name: version(name) for name in LIBRARIES if is_installed(name)}
+        return {"baselines": asdict(self), "versions": versions, "missing": list_missing()}
 
     def play(self, cache: PartCache) -> Played:
         """Return the results of all libraries on every sequence."""
@@ -91,19 +91,19 @@ class BaselinesBench:
 
     def metrics(self, played: Played) -> dict[str, Metric]:
         """Return all metrics by name."""
-        return metrics_of(played)
+        return compute_metrics(played)
 
     def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
         """Return the report."""
         return report(metrics)
 
 
-def installed(name: str) -> bool:
+def is_installed(name: str) -> bool:
     """Return whether a library is installed."""
     return find_spec(name) is not None
 
 
-def follow_of(name: str) -> Callable[[Floats, Points2, int], Points3]:
+def find_follow(name: str) -> Callable[[Floats, Points2, int], Points3]:
     """Return the function of a library: joints (T, J, 3) [m] from P (C, 3, 4), px (T, C, J, 2), a
     seed.
 
@@ -114,14 +114,14 @@ def follow_of(name: str) -> Callable[[Floats, Points2, int], Points3]:
 
 def names() -> list[str]:
     """Return the names of the libraries that run."""
-    return [*OURS, *filter(installed, LIBRARIES)]
+    return [*OURS, *filter(is_installed, LIBRARIES)]
 
 
 def _part(name: str, rig: Rig, condition: str, seed: int, tick: PartProgress) -> dict[str, Any]:
     """Return squared errors and time of each window of one sequence."""
     sequences = make_sequences(rig, condition, [seed])
     if name in LIBRARIES:
-        follow_of(name)(rig.P, sequences.px[:30, 0, :, 0], seed)  # compiles
+        find_follow(name)(rig.P, sequences.px[:30, 0, :, 0], seed)  # compiles
     started_s = time.perf_counter()
     joints = _joints(name, rig, sequences, seed)
     took_us = 1e6 * (time.perf_counter() - started_s) / len(joints)
@@ -137,11 +137,11 @@ def _part(name: str, rig: Rig, condition: str, seed: int, tick: PartProgress) ->
 def _joints(name: str, rig: Rig, sequences: Sequences, seed: int) -> Points3:
     """Return the joints (T, J, 3) of a sequence with one person."""
     if name in LIBRARIES:
-        return follow_of(name)(rig.P, sequences.px[:, 0, :, 0], seed)
+        return find_follow(name)(rig.P, sequences.px[:, 0, :, 0], seed)
     return np.stack([mean[0, 0] for mean, _ in beliefs(name, rig, sequences, [seed])])
 
 
-def metrics_of(played: Played) -> dict[str, Metric]:
+def compute_metrics(played: Played) -> dict[str, Metric]:
     """Return RMSE over all sequences with the best and the worst; microseconds per update."""
     metrics: dict[str, Metric] = {}
     times: dict[str, list[float]] = {}
@@ -162,7 +162,7 @@ def report(metrics: Metrics) -> Report:
     ]
     times = [format_number(metrics[f"update_us.{name}.1"], 1, 0) for name in names()]
     header = ["RMSE in cm", *names()]
-    return Report("Other people's code on the same sequences", missing_sentence(), [
+    return Report("Other people's code on the same sequences", describe_missing(), [
         format_table(header, [*lines, ["us per update of a worker", *times]]),
         "aniposelib is offline: it sees the whole clip at once, frames to come included; its time "
         "is the clip's over its frames. Low and high in results.json are the best and the worst "
@@ -170,13 +170,13 @@ def report(metrics: Metrics) -> Report:
     ], "the best and the worst sequence")  # fmt: skip
 
 
-def missing() -> list[str]:
+def list_missing() -> list[str]:
     """Return the libraries that are missing."""
-    return [name for name in LIBRARIES if not installed(name)]
+    return [name for name in LIBRARIES if not is_installed(name)]
 
 
-def missing_sentence() -> str:
+def describe_missing() -> str:
     """Return a sentence with the missing libraries and their installation."""
-    if not missing():
+    if not list_missing():
         return "All libraries are installed."
-    return f"Not installed, so not run: {', '.join(missing())}. Get them with: {INSTALL}"
+    return f"Not installed, so not run: {', '.join(list_missing())}. Get them with: {INSTALL}"

@@ -22,13 +22,13 @@ With a flat density particles that are all outliers would drift away.
 def follow(P: Floats, px: Points2, seed: int) -> Points3:
     """Return joints (T, J, 3) from px (T, C, J, 2)."""
     start = first_joints(P, px)
-    with _seeded(seed):
+    with _seed(seed):
         joints = [_one_joint(P, px[:, :, j], start[j]) for j in range(px.shape[2])]
     return np.stack(joints, axis=1)
 
 
 @contextmanager
-def _seeded(seed: int) -> Iterator[None]:
+def _seed(seed: int) -> Iterator[None]:
     """Seed NumPy's global stream, from which the library draws, and restore it afterwards."""
     before = np.random.get_state()  # noqa: NPY002
     np.random.seed(seed)  # noqa: NPY002
