@@ -7,7 +7,7 @@
 # make train-quick  a policy
 # make results      all numbers and pictures of the documentation made at older versions (hours)
 # make behaviour    whether anything behaves otherwise than recorded
-# make check        style, types, floors
+# make check        style, types, floors, language
 PYTHON ?= python3
 VENV ?= .venv
 STOCK := out/stock
@@ -71,6 +71,7 @@ check: $(DEV)
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/lint-imports
+	$(RUN) -m tests.language
 	$(VENV)/bin/pyright
 
 bench: $(DEV)
