@@ -142,6 +142,12 @@ the first images. Episodes are truncated by `TimeLimit`, or after n steps where 
 `reset(options={{"steps_left": n}})`. What else options fix: `ResetOptions`
 ([configuration](config.md)). Contact ends them only with
 `config={{"cost": {{"contact_terminates": True}}}}`.
+
+```{{toctree}}
+:hidden:
+
+{pages}
+```
 """
 PAGE = """\
 # {id}
@@ -199,6 +205,7 @@ def environment() -> str:
         turn=config.control.tool_turn_rad_s,
         far=observations.FAR_SEPARATION_M,
         concern=NEAR_FLOOR_M,
+        pages="\n".join(BUILT_IN),
     )
 
 
