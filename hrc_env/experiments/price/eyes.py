@@ -42,8 +42,8 @@ class Eyes:
 
 GROUPS = {
     "truth": "true joints", "estimator": "estimators", "cameras": "fewer cameras",
-    "latency": "late images", "calibration": "cameras that hang or look otherwise than told",
-    "covariance": "covariances that say too much or too little", "fault": "faults",
+    "latency": "late images", "calibration": "miscalibrated cameras",
+    "covariance": "covariances that are too small or too large", "fault": "faults",
 }  # fmt: skip
 """By name, in words."""
 
@@ -87,7 +87,7 @@ def all_eyes() -> dict[str, Eyes]:
         ("blind_3s", "all cameras lost from 3 to 6 s", _every("lost", None, 3.0, 6.0)),
     )  # fmt: skip
     scaled = (
-        (f"{name}{key}", f"{words}, says {says} its variance", setup, factor)
+        (f"{name}{key}", f"{words}, reports {says} its variance", setup, factor)
         for name, words, setup in (("", "four cameras", four), ("one_camera_", "one camera", one))
         for key, says, factor in (
             ("half_covariance", "half", 0.5),

@@ -105,8 +105,8 @@ def draw_price(path: Path, metrics: Metrics, task: str, eyes: Sequence[Eyes], le
     words = [GROUPS[name] for name in used]
     figure.legend(bars, words, loc="outside lower center", ncols=2, fontsize=10)
     figure.suptitle(
-        f"Work that is left where a robot drives into people {an_hour(level):.1f} times an hour\n"
-        "emulated detections, one body, the margin of one shield", fontsize=13,
+        f"Work retained at {an_hour(level):.1f} collisions with people per hour\n"
+        "emulated detections, one body, one shield with the margin adjusted", fontsize=13,
     )  # fmt: skip
     save(figure, path)
 
@@ -118,7 +118,7 @@ def _say(axis: Axes, shown: Sequence[Eyes], values: Sequence[Any]) -> None:
         if value.value == value.value:
             axis.text(1.2, y, f"{100 * value.value:.0f} %", va="center", color="white",
                       fontsize=12, fontweight="bold")  # fmt: skip
-    label(axis, "work that is left, in % of a robot without a shield", grid="x")
+    label(axis, "work retained [% of a robot without a shield]", grid="x")
     axis.set_xlim(0, max([100.0, *(100 * each.high for each in values)]))
     for side in ("top", "right", "left"):
         axis.spines[side].set_visible(False)

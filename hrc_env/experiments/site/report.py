@@ -66,10 +66,10 @@ def draw_place(path: Path, scene: Scene, seed: int, path_world: Floats) -> None:
     """The site from above with cameras and the first walk, and what each camera sees of it."""
     above = pinhole("above", np.array([0, 0, 36.0]), np.zeros(3), 37.0, *ABOVE_PX)
     worker = one(walk(scene, seed, 60, HRCConfig().ctrl_dt), 59)
-    figure = new_figure(15, 7.2)
-    grid = figure.add_gridspec(2, 4)
-    axes = [figure.add_subplot(grid[:, :2])]
-    axes += [figure.add_subplot(grid[k // 2, 2 + k % 2]) for k in range(4)]
+    figure = new_figure(15, 6.4)
+    grid = figure.add_gridspec(2, 3, width_ratios=(1.4, 1.0, 1.0))
+    axes = [figure.add_subplot(grid[:, 0])]
+    axes += [figure.add_subplot(grid[k // 2, 1 + k % 2]) for k in range(4)]
     titles = ("(a) the site from above, with the first walk", *(f"(b) camera {k}" for k in "1234"))
     sizes = (ABOVE_PX, *[VIEW_PX] * 4)
     for axis, camera, size, title in zip(axes, (above, *scene.cameras), sizes, titles, strict=True):
@@ -79,7 +79,7 @@ def draw_place(path: Path, scene: Scene, seed: int, path_world: Floats) -> None:
         axis.set_title(title, fontsize=13)
         axis.axis("off")
     px = project(above.P[None], path_world[None])[0][0, 0]
-    axes[0].plot(*px.T, color="#ffd600", linewidth=2.5, label="the head's way")
+    axes[0].plot(*px.T, color="#ffd600", linewidth=2.5, label="path of the head")
     places = np.stack([camera.eye_world for camera in scene.cameras])
     px = project(above.P[None], places[None])[0][0, 0]
     axes[0].plot(*px.T, "s", color="#ff1744", markersize=11, label="cameras, 5 m high")
@@ -94,7 +94,7 @@ def draw_paths(
     path: Path, scene: Scene, estimator: str, truth: Floats, heads: Mapping[str, Floats]
 ) -> None:
     """The first walk's head from above, truth against estimate: a panel a camera, one for all."""
-    figure = new_figure(16, 4.2)
+    figure = new_figure(16, 3.7)
     eyes = np.stack([camera.eye_world for camera in scene.cameras])
     panels = zip(figure.subplots(1, 5, sharey=True), heads.items(), range(5), strict=True)
     for axis, (column, head), k in panels:
