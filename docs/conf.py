@@ -9,11 +9,11 @@ from typing import Any
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-import hrc_env
-from docs import declared, rst
+import hrc_env  # noqa: E402
+from docs import declared, rst  # noqa: E402
 
 project = "hrc_env"
-author = copyright = "The hrc_env authors"  # noqa: A001
+author = copyright = "The hrc_env authors"
 version = release = hrc_env.__version__
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]

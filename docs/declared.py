@@ -1,7 +1,7 @@
 """Signatures and fields as the source declares them.
 
-Python evaluates annotations, so that `Points3` becomes a long expression of NumPy's; a reader of the
-reference sees the name instead.
+Python evaluates annotations, so that `Points3` becomes a long expression of NumPy's; the reference
+shows the name instead.
 """
 
 import ast
@@ -11,6 +11,7 @@ import itertools
 import textwrap
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from enum import Enum
 from typing import Any
 
 SHORT = 40
@@ -103,5 +104,7 @@ def _short(value: Any) -> str:
     """Return the text of a default that is not too long to read, else dots."""
     if inspect.isclass(value) or inspect.isfunction(value):
         return value.__name__
+    if isinstance(value, Enum):
+        return f"{type(value).__name__}.{value.name}"
     text = repr(value)
     return "..." if len(text) > SHORT or " at 0x" in text else text

@@ -95,7 +95,9 @@ def index() -> str:
 def arrays() -> list[str]:
     """Return the rows of the table of arrays that signatures name."""
     source = Path(str(import_module("hrc_env.core.typing").__file__)).read_text()
-    return [f"| `{name}` | {shape or f'`{kind}`'} |\n" for name, shape, kind in ALIAS.findall(source)]
+    return [
+        f"| `{name}` | {shape or f'`{kind}`'} |\n" for name, shape, kind in ALIAS.findall(source)
+    ]
 
 
 def page(title: str) -> str:

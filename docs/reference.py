@@ -366,10 +366,13 @@ def observation_table(env: HRCEnv) -> str:
     optional: list[tuple[str, ...]] = []
     for term in env.simulation.terms:
         part = env.simulation.layout.slices[term.name]
-        size = part.stop - part.start
-        entries = f"{part.start}-{part.stop - 1}" if size > 1 else f"{part.start}"
-        row = (f"`{term.name}`", term.unit, term.frame, f"{term.bound:g}", f"{term.scale:g}", term.doc)
-        (present if size else optional).append((entries if size else "optional", *row))
+        numbers = f"{term.bound:g}", f"{term.scale:g}"
+        row = (f"`{term.name}`", term.unit, term.frame, *numbers, term.doc)
+        if part.start == part.stop:
+            optional.append(("optional", *row))
+        else:
+            entries = dict.fromkeys((part.start, part.stop - 1))
+            present.append(("-".join(map(str, entries)), *row))
     heads = ("entries", "name", "unit", "frame", "bound", "scale", "meaning")
     return _table(heads, [*present, *optional])
 

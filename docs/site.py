@@ -1,12 +1,13 @@
-"""Build the site: make docs, python -m docs.site
+"""Build the site: make docs, python -m docs.site [FOLDER]
 
-Sphinx writes HTML of `docs/**.md` into out/docs, with warnings as errors and without a network;
-then every link inside of it is followed.
+Sphinx writes the pages of `docs/` as HTML into out/docs, or another folder, with warnings as errors
+and without a network; then every link inside of it is followed.
 """
 
 import importlib.util
 import shutil
 import sys
+from collections.abc import Sequence
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
@@ -41,18 +42,26 @@ class Page(HTMLParser):
             self.loaded.append(values[FETCHED[tag]])
 
 
-def main() -> int:
-    """Build and check; return the exit status."""
-    missing = [package for module, package in NEEDED.items() if not importlib.util.find_spec(module)]
+def main(words: Sequence[str] = ()) -> int:
+    """Build and check; return the exit status.
+
+    Args:
+        words: the folder, if it is not out/docs.
+    """
+    out = Path(words[0]).resolve() if words else OUT
+    missing = [
+        package for module, package in NEEDED.items() if not importlib.util.find_spec(module)
+    ]
     if missing:
         print(f"The site needs {', '.join(missing)}: pip install -e '.[docs]'", file=sys.stderr)
         return 2
-    status = build(OUT)
-    wrong = [] if status else broken_links(OUT)
-    print("\n".join(wrong), file=sys.stderr)
+    status = build(out)
+    wrong = [] if status else broken_links(out)
+    for each in wrong:
+        print(each, file=sys.stderr)
     if not status and not wrong:
-        print(f"{OUT.relative_to(DOCS.parent)}/index.html")
-    return status or bool(wrong)
+        print(f"The site is {out / 'index.html'}")
+    return status or int(bool(wrong))
 
 
 def build(out: Path) -> int:
@@ -77,17 +86,21 @@ def broken_links(out: Path) -> list[str]:
         for link in (*page.links, *local):
             parts = urlsplit(link)
             if parts.scheme or parts.netloc:
-                if parts.scheme not in ("http", "https", "mailto") or not (parts.netloc or parts.path):
+                if parts.scheme not in ("http", "https") or not parts.netloc:
                     wrong.append(f"{name}: {link} is no address")
                 continue
             target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
             if not target.is_file():
                 wrong.append(f"{name}: {link} leads nowhere")
-            elif parts.fragment and target in pages:
-                if unquote(parts.fragment) not in pages[target].anchors:
-                    wrong.append(f"{name}: {link} has no such section")
+            elif not _has_section(pages.get(target), unquote(parts.fragment)):
+                wrong.append(f"{name}: {link} has no such section")
     return wrong
 
 
+def _has_section(page: Page | None, anchor: str) -> bool:
+    """Return whether a page has an anchor; files that are no pages, and "", always have."""
+    return not anchor or page is None or anchor in page.anchors
+
+
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(sys.argv[1:]))

@@ -58,7 +58,8 @@ class PerceptionSetup:
         if self.n_cameras < 4:
             words += " from the start" if self.is_alone else f" after {WARM_UP_S:g} s"
         if self.latency_s:
-            words += f", {1000 * self.latency_s:.0f} ms late{'' if self.is_told else ', delay unknown'}"
+            words += f", {1000 * self.latency_s:.0f} ms late"
+            words += "" if self.is_told else ", delay unknown"
         return words
 
     @property
