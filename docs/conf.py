@@ -48,7 +48,7 @@ html_theme_options = {
     "source_branch": "main",
     "source_directory": "docs/",
     "light_css_variables": {"color-brand-primary": "#1d5fa8", "color-brand-content": "#1d5fa8"},
-    "dark_css_variables": {"color-brand-primary": "#f2c230", "color-brand-content": "#8ab8f0"},
+    "dark_css_variables": {"color-brand-primary": "#8ab8f0", "color-brand-content": "#8ab8f0"},
 }
 
 OUTSIDE = re.compile(r"\]\(((?:\.\./)+)((?!pictures/|reference/|[\w-]+\.md)[\w./-]+)\)")
@@ -96,7 +96,7 @@ def show_source(
     """Show signatures as they are written; the fields of a record stand below it."""
     if what not in ("class", "exception"):
         return declared.signature(obj) if inspect.isroutine(obj) else None
-    if hasattr(obj, "__dataclass_fields__"):
+    if hasattr(obj, "__dataclass_fields__") or getattr(obj, "_is_protocol", False):
         return "", None
     return (declared.signature(obj.__init__)[0], None) if inspect.isfunction(obj.__init__) else None
 

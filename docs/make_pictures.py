@@ -191,9 +191,9 @@ def clip() -> None:
 
 def site() -> None:
     """The construction site."""
-    env = HRCEnv(perception="truth", scene="site", n_workers=3)
-    env.reset(seed=3)
-    for _ in range(200):
+    env = HRCEnv(perception="truth", scene="site", n_workers=3, config={"worker": "any"})
+    env.reset(seed=5)
+    for _ in range(140):
         env.step(np.zeros(6))
     renderer = PictureRenderer(env.simulation.scene, 1280, 720)
     save(np.asarray(renderer.picture(*env.views.pose(), "overview")), "site.jpg")

@@ -667,7 +667,7 @@ def _command(kind: type, name: str) -> Iterator[str]:
 def _options(kind: type, but: type | None = None) -> str:
     """A table of a command's options; those of `but` are left out where they are the same."""
     known = {each.name: each.default for each in dataclasses.fields(but)} if but else {}
-    docs, rows = field_docs(kind), []
+    docs, rows = field_docs(EnvConfig) | field_docs(kind), []
     for field in dataclasses.fields(kind):
         if field.name in known and known[field.name] == field.default:
             continue

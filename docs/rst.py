@@ -10,8 +10,8 @@ BLOCK = re.compile(r"((?:^    .*\n|^\n(?=    ))+)", re.M)
 """Lines of code between paragraphs."""
 CODE = re.compile(r"(`[^`]+`)")
 PAGE = re.compile(r"\bdocs/([\w/]+)\.md\b")
-SPECIAL = re.compile(r"([*|]|\b_|_\b)")
-"""Characters that would begin or end markup."""
+SPECIAL = re.compile(r"(?<!\S)\*\w+\*(?!\w)|[*|]|\b_|_\b")
+"""Emphasis, which both languages write alike, and characters that would begin or end markup."""
 
 MODULES = {"columns": "hrc_env.experiments.columns"}
 """Public names that are modules, and their own names, by which Sphinx documents them."""
@@ -31,7 +31,7 @@ def inline(text: str) -> str:
     """Return a text with what stands in it marked up."""
     parts = CODE.split(text)
     for k in range(0, len(parts), 2):
-        escaped = SPECIAL.sub(r"\\\1", parts[k])
+        escaped = SPECIAL.sub(lambda found: "\\" * (len(found[0]) == 1) + found[0], parts[k])
         parts[k] = PAGE.sub(r":doc:`/\1`", escaped)
         if k > 0 and re.match(r"\w", parts[k]):
             parts[k] = "\\ " + parts[k]  # as in `Task`s

@@ -96,12 +96,12 @@ def test_signatures_name_arrays_by_their_aliases():
 
 def test_docstrings_become_what_sphinx_reads():
     text = rst.from_docstring(
-        "Give a `Task` and `x=1` to *it* (docs/start.md).\n\n    go(1)\n\nOf `Task`s.\n\n"
+        "Give a `Task` and `x=1` to *it* and x*y* (docs/start.md).\n\n    go(1)\n\nOf `Task`s.\n\n"
         "Args:\n    task: a `Task`.\n"
     )
     task = ":py:obj:`Task <hrc_env.Task>`"
     assert text == (
-        f"Give a {task} and ``x=1`` to \\*it\\* (:doc:`/start`).\n"
+        f"Give a {task} and ``x=1`` to *it* and x\\*y\\* (:doc:`/start`).\n"
         "\n.. code-block:: python\n\n   go(1)\n\n\n"
         f"Of {task}\\ s.\n\nArgs:\n    task: a {task}.\n"
     )

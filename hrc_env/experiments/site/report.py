@@ -66,7 +66,7 @@ def draw_place(path: Path, scene: Scene, seed: int, path_world: Floats) -> None:
     """The site from above with cameras and the first walk, and what each camera sees of it."""
     above = pinhole("above", np.array([0, 0, 36.0]), np.zeros(3), 37.0, *ABOVE_PX)
     worker = one(walk(scene, seed, 60, HRCConfig().ctrl_dt), 59)
-    figure = new_figure(15, 6.4)
+    figure = new_figure(15, 7.0)
     grid = figure.add_gridspec(2, 3, width_ratios=(1.4, 1.0, 1.0))
     axes = [figure.add_subplot(grid[:, 0])]
     axes += [figure.add_subplot(grid[k // 2, 1 + k % 2]) for k in range(4)]
