@@ -6,6 +6,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from docutils import nodes
+
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
@@ -28,6 +30,7 @@ myst_heading_anchors = 4
 myst_links_external_new_tab = False
 
 default_role = "code"
+smartquotes = False
 autodoc_mock_imports = ["stable_baselines3", "torch"]
 autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True}
@@ -51,19 +54,19 @@ html_theme_options = {
     "dark_css_variables": {"color-brand-primary": "#8ab8f0", "color-brand-content": "#8ab8f0"},
 }
 
-OUTSIDE = re.compile(r"\]\(((?:\.\./)+)((?!pictures/|reference/|[\w-]+\.md)[\w./-]+)\)")
-"""A link from a page to a file of the repository that is no page."""
+UPWARD = re.compile(r"\]\(((?:\.\./)+)([\w./-]+)\)")
+"""A link from a page to a file above it."""
 
 
 def link_to_repository(app: Any, name: str, source: list[str]) -> None:
-    """Lead links to files that are no pages to the repository."""
-    up = name.count("/")
+    """Lead links to files outside of this folder to the repository."""
+    depth = name.count("/")
 
     def lead(found: re.Match[str]) -> str:
-        inside = found[1].count("../") <= up
-        return found[0] if inside else f"]({REPOSITORY}{found[2]})"
+        is_inside = found[1].count("../") <= depth
+        return found[0] if is_inside else f"]({REPOSITORY}{found[2]})"
 
-    source[0] = OUTSIDE.sub(lead, source[0])
+    source[0] = UPWARD.sub(lead, source[0])
 
 
 def write_rst(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
@@ -101,9 +104,16 @@ def show_source(
     return (declared.signature(obj.__init__)[0], None) if inspect.isfunction(obj.__init__) else None
 
 
+def load_lazily(app: Any, doctree: Any) -> None:
+    """Let a browser load a picture when it is scrolled to."""
+    for picture in doctree.findall(nodes.image):
+        picture["loading"] = "lazy"
+
+
 def setup(app: Any) -> dict[str, bool]:
     """Connect the functions above."""
     app.connect("source-read", link_to_repository)
+    app.connect("doctree-read", load_lazily)
     app.connect("autodoc-process-docstring", write_rst, priority=400)  # before napoleon
     app.connect("autodoc-process-docstring", add_fields, priority=600)
     app.connect("autodoc-skip-member", skip_fields)

@@ -84,7 +84,9 @@ def _parameter(value: inspect.Parameter, node: ast.arg) -> str:
 
 def _annotation(node: ast.expr) -> str:
     """Return the text of an annotation, without the quotes of one that is not evaluated."""
-    return node.value if isinstance(node, ast.Constant) and node.value else ast.unparse(node)
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        return node.value
+    return ast.unparse(node)
 
 
 def _default(kind: type, name: str, node: ast.expr | None) -> str:
