@@ -5,7 +5,7 @@ import os
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from gymnasium import spaces
@@ -29,7 +29,7 @@ KINDS = {"ppo": PPO, "ppo_lagrangian": PPOLagrangian, "sac": SAC}
 """Classes of learners by algorithm."""
 NO_BUFFER = {"buffer_size": 1, "replay_buffer_class": None, "replay_buffer_kwargs": {}}
 """Arguments that load a learner for acting, without replay buffer."""
-Learner = PPO | SAC
+Learner: TypeAlias = "PPO | SAC"
 
 
 def save(learner: Learner, path: Path, facts: dict[str, Any]) -> None:

@@ -150,11 +150,11 @@ def test_the_leaderboard_shows_no_count_without_its_interval():
 
 def test_every_picture_is_made_by_a_command():
     made = {name for command in results.COMMANDS.values() for name in command.pictures}
-    drawn = re.findall(r"^([\w.]+\.(?:jpg|png)) ", (ROOT / "docs" / "make_pictures.py").read_text(),
-                       re.M)  # fmt: skip
+    text = (ROOT / "docs" / "make_pictures.py").read_text()
+    drawn = {*re.findall(r"^([\w.]+\.(?:jpg|png|webp)) ", text, re.M)} - {"ID.webp"}
     assert made.isdisjoint(drawn)
     films = {f"{task_id}.webp" for task_id in BUILT_IN}
-    assert made | {*drawn} | films == {path.name for path in results.PICTURES.iterdir()}
+    assert made | drawn | films == {path.name for path in results.PICTURES.iterdir()}
     sizes = [(results.PICTURES / each).stat().st_size for each in films]
     assert max(sizes) < 3e6
 
@@ -167,7 +167,7 @@ def test_no_commit_stands_in_prose(page):
 def test_the_documentation_is_short():
     assert len(README.read_text().splitlines()) <= 150
     docs = [page for page in generate.PAGES if page != README]
-    assert sum(len(by_hand(page).split()) for page in docs) <= 14_000
+    assert sum(len(by_hand(page).split()) for page in docs) <= 15_000
     assert len((ROOT / "CHANGELOG.md").read_text().split("## 0.1.0")[1].split()) <= 500
 
 

@@ -77,6 +77,12 @@ def plot_organs(path: Path, metrics: Metrics) -> None:
     save(figure, path)
 
 
+def _bar_title(configuration: str) -> str:
+    """Return the words below a bar, in two lines for a batch."""
+    words = title(configuration)
+    return words if configuration == SINGLE else f"batch of {words.replace(' on ', chr(10))}"
+
+
 def _stack(axis: Axes, group: list[str], metrics: Metrics) -> None:
     """Draw a bar for each configuration, with its parts stacked and the sum above."""
     x, foot = np.arange(len(group)), np.zeros(len(group))
@@ -86,5 +92,5 @@ def _stack(axis: Axes, group: list[str], metrics: Metrics) -> None:
         foot += us
     for place, total in enumerate(foot):
         axis.text(place, total, f"{total:.0f}", ha="center", va="bottom", fontsize=12)
-    axis.set_xticks(x, [title(each).replace(" on ", " in one\n") for each in group], fontsize=11)
+    axis.set_xticks(x, [_bar_title(each) for each in group], fontsize=11)
     axis.margins(y=0.08)

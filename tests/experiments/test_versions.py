@@ -8,7 +8,6 @@ import pytest
 from hrc_env.core.errors import ConfigError
 from hrc_env.experiments import versions
 from hrc_env.experiments.versions import (
-from hrc_env.tracking.estimators import find_estimator
     SUBSYSTEMS,
     check_subsystems,
     hash_source,
@@ -16,6 +15,7 @@ from hrc_env.tracking.estimators import find_estimator
     read_versions,
     select_versions,
 )
+from hrc_env.tracking.estimators import find_estimator
 
 
 @pytest.fixture

@@ -63,7 +63,7 @@ def draw(path: Path, key: str, rows: Mapping[str, str], metrics: Metrics) -> Non
     for place, row in zip(places, rows, strict=True):
         inside = f"{100 * metrics[f'coverage95.{key}.{row}'].value:.0f} %"
         axis.text(1.02, place, inside, transform=across, fontsize=11, va="center", color="0.3")
-    axis.text(1.02, len(rows) - 0.4, "coverage", transform=across, fontsize=10, color="0.3")
+    axis.text(1.02, len(rows) - 0.15, "coverage", transform=across, fontsize=10, color="0.3")
     axis.set_yticks(places, list(rows.values()))
     axis.set_ylim(-0.7, len(rows) - 0.3)
     axis.set_xscale("log")

@@ -132,13 +132,18 @@ def draw_tradeoff(
     seeing = [name for name in setups if find_setup(name).level != "none"]
     for policy, above in zip(policies, axes[0], strict=True):
         _draw_panel(above, metrics, policy, setups, "cost_towards")
+    free: Axes | None = None
     for policy, below in zip(policies, axes[1] if looking else (), strict=False):
         if policy in looking:
             _draw_panel(below, metrics, policy, seeing, "approaches")
         else:
-            below.remove()
+            below.axis("off")
+            free = below
     handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=12)
+    if free is None:
+        figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=12)
+    else:
+        free.legend(handles, labels, loc="center left", fontsize=12)
     save(figure, path)
 
 

@@ -131,8 +131,9 @@ def _draw_body(
     axis.set_title(f"{cameras}: {off_mm:.0f} mm", fontsize=13)
     middle = truth.mean(0)
     for name, value in zip("xyz", middle, strict=True):
-        axis.set(**{f"{name}lim": (value - 0.9, value + 0.9), f"{name}label": f"{name} [m]"})
-        getattr(axis, f"{name}axis").set_major_locator(MultipleLocator(0.5))
+        axis.set(**{f"{name}lim": (value - 0.9, value + 0.9)})
+        getattr(axis, f"set_{name}label")(f"{name} [m]", labelpad=12 if name == "x" else 6)
+        getattr(axis, f"{name}axis").set_major_locator(MultipleLocator(1.0 if name == "x" else 0.5))
     toward = recording.scene.cameras[c].eye_world - middle
     axis.view_init(elev=12, azim=float(np.degrees(np.arctan2(toward[1], toward[0]))) + 40)
     axis.set_box_aspect((1, 1, 1), zoom=0.88)

@@ -77,10 +77,10 @@ def draw_place(path: Path, scene: Scene, seed: int, path_world: Floats) -> None:
     """
     above = pinhole("above", np.array([0, 0, 36.0]), np.zeros(3), 37.0, *ABOVE_PX)
     worker = one(walk(scene, seed, 60, HRCConfig().ctrl_dt), 59)
-    figure = make_figure(15, 7.2)
-    grid = figure.add_gridspec(2, 4)
-    axes = [figure.add_subplot(grid[:, :2])]
-    axes += [figure.add_subplot(grid[k // 2, 2 + k % 2]) for k in range(4)]
+    figure = make_figure(15, 7.0)
+    grid = figure.add_gridspec(2, 3, width_ratios=(1.4, 1.0, 1.0))
+    axes = [figure.add_subplot(grid[:, 0])]
+    axes += [figure.add_subplot(grid[k // 2, 1 + k % 2]) for k in range(4)]
     titles = ("(a) the site from above, with the first walk", *(f"(b) camera {k}" for k in "1234"))
     sizes = (ABOVE_PX, *[VIEW_PX] * 4)
     for axis, camera, size, title in zip(axes, (above, *scene.cameras), sizes, titles, strict=True):
@@ -113,7 +113,7 @@ def draw_paths(
         truth: true path (T, 3) [m].
         heads: estimated paths (T, 3) by cameras [m].
     """
-    figure = make_figure(16, 4.2)
+    figure = make_figure(16, 3.7)
     eyes = np.stack([camera.eye_world for camera in scene.cameras])
     panels = zip(figure.subplots(1, 5, sharey=True), heads.items(), range(5), strict=True)
     for axis, (column, head), k in panels:
