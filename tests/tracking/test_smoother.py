@@ -7,7 +7,7 @@ from simulated import DT, HARD, LAB, Damage, detections, keypoints, track, walk
 from hrc_env.core.errors import ConfigError
 from hrc_env.tracking.config import ParticleConfig
 from hrc_env.tracking.estimators import make_estimator
-from hrc_env.tracking.smoother import dense, linear_motion, rts_step, smooth
+from hrc_env.tracking.smoother import Moments, dense, linear_motion, rts_step, smooth
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT
 
 INSIDE_95 = 7.815
@@ -52,7 +52,7 @@ def test_steps_back_are_the_conditional_gaussian_of_the_whole():
         predicted.append(mean)
         gain = cov @ H.T @ np.linalg.inv(H @ cov @ H.T + R)
         mean, cov = mean + gain @ (z[t] - H @ mean), cov - gain @ H @ cov
-        filtered.append((mean[None], cov[None]))
+        filtered.append(Moments(mean[None], cov[None]))
     smoothed = filtered[-1]
     for t in range(n_steps - 2, -1, -1):
         smoothed = rts_step(filtered[t], predicted[t + 1][None], smoothed, F, Q)
