@@ -234,7 +234,7 @@ def _amounts(faults: tuple[FaultConfig, ...], kinds: tuple[str, ...]) -> Mapping
     most = {kind: NEUTRAL.get(kind, 0.0) for kind in kinds}
     for fault in faults:
         none = NEUTRAL.get(fault.kind, 0.0)
-        amount = 1.0 if KINDS[fault.kind].bounds == (0.0, 0.0) else fault.how_much
+        amount = 1.0 if KINDS[fault.kind].bounds == (0.0, 0.0) else fault.max_amount
         if abs(amount - none) > abs(most[fault.kind] - none):
             most[fault.kind] = amount
     return {f"{FAULT}{kind}": amount for kind, amount in most.items()}

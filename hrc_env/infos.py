@@ -4,25 +4,25 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from hrc_env.core.declared import Records2
 from hrc_env.core.infos import MISCALIBRATED, MORE_PEOPLE, Info, of_workers
 from hrc_env.core.records import PoseEstimate, RobotState, WorkerTruth
-from hrc_env.core.typing import Bools, Ints, Records
+from hrc_env.core.typing import Bools, Ints
 from hrc_env.core.vacancy import Vacancy
 from hrc_env.geometry.distances import least_separation
 from hrc_env.motion import generator
 from hrc_env.rewards import RewardTerm
-from hrc_env.safety import cost as costs
 from hrc_env.safety import incidents
-from hrc_env.safety.cost import Cost, CostConfig
-from hrc_env.safety.incidents import IncidentMonitor
+from hrc_env.safety.cost import Cost, CostConfig, split_cost, sum_cost
+from hrc_env.safety.incidents import Incident, IncidentMonitor
 from hrc_env.tracking import metrics
 
 
-def cost_info(cost: Cost, happened: Records, present: Bools, config: CostConfig) -> Info:
+def cost_info(cost: Cost, happened: Records2[Incident], present: Bools, config: CostConfig) -> Info:
     """The cost by the names that safe-RL libraries read, with its parts, and the separation from
     who is there."""
-    parts = costs.parts(cost, happened, config)
-    total = costs.total(parts, config)
+    parts = split_cost(cost, happened, config)
+    total = sum_cost(parts, config)
     return {
         "cost": total,
         "cost_sum": total,
@@ -41,7 +41,7 @@ def reset_info(
     gaps_m = least_separation(*capsules, truth.capsules_world, truth.capsule_radius_m).distance_m
     names = ("", "_sum", *(f"_{name}" for name in ("proximity", "contact", *config.components)))
     happened = dict.fromkeys(incidents.SUMMARY.names or (), 0.0)
-    happened |= dict.fromkeys(incidents.AT_TIMES, np.nan)
+    happened |= dict.fromkeys(incidents.NOT_ALWAYS_MEASURED, np.nan)
     nearest_m = gaps_m.min(1, initial=np.inf, where=present)
     return {
         **{f"reward/{term.name}": np.zeros(n) for term in terms},
@@ -52,12 +52,14 @@ def reset_info(
     }
 
 
-def incident_info(happened: Records, monitor: IncidentMonitor, robot: RobotState) -> Info:
+def incident_info(
+    happened: Records2[Incident], monitor: IncidentMonitor, robot: RobotState
+) -> Info:
     """What happened to people in a step, (B, W) `incidents.INCIDENT`, and in its episode."""
-    told = incidents.summed_up(happened, monitor.known)
+    told = incidents.summarize(happened, monitor.history)
     return {
         **{f"safety/{name}": told[name] for name in incidents.SUMMARY.names or ()},
-        "safety/time_to_stop_s": monitor.stop_s(robot),
+        "safety/time_to_stop_s": monitor.find_stop_time(robot),
     }
 
 
@@ -70,7 +72,7 @@ def tracking_info(
     return {f"tracking/{name}": found[name] for name in metrics.TRACKING.names or ()}
 
 
-def worker_info(activity: Ints, body: Ints, happened: Records | None) -> Info:
+def worker_info(activity: Ints, body: Ints, happened: Records2[Incident] | None) -> Info:
     """What each worker (B, W) does, which body they have, and the contacts that begin: of a step,
     or none in a reset."""
     none = np.full(activity.shape, -1)

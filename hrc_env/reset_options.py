@@ -19,7 +19,7 @@ from hrc_env.motion.config import PeopleConfig, numbers
 from hrc_env.motion.decision import ANY_ACTIVITY, BehaviourParams, Cast, jobs_by_activity
 from hrc_env.motion.state import ACTIVITY_NAMES
 from hrc_env.perception.faults.fault import FaultConfig, check_cameras
-from hrc_env.pipeline.levels import CAMERA_LEVELS, check_knows
+from hrc_env.pipeline.levels import CAMERA_LEVELS, check_supported
 from hrc_env.pipeline.observed_images import ObservedImages
 from hrc_env.scene.build import Scene, with_rig
 from hrc_env.scene.domain_randomization import AppearanceConfig
@@ -162,7 +162,7 @@ def fix(options: Options, room: Room) -> Fixed:
     rig, rigs = _rig(given.get("cameras"), room)
     faults, appearance = _faults(given, room), _appearance(given, room)
     if faults is not None or appearance is not None:
-        check_knows(
+        check_supported(
             room.level,
             room.appearance if appearance is None else appearance,
             room.faults if faults is None else faults,

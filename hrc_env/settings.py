@@ -12,7 +12,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.mapping import restored
 from hrc_env.env_config import EnvConfig
 from hrc_env.geometry.camera_config import CameraConfig, parse_camera, read_rig
-from hrc_env.safety.shield import Shield, shield_called
+from hrc_env.safety.shield import Shield, find_shield
 from hrc_env.scene.build import Scene
 from hrc_env.scene.camera_images import ImageConfig, images_called
 from hrc_env.scene.rig_distribution import RigDistribution
@@ -112,7 +112,7 @@ def make_settings(asked: EnvConfig) -> Settings:
     return Settings(
         asked, lent(task(config.task)), estimator, cameras, scene,
         robot, _worker_counts(n_workers),
-        shield_called(asked.shield), config, images_called(asked.observe_images), rigs,
+        find_shield(asked.shield), config, images_called(asked.observe_images), rigs,
     )  # fmt: skip
 
 

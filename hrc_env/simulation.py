@@ -16,11 +16,12 @@ from hrc_env import infos, observations, rewards
 from hrc_env.belief import Belief, estimated_separation, of_concern, unseen_floor
 from hrc_env.control import fastest, joint_command, n_actions
 from hrc_env.core.batching import State, Stateful, picked, rows, write_rows
+from hrc_env.core.declared import Records2
 from hrc_env.core.errors import ConfigError, check_shape, needed
 from hrc_env.core.infos import Info
 from hrc_env.core.records import PoseEstimate, WorkerMotion, WorkerTruth
 from hrc_env.core.streams import children
-from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, JointVelocities, Points3, Records
+from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, JointVelocities, Points3
 from hrc_env.episode_cameras import NOTHING_GIVEN, EpisodeCameras
 from hrc_env.geometry import chains
 from hrc_env.geometry.camera_config import CameraConfig
@@ -34,10 +35,10 @@ from hrc_env.pipeline.sensor_input import SensorInput, TrueSensorInput
 from hrc_env.pipeline.tracking import PerceptionPipeline
 from hrc_env.reset_options import Fixed, Options, Room, fix
 from hrc_env.rewards import RewardConfig
-from hrc_env.safety import cost as costs
 from hrc_env.safety import incidents
-from hrc_env.safety.incidents import IncidentMonitor, Paths
-from hrc_env.safety.shield import shielded
+from hrc_env.safety.cost import measure_cost
+from hrc_env.safety.incidents import Incident, IncidentMonitor, Paths
+from hrc_env.safety.shield import apply_shield
 from hrc_env.scene import handling
 from hrc_env.scene.build import Scene, all_grounds, build
 from hrc_env.scene.domain_randomization import Look
@@ -345,9 +346,9 @@ class Simulation(Stateful):
         )  # fmt: skip
         if self.shield is None:
             return Command(command, previous, {})
-        allowed, info = shielded(self.shield, self.belief, command, self.config.ctrl_dt)
+        allowed, info = apply_shield(self.shield, self.belief, command, self.config.ctrl_dt)
         self.shield_change = allowed - command
-        return Command(allowed, previous, info)
+        return Command(allowed, previous, dict(info))
 
     def _move(self, command: Command) -> Truth:
         """Let workers, robots and the task go on by a control step."""
@@ -366,7 +367,7 @@ class Simulation(Stateful):
         world, arm = handling.loaded(self.scene, world, arm, q_path, task.is_load(self.task_state))
         progress = self._show_workers(world, motion)
         around = worker_capsules(self.bodies, path, motion.body), workers.capsule_radius_m
-        paths = incidents.measured(arm, world.robot.capsule_radius_m, *around)
+        paths = incidents.measure_paths(arm, world.robot.capsule_radius_m, *around)
         touched = paths.gaps_m.min((1, 2), initial=np.inf) <= 0.0
         world = replace(world, workers=progress, touched=touched, place=self.place)
         task_step = task.advance(self.task_state, self.streams["task"], world, config.ctrl_dt)
@@ -439,7 +440,7 @@ class Simulation(Stateful):
         info = agreed(self.keys, {
             **infos.reset_info(world.robot, truth.workers, present, terms, self.config.cost),
             **infos.tracking_info(rows(self.estimate, ids), truth.workers, present, identities),
-            **shielded(self.shield, belief, still, self.config.ctrl_dt)[1],
+            **apply_shield(self.shield, belief, still, self.config.ctrl_dt)[1],
             **self._episode_info(ids, generator.activity(self.motion), None),
         })  # fmt: skip
         write_rows(self.identities, ids, identities)
@@ -448,7 +449,7 @@ class Simulation(Stateful):
     def _judge(self, command: Command, truth: Truth, belief: Belief) -> StepResult:
         """Count cost and metrics on the truth; reward and observation read the belief."""
         config, paths = self.config, needed(truth.paths, "A step's paths")
-        cost = costs.cost(paths.gaps_m, config.cost)
+        cost = measure_cost(paths.gaps_m, config.cost)
         happened = self.monitor.step(truth.world, paths)
         terms = self._reward_terms(command, truth, belief)
         activity = generator.activity(self.motion)
@@ -516,13 +517,13 @@ class Simulation(Stateful):
             terms[name] = factor * np.asarray(terms[name])
         return terms
 
-    def _episode_info(self, ids: Ints, activity: Ints, happened: Records | None) -> Info:
+    def _episode_info(self, ids: Ints, activity: Ints, happened: Records2[Incident] | None) -> Info:
         """Return what the episodes of environments `ids` have come to, and who is there."""
         tally = {"episode_cost": self.episode_cost, **self.task.info(self.task_state)}
         body, cameras, seen = self.motion.workers["body"], self.settings["cameras"], self.pipeline
         return {
             **{name: value[ids] for name, value in tally.items()},
             **infos.worker_info(activity[ids], body[ids], happened),
-            **infos.perception_info(cameras, seen.suspected(ids), seen.vacancy(ids)),
+            **infos.perception_info(cameras, seen.suspected_cameras(ids), seen.vacancy(ids)),
             **self.cameras.info(ids),
         }

@@ -21,7 +21,7 @@ from hrc_env.core.records import Roi
 from hrc_env.env import HRCEnv
 from hrc_env.geometry import chains
 from hrc_env.geometry.camera_config import write_rig
-from hrc_env.perception.detector import own_joints
+from hrc_env.perception.detector import call_detector
 from hrc_env.registration import import_files
 from hrc_env.scene.build import build
 from hrc_env.scene.render import PictureRenderer
@@ -338,13 +338,15 @@ def test_a_detector_finds_the_worker(pixels):
 )
 def test_what_is_wrong_with_keypoints_is_said(found, said):
     with pytest.raises(ConfigError, match=said):
-        own_joints(lambda crop: found, np.zeros((256, 256, 3), np.uint8), Roi((9.0, 9.0), 9.0, 0.0))
+        call_detector(
+            lambda crop: found, np.zeros((256, 256, 3), np.uint8), Roi((9.0, 9.0), 9.0, 0.0)
+        )
 
 
 def test_a_joint_that_is_not_found_is_data():
     found = np.full((15, 3), 0.5)
     found[3] = np.nan
-    joints = own_joints(
+    joints = call_detector(
         lambda crop: found, np.zeros((256, 256, 3), np.uint8), Roi((9.0, 9.0), 9.0, 0.0)
     )
     assert joints[3, 2] == 0.0

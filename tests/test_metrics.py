@@ -6,7 +6,7 @@ import pytest
 from hrc_env.core.records import PoseEstimate, WorkerTruth
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.safety import incidents
-from hrc_env.safety.cost import Cost, CostConfig, cost
+from hrc_env.safety.cost import Cost, CostConfig, measure_cost
 from hrc_env.tracking.metrics import make_identities, measure_errors
 
 
@@ -17,7 +17,8 @@ def costs(distance_m: list[float], n_workers: int = 1) -> Cost:
     workers = np.repeat(robot[:, :, None], n_workers, axis=2)
     workers[..., 0] = np.array(distance_m)[:, None, None, None]
     radius_m = np.full((1, n_workers, 1), 0.1)
-    return cost(incidents.measured(robot, np.array([0.05]), workers, radius_m).gaps_m, CostConfig())
+    paths = incidents.measure_paths(robot, np.array([0.05]), workers, radius_m)
+    return measure_cost(paths.gaps_m, CostConfig())
 
 
 @pytest.mark.parametrize(

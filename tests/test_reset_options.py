@@ -188,10 +188,10 @@ def test_fault_amounts_are_drawn_anew_for_every_episode() -> None:
     turned = set()
     for _ in range(5):
         env.reset(seed=None if turned else 0)
-        recent = env.simulation.pipeline.cameras.recent
+        recent = env.simulation.pipeline.cameras.history
         (fault,) = recent.schedule_of(0).faults
-        assert 0.01 <= fault.how_much <= 0.02
-        turned.add(fault.how_much)
+        assert 0.01 <= fault.max_amount <= 0.02
+        turned.add(fault.max_amount)
     assert len(turned) == 5
 
 

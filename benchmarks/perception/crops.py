@@ -26,7 +26,7 @@ from hrc_env.geometry.cameras import (
 from hrc_env.geometry.sight import find_hidden
 from hrc_env.motion import generator
 from hrc_env.perception.detector import PoseDetector
-from hrc_env.perception.lensed import Lensed
+from hrc_env.perception.lenses import LensRenderer
 from hrc_env.perception.windows import window_from_joints
 from hrc_env.scene.build import Scene
 from hrc_env.scene.domain_randomization import Look
@@ -71,7 +71,7 @@ class Looker:
     def __init__(self, scene: Scene) -> None:
         self.scene, self.body = scene, load_body(scene.bodies[0])
         self.renderer = CropRenderer(scene)
-        self.source = Lensed(self.renderer, scene.cameras)
+        self.source = LensRenderer(self.renderer, scene.cameras)
         self.detector = PoseDetector(scene.cameras)
 
     def randomize(self, look: Look) -> None:

@@ -53,7 +53,9 @@ def matrix(quaternion_wxyz: QuaternionsWxyz) -> Rotations:
 
 
 @kernel
-def rotate(quaternion: Floats | tuple[float, ...], vector: Floats | Vector3) -> Vector3:
+def rotate(
+    quaternion: Floats | tuple[float, ...], vector: Floats | tuple[float, float, float]
+) -> Vector3:
     """Return a vector (3,) rotated by a unit quaternion: v + 2 w (u x v) + 2 u x (u x v)."""
     w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
     a = 2.0 * (y * vector[2] - z * vector[1])

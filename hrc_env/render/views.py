@@ -16,7 +16,7 @@ from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.geometry.cameras import PinholeCamera, image_from_pinhole, pinhole, resize
 from hrc_env.geometry.chains import capsules
 from hrc_env.motion import generator
-from hrc_env.perception.lensed import Lensed
+from hrc_env.perception.lenses import LensRenderer
 from hrc_env.render import overlay
 from hrc_env.render.marks import (
     CAPSULES_HIDDEN,
@@ -287,7 +287,7 @@ class Views:
         if all(camera.lens is None for camera in cameras):
             return self._drawn([resize(camera, width, height) for camera in cameras], seen)
         size = (SMOOTHING * width, SMOOTHING * width)
-        images = Lensed(self._renderer("square", size, seen), cameras)
+        images = LensRenderer(self._renderer("square", size, seen), cameras)
         views = []
         for camera in cameras:
             middle_px = camera.width_px / 2, camera.height_px / 2

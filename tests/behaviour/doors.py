@@ -75,13 +75,13 @@ from hrc_env.motion.anatomy import anatomy
 from hrc_env.motion.clip import Clip, fitted_to, load_clip, placed_at_origin, save_clip
 from hrc_env.motion.traffic import meets
 from hrc_env.perception import (
-    believing,
     blazepose,
     calibration,
     detector,
-    lensed,
+    lenses,
     noise,
     outline,
+    plausibility,
     searching,
     windows,
 )
@@ -93,9 +93,9 @@ from hrc_env.pipeline import reacquisition
 from hrc_env.pipeline.bystanders import Bystanders
 from hrc_env.pipeline.pose_tracker import PoseTracker
 from hrc_env.safety import contact, incidents, separation, solver
+from hrc_env.safety.built_in import build_constraints, describe_pose
 from hrc_env.safety.config import PRESETS, ShieldConfig
-from hrc_env.safety.guard import constraints, describe_arm
-from hrc_env.safety.shield import shield_called, shielded
+from hrc_env.safety.shield import apply_shield, find_shield
 from hrc_env.safety.unseen import find_undetected
 from hrc_env.scene import domain_randomization as looks
 from hrc_env.scene import rigs
@@ -212,7 +212,7 @@ DRAWING = (
     ("map", ("znear", "zfar", "fogstart", "fogend", "haze", "shadowclip", "shadowscale", "alpha")),
 )
 """How MuJoCo draws, by its names."""
-RENAMED: dict[str, str] = {}
+RENAMED: dict[str, str] = {"shield/clearance_m": "shield/least_m"}
 """Today's names of observation terms, reward terms and infos that the probes know by another."""
 
 
@@ -440,7 +440,7 @@ def _numeric(infos: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
     named = {name: np.where(known[name], infos[name], 0.0) for name in plain if known[name].any()}
     if "is_success" in named:
         named["is_success"] = named["is_success"].astype(bool)
-    return named
+    return {RENAMED.get(name, name): value for name, value in named.items()}
 
 
 FLAGS_OF = {name: entry.flag for name, entry in ENTRIES.items() if entry.flag}
@@ -1725,7 +1725,7 @@ class Crowd:
         return {
             "hips_m": np.nan_to_num(now.hips_world[0], nan=9.0),
             "age_s": np.minimum(now.age_s[0], 9.0), "remembered": np.array(n),
-            "beside": np.array(sum(each.cameras for each in beside)),
+            "beside": np.array(sum(each.n_cameras for each in beside)),
             "given_up": self._known.given_up[0].copy(),
         }  # fmt: skip
 
@@ -1774,7 +1774,7 @@ class Emulator:
             cameras or self.rig.cameras, self._config, expected,
         )  # fmt: skip
         if has_no_names:
-            found = keypoint_emulator.without_names(found, self._rngs)
+            found = keypoint_emulator.shuffle_workers(found, self._rngs)
         return _keypoints(found)
 
     def remember(self) -> Arrays:
@@ -1803,7 +1803,7 @@ class Faults:
         configs = tuple(faults.FaultConfig(**_renamed(each, FAULT_FIELDS)) for each in wrong)
         self._schedule = fault_schedule.Schedule(rig.configs, configs, step_s)
         self._rig = rig
-        self._recent = fault_schedule.Recent(2, self._schedule)
+        self._recent = fault_schedule.History(2, self._schedule)
 
     def summarise(self) -> NDArray[np.float64]:
         """Return whether nothing is wrong, the longest delay, the memory and what is frozen."""
@@ -1817,13 +1817,13 @@ class Faults:
         plan, rows = self._schedule, []
         for c in range(len(self._rig.cameras)):
             frame = plan.frame(seed, step, c)
-            shows = (-1, -1) if frame is None else (frame.shows, frame.taken)
+            shows = (-1, -1) if frame is None else (frame.scene_step, frame.taken_step)
             rows.append((*shows, plan.exposure_s(c, step)))
         return np.array(rows, float)
 
     def move_cameras(self, seed: int, step: int) -> Any:
         """Return the cameras as they really are at a step."""
-        return self._schedule.actual(self._rig.cameras, seed, step)
+        return self._schedule.actual_cameras(self._rig.cameras, seed, step)
 
     def begin(self, seed: int) -> NDArray[np.int64]:
         """Begin two episodes and return their numbers for faults."""
@@ -1834,8 +1834,8 @@ class Faults:
     def arrive(self, b: int) -> NDArray[np.float64]:
         """Take an image of a step and return of each camera (C, 2) the number of the one that
         arrives (-1: none) and its time."""
-        step = self._recent.begin(b)
-        records, times_s = self._recent.arrived(b, step)
+        step = self._recent.begin_step(b)
+        records, times_s = self._recent.exchange(b, step)
         return np.column_stack([[-1 if each is None else each for each in records], times_s])
 
     def places(self, cameras: Any) -> Arrays:
@@ -1873,12 +1873,12 @@ def describe_posture(joints_m: NDArray[np.float64], speed_m_s: Any, eye_m: Any) 
     front = outline.facing(joints_m)
     known = calibration.read_calibration()
     return {
-        "facing": np.array(front), "folded": outline.folded(joints_m),
+        "facing": np.array(front), "folded": outline.folding(joints_m),
         "kneeling": outline.kneeling(joints_m), "handling": outline.handling(joints_m),
         "speed": outline.speed(speed_m_s), "stepping": outline.stepping(outline.speed(speed_m_s)),
         "shares": np.array(outline.posture_of(joints_m, speed_m_s)),
         "pose": outline.pose_of(joints_m), "novelty_m": outline.novelty_m(joints_m, known.poses),
-        "from": outline.seen_from(joints_m, *front, eye_m),
+        "from": outline.view_angle(joints_m, front, eye_m),
         "is_folded": outline.is_folded(joints_m),
     }  # fmt: skip
 
@@ -1887,7 +1887,7 @@ def believe(rig: Rig, found: Arrays, is_floor_known: bool) -> bool:
     """Return whether keypoints (C, J, ...) are believed to be a person's."""
     floor_m = rig.floor_m if is_floor_known else None
     joints = (found[name] for name in ("px", "confidence", "sigma_px"))
-    return believing.is_somebody(*joints, rig.cameras, floor_m)
+    return plausibility.is_person(*joints, rig.cameras, floor_m)
 
 
 # --- Recorded motion (importer.py) ---------------------------------------------------------------
@@ -2103,22 +2103,23 @@ def agree(rig: Rig, candidates: Any) -> tuple[Any, list[Any]]:
     """Return the windows (C, 4) of each proposal, best first, of candidates (C,) of windows, and
     those that are left without the first one's."""
     known = [[_roi(each) for each in found] for found in candidates]
-    proposed = [[_window(w) for w in each] for each in searching.proposals(known, rig.cameras)]
+    proposed = [[_window(w) for w in each] for each in searching.propose_people(known, rig.cameras)]
     first = searching.agreed_windows(known, rig.cameras)
-    left = searching.apart_from(known, [first])
+    left = searching.exclude_people(known, [first])
     return np.array(proposed).reshape(-1, len(known), 4), [len(each) for each in left]
 
 
 def keep_distinct(found: Any, n_cameras: int) -> list[Any]:
     """Return each camera's people of all that were found: camera, score, window."""
-    kept = searching.distinct([(c, s, _roi(w)) for c, s, w in found], n_cameras)
+    candidates = [searching.Found(c, s, _roi(w)) for c, s, w in found]
+    kept = searching.drop_duplicates(candidates, n_cameras)
     return [[_window(each) for each in some] for some in kept]
 
 
 def to_pinhole(rig: Rig, found: Arrays) -> Arrays:
     """Return keypoints (B, C, W, J) of images with lenses as pinholes would show them."""
     joints = (found[name] for name in ("px", "confidence", "sigma_px"))
-    return _keypoints(lensed.pinhole_keypoints(Keypoints(*joints), rig.cameras))
+    return _keypoints(lenses.pinhole_keypoints(Keypoints(*joints), rig.cameras))
 
 
 class Drawn:
@@ -2144,7 +2145,7 @@ class Drawn:
 
 def view_through_lens(rig: Rig, drawn: Drawn, c: int, window: Window) -> Picture:
     """Return a window of a camera's image as its lens distorts it."""
-    return lensed.Lensed(drawn, rig.cameras).crop(c, _roi(window))
+    return lenses.LensRenderer(drawn, rig.cameras).crop(c, _roi(window))
 
 
 def sample_picture(picture: Picture, window: Window, side_px: int) -> Picture:
@@ -2168,8 +2169,8 @@ def spoil_picture(
     seeds: tuple[int, ...],
 ) -> Picture:  # fmt: skip
     """Return a picture of a window of the first camera with one fault."""
-    shown = corruptions.Shown(picture, rig.cameras[0], _roi(window), seeds)
-    return corruptions.spoil(shown, faults.FaultConfig(kind, (0,), amount))
+    shown = corruptions.CropView(picture, rig.cameras[0], _roi(window), seeds)
+    return corruptions.corrupt(shown, faults.FaultConfig(kind, (0,), amount))
 
 
 class Film:
@@ -2179,13 +2180,14 @@ class Film:
         """Plan faults, mappings with the names of `FAULT_FIELDS`."""
         configs = tuple(faults.FaultConfig(**_renamed(each, FAULT_FIELDS)) for each in wrong)
         plan = fault_schedule.Schedule(rig.configs, configs, step_s)
-        self._film = camera_film.CameraFilm(lensed.Lensed(drawn, rig.cameras), plan)
+        self._film = camera_film.CameraFilm(lenses.LensRenderer(drawn, rig.cameras), plan)
         self._rig = rig
 
     def show(self, step: int, now: Arrays, before: Arrays, shown: Any, seed: int) -> None:
         """Show people and arm now, as they were a step before, to the cameras that are `shown`."""
         at, was = (_posed(each) for each in (now, before))
-        shot = camera_film.Shot(step, now["q"], at, (before["q"], was), self._rig.cameras)
+        pose, last = camera_film.ScenePose(now["q"], at), camera_film.ScenePose(before["q"], was)
+        shot = camera_film.Shot(step, pose, last, self._rig.cameras)
         self._film.show([shot if c in shown else None for c in range(len(self._rig.cameras))], seed)
 
     def take(self, c: int, window: Window) -> Picture:
@@ -2274,7 +2276,7 @@ class Follower:
 
 def joints_by(find: Callable[[Picture], Any], picture: Picture, window: Window) -> Any:
     """Return joints (J, 3) that somebody's own function finds in a picture of a window."""
-    return detector.own_joints(find, picture, _roi(window))
+    return detector.call_detector(find, picture, _roi(window))
 
 
 class Renderer:
@@ -2284,7 +2286,7 @@ class Renderer:
         """Make a renderer of the rig's scene with workers."""
         scene = build_scene(rig.scene.config, rig.scene.name, n_workers, names)
         self._renderer = CropRenderer(scene)
-        self._lensed = lensed.Lensed(self._renderer, scene.cameras)
+        self._lensed = lenses.LensRenderer(self._renderer, scene.cameras)
 
     def pose(self, people: Arrays) -> None:
         """Pose arm and people, whose bodies are rows of the names."""
@@ -2317,7 +2319,7 @@ class Searches:
     def tick(self, has_image: list[bool]) -> list[int]:
         """Count a step and return the cameras whose images are to be searched."""
         self._schedule.tick(0)
-        return self._schedule.due(0, has_image)
+        return self._schedule.due_cameras(0, has_image)
 
     def remember(self, cameras: list[int], found: list[list[Window]]) -> list[list[Window]]:
         """Keep what some cameras show and return it with what others showed lately."""
@@ -2330,8 +2332,8 @@ class Searches:
 
     def count(self, worker: int, shown: NDArray[np.bool_], has_image: list[bool]) -> list[int]:
         """Count the cameras that show a worker and return those to be searched for them."""
-        self._workers.saw(0, worker, shown)
-        return self._workers.blind(0, worker, has_image)
+        self._workers.count(0, worker, shown)
+        return self._workers.blind_cameras(0, worker, has_image)
 
     def learn(
         self,
@@ -2343,24 +2345,39 @@ class Searches:
         """Learn what a search for a worker has shown."""
         candidates = [list(map(_roi, each)) for each in found]
         theirs = [list(map(_roi, each)) for each in others]
-        self._workers.found(0, worker, candidates, list(map(_roi, windows)), theirs)
+        self._workers.learn(0, worker, candidates, list(map(_roi, windows)), theirs)
 
     def look(self, worker: int, expected: list[Window]) -> list[Window]:
         """Return where the cameras look for a worker."""
-        return list(map(_window, self._workers.windows(0, worker, list(map(_roi, expected)))))
+        return list(
+            map(_window, self._workers.choose_windows(0, worker, list(map(_roi, expected))))
+        )
 
 
 # --- Shield and incidents (shield.py) ------------------------------------------------------------
 
 SHIELD_SETTINGS: dict[str, str] = {
-    name: name
-    for name in (
-        "kind", "margin_m", "hand_margin_m", "sigmas", "least_sigmas_m", "predicted_m_s",
-        "doubtful_m", "doubtful_sigmas", "human_m_s", "human_margin_m_s", "human_s", "latency_s",
-        "reaction_s", "deceleration_m_s2", "gain_hz", "retreat_m_s", "unseen_s", "unknown_m_s",
-        "welcome_m_s", "still_m_s",
-    )
-}  # fmt: skip
+    "kind": "kind",
+    "margin_m": "margin_m",
+    "hand_margin_m": "hand_margin_m",
+    "sigmas": "n_sigmas",
+    "least_sigmas_m": "min_uncertainty_m",
+    "predicted_m_s": "prediction_growth_m_s",
+    "doubtful_m": "single_view_std_m",
+    "doubtful_sigmas": "single_view_sigmas",
+    "human_m_s": "worker_speed_m_s",
+    "human_margin_m_s": "worker_speed_margin_m_s",
+    "human_s": "worker_time_s",
+    "latency_s": "latency_s",
+    "reaction_s": "reaction_s",
+    "deceleration_m_s2": "deceleration_m_s2",
+    "gain_hz": "retreat_gain_hz",
+    "retreat_m_s": "max_retreat_m_s",
+    "unseen_s": "stale_after_s",
+    "unknown_m_s": "unknown_speed_limit_m_s",
+    "welcome_m_s": "contact_speed_m_s",
+    "still_m_s": "creep_m_s",
+}
 """Names of the probes for settings of shields, and today's fields."""
 N_SEGMENTS = len(contact.SEGMENT_REGIONS)
 BODY_REGIONS = tuple(contact.REGIONS)
@@ -2419,25 +2436,25 @@ class Guarded:
         chosen = settings
         if not isinstance(settings, str):
             chosen = {SHIELD_SETTINGS[name]: value for name, value in settings.items()}
-        shield = shield_called(chosen)
+        shield = find_shield(chosen)
         assert shield is not None, "These settings are of a shield."
-        allowed, given = shielded(shield, self._now, wanted, step_s)
-        return {"allowed": allowed, **given}
+        allowed, given = apply_shield(shield, self._now, wanted, step_s)
+        return {"allowed": allowed, **{RENAMED.get(k, k): value for k, value in given.items()}}
 
     def constrain(
         self, wanted: NDArray[np.float64], step_s: float, settings: Mapping[str, Any]
     ) -> dict[str, NDArray[Any]]:
         """Return the rows that a shield keeps, as sums over them."""
         config = ShieldConfig(**{SHIELD_SETTINGS[name]: each for name, each in settings.items()})
-        arm, lost = describe_arm(self._now), find_undetected(self._now, config).lost
-        found = constraints(self._now, arm, lost, wanted, step_s, config)
+        pose, lost = describe_pose(self._now), find_undetected(self._now, config).is_lost
+        found = build_constraints(self._now, pose, lost, wanted, step_s, config)
         is_row = np.arange(found.b.shape[1]) < found.n_rows[:, None]
         J, b = np.where(is_row[..., None], found.J, 0.0), np.where(is_row, found.b, 0.0)
         return {
             "n_rows": found.n_rows, "J": J.sum(1), "b": b.sum(1),
             "Jb": np.einsum("brn,br->bn", J, b), "JJ": (J**2).sum(1), "low": found.low,
             "high": found.high,
-            "least_m": np.where(np.isinf(found.least_m), 9.0, found.least_m),
+            "least_m": np.where(np.isinf(found.clearance_m), 9.0, found.clearance_m),
         }  # fmt: skip
 
     def measure(self) -> dict[str, NDArray[np.float64]]:
@@ -2454,8 +2471,11 @@ class Guarded:
 
 def default_shields() -> dict[str, NDArray[Any]]:
     """Return the numbers of the shields that come with the package."""
-    return {name: np.array([config.record()[0][field] for field in config.record().dtype.names])
-            for name, config in PRESETS.items()}  # fmt: skip
+    fields = [field for field in SHIELD_SETTINGS.values() if field != "kind"]
+    return {
+        name: np.array([getattr(config, field) for field in fields], float)
+        for name, config in PRESETS.items()
+    }
 
 
 def solve_rows(
@@ -2464,7 +2484,8 @@ def solve_rows(
 ) -> NDArray[np.float64]:  # fmt: skip
     """Return the nearest velocities that keep rows as far as their weights ask."""
     x = np.empty_like(wanted)
-    solver.solve(J, b, weight, low, high, wanted, x, np.empty((len(x) + 3, len(x))))
+    problem = solver.Problem(J, b, weight, low, high, wanted)
+    solver.solve(problem, x, np.empty((len(x) + 3, len(x))))
     return x
 
 
@@ -2513,14 +2534,14 @@ class Watched:
         state = chains.robot_state(self._chain, np.zeros_like(qd), qd)
         nowhere, turn = np.zeros((*held.shape, 3)), np.zeros((*held.shape, 4))
         world = World(robot=state, objects=ObjectState(nowhere, turn, nowhere, nowhere, held))
-        paths = incidents.measured(robot, robot_m, workers, worker_m)
+        paths = incidents.measure_paths(robot, robot_m, workers, worker_m)
         found = self._watch.step(world, paths)
-        told = incidents.summed_up(found, self._watch.known)
-        values = {f"one/{name}": found[name].copy() for name in found.dtype.names}
-        values |= {f"all/{name}": told[name].copy() for name in told.dtype.names}
-        known = self._watch.known
-        values |= {f"known/{name}": known[name].copy() for name in known.dtype.names}
-        return {**values, "stop_s": self._watch.stop_s(state)}
+        told = incidents.summarize(found, self._watch.history)
+        values = {}
+        for group, records in (("one", found), ("all", told), ("known", self._watch.history)):
+            for name in records.dtype.names:
+                values[f"{group}/{name.removeprefix('is_')}"] = records[name].copy()
+        return {**values, "stop_s": self._watch.find_stop_time(state)}
 
 
 def start_near(home: NDArray[np.float64], spread: NDArray[np.float64], seeds: list[int]) -> Any:

@@ -50,7 +50,7 @@ def test_everything_said_reaches_the_environment():
     assert (simulation.scene.name, simulation.control) == ("site", "tool")
     assert list(simulation.settings["n_workers"]) == [1, 2]
     assert config.motion.people != settle().config.motion.people
-    assert [(fault.kind, fault.how_much) for fault in config.faults] == [("late", 0.2)]
+    assert [(fault.kind, fault.max_amount) for fault in config.faults] == [("late", 0.2)]
     assert (config.reward.proximity, config.worker) == (0.5, "any")
     assert simulation.shield.keywords["config"] == ShieldConfig("ssm", margin_m=0.1)
     env.close()

@@ -134,7 +134,7 @@ def test_eyes_are_what_their_names_say():
     assert QUESTIONS.keys() == CONTRASTS.keys()
     (turned,) = known["all_turned_1deg"].turns("lab")
     assert turned.faults[0].kind == "wrong_rotation"
-    assert turned.faults[0].how_much == pytest.approx(np.deg2rad(1))
+    assert turned.faults[0].max_amount == pytest.approx(np.deg2rad(1))
     assert len(known["one_frozen"].turns("lab")) == 4
     assert known["half_covariance"].covariance == 0.5
     assert known["paper_restarts"].setup == PerceptionSetup(estimator="paper_restarts")

@@ -11,7 +11,7 @@ from hrc_env.core.skeleton import JOINT
 from hrc_env.geometry.cameras import image_from_pinhole, inside_image, project, projections
 from hrc_env.motion import generator
 from hrc_env.perception.detector import PoseDetector
-from hrc_env.perception.lensed import Lensed
+from hrc_env.perception.lenses import LensRenderer
 from hrc_env.perception.searching import FITTING, ImageSource, search_windows
 from hrc_env.scene.build import build
 from hrc_env.scene.domain_randomization import APPEARANCES, draw_look
@@ -36,7 +36,7 @@ class Search:
     def __init__(self, name):
         self.scene = build(name=name, n_workers=1)
         self.renderer = CropRenderer(self.scene)
-        self.source = Lensed(self.renderer, self.scene.cameras)
+        self.source = LensRenderer(self.renderer, self.scene.cameras)
         self.detector = PoseDetector(self.scene.cameras, None, floor(self.scene.grounds))
 
     def detect(self, q, motion, look=None):

@@ -1,5 +1,5 @@
-"""Two cameras of which one hangs askew: they are turned until they agree, and it is said how far
-off the body may be."""
+"""Two cameras of which one is turned against its calibration: the turns are found, and the body's
+uncertain displacement is reported."""
 
 import numpy as np
 import pytest

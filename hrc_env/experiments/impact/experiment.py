@@ -39,7 +39,7 @@ from hrc_env.experiments.setups import (
 )
 from hrc_env.experiments.stage import N_TOGETHER, PEOPLE
 from hrc_env.experiments.versions import key_of, source_digest
-from hrc_env.safety.shield import shield_called
+from hrc_env.safety.shield import find_shield
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import find_task
 from hrc_env.tracking.estimators import find_estimator
@@ -80,7 +80,7 @@ class Impact:
     def __post_init__(self) -> None:
         """Raise `ConfigError` for what cannot work."""
         find_task(self.task)
-        shield_called(self.shield)
+        find_shield(self.shield)
         at_least_one(self, "n_seeds", "n_pixels", "n_steps", "learning_steps")
         for name in self.policies:
             if name in POLICIES:

@@ -118,9 +118,10 @@ def _update_worker(
         tree, noise, has_rivals = worker.trees[h], worker.noise[h], worker.n_alive[0] > 1
         branches = searches_now and h == 0
         is_weighed = has_rivals or branches
-        if read_for_hypothesis(
+        is_mirrored = read_for_hypothesis(
             tree, worker.views[h], noise, measured, b, w, settings, frame
-        ) and acquire(tree, frame, settings):  # the body was tracked with its sides exchanged
+        )
+        if is_mirrored and acquire(tree, frame, settings):
             tree.slope[:] = 0.0
         evidence = condition_on_frame(tree, prior, is_weighed, frame, settings, work)
         if is_weighed:

@@ -214,7 +214,8 @@ def measure_gaps(tree: Tree, frame: Frame, rows: Floats, gap: Floats, variance: 
     a, b = pair.cameras[0], pair.cameras[1]
     turned, cameras = np.empty((2, 3, 4)), np.empty(2, CAMERA)
     for k in range(2):
-        turn_camera(frame.cameras[pair.cameras[k]], pair.turn[3 * k : 3 * k + 3], turned[k])
+        c: int = pair.cameras[k]
+        turn_camera(frame.cameras[c], pair.turn[3 * k : 3 * k + 3], turned[k])
     model_cameras(turned, cameras)
     one, other, middle, normal = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for j in range(len(frame.ok)):
@@ -222,7 +223,8 @@ def measure_gaps(tree: Tree, frame: Frame, rows: Floats, gap: Floats, variance: 
             continue
         look(cameras[0].back, frame.z[j, a, 0], frame.z[j, a, 1], one)
         look(cameras[1].back, frame.z[j, b, 0], frame.z[j, b, 1], other)
-        far_a, far_b, _ = nearest_places(cameras[0].eye, one, cameras[1].eye, other, middle)
+        crossing = nearest_places(cameras[0].eye, one, cameras[1].eye, other, middle)
+        far_a, far_b = crossing.distance_1, crossing.distance_2
         if not (far_a > 0.0 and far_b > 0.0):
             continue
         _write_normal(one, other, normal)
@@ -326,5 +328,5 @@ def write_projections(pair: Pair, frame: Frame) -> None:
                 frame.P[c, i, k] = frame.cameras[c].P[i, k]
     if pair.is_misaligned:
         for k in range(2):
-            c = pair.cameras[k]
+            c: int = pair.cameras[k]
             turn_camera(frame.cameras[c], pair.turn[3 * k : 3 * k + 3], frame.P[c])
