@@ -22,10 +22,10 @@ from hrc_env.safety.separation import protective_distance
 from hrc_env.safety.shield import SHIELDS, apply_shield, find_shield
 from hrc_env.scene.build import build
 from hrc_env.scene.domain_randomization import AppearanceConfig
-from hrc_env.scene.robot import ROBOTS, chain_of
+from hrc_env.scene.robot import ROBOTS, make_chain
 from hrc_env.settings import settle
 
-ARM, BASE = (chain_of(ROBOTS[name], (0.0, 0.0, 0.0)) for name in ("ur10e_like", "mobile_base"))
+ARM, BASE = (make_chain(ROBOTS[name], (0.0, 0.0, 0.0)) for name in ("ur10e_like", "mobile_base"))
 
 
 @pytest.mark.parametrize(

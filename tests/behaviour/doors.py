@@ -62,18 +62,20 @@ from hrc_env.geometry.robot_model import RobotModel
 from hrc_env.geometry.rotations import matrix
 from hrc_env.geometry.triangulation import linear_point, triangulate
 from hrc_env.mocap import footing, person, repair, stance
-from hrc_env.mocap.guess import first_guess
-from hrc_env.mocap.poses import joints_in, marks_of, posed
+from hrc_env.mocap.guess import guess_controls
+from hrc_env.mocap.poses import locate_joints, make_marks, pose_segments
 from hrc_env.mocap.read import read_recording as read_capture
 from hrc_env.mocap.record import Capture
-from hrc_env.mocap.retarget import adapted, fitted, retarget
+from hrc_env.mocap.retarget import fit_controls, retarget, scale_joints
 from hrc_env.motion import config as motion_config
 from hrc_env.motion import floorplan, lying, paths, repertoire, routes, schedule, starting, starts
 from hrc_env.motion import generator as motion
-from hrc_env.motion.activities.pieces import stage, stocked
-from hrc_env.motion.anatomy import anatomy
-from hrc_env.motion.clip import Clip, fitted_to, load_clip, placed_at_origin, save_clip
-from hrc_env.motion.traffic import meets
+from hrc_env.motion.activities.pieces import cut_clips as cut_into_pieces
+from hrc_env.motion.activities.pieces import make_stage
+from hrc_env.motion.anatomy import measure_body as measure_anatomy
+from hrc_env.motion.clip import Clip, load_clip, move_to_origin, save_clip, scale_clip
+from hrc_env.motion.points import Point
+from hrc_env.motion.traffic import find_meeting
 from hrc_env.perception import (
     blazepose,
     calibration,
@@ -99,13 +101,13 @@ from hrc_env.safety.shield import apply_shield, find_shield
 from hrc_env.safety.unseen import find_undetected
 from hrc_env.scene import domain_randomization as looks
 from hrc_env.scene import rigs
-from hrc_env.scene.build import SceneConfig, drawing_model, visuals
+from hrc_env.scene.build import SceneConfig, drawing_model, find_visuals
 from hrc_env.scene.build import build as build_scene
-from hrc_env.scene.objects import held_by
+from hrc_env.scene.objects import find_held
 from hrc_env.scene.render import CropRenderer
 from hrc_env.scene.rig import make_cameras
-from hrc_env.scene.rigs import floor as floor_points
-from hrc_env.scene.robot import ROBOTS, chain_of
+from hrc_env.scene.rigs import sample_floor as floor_points
+from hrc_env.scene.robot import ROBOTS, make_chain
 from hrc_env.settings import settle
 from hrc_env.simulation import Simulation
 from hrc_env.tasks.reach import MIDDLE
@@ -328,22 +330,22 @@ class Env:
     def describe_rig(self) -> dict[str, NDArray[Any]]:
         """Return which places the cameras see, and how many sentences there are on the rig."""
         scene = self._simulation.scene
-        places = rigs.workspace(scene.grounds)
+        places = rigs.sample_workspace(scene.grounds)
         return {
-            "places_m": places, "seen": rigs.sees(scene.cameras, scene.obstacles, places).T,
-            "n_findings": np.array([len(rigs.findings(scene))]),
+            "places_m": places, "seen": rigs.find_visible(scene.cameras, scene.obstacles, places).T,
+            "n_findings": np.array([len(rigs.describe_defects(scene))]),
         }  # fmt: skip
 
     def dress(self, appearance: str, seed: int) -> dict[str, NDArray[Any]]:
         """Return how an episode of an appearance looks to the cameras."""
         scene = self._simulation.scene
-        built, model, worn = drawing_model(scene), drawing_model(scene), visuals(scene)
+        built, model, worn = drawing_model(scene), drawing_model(scene), find_visuals(scene)
         rng = np.random.default_rng([seed, 49])
         look = looks.draw_look(looks.APPEARANCES[appearance], scene.n_workers, rng)
         looks.randomize(model, built, worn, look)
-        looks.take_off_hats(model, worn, look)
+        looks.hide_hats(model, worn, look)
         drawn = mujoco.MjvScene(model, maxgeom=80)
-        looks.strew(drawn, scene.grounds, look)
+        looks.add_litter(drawn, scene.grounds, look)
         litter = np.zeros((looks.MOST_LITTER, 19))
         for row, geom in zip(litter, drawn.geoms[: drawn.ngeom], strict=False):
             row[:] = [*geom.size, *geom.pos, *np.ravel(geom.mat), *geom.rgba]
@@ -522,7 +524,7 @@ def can_reach(
     """Return whether a robot at the origin is thought to get its tool to a place."""
     target = ReachTarget("a place", place_m, along, within_m)
     try:
-        check_reach("a probe", robot, chain_of(ROBOTS[robot], (0.0, 0.0, 0.0)), [target])
+        check_reach("a probe", robot, make_chain(ROBOTS[robot], (0.0, 0.0, 0.0)), [target])
     except ConfigError:
         return False
     return True
@@ -584,7 +586,7 @@ def objects_in_hand(
     away = np.arange(n_objects)[:, None] * [0.02, 0, 0, 0, 0, 0, 0]
     qpos[:, first:] = (poses[:, None] + away).reshape(n, -1)
     held = [
-        held_by(objects, qpos, points_m, HandState(np.zeros(n), np.zeros(n), closed))
+        find_held(objects, qpos, points_m, HandState(np.zeros(n), np.zeros(n), closed))
         for closed in (np.ones(n, bool), np.arange(n) % 2 == 0)
     ]
     env.close()
@@ -857,7 +859,7 @@ def list_jobs(work: str) -> Arrays:
 def measure_body(name: str) -> Arrays:
     """Return the measures of a baked body, each (1, ...) [m]."""
     body = bodies.load_body(name)
-    bones = anatomy(body)
+    bones = measure_anatomy(body)
     measures = {
         "stature_m": body.stature_m,
         "rest_m": body.rest_position,
@@ -868,15 +870,15 @@ def measure_body(name: str) -> Arrays:
         "capsule_radius_m": body.capsule_radius_m,
         "bone_offset_m": bones.offset,
         "bone_frame": bones.frame,
-        "sizes_m": bones.size,
-        "rounds": bones.round,
+        "sizes_m": bones.lengths,
+        "rounds": bones.trunk_ends,
     }
     return {key: np.asarray(value)[None] for key, value in measures.items()}
 
 
 def pose_body(name: str, controls: NDArray[np.float64]) -> Arrays:
     """Return where the segments of a body are in poses (T, controls)."""
-    position, turn, _ = posed(controls, anatomy(bodies.load_body(name)))
+    position, turn, _ = pose_segments(controls, measure_anatomy(bodies.load_body(name)))
     return {"position_m": position, "turn": turn}
 
 
@@ -886,11 +888,11 @@ def perform_scene(
 ) -> Arrays:  # fmt: skip
     """Return what a worker alone does in a scene of the repertoire, moment by moment; at another
     height than usual if one is given."""
-    me = repertoire.alone(bodies.load_body(body), place[:2], place[2], is_right)
+    me = repertoire.make_worker(bodies.load_body(body), place[:2], place[2], is_right)
     rng = np.random.default_rng(seed)
     acts = repertoire.SCENES[name]
     if height_m is not None:
-        acts = tuple((activity, start, height_m) for activity, start, _ in acts)
+        acts = tuple(act._replace(height_m=height_m) for act in acts)
     return _join_films(repertoire.perform(acts, me, rng, every_s))
 
 
@@ -900,7 +902,7 @@ def perform_reaches(
 ) -> Arrays:  # fmt: skip
     """Return reaches one after the other of a worker beside the robot, or elsewhere."""
     config = motion_config.MotionConfig(people=motion_config.PeopleConfig(sudden_probability=0.3))
-    numbers = motion_config.numbers(config, (0.0, 0.0))
+    numbers = motion_config.make_hand_params(config, Point(0.0, 0.0))
     reach, lift = ACTIVITIES.index("reach"), ACTIVITIES.index("lift")
 
     def start_reach(draws: Any, height: float, me: Any) -> float:
@@ -909,8 +911,9 @@ def perform_reaches(
     def start_lift(draws: Any, height: float, me: Any) -> float:
         return starting.start_lift(draws, numbers, me)
 
-    me = repertoire.alone(bodies.load_body(body), (1.15, 0.1), np.pi + 0.1, is_right)
-    acts = [(reach, start_reach, height_m), (lift, start_lift, 0.0)] * n_acts
+    me = repertoire.make_worker(bodies.load_body(body), (1.15, 0.1), np.pi + 0.1, is_right)
+    reaches = repertoire.Act(reach, start_reach, height_m)
+    acts = [reaches, repertoire.Act(lift, start_lift, 0.0)] * n_acts
     return _join_films(repertoire.perform(acts, me, np.random.default_rng(seed), every_s))
 
 
@@ -931,7 +934,7 @@ def _join_films(films: Any) -> Arrays:
 
 def place_body(names: tuple[str, ...], rows: NDArray[np.int64], segments: Arrays) -> Arrays:
     """Return joints, their velocities and capsules of bodies (N,) whose segments are given."""
-    body, now = bodies.stack(names), _motion_of(segments, rows)
+    body, now = bodies.load_bodies(names), _motion_of(segments, rows)
     truth = bodies.worker_truth(body, now)
     path = WorkerPath(now.position_world[:, None], now.quaternion_wxyz[:, None])
     return {
@@ -983,16 +986,16 @@ def read_clip(path: Path) -> Any:
 
 def time_pieces(clips: Any, names: tuple[str, ...], place: str) -> float:
     """Return how long the pieces last into which clips are cut for bodies in a place [s]."""
-    sizes = np.stack([anatomy(bodies.load_body(name)).size for name in names])
-    plan = floorplan.floorplan(Floor(place).grounds)
-    return stocked(clips, sizes, stage(plan, motion_config.MotionConfig())).lasts_s
+    sizes = np.stack([measure_anatomy(bodies.load_body(name)).lengths for name in names])
+    plan = floorplan.make_floorplan(Floor(place).grounds)
+    return cut_into_pieces(clips, sizes, make_stage(plan, motion_config.MotionConfig())).lasts_s
 
 
 def list_clip(clip: Any) -> Arrays:
     """Return what a clip holds, and its controls from the origin on."""
     return {
         "controls": clip.controls, "contacts": clip.contacts, "size_m": clip.size,
-        "at_origin": placed_at_origin(clip.controls), "fps": np.array([clip.fps]),
+        "at_origin": move_to_origin(clip.controls), "fps": np.array([clip.fps]),
         "source": np.array([clip.source], "U"),
     }  # fmt: skip
 
@@ -1003,7 +1006,7 @@ class Floor:
     def __init__(self, place: str) -> None:
         """Measure the floor of "lab", "site" or "open"."""
         self.grounds = motion.OPEN_FLOOR if place == "open" else build_scene(name=place).grounds
-        self._plan = floorplan.floorplan(self.grounds)
+        self._plan = floorplan.make_floorplan(self.grounds)
         self.x_m, self.y_m = self.grounds.walkable_x_m, self.grounds.walkable_y_m
         self.robot_m = self.grounds.robot_xy_m
 
@@ -1019,24 +1022,24 @@ class Floor:
             "blocked_m": np.asarray(grounds.blocked, float).reshape(1, -1),
             "places": np.array(at),
             "kinds": np.array(words, "U"),
-            "room_for": np.array([floorplan.room_for(self._plan, m) for m in apart]),
+            "room_for": np.array([floorplan.count_room(self._plan, m) for m in apart]),
         }
 
     def measure_slack(self, points_m: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the room (N,) round points (N, 2) [m]."""
         plan = self._plan
-        slack = [floorplan.slack_at(x, y, plan.slack, plan.origin) for x, y in points_m.tolist()]
+        slack = [floorplan.read_slack(x, y, plan.grid) for x, y in points_m.tolist()]
         return np.array(slack)
 
     def lay_loads(self, seed: int) -> Arrays:
         """Return the loads that lie about at first, and a little off their places."""
-        first = lying.at_first(self.grounds.places, schedule.JOBS)
+        first = lying.make_loads(self.grounds.places, schedule.JOBS)
         laid = np.zeros(len(first) + 1, first.dtype)
-        lying.lay_out(laid, first, np.random.default_rng(seed))
+        lying.reset_loads(laid, first, np.random.default_rng(seed))
         return {
             "first": first["pose"].copy(), "shown": laid["shown"].copy(),
-            "stand": laid["stand"].copy(), "at": laid["at"].copy(), "free": lying.on_top(laid),
-            "in_the_way": lying.in_the_way(laid),
+            "stand": laid["stand"].copy(), "at": laid["at"].copy(),
+            "free": lying.find_uncovered(laid), "in_the_way": lying.list_load_discs(laid),
         }  # fmt: skip
 
     def find_way(
@@ -1045,10 +1048,13 @@ class Floor:
     ) -> Arrays:  # fmt: skip
         """Return whether there is a way past discs (n, 3), and its points and directions at shares
         of its length."""
-        me, plan = repertoire.alone(bodies.load_body()), self._plan
-        ends = tuple(map(float, start_m)), tuple(map(float, end_m))
-        found = routes.route(*ends, bow, discs, plan.slack, plan.origin, me)
-        ways = [(*paths.along(s, me), paths.facing(s, me)) for s in shares * me["length"]]
+        me, plan = repertoire.make_worker(bodies.load_body()), self._plan
+        ends = Point(*map(float, start_m)), Point(*map(float, end_m))
+        found = routes.find_route(*ends, bow, discs, plan.grid, me)
+        ways = [
+            (*paths.locate_on_path(s, me), paths.average_heading(s, me))
+            for s in shares * me["length"]
+        ]
         facts = float(me["length"]), float(me["sharpest"]), float(me["n_pieces"])
         way = np.array(ways) if found else np.full((len(shares), 3), np.nan)
         return {"found": found, "way": way, "facts": np.array(facts if found else (0.0,) * 3)}
@@ -1085,7 +1091,7 @@ class Crew:
         )
         grounds = dataclasses.replace(grounds, places=(*grounds.places, *more))
         self.robot_m = grounds.robot_xy_m
-        self.names, self._body = names, bodies.stack(names)
+        self.names, self._body = names, bodies.load_bodies(names)
         self._state = motion.make_state(
             batch, n_workers, self._body, config, grounds, fewest, girth_m
         )
@@ -1111,7 +1117,11 @@ class Crew:
     def move(self) -> Arrays:
         """Return the bodies now: arrays (B, W, ...), and what they are about."""
         now, held, workers = self._now, self._now.held, self._state.workers
-        fields = ("job", "going", "at", "doing", "reaction", "time_s", "duration_s", "pace", "spot")
+        fields = {
+            "job": "job", "going": "travel", "at": "place_kind", "doing": "current_reaction",
+            "reaction": "planned_reaction", "time_s": "time_s", "duration_s": "duration_s",
+            "pace": "pace", "spot": "place",
+        }  # fmt: skip
         return {
             "activity": motion.activity(self._state),
             "position_m": now.position_world,
@@ -1121,7 +1131,7 @@ class Crew:
             "body": now.body,
             "held": held.kind, "held_m": held.position_world, "held_turn": held.quaternion_wxyz,
             "path_m": self._path.position_world,
-            **{f"plan/{name}": np.array(workers[name]) for name in fields},
+            **{f"plan/{name}": np.array(workers[field]) for name, field in fields.items()},
         }  # fmt: skip
 
     def list_deeds(self) -> Arrays:
@@ -1145,7 +1155,7 @@ class Crew:
         """Return when and where workers would come too near to another if those of all environments
         were in one, (B W, 3)."""
         everyone = self._state.workers.reshape(-1)
-        return np.array([meets(w, everyone) for w in range(len(everyone))], float)
+        return np.array([find_meeting(w, everyone) for w in range(len(everyone))], float)
 
 
 # --- Tracker and geometry (tracker.py) -----------------------------------------------------------
@@ -1904,7 +1914,7 @@ def name_joints() -> tuple[str, ...]:
 
 def joints_of_segments(segments: Arrays, body: str) -> NDArray[np.float64]:
     """Return joints (T, 15, 3) as the network means them, of segments (T, 22, ...)."""
-    marks = marks_of(bodies.load_body(body), landmarks=True)
+    marks = make_marks(bodies.load_body(body), landmarks=True)
     arm = matrix(segments["turn"])[:, marks.segment] @ marks.offset[..., None]
     return segments["position_m"][:, marks.segment] + arm[..., 0]
 
@@ -1933,11 +1943,11 @@ def read_recording(
         read = read_capture(path, fps, source_fps, None, is_off_floor_allowed)
     except ConfigError:
         return None
-    facts = read.fps, read.landmarks, len(read.repaired)
+    facts = read.fps, read.are_landmarks, len(read.notes)
     return {
         "joints_m": read.joints_world,
         "facts": np.array([facts], float),
-        "names": np.array(read.found, "U"),
+        "names": np.array(read.node_names, "U"),
     }
 
 
@@ -1962,21 +1972,21 @@ def describe_clip(clip: Any, error: Any) -> Arrays:
 def fit_steps(joints_m: Any, fps: float, body: str) -> Arrays:
     """Return what comes of joints (T, 15, 3) step by step: wished, guessed, fitted, with
     feet locked."""
-    marks = marks_of(bodies.load_body(body), landmarks=True)
-    wished = adapted(np.asarray(joints_m, float), fps, marks)
-    poses = fitted(wished, fps, marks)
-    locked, stands = stance.locked(poses, fps, marks.anatomy.size)
+    marks = make_marks(bodies.load_body(body), landmarks=True)
+    wished = scale_joints(np.asarray(joints_m, float), fps, marks)
+    poses = fit_controls(wished, fps, marks)
+    locked, stands = stance.lock_feet(poses, fps, marks.anatomy.lengths)
     return {
-        "wished_m": wished, "guess": first_guess(wished, fps, marks), "poses": poses,
+        "wished_m": wished, "guess": guess_controls(wished, fps, marks), "poses": poses,
         "locked": locked, "stands": stands,
-        "joints_m": joints_in(locked, marks),
-        "slip_m_s": stance.slip(locked, stands, fps, marks.anatomy),
+        "joints_m": locate_joints(locked, marks),
+        "slip_m_s": stance.measure_slip(locked, stands, fps, marks.anatomy),
     }  # fmt: skip
 
 
 def fit_clip(clip: Any, body: str) -> NDArray[np.float64]:
     """Return a clip's controls for a worker of other measures."""
-    return fitted_to(clip, anatomy(bodies.load_body(body)).size)
+    return scale_clip(clip, measure_anatomy(bodies.load_body(body)).lengths)
 
 
 def made_clip(values: Arrays, fps: float) -> Any:
@@ -1989,9 +1999,11 @@ def made_clip(values: Arrays, fps: float) -> Any:
 def cut_clips(clips: Any, names: tuple[str, ...], place: str) -> Arrays | None:
     """Return the pieces into which clips are cut for bodies in a place; None: refused."""
     config = motion_config.MotionConfig()
-    sizes = np.stack([anatomy(bodies.load_body(name)).size for name in names])
+    sizes = np.stack([measure_anatomy(bodies.load_body(name)).lengths for name in names])
     try:
-        pieces = stocked(clips, sizes, stage(floorplan.floorplan(Floor(place).grounds), config))
+        pieces = cut_into_pieces(
+            clips, sizes, make_stage(floorplan.make_floorplan(Floor(place).grounds), config)
+        )
     except ConfigError:
         return None
     return {
@@ -2002,23 +2014,27 @@ def cut_clips(clips: Any, names: tuple[str, ...], place: str) -> Arrays | None:
 
 def judge_floor(joints_m: NDArray[np.float64], fps: float) -> Arrays:
     """Return where feet rest, the floor's height, and joints on a level floor."""
-    height, rests = footing.supports(joints_m, fps)
-    levelled, changes = footing.level(joints_m, fps)
-    faults_found = len(footing.off_floor(joints_m, fps))
-    facts = footing.floor_height(joints_m, fps), len(changes), faults_found
+    height, rests = footing.find_support(joints_m, fps)
+    levelled, changes = footing.level_floor(joints_m, fps)
+    faults_found = len(footing.describe_floor_faults(joints_m, fps))
+    facts = footing.measure_floor_height(joints_m, fps), len(changes), faults_found
     return {"height_m": height, "rests": rests, "level_m": levelled, "facts": np.array(facts)}
 
 
 def measure_person(joints_m: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return stature, leg, two bones, and whether the first frame is a rest pose."""
-    bones = (person.length(joints_m, a, b) for a, b in (("shoulder", "elbow"), ("knee", "ankle")))
-    rest = repair.without_rest_pose(joints_m)[0]
-    return np.array([person.stature(joints_m), person.legs(joints_m), *bones, float(rest)])
+    bones = (
+        person.measure_bone(joints_m, a, b) for a, b in (("shoulder", "elbow"), ("knee", "ankle"))
+    )
+    rest = repair.skip_rest_pose(joints_m)[0]
+    return np.array(
+        [person.measure_stature(joints_m), person.measure_legs(joints_m), *bones, float(rest)]
+    )
 
 
 def resample(values: NDArray[np.float64], fps: float, wished_fps: float) -> NDArray[np.float64]:
     """Return values (T, ...) at another rate."""
-    return person.resampled(values, fps, wished_fps)
+    return person.resample(values, fps, wished_fps)
 
 
 # --- The detector (detector.py) ------------------------------------------------------------------
@@ -2556,8 +2572,8 @@ def start_apart(n: int, seed: int, spread_rad: float, people: str) -> dict[str, 
     ids, chain, state = np.arange(n), simulation.chain, simulation.motion
     home = np.tile(np.zeros(chain.n_joints), (1, 1))[0]
     spread = np.full(chain.n_joints, spread_rad)
-    q = starts.apart(
+    q = starts.begin_apart(
         ids, lambda some: starts.draw_near(home, spread, [rngs[b] for b in some]), state, rngs,
         chain, simulation.bodies,
     )  # fmt: skip
-    return {"q": q, "gap_m": starts.gap_m(ids, q, state, chain, simulation.bodies)}
+    return {"q": q, "gap_m": starts.measure_gap_m(ids, q, state, chain, simulation.bodies)}

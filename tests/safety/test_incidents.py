@@ -7,7 +7,7 @@ from hrc_env.agents.env_info import env_info
 from hrc_env.agents.registry import make_agent
 from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCEnv
-from hrc_env.motion.starts import gap_m
+from hrc_env.motion.starts import measure_gap_m
 from hrc_env.safety import contact, incidents
 from hrc_env.safety.contact import contact_force
 from hrc_env.safety.cost import COMPONENTS, CostConfig
@@ -169,9 +169,9 @@ def test_info_says_what_happened_and_chosen_parts_are_the_cost():
 def test_directed_speeds_add_up_to_how_the_gap_closes():
     simulation, _ = played(40, batch=40)
     moving = simulation.motion, simulation.chain, simulation.bodies
-    before = gap_m(np.arange(40), simulation.physics.q, *moving)
+    before = measure_gap_m(np.arange(40), simulation.physics.q, *moving)
     info = simulation.step(np.zeros((40, 6))).info
-    closing = (before - gap_m(np.arange(40), simulation.physics.q, *moving)) / DT
+    closing = (before - measure_gap_m(np.arange(40), simulation.physics.q, *moving)) / DT
     both = info["safety/robot_towards_m_s"] + info["safety/worker_towards_m_s"]
     near = np.isfinite(both)
     assert near.sum() > 10

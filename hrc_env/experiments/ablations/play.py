@@ -31,7 +31,7 @@ from hrc_env.pipeline.sensor_input import Generators, TrueSensorInput
 from hrc_env.pipeline.tracking import PoseTracking
 from hrc_env.scene.build import Scene, build
 from hrc_env.tracking.metrics import make_identities, measure_errors
-from hrc_env.worker.body import Body, pool, stack, worker_truth
+from hrc_env.worker.body import Body, load_bodies, select_bodies, worker_truth
 
 LEVEL = "keypoints"
 BODIES = "any"
@@ -56,7 +56,7 @@ class Walks:
 @lru_cache(maxsize=1)
 def walks_of(scene: str, n_workers: int, seeds: tuple[int, ...], n_steps: int) -> Walks:
     """Episodes of workers at their work, one a seed, each of n_steps."""
-    config, bodies = HRCConfig(), stack(pool(BODIES))
+    config, bodies = HRCConfig(), load_bodies(select_bodies(BODIES))
     place = build(config.scene, scene, n_workers, bodies.names)
     state = generator.make_state(len(seeds), n_workers, bodies, config.motion, place.grounds)
     rngs = [np.random.default_rng([seed, 0]) for seed in seeds]
