@@ -5,9 +5,10 @@
 # make test-ray     engines and training on a cluster of Ray, in a fresh environment
 # make test-long    what a release needs: that, and what takes longest
 # make train-quick  a policy
+# make docs         the site, in out/docs
 # make results      all numbers and pictures of the documentation made at older versions (hours)
 # make behaviour    whether anything behaves otherwise than recorded
-# make check        style, types, floors
+# make check        style, types, floors, language
 PYTHON ?= python3
 VENV ?= .venv
 STOCK := out/stock
@@ -16,23 +17,35 @@ RUN := $(VENV)/bin/python
 # What is installed: the environment; with its learner; with what develops it. Each has the former.
 CORE := $(VENV)/.core
 TRAIN := $(VENV)/.train
+DOCS := $(VENV)/.docs
 DEV := $(VENV)/.dev
 PYTEST := $(RUN) -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
-.PHONY: demo test test-all test-stock test-ray test-long behaviour check bench train-quick results clean
+.PHONY: demo test test-all test-stock test-ray test-long behaviour check bench train-quick docs results clean
 .DEFAULT_GOAL := demo
 
 $(CORE): NEEDED := .
 $(TRAIN): NEEDED := .[train]
 $(TRAIN): HAS := $(CORE)
 $(DEV): NEEDED := .[dev]
-$(DEV): HAS := $(CORE) $(TRAIN)
+$(DEV): HAS := $(CORE) $(TRAIN) $(DOCS)
 $(CORE) $(TRAIN) $(DEV): pyproject.toml constraints.txt
 	@test -x $(RUN) || $(PYTHON) -m venv $(VENV)
 	@echo "Installing hrc_env and what it needs into $(VENV) (a minute or two) ..."
 	@$(RUN) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e "$(NEEDED)"
 	@$(RUN) -m hrc_env setup
 	@touch $(HAS) $@
+
+# Imports the package and runs none of it: no weights, no kernels.
+$(DOCS): pyproject.toml constraints.txt
+	@test -x $(RUN) || $(PYTHON) -m venv $(VENV)
+	@echo "Installing hrc_env and what builds its site into $(VENV) (a minute) ..."
+	@$(RUN) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[docs]" || \
+		{ echo "make docs needs the packages of the extra docs: run it once with a network."; exit 1; }
+	@touch $@
+
+docs: $(DOCS)
+	$(RUN) -m docs.site
 
 demo: $(CORE)
 	$(RUN) -m hrc_env demo
@@ -71,6 +84,7 @@ check: $(DEV)
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/lint-imports
+	$(RUN) -m tests.language
 	$(VENV)/bin/pyright
 
 bench: $(DEV)

@@ -29,7 +29,11 @@ REFERENCE: dict[Path, Callable[[], str]] = {
     DOCS / "reference" / "shields.md": reference.shields,
     DOCS / "reference" / "leaderboard.md": leaderboard.page,
     DOCS / "reference" / "declarations.md": reference.declarations,
-    DOCS / "reference" / "names.md": names.page,
+    DOCS / "reference" / "names.md": names.index,
+    **{
+        DOCS / "reference" / "api" / names.page_name(each): partial(names.page, each)
+        for each in names.groups()
+    },
 }
 """Generated whole."""
 

@@ -1,6 +1,7 @@
 """Make the pictures of README and docs: python -m docs.make_pictures
 
-loop.jpg      the still of `python -m hrc_env demo`
+demo.webp     the film of `python -m hrc_env demo`
+loop.jpg      its still
 room.jpg      the lab from beside and from outside
 site.jpg      the construction site
 site_work.jpg  people at work on it
@@ -18,6 +19,7 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import cv2
 import gymnasium
@@ -27,7 +29,7 @@ from PIL import Image
 
 from benchmarks.gallery.still import views
 from hrc_env.agents.env_info import env_info
-from hrc_env.agents.experts import expert
+from hrc_env.agents.experts import make_expert
 from hrc_env.core.batching import copied
 from hrc_env.core.records import Roi
 from hrc_env.env import HRCEnv
@@ -45,12 +47,23 @@ from hrc_env.worker.body import worker_names
 
 PICTURES = Path(__file__).parent / "pictures"
 JPEG_QUALITY = 88
-FILM_PX, SEED_FILM, MOST_STEPS = {"width": 480, "height": 360}, 1, 800
+FILM_PX, SEED_FILM, MOST_STEPS = {"width": 640, "height": 480}, 1, 800
+DEMO_PX, DEMO_STEP = (960, 540), 2
+"""Of the demo's film: size, and which frames are kept."""
 STEPS_A_FRAME, FRAME_MS = 5, 100
 """Of the films of episodes: size, seed and length; how many steps lie between frames, and how long
 each is shown."""
 SEED_WALK, STEPS_WALK = 3, 91
 """An episode and a step of it at which the worker walks."""
+
+
+def save_film(frames: Sequence[np.ndarray], name: str, frame_ms: int) -> None:
+    """A WebP in docs/pictures, each frame of which is shown for that long [ms]."""
+    first, *others = (Image.fromarray(np.asarray(frame, np.uint8)) for frame in frames)
+    first.save(
+        PICTURES / name, save_all=True, append_images=others,
+        duration=frame_ms, loop=0, quality=55, method=6,
+    )  # fmt: skip
 
 
 def save(image: np.ndarray, name: str) -> None:
@@ -59,10 +72,13 @@ def save(image: np.ndarray, name: str) -> None:
     cv2.imwrite(path, image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
 
 
-def loop() -> None:
-    """One frame of the demo's film."""
+def demo() -> None:
+    """The demo's film, smaller, and one frame of it."""
     subprocess.run([sys.executable, "-m", "hrc_env", "demo"], check=True)
     save(imageio.imread("out/demo.png"), "loop.jpg")
+    film: Any = imageio.get_reader("out/demo.mp4")
+    frames = [shrink(frame, *DEMO_PX) for k, frame in enumerate(film) if k % DEMO_STEP == 0]
+    save_film(frames, "demo.webp", round(1000 * DEMO_STEP / film.get_meta_data()["fps"]))
 
 
 def room() -> None:
@@ -154,17 +170,14 @@ def episodes(ids: Sequence[str] = tuple(BUILT_IN)) -> None:
         inner = env.unwrapped
         assert isinstance(inner, HRCEnv)
         observation, _ = env.reset(seed=SEED_FILM)
-        agent, frames, over, n = expert(env_info(inner.simulation)), [], False, 0
+        agent, frames, over, n = make_expert(env_info(inner.simulation)), [], False, 0
         while not over and n < MOST_STEPS:
             if n % STEPS_A_FRAME == 0:
-                frames.append(Image.fromarray(np.asarray(env.render(), np.uint8)))
+                frames.append(np.asarray(env.render()))
             observation, _, terminated, truncated, _ = env.step(agent.act(observation))
             over, n = terminated or truncated, n + 1
         env.close()
-        frames[0].save(
-            PICTURES / f"{task_id}.webp", save_all=True, append_images=frames[1:],
-            duration=FRAME_MS, loop=0, quality=60, method=6,
-        )  # fmt: skip
+        save_film(frames, f"{task_id}.webp", FRAME_MS)
 
 
 def clip() -> None:
@@ -179,9 +192,9 @@ def clip() -> None:
 
 def site() -> None:
     """The construction site."""
-    env = HRCEnv(perception="truth", scene="site", n_workers=3)
-    env.reset(seed=3)
-    for _ in range(200):
+    env = HRCEnv(perception="truth", scene="site", n_workers=3, config={"worker": "any"})
+    env.reset(seed=5)
+    for _ in range(140):
         env.step(np.zeros(6))
     renderer = PictureRenderer(env.simulation.scene, 1280, 720)
     save(np.asarray(renderer.picture(*env.views.pose(), "overview")), "site.jpg")
@@ -211,7 +224,7 @@ def workers() -> None:
 
 if __name__ == "__main__":
     PICTURES.mkdir(exist_ok=True)
-    loop()
+    demo()
     room()
     site()
     site_work()

@@ -46,11 +46,11 @@ if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
     from hrc_env.evaluation.episodes import evaluate_episodes as evaluate_episodes
     from hrc_env.evaluation.intervals import Comparison as Comparison
     from hrc_env.evaluation.intervals import compare_means as compare_means
+    from hrc_env.evaluation.intervals import compare_paired as compare_paired
     from hrc_env.evaluation.intervals import compare_rates as compare_rates
-    from hrc_env.evaluation.intervals import mean_over as mean_over
-    from hrc_env.evaluation.intervals import paired as paired
-    from hrc_env.evaluation.intervals import rate_of as rate_of
-    from hrc_env.evaluation.intervals import share_of as share_of
+    from hrc_env.evaluation.intervals import estimate_mean as estimate_mean
+    from hrc_env.evaluation.intervals import estimate_rate as estimate_rate
+    from hrc_env.evaluation.intervals import estimate_share as estimate_share
     from hrc_env.evaluation.rollout import Transition as Transition
     from hrc_env.evaluation.rollout import rollout as rollout
     from hrc_env.experiments import columns as columns
@@ -123,7 +123,7 @@ if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
 __version__ = "0.1.0"
 
 PUBLIC = {
-    # environments and their settings
+    # environments
     "AppearanceConfig": "hrc_env.scene.domain_randomization",
     "EnvConfig": "hrc_env.env_config",
     "FaultConfig": "hrc_env.perception.faults.fault",
@@ -134,14 +134,12 @@ PUBLIC = {
     "HRCVectorEnv": "hrc_env.vector.env",
     "IDS": "hrc_env.registration",
     "ImageConfig": "hrc_env.scene.camera_images",
-    "PeopleConfig": "hrc_env.motion.config",
     "ResetOptions": "hrc_env.reset_options",
     "RigDistribution": "hrc_env.scene.rig_distribution",
     "Views": "hrc_env.render.views",
     "make_vector": "hrc_env.vector.make",
     "save_config": "hrc_env.config",
     # tasks
-    "Belief": "hrc_env.belief",
     "Effects": "hrc_env.world",
     "Goal": "hrc_env.tasks.goal",
     "ObservationTerm": "hrc_env.observations",
@@ -157,16 +155,17 @@ PUBLIC = {
     "find_task": "hrc_env.tasks.task",
     "register_task": "hrc_env.registration",
     "with_rewards": "hrc_env.tasks.task",
-    # robots and shields
+    # robots
     "Hand": "hrc_env.scene.robot",
     "ROBOTS": "hrc_env.scene.robot",
     "Robot": "hrc_env.scene.robot",
-    "Shield": "hrc_env.safety.shield",
-    "ShieldConfig": "hrc_env.safety.config",
     "Suction": "hrc_env.scene.robot",
     "register_robot": "hrc_env.registration",
-    "register_shield": "hrc_env.registration",
     "robot_from_mjcf": "hrc_env.scene.robot_import",
+    # shields
+    "Shield": "hrc_env.safety.shield",
+    "ShieldConfig": "hrc_env.safety.config",
+    "register_shield": "hrc_env.registration",
     # cameras
     "CameraConfig": "hrc_env.geometry.camera_config",
     "Lens": "hrc_env.geometry.lens",
@@ -174,7 +173,7 @@ PUBLIC = {
     "make_cameras": "hrc_env.scene.rig",
     "read_rig": "hrc_env.geometry.camera_config",
     "write_rig": "hrc_env.geometry.camera_config",
-    # from images to keypoints
+    # detectors
     "BLAZEPOSE_INDEX": "hrc_env.core.skeleton",
     "DetectorConfig": "hrc_env.perception.detector",
     "ImageSource": "hrc_env.perception.searching",
@@ -185,7 +184,8 @@ PUBLIC = {
     "crop_window": "hrc_env.perception.blazepose",
     "load_blazepose": "hrc_env.perception.blazepose",
     "register_detector": "hrc_env.registration",
-    # from keypoints to poses
+    # belief and estimators
+    "Belief": "hrc_env.belief",
     "Estimator": "hrc_env.tracking.estimators",
     "EstimatorSpec": "hrc_env.tracking.estimators",
     "PoseEstimate": "hrc_env.core.records",
@@ -196,44 +196,46 @@ PUBLIC = {
     "register_estimator": "hrc_env.registration",
     "smooth": "hrc_env.tracking.smoother",
     "standard_deviation_m": "hrc_env.belief",
-    # recordings of people
+    # people
     "Clip": "hrc_env.motion.clip",
+    "PeopleConfig": "hrc_env.motion.config",
     "load_clip": "hrc_env.motion.clip",
     "read_recording": "hrc_env.mocap.read",
     "retarget": "hrc_env.mocap.retarget",
     "save_clip": "hrc_env.motion.clip",
-    # agents and what their episodes come to
+    # agents and learning
     "Agent": "hrc_env.agents.env_info",
-    "Comparison": "hrc_env.evaluation.intervals",
     "EnvInfo": "hrc_env.agents.env_info",
-    "Episode": "hrc_env.evaluation.dataset",
-    "EpisodeSet": "hrc_env.evaluation.dataset",
-    "Metric": "hrc_env.core.results",
     "PPOSettings": "hrc_env.agents.learner_settings",
     "ProximityRamp": "hrc_env.agents.callbacks",
     "RECIPES": "hrc_env.agents.learner_settings",
     "SACSettings": "hrc_env.agents.learner_settings",
+    "env_info": "hrc_env.agents.env_info",
+    "make_agent": "hrc_env.agents.registry",
+    # evaluation
+    "Comparison": "hrc_env.evaluation.intervals",
+    "Episode": "hrc_env.evaluation.dataset",
+    "EpisodeSet": "hrc_env.evaluation.dataset",
+    "Metric": "hrc_env.core.results",
     "Score": "hrc_env.evaluation.episodes",
     "Transition": "hrc_env.evaluation.rollout",
     "compare_means": "hrc_env.evaluation.intervals",
+    "compare_paired": "hrc_env.evaluation.intervals",
     "compare_rates": "hrc_env.evaluation.intervals",
-    "env_info": "hrc_env.agents.env_info",
+    "estimate_mean": "hrc_env.evaluation.intervals",
+    "estimate_rate": "hrc_env.evaluation.intervals",
+    "estimate_share": "hrc_env.evaluation.intervals",
     "evaluate": "hrc_env.evaluation.episodes",
     "evaluate_episodes": "hrc_env.evaluation.episodes",
     "load_episodes": "hrc_env.evaluation.dataset",
-    "make_agent": "hrc_env.agents.registry",
-    "mean_over": "hrc_env.evaluation.intervals",
-    "paired": "hrc_env.evaluation.intervals",
-    "rate_of": "hrc_env.evaluation.intervals",
     "rollout": "hrc_env.evaluation.rollout",
-    "share_of": "hrc_env.evaluation.intervals",
-    # studies
+    # experiments
     "PerceptionSetup": "hrc_env.experiments.setups",
     "Row": "hrc_env.experiments.study",
     "Study": "hrc_env.experiments.study",
     "columns": "hrc_env.experiments",
     "run_experiment": "hrc_env.experiments.runner",
-    # files of your own, and errors
+    # errors and files
     "ConfigError": "hrc_env.core.errors",
     "HRCError": "hrc_env.core.errors",
     "import_files": "hrc_env.registration",

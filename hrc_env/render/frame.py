@@ -51,14 +51,14 @@ def compose(
     level, config = views.simulation.perception, views.simulation.config
     frame = _panel(HEIGHT, WIDTH)
     if level == "pixels":
-        title = "what the pose network is given: crops round the predicted worker"
+        title = "input of the pose network: crops around the predicted worker"
         pictures = views.crops(CROP, seen)[:4]
     else:
-        title = f"what the robot believes (perception: {level}), from above and from the side"
+        title = f"estimate (perception: {level}), from above and from the side"
         pictures = views.beliefs(*BELIEF, seen)
     overlay.write(frame, title, (RIGHT_X + 4, TITLE_Y), 16)
     room = views.room(*ROOM, seen)
-    overlay.label(room, "what happens", (10, 10), 18)
+    overlay.label(room, "scene", (10, 10), 18)
     foot = room[-LEGEND_HEIGHT:]
     cv2.addWeighted(foot, 0.25, legend(level), 0.75, 0, dst=foot)
     _paste(frame, room, (0, 0))
@@ -123,8 +123,8 @@ def _axes(limit_m: float) -> Image:
     cv2.line(image, (LEFT, y), (RIGHT, y), (190, 70, 80), 1)
     overlay.write(image, "separation", (14, 10), 18)
     overlay.write(image, "true", (14, 36), 15)
-    overlay.write(image, "as the robot believes", (14, 56), 15, overlay.BELIEF)
-    overlay.write(image, "bar: a step that costs", (14, 76), 15, overlay.COST)
+    overlay.write(image, "estimated", (14, 56), 15, overlay.BELIEF)
+    overlay.write(image, "bar: step with cost", (14, 76), 15, overlay.COST)
     return image
 
 
