@@ -116,7 +116,7 @@ def test_what_the_robot_reads_knows_no_truth(name):
 
 def test_who_chooses_windows_and_tracks_is_not_shown_the_world():
     """Sensors are; what looks through them and believes names neither their input nor bodies."""
-    looks = ["looking", "reacquisition", "tracking", "image_tracking", "pose_tracker"]
+    looks = ["worker_detector", "reacquisition", "tracking", "image_tracking", "pose_tracker"]
     finds = ["detector", "searching", "windows", "blazepose", "network"]
     paths = [PACKAGE / "pipeline" / f"{name}.py" for name in looks]
     paths += [PACKAGE / "perception" / f"{name}.py" for name in finds]

@@ -289,7 +289,7 @@ class PoseTracking(PerceptionPipeline):
 
     def suspected_cameras(self, ids: Ints) -> Bools:
         """Return the cameras (B, C) of environments `ids` that may be miscalibrated."""
-        return self.monitored["suspected"][ids] | self.presence.contradicted(ids)
+        return self.monitored["suspected"][ids] | self.presence.find_contradicting_cameras(ids)
 
     def _age_s(self, ids: Ints, keypoints: Keypoints) -> Floats:
         """Return the ages (B, C) of the images by their own times [s]; NaN: there is none."""

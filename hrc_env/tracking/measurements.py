@@ -183,7 +183,7 @@ def read_worker(measured: KeypointArrays, b: int, w: int, sigma_scale: float, fr
 
 
 @kernel(fastmath=_REORDER)
-def pixel_spread(p: Floats, u: float, v: float, depth: float, cov: Floats) -> float:
+def compute_pixel_variance(p: Floats, u: float, v: float, depth: float, cov: Floats) -> float:
     """Return the mean variance of a coordinate of the pixel of an uncertain point [px^2].
 
     Args:
@@ -219,7 +219,7 @@ def project_joint(p: Floats, mean: Floats, cov: Floats) -> JointPixel:
     depth = p[2, 0] * x + p[2, 1] * y + p[2, 2] * z + p[2, 3]
     u = (p[0, 0] * x + p[0, 1] * y + p[0, 2] * z + p[0, 3]) / depth
     v = (p[1, 0] * x + p[1, 1] * y + p[1, 2] * z + p[1, 3]) / depth
-    return JointPixel(u, v, depth, pixel_spread(p, u, v, depth, cov))
+    return JointPixel(u, v, depth, compute_pixel_variance(p, u, v, depth, cov))
 
 
 @kernel
@@ -353,18 +353,18 @@ def _weigh_swap(tree: Tree, frame: Frame, c: int, inlier_odds: float) -> float:
         if not depth > NEAREST_DEPTH_M:
             continue
         if ok[m, c]:
-            swapped *= _mixture_density(
+            swapped *= _compute_mixture_density(
                 z[m, c, 0] - u, z[m, c, 1] - v, sigma[m, c], spread, inlier_odds
             )
         if ok[j, c]:
-            right *= _mixture_density(
+            right *= _compute_mixture_density(
                 z[j, c, 0] - u, z[j, c, 1] - v, sigma[j, c], spread, inlier_odds
             )
     return min(max(math.log(swapped / right), -_MOST_EVIDENCE), _MOST_EVIDENCE)
 
 
 @kernel(fastmath=_REORDER)
-def _mixture_density(
+def _compute_mixture_density(
     du: float, dv: float, sigma: float, spread: float, inlier_odds: float
 ) -> float:
     """Return the density of a detection relative to an outlier's, up to a common factor.

@@ -179,7 +179,7 @@ class OutOfSequence(Generic[State]):
         ids = np.flatnonzero(use.any(1))
         if len(ids) == 0:
             return
-        part, used = self._part(state, ids), use[ids]
+        part, used = self._select_states(state, ids), use[ids]
         frame_set = FrameSet(drop_cameras(rows(keypoints, ids), ~used), used, state.clock_s[ids])
         self._use_frames(part, state, ids, frame_set, picked(rngs, ids))
         self._write(state, ids, part)
@@ -197,7 +197,7 @@ class OutOfSequence(Generic[State]):
         ends_s, steps_s = state.end_s[ids, slot], state.step_s[ids, slot]
         for members, step_s, frame_sets in group_frames(state.frames, ids, ends_s, steps_s):
             group, done_s = ids[members], 0.0
-            part, streams = self._part(state, group), picked(rngs, group)
+            part, streams = self._select_states(state, group), picked(rngs, group)
             for at_s, frame_set in frame_sets:
                 self.inner.predict(part, at_s - done_s, streams)
                 self._use_frames(part, state, group, frame_set, streams)
@@ -226,7 +226,7 @@ class OutOfSequence(Generic[State]):
                 keypoints = add_held_frames(state.frames, ids, frame_set, wanted)
         self.inner.update(part, keypoints, rngs)
 
-    def _part(self, state: LateState[State], ids: Ints) -> State:
+    def _select_states(self, state: LateState[State], ids: Ints) -> State:
         """Return the present states of environments `ids`: copies, unless these are all."""
         return state.now if len(ids) == len(state.clock_s) else rows(state.now, ids)
 
@@ -244,7 +244,7 @@ class OutOfSequence(Generic[State]):
             age: number of slots before the open one.
         """
         slots = _find_slots(state, ids, age)
-        write_rows(_flatten_slots(state.kept), slots, self._part(state, ids))
+        write_rows(_flatten_slots(state.kept), slots, self._select_states(state, ids))
 
 
 def _snap_to_present(time_s: Floats, now_s: Floats) -> Floats:

@@ -213,7 +213,7 @@ class Presence(Stateful):
         others = rows(self.others, ids)
         return Vacancy(self.coverage, self.levels[ids], self.age_s[ids], others)
 
-    def contradicted(self, ids: Ints) -> Bools:
+    def find_contradicting_cameras(self, ids: Ints) -> Bools:
         """Return (b, C) the cameras of environments `ids` that contradict the calibration.
 
         Several cameras contradict it once they have shown an unexplained person in `CONTRADICTED`
@@ -250,7 +250,7 @@ class Presence(Stateful):
         strange = np.where(searches.shown.unexplained, self.strangers[ids] + 1, 0)
         strange = np.where(searches.whole | searches.shown.poses, strange, self.strangers[ids])
         self.strangers[ids] = strange
-        contradicted = self.contradicted(ids).any(1)
+        contradicted = self.find_contradicting_cameras(ids).any(1)
         self.doubt[ids] = np.where(contradicted, AGREED, np.maximum(self.doubt[ids] - 1, 0))
         doubtful = self.doubt[ids] > 0
         estimate = replace(estimate, tracked=estimate.tracked & ~doubtful[:, None])

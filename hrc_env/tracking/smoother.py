@@ -138,7 +138,7 @@ def rts_step(filtered: Moments, predicted: Floats, later: Moments, F: Floats, Q:
     return Moments(mean, 0.5 * (cov + cov.swapaxes(-1, -2)))
 
 
-def linear_motion(dt_s: float, config: ParticleConfig) -> LinearMotion:
+def make_linear_motion(dt_s: float, config: ParticleConfig) -> LinearMotion:
     """Return the motion of a body over `dt_s` [s], as `tree.predict` moves it."""
     own, travel, noise, shared = make_motion_model(dt_s, config.damping, config.root_acceleration)
     F = np.zeros((N_JOINTS, 2, N_JOINTS, 2))
@@ -151,7 +151,7 @@ def linear_motion(dt_s: float, config: ParticleConfig) -> LinearMotion:
     return LinearMotion(_expand_axes(F), _expand_axes(Q))
 
 
-def dense(cov: Floats, slope: Floats) -> Floats:
+def expand_covariance(cov: Floats, slope: Floats) -> Floats:
     """Return the covariance of all joints, (n, 90, 90).
 
     Args:
@@ -178,7 +178,7 @@ def _smooth_one_way(
 ) -> _Smoothed:
     """Filter through a clip with frames every `dt_s` [s], then smooth backwards."""
     frames = _filter_clip(estimator, clip, dt_s)
-    F, Q = linear_motion(dt_s, estimator.config)
+    F, Q = make_linear_motion(dt_s, estimator.config)
     mean, cov = _get_moments(frames[-1])
     means, covs = [mean], [_get_position_blocks(cov)]
     for frame, later in zip(frames[-2::-1], frames[:0:-1], strict=True):
@@ -232,7 +232,7 @@ def _filter_clip(
 
 def _get_moments(frame: _FilteredFrame) -> Moments:
     """Return the moments of all 90 coordinates of the bodies after a frame."""
-    return Moments(frame.mean.copy(), dense(frame.cov, frame.slope))
+    return Moments(frame.mean.copy(), expand_covariance(frame.cov, frame.slope))
 
 
 def _get_position_blocks(cov: Floats) -> Floats:

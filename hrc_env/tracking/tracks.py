@@ -241,7 +241,7 @@ def bound(cov: Covariances3, min_std: float, max_std: float) -> None:
             for k in range(i, 3):
                 cov[j, i, k] = cov[j, k, i] = scale * cov[j, i, k]
         if not _is_wider(cov[j], floor + _ROUNDING * widest):
-            missing = max(floor - least_eigenvalue(cov[j]), 0.0)
+            missing = max(floor - find_least_eigenvalue(cov[j]), 0.0)
             for i in range(3):
                 cov[j, i, i] += missing
 
@@ -256,7 +256,7 @@ def _is_wider(a: Floats, floor: float) -> bool:
 
 
 @kernel
-def least_eigenvalue(a: Floats) -> float:
+def find_least_eigenvalue(a: Floats) -> float:
     """Return the smallest eigenvalue of a symmetric 3x3 matrix (Smith, Comm. ACM 4, 1961)."""
     mean = (a[0, 0] + a[1, 1] + a[2, 2]) / 3.0
     x, y, z = a[0, 0] - mean, a[1, 1] - mean, a[2, 2] - mean

@@ -1373,7 +1373,7 @@ class Presence:
         ids = np.arange(len(self._known.doubt))
         floor = self._known.vacancy(ids)
         return {"level": floor.level, "level_age_s": floor.age_s,
-                "contradicted": self._known.contradicted(ids)}  # fmt: skip
+                "contradicted": self._known.find_contradicting_cameras(ids)}  # fmt: skip
 
 
 class Watchers:

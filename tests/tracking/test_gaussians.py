@@ -6,7 +6,7 @@ from simulated import DT, LAB, Damage, detections, generators, keypoints, track,
 
 from hrc_env.core.skeleton import MIRROR
 from hrc_env.tracking.estimators import make_estimator
-from hrc_env.tracking.tracks import least_eigenvalue
+from hrc_env.tracking.tracks import find_least_eigenvalue
 from hrc_env.tracking.tree.gaussian import PARENT
 from hrc_env.tracking.tree.predict import SPEED_M_S, SPREAD_M, discretise_joints
 
@@ -119,6 +119,6 @@ def test_the_least_eigenvalue_is_the_least_eigenvalue():
         root = rng.normal(size=(3, 3)) * rng.uniform(0.01, 1, 3)
         matrix = root @ root.T
         np.testing.assert_allclose(
-            least_eigenvalue(matrix), np.linalg.eigvalsh(matrix)[0], atol=1e-9
+            find_least_eigenvalue(matrix), np.linalg.eigvalsh(matrix)[0], atol=1e-9
         )
-    assert least_eigenvalue(2.0 * np.eye(3)) == 2.0
+    assert find_least_eigenvalue(2.0 * np.eye(3)) == 2.0

@@ -202,9 +202,9 @@ def test_people_whom_several_cameras_show_and_nothing_explains_are_unknown_and_n
     assert watch.look(odd=[0, 2])[0] == [False]
     for _ in range(CONTRADICTED - 2):
         assert watch.look(odd=[0, 2])[0] == [True]
-        assert not watch.known.contradicted(ids).any()
+        assert not watch.known.find_contradicting_cameras(ids).any()
     watch.look(odd=[0, 2])
-    assert watch.known.contradicted(ids)[0].tolist() == [True, False, True, False]
+    assert watch.known.find_contradicting_cameras(ids)[0].tolist() == [True, False, True, False]
     assert all(watch.look()[0] == [True] for _ in range(AGREED))
     assert watch.look()[0] == [False]
 
@@ -214,7 +214,7 @@ def test_one_camera_that_shows_a_stranger_says_of_no_floor_that_it_is_empty_and_
     for _ in range(50):
         watch.look(odd=[0])
     assert watch.floor == [PROBABLY_EMPTY, EMPTY]
-    assert not watch.known.contradicted(np.arange(1)).any()
+    assert not watch.known.find_contradicting_cameras(np.arange(1)).any()
     assert watch.look((True,), odd=[0])[0] == [False]
 
 

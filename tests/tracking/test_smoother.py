@@ -7,7 +7,13 @@ from simulated import DT, HARD, LAB, Damage, detections, keypoints, track, walk
 from hrc_env.core.errors import ConfigError
 from hrc_env.tracking.config import ParticleConfig
 from hrc_env.tracking.estimators import make_estimator
-from hrc_env.tracking.smoother import dense, linear_motion, rts_step, smooth
+from hrc_env.tracking.smoother import (
+    Moments,
+    expand_covariance,
+    make_linear_motion,
+    rts_step,
+    smooth,
+)
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT
 
 INSIDE_95 = 7.815
@@ -52,7 +58,7 @@ def test_steps_back_are_the_conditional_gaussian_of_the_whole():
         predicted.append(mean)
         gain = cov @ H.T @ np.linalg.inv(H @ cov @ H.T + R)
         mean, cov = mean + gain @ (z[t] - H @ mean), cov - gain @ H @ cov
-        filtered.append((mean[None], cov[None]))
+        filtered.append(Moments(mean[None], cov[None]))
     smoothed = filtered[-1]
     for t in range(n_steps - 2, -1, -1):
         smoothed = rts_step(filtered[t], predicted[t + 1][None], smoothed, F, Q)
@@ -78,7 +84,7 @@ def test_the_dense_covariance_has_the_trees_marginals_and_edges_and_nothing_else
         own = a @ a.T + np.eye(6)
         q = PARENT[j]
         cov[0, j] = own if q < 0 else own + slope[0, j] @ cov[0, q] @ slope[0, j].T
-    whole = dense(cov, slope)[0]
+    whole = expand_covariance(cov, slope)[0]
     assert np.linalg.eigvalsh(whole).min() > 0
     inverse = np.linalg.inv(whole).reshape(15, 6, 15, 6)
     for j in range(15):
@@ -95,8 +101,8 @@ def test_its_motion_is_the_filters():
     for frame in px:
         e.predict(state, DT, [])
         e.update(state, keypoints(frame), [])
-    F, Q = linear_motion(DT, ParticleConfig())
-    before = dense(state.trees["cov"][0, 0], state.trees["slope"][0, 0])[0]
+    F, Q = make_linear_motion(DT, ParticleConfig())
+    before = expand_covariance(state.trees["cov"][0, 0], state.trees["slope"][0, 0])[0]
     e.predict(state, DT, [])
     after = F @ before @ F.T + Q
     for j in range(15):

@@ -17,7 +17,7 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import MIRROR, N_JOINTS
 from hrc_env.core.typing import Bools, Covariances3, Floats, Points2, Points3
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
-from hrc_env.tracking.measurements import pixel_spread
+from hrc_env.tracking.measurements import compute_pixel_variance
 
 LEAST_JOINTS = 3
 """Least number of joints of a pose that can belong to a worker."""
@@ -82,8 +82,8 @@ def project_body(
             continue
         u, v, depth = pixel_of(camera, mean[j, 0], mean[j, 1], mean[j, 2])
         if depth > NEAREST_DEPTH_M:
-            spread = pixel_spread(camera, u, v, depth, cov[j])
-            spread += slack_m**2 * pixel_spread(camera, u, v, depth, _ISOTROPIC)
+            spread = compute_pixel_variance(camera, u, v, depth, cov[j])
+            spread += slack_m**2 * compute_pixel_variance(camera, u, v, depth, _ISOTROPIC)
             if math.isfinite(u + v + spread) and spread >= 0.0:
                 image[j, 0], image[j, 1], image[j, 2] = u, v, spread
 
