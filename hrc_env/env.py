@@ -29,7 +29,7 @@ from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.registration import HasSpec
 from hrc_env.rehearsal import rehearse
 from hrc_env.render.marks import OVERLAYS
-from hrc_env.render.views import CameraChoice, Views, picture_size
+from hrc_env.render.views import CameraChoice, Views, check_size
 from hrc_env.reset_options import ResetOptions, lasting_options, named_options
 from hrc_env.rewards import RewardConfig
 from hrc_env.settings import Settings, settle
@@ -57,7 +57,7 @@ class EnvBase(HasSpec, Stateful):
         asked = settings.asked
         check_render_mode(asked.render_mode, self.PICTURES)
         share()
-        self._size = picture_size(asked.width, asked.height)
+        self._size = check_size(asked.width, asked.height)
         self._shown = parse_overlays(asked.render_markers, asked.overlay)
         if asked.overlay is not None and not str(asked.render_mode).startswith("rgb_array"):
             warnings.warn(

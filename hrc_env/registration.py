@@ -248,8 +248,7 @@ OTHERWISE = (
 
 
 class Spec(EnvSpec):
-    """A spec with all arguments in its JSON, so that `gymnasium.make` makes the same
-    environment."""
+    """A spec with all arguments in its JSON, from which the same environment can be made."""
 
     def to_json(self) -> str:
         """Return the spec as JSON, or raise `ConfigError` for an argument that JSON cannot hold."""

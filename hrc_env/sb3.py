@@ -123,8 +123,7 @@ class HRCVecEnv(VecEnv):
         super().set_options([dict(named_options(one, *ALONE)) for one in each])
 
     def reset(self) -> Observation:  # type: ignore[override]
-        """Start an episode of every environment, the first from its seed, others from its
-        stream."""
+        """Start an episode of every environment, the first from its seed, later from its stream."""
         limit = self.env.max_episode_steps
         elapsed = np.zeros(self.num_envs, int)
         if self._phases is not None:

@@ -1,51 +1,77 @@
-"""A film's frame: the room beside the four cameras, what is believed, and the separation."""
+"""A film's frame: the scene beside the four cameras, the belief, and the separation."""
 
 from collections.abc import Mapping
+from typing import TypeAlias
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from hrc_env.core.typing import Image
+from hrc_env.core.declared import Records1, dtype_of
+from hrc_env.core.typing import Floats, Image
 from hrc_env.pipeline.levels import CAMERA_LEVELS
 from hrc_env.render import overlay
 from hrc_env.render.views import Glance, Views
 
-WIDTH, HEIGHT = 1600, 900
+WIDTH = 1600
+"""Width of a frame [px]."""
+HEIGHT = 900
+"""Height of a frame [px]."""
 ROOM = (792, 716)
+"""Width and height of the picture of the scene [px]."""
 TILE = (400, 225)
+"""Width and height of a camera's picture [px]."""
 RIGHT_X = WIDTH - 2 * TILE[0] - 4
-"""Where the pictures on the right begin."""
+"""Left edge of the pictures on the right [px]."""
 TITLE_Y = 2 * TILE[1] + 22
+"""Upper edge of the title on the right [px]."""
 CROP = 196
+"""Side of a crop [px]."""
 BELIEF = (400, 214)
+"""Width and height of a picture of the belief [px]."""
 LEGEND_HEIGHT = 28
+"""Height of the legend [px]."""
 STRIP_HEIGHT = 180
+"""Height of the strip below [px]."""
 STRIP_S = 10.0
-"""Seconds that the strip below shows."""
+"""Duration that the strip shows [s]."""
 FAR_M = 1.5
-"""Distances are drawn up to this [m]."""
+"""Largest distance that is drawn [m]."""
 LEFT, RIGHT, TOP, BOTTOM = 290, WIDTH - 20, 14, STRIP_HEIGHT - 14
-"""Where in the strip the curves are."""
-NEAR, TOUCHING = (150, 30, 40), (255, 40, 60)
-"""Colours of steps that cost."""
-MOMENT = np.dtype([("true_m", float), ("estimated_m", float), ("error_m", float), ("cost", float)])
-"""What the strip shows of a step: the separation, truly and as the robot believes it, the error of
-the tracked joints (NaN: nobody was tracked), and what it cost."""
-Diary = NDArray[np.void]
-"""(T,) moments."""
+"""Edges of the curves in the strip [px]."""
+NEAR = (150, 30, 40)
+"""Colour of steps with a cost below 2."""
+TOUCHING = (255, 40, 60)
+"""Colour of steps with a higher cost."""
+
+
+class Moment:
+    """Values of one step in the strip."""
+
+    true_m: float
+    """True separation [m]."""
+    estimated_m: float
+    """Separation by the robot's belief [m]."""
+    error_m: float
+    """Error of the tracked joints [m]; NaN without a track."""
+    cost: float
+    """Cost of the step."""
+
+
+MOMENT = dtype_of(Moment)
+Diary: TypeAlias = Records1[Moment]
+"""(T,) moments of an episode."""
 
 
 def compose(
     views: Views, diary: Diary, counts: Mapping[str, float], seen: Glance | None = None
 ) -> Image:
-    """Return a frame (900, 1600, 3): room, cameras, crops or belief, strip.
+    """Return a frame (900, 1600, 3): scene, cameras, crops or belief, and strip.
 
     Args:
-        views: of the simulation, which may have gone on.
-        diary: the moments so far.
-        counts: attempts that succeeded and that failed so far.
-        seen: the moment with which the diary ends; None: now.
+        views: views of the simulation, which may have advanced.
+        diary: (T,) the moments of the episode up to the frame.
+        counts: numbers of successful and failed attempts up to the frame.
+        seen: the last moment of the diary; None for the present one.
     """
     seen = seen or views.glance()
     level, config = views.simulation.perception, views.simulation.config
@@ -71,13 +97,16 @@ def compose(
 
 
 def legend(level: str) -> Image:
-    """(28, 792, 3) what the colours mean at a perception level."""
+    """Return (28, 792, 3) the legend of the colours at a perception level."""
     image = _panel(LEGEND_HEIGHT, ROOM[0])
     marks = [
-        ("worker's left", overlay.LEFT, "line"), ("right", overlay.RIGHT, "line"),
-        ("estimate, 2 sigma", overlay.BELIEF, "dot"), ("goal", overlay.GOAL, "ring"),
-        ("detected joint", overlay.DETECTED, "dot"), ("crop", overlay.WINDOW, "box"),
-    ]  # fmt: skip
+        ("worker's left", overlay.LEFT, "line"),
+        ("right", overlay.RIGHT, "line"),
+        ("estimate, 2 sigma", overlay.BELIEF, "dot"),
+        ("goal", overlay.GOAL, "ring"),
+        ("detected joint", overlay.DETECTED, "dot"),
+        ("crop", overlay.WINDOW, "box"),
+    ]
     n_shown = 6 if level == "pixels" else 5 if level in CAMERA_LEVELS else 4
     x, y = 12, LEGEND_HEIGHT // 2
     for text, colour, shape in marks[:n_shown]:
@@ -93,15 +122,22 @@ def legend(level: str) -> Image:
 
 
 def strip(diary: Diary, counts: Mapping[str, float], dt_s: float, limit_m: float) -> Image:
-    """True and estimated separation over the last seconds; red where a step cost."""
+    """Return the strip: true and estimated separation over the last seconds, and the cost.
+
+    Args:
+        diary: (T,) the moments of the episode.
+        counts: numbers of successful and failed attempts.
+        dt_s: duration of a step [s].
+        limit_m: separation below which a step has a cost [m].
+    """
     image = _axes(limit_m)
     n_shown = round(STRIP_S / dt_s)
     shown = diary[-n_shown:]
     x = np.round(LEFT + (RIGHT - LEFT) * np.arange(len(shown)) / n_shown).astype(int)
-    for at, cost in zip(x.tolist(), shown["cost"].tolist(), strict=True):
+    for left, cost in zip(x.tolist(), shown["cost"].tolist(), strict=True):
         if cost > 0:
             colour = NEAR if cost < 2 else TOUCHING
-            cv2.rectangle(image, (at, TOP), (at + 6, BOTTOM), colour, -1)
+            cv2.rectangle(image, (left, TOP), (left + 6, BOTTOM), colour, -1)
     for name, colour in (("true_m", overlay.INK), ("estimated_m", overlay.BELIEF)):
         points = np.stack([x, _y_of(shown[name])], -1).astype(np.int32)
         cv2.polylines(image, [points], False, colour, 2, cv2.LINE_AA)
@@ -113,7 +149,7 @@ def strip(diary: Diary, counts: Mapping[str, float], dt_s: float, limit_m: float
 
 
 def _axes(limit_m: float) -> Image:
-    """The strip without its curves."""
+    """Return the strip without its curves."""
     image = _panel(STRIP_HEIGHT, WIDTH)
     for metres in (0.0, 0.5, 1.0, 1.5):
         y = int(_y_of(np.array(metres)))
@@ -128,14 +164,17 @@ def _axes(limit_m: float) -> Image:
     return image
 
 
-def _y_of(metres: NDArray[np.float64]) -> NDArray[np.float64]:
+def _y_of(metres: Floats) -> Floats:
+    """Return the rows of distances in the strip [px]."""
     return np.round(BOTTOM - (BOTTOM - TOP) * np.clip(metres, 0, FAR_M) / FAR_M)
 
 
 def _panel(height: int, width: int) -> Image:
+    """Return a dark picture."""
     return np.full((height, width, 3), overlay.PANEL, np.uint8)
 
 
-def _paste(frame: Image, picture: NDArray[np.uint8], at: tuple[int, int]) -> None:
-    x, y = at
+def _paste(frame: Image, picture: Image, corner: overlay.Pixel) -> None:
+    """Copy a picture into a frame, its upper left corner at x, y."""
+    x, y = corner[0], corner[1]
     frame[y : y + picture.shape[0], x : x + picture.shape[1]] = picture

@@ -1,5 +1,4 @@
-"""Marks in pictures beside the scene: places that the task marks, and shapes of which distances are
-taken."""
+"""Marks in pictures beside the scene: markers of the task, and capsules of robot and people."""
 
 from dataclasses import dataclass
 
@@ -18,62 +17,71 @@ from hrc_env.worker.body import worker_truth
 
 OVERLAYS = ("capsules",)
 """Overlays of a picture of the scene."""
-MARKER_M, MARKER_PX = 0.05, 4
-"""Radius of a marker [m], and in a picture at least [px]."""
-MARKER_SHOWN, MARKER_HIDDEN = 0.8, 0.3
-CAPSULES_SHOWN, CAPSULES_HIDDEN = 0.5, 0.12
-"""Opacity before other things, and behind them."""
+MARKER_M = 0.05
+"""Radius of a marker [m]."""
+MARKER_PX = 4
+"""Least radius of a marker in a picture [px]."""
+MARKER_SHOWN = 0.8
+"""Opacity of visible markers."""
+MARKER_HIDDEN = 0.3
+"""Opacity of occluded markers."""
+CAPSULES_SHOWN = 0.5
+"""Opacity of visible capsules."""
+CAPSULES_HIDDEN = 0.12
+"""Opacity of occluded capsules."""
 COLOURS = {
     "robot": overlay.LEFT,
-    "people, as believed": overlay.BELIEF,
-    "people, as they are": overlay.RIGHT,
+    "people, estimated": overlay.BELIEF,
+    "people, true": overlay.RIGHT,
 }
-"""Of capsules, by whose they are."""
+"""Colours of capsules by their group."""
 LEGEND_FROM_PX = 320
-"""Pictures that are narrower have no legend."""
+"""Least width of pictures with a legend [px]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solids:
-    """Capsules of one group, as distances take them."""
+    """Capsules of one group, from which distances are computed."""
 
-    whose: str
-    """A key of `COLOURS`."""
+    group: str
+    """Name of the group, a key of `COLOURS`."""
     ends_world: Capsules
-    """(N, 2, 3) [m]."""
+    """(N, 2, 3) end points of their axes [m]."""
     radius_m: Floats
-    """(N,)."""
+    """(N,) radii [m]."""
 
 
-def solids_of(simulation: Simulation, b: int) -> tuple[Solids, ...]:
+def find_solids(simulation: Simulation, b: int) -> tuple[Solids, ...]:
     """Return the capsules of environment `b`.
 
-    Those of the robot, with what it holds, and of people as they are believed are what shields,
-    rewards and the observed separation take. Costs, contacts and `info["safety/..."]` take the
-    robot and people as they are. Nobody stands for who is not tracked.
+    Shields, rewards and the observed separation use those of the robot with its load and of people
+    by the estimate, which has none for a worker without a track. Costs, contacts and
+    `info["safety/..."]` use those of the robot and the true ones of people.
     """
-    robot, seen = simulation.belief.robot, one(simulation.estimate, b)
-    believed = segments(seen.mean_world[seen.tracked])
+    robot, estimate = simulation.belief.robot, one(simulation.estimate, b)
+    believed = segments(estimate.mean_world[estimate.tracked])
     motion = one(generator.current(simulation.motion, np.array([b])), 0)
-    truth, there = worker_truth(simulation.bodies, motion), simulation.present[b]
+    truth, present = worker_truth(simulation.bodies, motion), simulation.present[b]
     return (
         Solids("robot", robot.capsules_world[b], robot.capsule_radius_m),
         Solids(
-            "people, as believed",
+            "people, estimated",
             believed.reshape(-1, 2, 3),
             np.tile(SEGMENT_RADIUS_M, len(believed)),
         ),
         Solids(
-            "people, as they are",
-            truth.capsules_world[there].reshape(-1, 2, 3),
-            truth.capsule_radius_m[there].reshape(-1),
+            "people, true",
+            truth.capsules_world[present].reshape(-1, 2, 3),
+            truth.capsule_radius_m[present].reshape(-1),
         ),
     )
 
 
-def marks_of(solids: tuple[Solids, ...]) -> Marks:
-    """Return capsules as a picture shows them."""
-    colours = [np.tile(np.array(COLOURS[s.whose]) / 255, (len(s.radius_m), 1)) for s in solids]
+def mark_solids(solids: tuple[Solids, ...]) -> Marks:
+    """Return capsules as marks of a picture, in the colours of their groups."""
+    colours = [
+        np.tile(np.array(COLOURS[each.group]) / 255, (len(each.radius_m), 1)) for each in solids
+    ]
     return Marks(
         np.concatenate([each.ends_world for each in solids]),
         np.concatenate([each.radius_m for each in solids]),
@@ -81,8 +89,8 @@ def marks_of(solids: tuple[Solids, ...]) -> Marks:
     )
 
 
-def markers_of(points_world: Points3, camera: PinholeCamera) -> Marks:
-    """Return a sphere round each point (M, 3), in a picture of a camera."""
+def mark_points(points_world: Points3, camera: PinholeCamera) -> Marks:
+    """Return a sphere round each point (M, 3) [m] as marks of a camera's picture."""
     depth_m = (points_world - camera.eye_world) @ camera.T_world_from_cam[:3, 2]
     radius_m = np.maximum(MARKER_M, MARKER_PX * depth_m / camera.K[0, 0])
     rgb = np.tile(np.array(overlay.GOAL) / 255, (len(points_world), 1))
@@ -90,11 +98,11 @@ def markers_of(points_world: Points3, camera: PinholeCamera) -> Marks:
 
 
 def draw_legend(image: Image, solids: tuple[Solids, ...]) -> None:
-    """Write whose capsules have which colour, in place."""
+    """Write the groups of capsules in their colours into a picture."""
     height, width = image.shape[:2]
     if width < LEGEND_FROM_PX:
         return
-    size, names = max(12, width // 60), [each.whose for each in solids if len(each.radius_m)]
-    for row, whose in enumerate(names):
-        at = size // 2, height - (len(names) - row) * round(1.7 * size) - size // 2
-        overlay.label(image, whose, at, size, COLOURS[whose])
+    size, names = max(12, width // 60), [each.group for each in solids if len(each.radius_m)]
+    for row, group in enumerate(names):
+        corner = size // 2, height - (len(names) - row) * round(1.7 * size) - size // 2
+        overlay.label(image, group, corner, size, COLOURS[group])

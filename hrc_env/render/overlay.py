@@ -1,7 +1,7 @@
-"""Pictures for people: what the cameras see and what is made of it, drawn over a render."""
+"""Drawings over pictures: estimates, keypoints, crops, markers and text."""
 
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple, TypeAlias
 
 import cv2
 import numpy as np
@@ -20,7 +20,10 @@ from hrc_env.geometry.cameras import (
 )
 from hrc_env.safety.shield import ACTIVE_RAD_S
 
-Colour = tuple[int, int, int]
+Colour: TypeAlias = tuple[int, int, int]
+"""Red, green and blue, from 0 to 255."""
+Pixel: TypeAlias = tuple[int, int]
+"""Column and row in a picture [px]."""
 LEFT: Colour = (66, 165, 245)
 RIGHT: Colour = (255, 138, 60)
 MIDDLE: Colour = (235, 235, 235)
@@ -34,21 +37,37 @@ ARM: Colour = (150, 158, 168)
 BELIEF: Colour = (90, 230, 160)
 COST: Colour = (255, 110, 120)
 SHIELD: Colour = (255, 90, 60)
+"""Colours of the drawings."""
 FLOOR_M = 3
-"""The floor is drawn so far [m]."""
+"""Half side of the grid on the floor [m]."""
 SIDE_COLOURS = {("left", "left"): LEFT, ("right", "right"): RIGHT}
-"""Of bones by the sides of their ends; those across are `MIDDLE`."""
+"""Colours of bones by the sides of their ends; bones across have `MIDDLE`."""
+
+
+class Projection(NamedTuple):
+    """Points in a picture."""
+
+    px: Points2
+    """(N, 2) columns and rows [px]."""
+    depth_m: Floats
+    """(N,) distances along the optical axis [m]."""
 
 
 def draw_estimate(
     image: Image, camera: PinholeCamera, estimate: PoseEstimate, thickness: int = 2
 ) -> None:
-    """The estimated skeletons of a batch of one with 2-sigma ellipses, in place; workers without a
-    track are not drawn. `image` (H, W, 3) is a render of `camera`, of any size with its aspect."""
+    """Draw the estimated skeletons with 2-sigma ellipses; workers without a track are left out.
+
+    Args:
+        image: (H, W, 3) picture of the camera, of any size with its aspect; it is changed.
+        camera: the camera.
+        estimate: estimate of one environment, a batch of one.
+        thickness: thickness of the lines [px].
+    """
     scale = image.shape[1] / camera.width_px
     for worker in np.flatnonzero(estimate.tracked[0]):
         joints = estimate.mean_world[0, worker]
-        points, depth_m = _projected(image, camera, joints)
+        points, depth_m = _project(image, camera, joints)
         if (depth_m < 0.1).any():
             continue
         _ellipses(image, camera, joints, estimate.cov_world[0, worker], scale)
@@ -57,7 +76,7 @@ def draw_estimate(
 
 
 def draw_keypoints(image: Image, camera: PinholeCamera, keypoints: Keypoints, index: int) -> None:
-    """The joints that camera `index` detected, in place; faint where it was not sure."""
+    """Draw the joints that camera `index` detected, fainter for a lower confidence."""
     scale = image.shape[1] / camera.width_px
     px = image_from_pinhole(camera, keypoints.px[0, index].reshape(-1, 2)) * scale
     known = np.isfinite(px).all(-1)
@@ -66,7 +85,7 @@ def draw_keypoints(image: Image, camera: PinholeCamera, keypoints: Keypoints, in
 
 
 def draw_window(image: Image, camera: PinholeCamera, window: Roi) -> None:
-    """The outline of a crop, in place."""
+    """Draw the outline of a crop."""
     scale = image.shape[1] / camera.width_px
     box = (
         (window.centre_px[0] * scale, window.centre_px[1] * scale),
@@ -78,7 +97,14 @@ def draw_window(image: Image, camera: PinholeCamera, window: Roi) -> None:
 
 
 def draw_landmarks(image: Image, window: Roi, joints_px: Points2, confidence: Floats) -> None:
-    """Detected joints and bones on a crop, in place; joints_px (J, 2) of the whole image."""
+    """Draw detected joints and bones on a crop.
+
+    Args:
+        image: the crop, which is changed.
+        window: the crop's window in the camera's image.
+        joints_px: (J, 2) joints in the camera's image [px].
+        confidence: (J,) confidences in [0, 1].
+    """
     offset = (joints_px - np.array(window.centre_px)) * (image.shape[1] / window.side_px)
     c, s = np.cos(window.rotation_rad), np.sin(window.rotation_rad)
     points = offset @ np.array([[c, -s], [s, c]]) + image.shape[1] / 2
@@ -89,7 +115,7 @@ def draw_landmarks(image: Image, window: Roi, joints_px: Points2, confidence: Fl
 
 
 def draw_floor(image: Image, camera: PinholeCamera, middle: Floats) -> None:
-    """A grid of metres on the floor round a point (3,), in place."""
+    """Draw a grid of metres on the floor round a point (3,) [m]."""
     foot = np.array([middle[0], middle[1], 0.0])
     for k in range(-FLOOR_M, FLOOR_M + 1):
         line = np.array([(-FLOOR_M, k, 0), (FLOOR_M, k, 0)])
@@ -100,15 +126,23 @@ def draw_floor(image: Image, camera: PinholeCamera, middle: Floats) -> None:
 def draw_path(
     image: Image, camera: PinholeCamera, points: Floats, colour: Colour, thickness: int
 ) -> None:
-    """Straight lines from point to point (N, 3) [m], in place; none where one is behind."""
-    px, depth_m = _projected(image, camera, points)
+    """Draw a polyline through points (N, 3) [m], if all are in front of the camera.
+
+    Args:
+        image: a picture of the camera, which is changed.
+        camera: the camera.
+        points: (N, 3) the points [m].
+        colour: colour of the line.
+        thickness: its thickness [px].
+    """
+    px, depth_m = _project(image, camera, points)
     if (depth_m >= 0.1).all():
         _lines(image, px, colour, thickness)
 
 
 def draw_markers(image: Image, camera: PinholeCamera, markers_world: Floats) -> None:
-    """A ring round each point (M, 3), in place; drawn over whatever stands before it."""
-    px, depth_m = _projected(image, camera, markers_world)
+    """Draw a ring round each point (M, 3) [m], over the objects in front of it."""
+    px, depth_m = _project(image, camera, markers_world)
     focal_px = camera.K[0, 0] * image.shape[1] / camera.width_px
     for middle, away_m in zip(_fixed(px), depth_m.tolist(), strict=True):
         if away_m >= 0.1:
@@ -118,34 +152,45 @@ def draw_markers(image: Image, camera: PinholeCamera, markers_world: Floats) -> 
 
 
 def draw_shield(image: Image, change_rad_s: float) -> None:
-    """A frame and words, in place, while a shield changes what is commanded by more than it takes
-    to be called active [rad/s]."""
+    """Draw a frame and a label if the shield's change of the command counts as active [rad/s]."""
     if change_rad_s > ACTIVE_RAD_S:
         height, width = image.shape[:2]
         thickness = max(2, width // 240)
         cv2.rectangle(image, (0, 0), (width - 1, height - 1), SHIELD, thickness)
         size = max(12, width // 60)
         text = f"shield: {change_rad_s:.1f} rad/s"
-        at = width - text_width(text, size) - 2 * size, height - 3 * size
-        write(image, text, at, size, SHIELD)
+        corner = width - text_width(text, size) - 2 * size, height - 3 * size
+        write(image, text, corner, size, SHIELD)
 
 
-def label(
-    image: Image, text: str, at: tuple[int, int], size: int = 16, colour: Colour = INK
-) -> None:
-    """Text with its upper left corner at `at`, on a dark plate, in place."""
-    x, y = at
+def label(image: Image, text: str, corner: Pixel, size: int = 16, colour: Colour = INK) -> None:
+    """Write a text on a dark plate.
+
+    Args:
+        image: the picture, which is changed.
+        text: the text.
+        corner: upper left corner of the plate.
+        size: size of the font [px].
+        colour: colour of the text.
+    """
+    x, y = corner[0], corner[1]
     pad, (_, _, right, bottom) = max(3, size // 4), _font(size).getbbox(text)
     plate = image[y : y + round(bottom) + 2 * pad, x : x + round(right) + 2 * pad]
     plate[:] = (0.35 * plate + 0.65 * np.array(PANEL)).astype(np.uint8)
     write(image, text, (x + pad, y + pad), size, colour)
 
 
-def write(
-    image: Image, text: str, at: tuple[int, int], size: int = 16, colour: Colour = INK
-) -> None:
-    """Text with its upper left corner at `at`, in place."""
-    x, y = at
+def write(image: Image, text: str, corner: Pixel, size: int = 16, colour: Colour = INK) -> None:
+    """Write a text.
+
+    Args:
+        image: the picture, which is changed.
+        text: the text.
+        corner: upper left corner of the text.
+        size: size of the font [px].
+        colour: colour of the text.
+    """
+    x, y = corner[0], corner[1]
     ink = _ink(text, size)
     patch = image[y : y + ink.shape[0], x : x + ink.shape[1]]
     ink = ink[: patch.shape[0], : patch.shape[1]]
@@ -153,17 +198,17 @@ def write(
 
 
 def text_width(text: str, size: int = 16) -> int:
-    """How wide a text is [px]."""
+    """Return the width of a text [px]."""
     return round(_font(size).getbbox(text)[2])
 
 
 def panel(width: int, height: int) -> Image:
-    """A dark picture to draw on."""
+    """Return a dark picture."""
     return np.full((height, width, 3), PANEL, np.uint8)
 
 
 def tile(pictures: list[Image], columns: int, gap: int = 4) -> Image:
-    """Pictures of one size in rows, with dark seams."""
+    """Return pictures of one size in rows, with dark seams."""
     height, width = pictures[0].shape[:2]
     rows = -(-len(pictures) // columns)
     sheet = panel(columns * (width + gap) - gap, rows * (height + gap) - gap)
@@ -174,27 +219,35 @@ def tile(pictures: list[Image], columns: int, gap: int = 4) -> Image:
 
 
 def shrink(image: NDArray[Any], width: int, height: int) -> Image:
-    """The image in another size; every pixel is the mean of those it stands for."""
+    """Return an image in a smaller size; its pixels are means of the original ones."""
     return np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
 
 
 def middle_rows(image: Image, height: int) -> Image:
-    """The middle `height` rows."""
+    """Return the middle `height` rows of an image."""
     top = (image.shape[0] - height) // 2
     return image[top : top + height]
 
 
-def _projected(image: Image, camera: PinholeCamera, points: Floats) -> tuple[Points2, Floats]:
-    """(N, 2) where points (N, 3) are in a picture of the camera, and (N,) how far ahead [m]."""
+def _project(image: Image, camera: PinholeCamera, points: Floats) -> Projection:
+    """Return points (N, 3) [m] in a picture of a camera."""
     px, depth_m = project(camera.P[None], points[None])
     scale = image.shape[1] / camera.width_px
-    return image_from_pinhole(camera, px[0, 0]) * scale, depth_m[0, 0]
+    return Projection(image_from_pinhole(camera, px[0, 0]) * scale, depth_m[0, 0])
 
 
 def _ellipses(
     image: Image, camera: PinholeCamera, joints: Floats, covariances: Floats, scale: float
 ) -> None:
-    """The images of 2-sigma regions of joints (J, 3), to first order, faintly, in place."""
+    """Draw the images of 2-sigma regions of joints, to first order.
+
+    Args:
+        image: a picture of the camera, which is changed.
+        camera: the camera.
+        joints: (J, 3) the joints [m].
+        covariances: (J, 3, 3) their covariances [m^2].
+        scale: pixels of the picture for a pixel of the camera.
+    """
     R_cam_from_world = camera.T_world_from_cam[:3, :3].T
     x, y, z = ((joints - camera.eye_world) @ R_cam_from_world.T).T
     one, none = np.ones_like(z), np.zeros_like(z)
@@ -215,36 +268,37 @@ def _ellipses(
 
 
 def _draw_bones(image: Image, points: Points2, thickness: int) -> None:
-    spots = _fixed(points)
+    """Draw the bones between joints (J, 2) [px]."""
+    pixels = _fixed(points)
     for first, second in BONES[:-2]:
         sides = JOINTS[first].split("_")[0], JOINTS[second].split("_")[0]
         colour = SIDE_COLOURS.get(sides, MIDDLE)
-        cv2.line(image, spots[first], spots[second], colour, thickness, cv2.LINE_AA, 4)
+        cv2.line(image, pixels[first], pixels[second], colour, thickness, cv2.LINE_AA, 4)
 
 
 def _draw_joints(image: Image, points: Points2, confidence: Floats, radius: int) -> None:
-    """Joints (N, 2) [px], faint where nobody was sure."""
-    for spot, sure in zip(_fixed(points), confidence.tolist(), strict=True):
-        share = 0.35 + 0.65 * sure
+    """Draw joints (N, 2) [px], fainter for a lower confidence (N,)."""
+    for pixel, share_sure in zip(_fixed(points), confidence.tolist(), strict=True):
+        share = 0.35 + 0.65 * share_sure
         colour = [round(p + share * (q - p)) for p, q in zip(PANEL, DETECTED, strict=True)]
-        cv2.circle(image, spot, radius * 16, colour, -1, cv2.LINE_AA, 4)
+        cv2.circle(image, pixel, radius * 16, colour, -1, cv2.LINE_AA, 4)
 
 
 def _lines(image: Image, points: Points2, colour: Colour, thickness: int) -> None:
-    """Straight lines from point to point (N, 2) [px]."""
-    spots = np.array(_fixed(points), np.int32)
-    cv2.polylines(image, [spots], False, colour, thickness, cv2.LINE_AA, 4)
+    """Draw a polyline through points (N, 2) [px]."""
+    pixels = np.array(_fixed(points), np.int32)
+    cv2.polylines(image, [pixels], False, colour, thickness, cv2.LINE_AA, 4)
 
 
-def _fixed(points: Points2) -> list[tuple[int, int]]:
-    """Sub-pixel coordinates (N, 2) for OpenCV, which counts from pixel centres: 4 binary places."""
+def _fixed(points: Points2) -> list[Pixel]:
+    """Return points (N, 2) in 1/16 px from the centre of the first pixel, as OpenCV takes them."""
     limited = np.clip(points - 0.5, -30000, 30000)
     return [(x, y) for x, y in np.round(limited * 16).astype(int).tolist()]
 
 
 @lru_cache(maxsize=256)
 def _ink(text: str, size: int) -> NDArray[np.float32]:
-    """(H, W, 1) how much ink there is where, 0 to 1."""
+    """Return (H, W, 1) the opacity of a text, from 0 to 1."""
     font = _font(size)
     _, _, right, bottom = font.getbbox(text)
     drawn = PillowImage.new("L", (round(right) + 2, round(bottom) + 2))
@@ -254,7 +308,7 @@ def _ink(text: str, size: int) -> NDArray[np.float32]:
 
 @lru_cache(maxsize=16)
 def _font(size: int) -> ImageFont.FreeTypeFont:
-    """DejaVu Sans, which comes with matplotlib."""
+    """Return DejaVu Sans, which comes with matplotlib."""
     from matplotlib import get_data_path
 
     return ImageFont.truetype(f"{get_data_path()}/fonts/ttf/DejaVuSans.ttf", size)

@@ -1,12 +1,12 @@
-"""Pictures from places that stay, quickly: what moves laid over what was drawn once.
+"""Fast pictures from fixed viewpoints: moving geoms over a stored picture of the static ones.
 
-What stands still is drawn once, larger than the picture and with its shadows; then only the arm
-and the workers are drawn, where they are. What keeps the sun off the rest is asked of a picture
-of them from the sun.
+Static geoms are drawn once, larger than the picture and with their shadows; then only the robot and
+the workers are drawn, where they are. Their shadows come from a picture of them from the sun.
 """
 
+from collections.abc import Hashable
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import cv2
 import numpy as np
@@ -21,132 +21,173 @@ from hrc_env.scene.build import Scene
 from hrc_env.scene.canvas import BEFORE_THE_SUN, IN_THE_SHADE, MOVING, STILL, Canvas, Marks
 
 SMOOTHING = 2
-"""All is drawn so many times as large, for smooth edges."""
+"""Factor by which pictures are drawn larger, for smooth edges."""
 QUALITY = {
-    "offsamples": 0, "shadowsize": 4096, "numslices": 14, "numstacks": 5, "numquads": 1,
-}  # fmt: skip
+    "offsamples": 0,
+    "shadowsize": 4096,
+    "numslices": 14,
+    "numstacks": 5,
+    "numquads": 1,
+}
+"""MuJoCo's visual quality of these pictures."""
 SUN_PX = 256
 """Side of the picture from the sun."""
 BIAS_M = 0.03
-"""Nothing shades what is nearer to it than this, along the light [m]."""
+"""Least distance along the light from an object to its shadow [m]."""
 SOFT_PX = 3
-"""Edges of shadows are so soft."""
+"""Width of the soft edges of shadows [px]."""
 COARSE = 2
-"""Shadows are looked up for one pixel in so many, each way."""
-Box: TypeAlias = tuple[int, int, int, int]
-"""Left, top, right, bottom in a picture's pixels."""
-Depths = NDArray[np.float32]
+"""Step of the pixels for which shadows are computed, in both directions [px]."""
+Depths: TypeAlias = NDArray[np.float32]
+"""Depths or distances of pixels."""
+
+
+class Box(NamedTuple):
+    """A rectangle in a picture [px]."""
+
+    left: int
+    """First column."""
+    top: int
+    """First row."""
+    right: int
+    """Column behind the last one."""
+    bottom: int
+    """Row behind the last one."""
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether the rectangle has no pixels."""
+        return self.right <= self.left or self.bottom <= self.top
+
+
+class Layer(NamedTuple):
+    """A drawn part of the scene, `SMOOTHING` times as large as the picture, top row first."""
+
+    rgb: Image
+    """Colours; black where there is nothing."""
+    z: Depths
+    """Depths from 1 near to 0 far, and where there is nothing."""
 
 
 @dataclass(frozen=True, slots=True)
 class Shade:
-    """What moves, seen from the sun."""
+    """A picture of the moving geoms from the sun."""
 
     z: Depths
-    """(SUN_PX, SUN_PX) how near to the sun: 1 `begin_m` along the light, 0 `deep_m` further and
-    where nothing is."""
+    """(SUN_PX, SUN_PX) depths: 1 at `begin_m` along the light, 0 at `deep_m` beyond and where there
+    is nothing."""
     begin_m: float
+    """Coordinate of the near plane along the light [m]."""
     deep_m: float
+    """Distance of the far plane from the near plane [m]."""
     corner: tuple[float, float]
-    """Where the first pixel begins: right and down [m], as `sun_axes`."""
+    """Coordinates of the first pixel's corner, right and down in `sun_axes` [m]."""
     step_m: float
     """Side of a pixel [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Backdrop:
-    """What stands still, seen from a place."""
+    """A stored picture of the static geoms."""
 
     rgb: Image
-    """In the picture's size."""
+    """Colours in the picture's size."""
     z: Depths
-    """`SMOOTHING` times as large; 1 is near."""
+    """Depths from 1 near to 0 far, `SMOOTHING` times as large."""
     dark: Image | None
-    """The picture without the sun; None where shadows are not asked for."""
+    """The picture without the sun; None for pictures without shadows."""
     spots: tuple[NDArray[np.floating], ...]
-    """What the picture shows in the sun's axes: right, down and along, (h, w) [m] each."""
+    """Points of the picture in the sun's axes: right, down and along, (h, w) each [m]."""
 
 
 class Stage(Canvas):
-    """Pictures of a scene from a few places; what stands still is kept for each."""
+    """Renderer of pictures from a few viewpoints; static geoms are drawn once for each.
+
+    Args:
+        scene: the scene.
+        width: greatest width of a picture [px].
+        height: greatest height of a picture [px].
+    """
 
     def __init__(self, scene: Scene, width: int, height: int) -> None:
-        """A stage for pictures of at most `width` x `height`."""
         gl.draw_on_one_thread()
         size = max(SMOOTHING * width, SUN_PX), max(SMOOTHING * height, SUN_PX)
         super().__init__(scene, *size, QUALITY)
         self._shade: Shade | None = None
-        """Of this pose, once it was asked for."""
+        """Picture from the sun in the present pose, once it has been drawn."""
 
     def pose(self, q: JointAngles, motion: WorkerMotion | None) -> None:
-        """Pose what moves: arm q (N,), the workers of one environment (W, S, ...)."""
+        """Pose the moving geoms.
+
+        Args:
+            q: (N,) joint angles of the robot [rad].
+            motion: poses of the workers of one environment, arrays (W, S, ...).
+        """
         super().pose(q, motion)
         self._shade = None
 
     def picture(self, camera: PinholeCamera, shadows: bool = False) -> Image:
-        """What a pinhole camera sees, in the size of its image."""
+        """Return the picture of a pinhole camera, in the size of its image."""
         key = _key(camera, shadows)
         if key not in self._kept:
-            self._kept[key] = self._still(camera, shadows)
+            self._kept[key] = self._draw_still(camera, shadows)
         backdrop = self._kept[key]
         image = backdrop.rgb.copy()
         if backdrop.dark is not None:
             self._cast_shadows(image, backdrop, backdrop.dark)
-        box = self.box(camera)
-        if box[2] > box[0] and box[3] > box[1]:
-            _lay_over(image, backdrop, box, *self.moving(camera, box))
+        box = self.find_box(camera)
+        if not box.is_empty:
+            _lay_over(image, backdrop, box, self.draw_moving(camera, box))
         return image
 
     def mark(
         self, image: Image, camera: PinholeCamera, marks: Marks, shown: float, hidden: float
     ) -> None:
-        """Lay marks over a picture of the camera, in place.
+        """Draw marks over a picture of a camera.
 
         Args:
-            image: as of `picture`, which was called for this camera before.
-            camera: through which it was taken.
+            image: result of `picture` for this camera, which is changed.
+            camera: the camera.
             marks: capsules and spheres.
-            shown: their opacity in [0, 1] where nothing is nearer,
-            hidden: and where something is.
+            shown: opacity of visible marks, in [0, 1].
+            hidden: opacity of occluded marks, in [0, 1].
         """
         middles = marks.ends_world.mean(1)
         half_m = np.linalg.norm(np.diff(marks.ends_world, axis=1)[:, 0], axis=-1) / 2
-        box = _box(camera, middles, marks.radius_m + half_m)
-        left, top, right, bottom = box
-        if right <= left or bottom <= top:
+        box = _bound_spheres(camera, middles, marks.radius_m + half_m)
+        if box.is_empty:
             return
-        _, z_moving = self.moving(camera, box)
+        moving = self.draw_moving(camera, box)
         fine = SMOOTHING * np.array(box)
         z_still = self._backdrop_z(camera)[fine[1] : fine[3], fine[0] : fine[2]]
         self.show_marks(marks)
-        rgb, z = self._read(camera, box)
-        before = z > np.maximum(z_still, z_moving)
-        share = np.where(z > 0, np.where(before, shown, hidden), 0.0).astype(np.float32)
-        size = right - left, bottom - top
-        laid = cv2.resize(rgb * share[..., None], size, interpolation=cv2.INTER_AREA)
+        layer = self._read_box(camera, box)
+        before = layer.z > np.maximum(z_still, moving.z)
+        share = np.where(layer.z > 0, np.where(before, shown, hidden), 0.0).astype(np.float32)
+        size = box.right - box.left, box.bottom - box.top
+        laid = cv2.resize(layer.rgb * share[..., None], size, interpolation=cv2.INTER_AREA)
         free = 1 - cv2.resize(share, size, interpolation=cv2.INTER_AREA)
-        part = image[top:bottom, left:right]
+        part = image[box.top : box.bottom, box.left : box.right]
         part[:] = np.round(part * free[..., None] + laid)
 
     def _backdrop_z(self, camera: PinholeCamera) -> Depths:
-        """Depths of what stands still, `SMOOTHING` times as large."""
+        """Return the depths of the static geoms, `SMOOTHING` times as large as the picture."""
         for shadows in (True, False):
             if (key := _key(camera, shadows)) in self._kept:
                 return self._kept[key].z
         raise KeyError(camera.name)
 
-    def moving(self, camera: PinholeCamera, box: Box) -> tuple[Image, Depths]:
-        """What moves within a box of the picture: rgb and z, `SMOOTHING` times as large,
-        top row first; black and 0 where nothing is."""
+    def draw_moving(self, camera: PinholeCamera, box: Box) -> Layer:
+        """Return the moving geoms within a box of the picture."""
         self.show(MOVING)
-        return self._read(camera, box)
+        return self._read_box(camera, box)
 
-    def box(self, camera: PinholeCamera) -> Box:
-        """Where in the picture things that move are, and maybe a little more."""
-        return _box(camera, *self.find_moving_spheres())
+    def find_box(self, camera: PinholeCamera) -> Box:
+        """Return a box of the picture that contains the moving geoms."""
+        return _bound_spheres(camera, *self.find_moving_spheres())
 
-    def shade(self) -> Shade | None:
-        """What moves, as the sun sees it; None without a sun or without anything that moves."""
+    def draw_shade(self) -> Shade | None:
+        """Return a picture of the moving geoms from the sun; None without a sun or such geoms."""
         self.show(BEFORE_THE_SUN)
         axes, (middles, radii_m) = self.sun_axes(), self.find_moving_spheres()
         if axes is None or not len(middles):
@@ -164,32 +205,34 @@ class Stage(Canvas):
         upright = np.ascontiguousarray(z[::-1])
         return Shade(upright, float(low[2]), deep_m, corner, 2 * half_m / SUN_PX)
 
-    def _still(self, camera: PinholeCamera, shadows: bool) -> _Backdrop:
+    def _draw_still(self, camera: PinholeCamera, shadows: bool) -> _Backdrop:
+        """Return a picture of the static geoms."""
         size, axes = (camera.width_px, camera.height_px), self.sun_axes()
+        whole = Box(0, 0, *size)
         self.show(STILL, shadows=shadows)
-        rgb, z = self._read(camera, (0, 0, *size))
+        rgb, z = self._read_box(camera, whole)
         dark, spots = None, ()
         if shadows and axes is not None:
             points = _points(camera, self.distance_m(z[::SMOOTHING, ::SMOOTHING]))
-            at = points[::COARSE, ::COARSE] @ axes.astype(np.float32)
-            spots = tuple(np.ascontiguousarray(at[..., k]) for k in range(3))
+            in_sun_axes = points[::COARSE, ::COARSE] @ axes.astype(np.float32)
+            spots = tuple(np.ascontiguousarray(in_sun_axes[..., k]) for k in range(3))
             self.show(IN_THE_SHADE)
-            dark = shrink(self._read(camera, (0, 0, *size))[0], *size)
+            dark = shrink(self._read_box(camera, whole).rgb, *size)
         return _Backdrop(shrink(rgb, *size), z, dark, spots)
 
-    def _read(self, camera: PinholeCamera, box: Box) -> tuple[Image, Depths]:
-        """What is shown within a box of the picture, `SMOOTHING` times as large, top row first."""
-        left, top, right, bottom = box
-        window = Roi(((left + right) / 2, (top + bottom) / 2), float(right - left), 0.0)
-        self.aim(camera, window, bottom - top)
-        shape = SMOOTHING * (bottom - top), SMOOTHING * (right - left)
+    def _read_box(self, camera: PinholeCamera, box: Box) -> Layer:
+        """Return the chosen part of the scene within a box of the picture."""
+        width, height = box.right - box.left, box.bottom - box.top
+        middle = (box.left + box.right) / 2, (box.top + box.bottom) / 2
+        self.aim(camera, Roi(middle, float(width), 0.0), height)
+        shape = SMOOTHING * height, SMOOTHING * width
         rgb, z = np.empty((*shape, 3), np.uint8), np.empty(shape, np.float32)
         self.read(rgb, z)
-        return np.ascontiguousarray(rgb[::-1]), np.ascontiguousarray(z[::-1])
+        return Layer(np.ascontiguousarray(rgb[::-1]), np.ascontiguousarray(z[::-1]))
 
     def _cast_shadows(self, image: Image, backdrop: _Backdrop, dark: Image) -> None:
-        """Show the backdrop without the sun where something that moves keeps it off, in place."""
-        shade = self._shade = self._shade or self.shade()
+        """Replace the backdrop by the one without the sun in the shadows of moving geoms."""
+        shade = self._shade = self._shade or self.draw_shade()
         if shade is None:
             return
         right, down, along = backdrop.spots
@@ -203,37 +246,43 @@ class Stage(Canvas):
         x0, y0, wide, high = cv2.boundingRect(share)
         if wide == 0:
             return
-        where = slice(y0, y0 + high), slice(x0, x0 + wide)
-        weight = cv2.cvtColor(share[where], cv2.COLOR_GRAY2RGB)
-        lit = cv2.multiply(image[where], 255 - weight, scale=1 / 255)
-        image[where] = cv2.add(lit, cv2.multiply(dark[where], weight, scale=1 / 255))
+        part = slice(y0, y0 + high), slice(x0, x0 + wide)
+        weight = cv2.cvtColor(share[part], cv2.COLOR_GRAY2RGB)
+        lit = cv2.multiply(image[part], 255 - weight, scale=1 / 255)
+        image[part] = cv2.add(lit, cv2.multiply(dark[part], weight, scale=1 / 255))
 
 
-def _key(camera: PinholeCamera, shadows: bool) -> tuple[Any, ...]:
-    """Key of a backdrop."""
+def _key(camera: PinholeCamera, shadows: bool) -> tuple[Hashable, ...]:
+    """Return the key of a backdrop."""
     view = camera.K.tobytes(), camera.T_world_from_cam.tobytes()
     return (*view, camera.width_px, camera.height_px, shadows)
 
 
-def _box(camera: PinholeCamera, middles: Points3, radii_m: Floats) -> Box:
-    """Where in a camera's picture spheres are, and maybe a little more."""
+def _bound_spheres(camera: PinholeCamera, middles: Points3, radii_m: Floats) -> Box:
+    """Return a box of a camera's picture that contains spheres.
+
+    Args:
+        camera: the camera.
+        middles: (N, 3) middles of the spheres [m].
+        radii_m: (N,) their radii [m].
+    """
     size = camera.width_px, camera.height_px
     x, y, depth = ((middles - camera.eye_world) @ camera.T_world_from_cam[:3, :3]).T
     ahead = depth > -radii_m
     x, y, depth, radii_m = x[ahead], y[ahead], depth[ahead], radii_m[ahead]
     if not len(depth):
-        return 0, 0, 0, 0
+        return Box(0, 0, 0, 0)
     if (depth < radii_m + 0.1).any():
-        return 0, 0, *size
+        return Box(0, 0, *size)
     corners = np.stack([_reach(x, depth, radii_m), _reach(y, depth, radii_m)], -1)
     low, high = corners * camera.K[[0, 1], [0, 1]] + camera.K[:2, 2]
     left, top = np.clip(np.floor(low - 2), 0, size).astype(int).tolist()
     right, bottom = np.clip(np.ceil(high + 2), 0, size).astype(int).tolist()
-    return left, top, right, bottom
+    return Box(left, top, right, bottom)
 
 
 def _reach(x: Floats, depth: Floats, radii_m: Floats) -> Floats:
-    """(2,) the least and the greatest of what spheres cover, in focal lengths from the axis."""
+    """Return (2,) the least and greatest image coordinate of spheres, in focal lengths."""
     nearest, furthest = depth - radii_m, depth + radii_m
     low = np.minimum((x - radii_m) / nearest, (x - radii_m) / furthest)
     high = np.maximum((x + radii_m) / nearest, (x + radii_m) / furthest)
@@ -241,21 +290,27 @@ def _reach(x: Floats, depth: Floats, radii_m: Floats) -> Floats:
 
 
 def _points(camera: PinholeCamera, depth_m: Depths) -> Depths:
-    """(H, W, 3) points in the world that the picture shows [m]."""
+    """Return (H, W, 3) the points in the world of a picture's pixels [m]."""
     x = (np.arange(camera.width_px) + 0.5 - camera.K[0, 2]) / camera.K[0, 0] * depth_m
     y = (np.arange(camera.height_px) + 0.5 - camera.K[1, 2])[:, None] / camera.K[1, 1] * depth_m
     points = np.stack([x, y, depth_m], -1) @ camera.T_world_from_cam[:3, :3].T + camera.eye_world
     return points.astype(np.float32)
 
 
-def _lay_over(image: Image, backdrop: _Backdrop, box: Box, rgb: Image, z: Depths) -> None:
-    """Lay what is nearer over the picture, with smooth edges, in place."""
-    left, top, right, bottom = box
-    fine = SMOOTHING * np.array(box)
+def _lay_over(image: Image, backdrop: _Backdrop, box: Box, layer: Layer) -> None:
+    """Draw a layer over a picture where it is nearer, with smooth edges.
+
+    Args:
+        image: the picture, which is changed.
+        backdrop: the static geoms in it.
+        box: box of the layer in the picture.
+        layer: the moving geoms.
+    """
+    fine, size = SMOOTHING * np.array(box), (box.right - box.left, box.bottom - box.top)
     behind = np.ascontiguousarray(backdrop.z[fine[1] : fine[3], fine[0] : fine[2]])
-    nearer = cv2.compare(z, behind, cv2.CMP_GT)
-    shown = cv2.bitwise_and(rgb, rgb, mask=nearer)
-    free = 255 - shrink(nearer, right - left, bottom - top)
-    part = image[top:bottom, left:right]
+    nearer = cv2.compare(layer.z, behind, cv2.CMP_GT)
+    shown = cv2.bitwise_and(layer.rgb, layer.rgb, mask=nearer)
+    free = 255 - shrink(nearer, *size)
+    part = image[box.top : box.bottom, box.left : box.right]
     through = cv2.multiply(part, cv2.cvtColor(free, cv2.COLOR_GRAY2RGB), scale=1 / 255)
-    part[:] = cv2.add(through, shrink(shown, right - left, bottom - top))
+    part[:] = cv2.add(through, shrink(shown, *size))

@@ -1,8 +1,8 @@
-"""Views of a simulation for people: the room, the cameras with what was made of them."""
+"""Pictures of a simulation: the scene, the cameras with detections, and the belief."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,9 +25,9 @@ from hrc_env.render.marks import (
     MARKER_SHOWN,
     Solids,
     draw_legend,
-    markers_of,
-    marks_of,
-    solids_of,
+    find_solids,
+    mark_points,
+    mark_solids,
 )
 from hrc_env.render.stage import SMOOTHING, Stage
 from hrc_env.scene.canvas import Canvas
@@ -42,63 +42,92 @@ from hrc_env.scene.render import (
 from hrc_env.scene.rig import make_cameras
 from hrc_env.simulation import Simulation
 
-SMALLEST_PX, LARGEST_PX = 16, 4096
+SMALLEST_PX = 16
+"""Least width and height of a picture [px]."""
+LARGEST_PX = 4096
+"""Greatest width and height of a picture [px]."""
 DEPTH_QUALITY = {**PICTURE_QUALITY, "offsamples": 0, "shadowsize": 0}
+"""MuJoCo's visual quality of pictures of depths."""
 MOSAIC_TILE = (640, 360)
+"""Width and height of a camera's picture in a mosaic [px]."""
 SIDES = (
     ("from above", np.array([0.0, 0.0, 5.0]), np.zeros(3)),
     ("from the side", np.array([0.0, -4.2, 1.4]), np.array([0.0, 0.0, 0.9])),
 )
-"""Where what is believed is seen from: eye and target from the robot's foot [m]."""
+"""Viewpoints of the belief: eye and target from the robot's foot [m]."""
 SIDES_HFOV_DEG = 55.0
+"""Horizontal field of view of these viewpoints [deg]."""
 CameraChoice: TypeAlias = int | str | CameraConfig | PinholeCamera | None
-"""A camera of the rig by its index or name, a viewpoint's name, or a camera of one's own; None: the
+"""A camera of the rig by its index or name, the name of a viewpoint, or a camera; None for the
 task's viewpoint."""
 
 
-def picture_size(width: Any, height: Any) -> tuple[int, int]:
-    """A picture's width and height [px]; `ConfigError` unless whole numbers from 16 to 4096."""
+class Size(NamedTuple):
+    """Size of a picture [px]."""
+
+    width: int
+    """Width."""
+    height: int
+    """Height."""
+
+
+class Pose(NamedTuple):
+    """Pose of an environment."""
+
+    q: Floats
+    """(nq,) robot, fingers and loose objects, as `Physics.qpos`."""
+    motion: WorkerMotion
+    """Poses of the workers, arrays (W, S, ...)."""
+
+
+def check_size(width: object, height: object) -> Size:
+    """Return the size of a picture, or raise `ConfigError` unless it is from 16 to 4096 px."""
     limits = SMALLEST_PX, LARGEST_PX
-    return whole("width [px]", width, *limits), whole("height [px]", height, *limits)
+    return Size(whole("width [px]", width, *limits), whole("height [px]", height, *limits))
 
 
 @dataclass(frozen=True, slots=True)
 class Glance:
-    """One environment at one moment, apart from the simulation, which may go on."""
+    """Copy of one environment's present moment, so that the simulation may advance."""
 
     q: Floats
-    """(nq,) as `Physics.qpos`."""
+    """(nq,) robot, fingers and loose objects, as `Physics.qpos`."""
     motion: WorkerMotion
-    """The workers, arrays (W, S, ...)."""
+    """Poses of the workers, arrays (W, S, ...)."""
     look: Look | None
+    """Look of the episode; None for the scene as built."""
     markers_world: Points3
-    """(M, 3) what the task has to show [m]."""
+    """(M, 3) markers of the task [m]."""
     cameras: tuple[PinholeCamera, ...]
-    """Those of its episode."""
+    """Cameras of the episode."""
     estimate: PoseEstimate
-    """Of a batch of one, as are the keypoints."""
+    """Belief about the workers, a batch of one."""
     keypoints: Keypoints | None
+    """Last detections, a batch of one; None without cameras."""
     windows: list[list[Roi | None]]
-    """Of every worker, through every camera."""
+    """Crop of each worker in each camera's image."""
     crops: list[Image | None]
-    """What the pose network was given of the first worker."""
+    """Crop of the first worker for the pose network, from each camera."""
     shield_rad_s: float = 0.0
-    """By how much the shield changed the last command."""
+    """Norm of the shield's change of the last command [rad/s]."""
     solids: tuple[Solids, ...] = ()
-    """Shapes of which distances are taken, for the overlay."""
+    """Capsules from which distances are computed, for the overlay."""
 
 
 class Views:
-    """Pictures of a simulation's environments; graphics contexts are made when asked for.
+    """Pictures of a simulation's environments; graphics contexts are made at the first picture.
 
-    Any thread may ask for one, and call `close`, but no two at once; with a `glance` taken before,
-    the simulation may go on in another one.
+    Any thread may draw, and call `close`, but no two at once. With a `glance` that was taken
+    before, the simulation may advance in another thread.
+
+    Args:
+        simulation: the simulation.
     """
 
     def __init__(self, simulation: Simulation) -> None:
         self.simulation = simulation
         self._renderers: dict[str, tuple[tuple[int, int], Any]] = {}
-        """By purpose: the size of their pictures, and themselves."""
+        """Size of the pictures and renderer, by purpose."""
 
     def picture(
         self,
@@ -113,21 +142,21 @@ class Views:
         """Return a picture of environment `b`, (height, width, 3) of uint8, top row first.
 
         Args:
-            depth: distances along the optical axis instead, (height, width) float32 [m]; of the
-                scene alone.
+            depth: whether to return distances along the optical axis instead, (height, width)
+                float32 [m], of the scene alone.
             b: the environment.
             size: width and height [px].
-            camera: which one: an index or a name of the rig; a viewpoint such as "room" or "top";
-                or a `CameraConfig`. None: from where the task is seen best.
-            markers: whether goals and other places that the task marks are shown.
-            capsules: whether what distances are taken of is laid over the scene: capsules of robot
-                and people. Not through a camera with a lens.
+            camera: index or name of a camera of the rig, a viewpoint such as "room" or "top", or a
+                `CameraConfig`; None for the task's viewpoint.
+            markers: whether the markers of the task are shown, such as goals.
+            capsules: whether the capsules of robot and people, from which distances are computed,
+                are drawn over the scene; not for a camera with a lens.
 
         Raises:
             ConfigError: there is no such camera.
         """
         seen, viewpoint = self.glance(b, capsules), self.simulation.task.viewpoint
-        chosen = viewpoint if camera is None else _chosen(camera, seen.cameras)
+        chosen = viewpoint if camera is None else _choose(camera, seen.cameras)
         if depth:
             renderer = self._renderer("depth", size, seen)
             return renderer.picture(seen.q, seen.motion, chosen, depth=True)
@@ -136,13 +165,13 @@ class Views:
             if markers:
                 overlay.draw_markers(image, chosen, seen.markers_world)
         else:
-            image = self._marked(self._view(chosen, *size), seen, markers)
+            image = self._draw_marked(self._make_view(chosen, *size), seen, markers)
             draw_legend(image, seen.solids)
         overlay.draw_shield(image, seen.shield_rad_s)
         return image
 
     def glance(self, b: int = 0, capsules: bool = False) -> Glance:
-        """All that there is to draw of environment `b` now; `capsules`: `Glance.solids`, too."""
+        """Return a copy of environment `b`'s present moment; with `capsules`, also its solids."""
         simulation = self.simulation
         keypoints, windows = simulation.pipeline.last_detections(b)
         return Glance(
@@ -155,27 +184,27 @@ class Views:
             [list(of_worker) for of_worker in windows],
             list(simulation.pipeline.crops(b)),
             float(np.linalg.norm(simulation.shield_change[b])),
-            solids_of(simulation, b) if capsules else (),
+            find_solids(simulation, b) if capsules else (),
         )
 
-    def pose(self, b: int = 0) -> tuple[Floats, WorkerMotion]:
-        """All that moves (nq,) and the workers (W, S, ...) of environment `b` now."""
+    def pose(self, b: int = 0) -> Pose:
+        """Return the present pose of environment `b`."""
         motion = one(generator.current(self.simulation.motion, np.array([b])), 0)
-        return self.simulation.physics.qpos[b], motion
+        return Pose(self.simulation.physics.qpos[b], motion)
 
     def room(self, width: int, height: int, seen: Glance) -> Image:
-        """Return the room with the estimated skeleton over it.
+        """Return the scene with the estimated skeletons over it.
 
         Args:
-            width: of the picture [px].
-            height: likewise.
-            seen: a moment, as of `glance`.
+            width: width of the picture [px].
+            height: height of the picture [px].
+            seen: a moment, as `glance` returns it.
 
         Returns:
             (height, width, 3) of uint8, top row first.
         """
         camera = viewpoint_camera(self.simulation.task.viewpoint, width, height)
-        (image,) = self._drawn([camera], seen, shadows=True)
+        (image,) = self._draw([camera], seen, shadows=True)
         overlay.draw_estimate(image, camera, seen.estimate)
         overlay.draw_markers(image, camera, seen.markers_world)
         overlay.draw_shield(image, seen.shield_rad_s)
@@ -185,12 +214,12 @@ class Views:
         """Return every camera's picture with crops, detected keypoints and the estimate.
 
         Args:
-            width: of a picture [px].
-            height: likewise.
-            seen: a moment, as of `glance`.
+            width: width of a picture [px].
+            height: height of a picture [px].
+            seen: a moment, as `glance` returns it.
 
         Returns:
-            (height, width, 3) of uint8 each, without shadows, as the detector sees the scene.
+            (height, width, 3) of uint8 each, without shadows, as in the input of the detector.
         """
         views = self._through_cameras(width, height, seen, seen.cameras)
         for c, (camera, image) in enumerate(zip(seen.cameras, views, strict=True)):
@@ -204,8 +233,8 @@ class Views:
         return views
 
     def crops(self, size: int, seen: Glance) -> list[Image]:
-        """Return each camera's crop, as the pose network was given it, with its landmarks."""
-        keypoints, images = seen.keypoints, []
+        """Return each camera's crop, the input of the pose network, with its landmarks."""
+        keypoints, images = seen.keypoints, list[Image]()
         if keypoints is None or not seen.windows:
             return []
         parts = zip(seen.cameras, seen.crops, seen.windows[0], strict=True)
@@ -221,14 +250,14 @@ class Views:
         return images
 
     def beliefs(self, width: int, height: int, seen: Glance) -> list[Image]:
-        """Return the belief, seen from above and from the side.
+        """Return pictures of the belief from above and from the side.
 
-        It is the robot, its task and the estimate of the workers; there is no truth in it.
+        They show the robot, its task and the estimate of the workers, and no truth.
 
         Args:
-            width: of a picture [px].
-            height: likewise.
-            seen: a moment, as of `glance`.
+            width: width of a picture [px].
+            height: height of a picture [px].
+            seen: a moment, as `glance` returns it.
 
         Returns:
             (height, width, 3) of uint8 each.
@@ -236,7 +265,7 @@ class Views:
         chain = self.simulation.chain
         arm = capsules(chain, seen.q[: chain.n_joints])
         foot = np.array([*arm[0, 0, :2], 0.0])
-        images = []
+        images = list[Image]()
         for name, eye, target in SIDES:
             camera = pinhole(name, foot + eye, foot + target, SIDES_HFOV_DEG, width, height)
             image = overlay.panel(width, height)
@@ -245,13 +274,13 @@ class Views:
                 overlay.draw_path(image, camera, np.array(ends), overlay.ARM, 5)
             overlay.draw_estimate(image, camera, seen.estimate)
             overlay.draw_markers(image, camera, seen.markers_world)
-            nobody = "" if seen.estimate.tracked[0].any() else ": nobody is known"
-            overlay.label(image, name + nobody, (6, 6), 13)
+            suffix = "" if seen.estimate.tracked[0].any() else ": no tracks"
+            overlay.label(image, name + suffix, (6, 6), 13)
             images.append(image)
         return images
 
     def mosaic(self, b: int = 0) -> Image:
-        """Return the cameras' pictures of environment `b` in two columns."""
+        """Return the cameras' pictures of environment `b`, tiled in two columns."""
         return overlay.tile(self.cameras(*MOSAIC_TILE, self.glance(b)), 2)
 
     def close(self) -> None:
@@ -263,32 +292,32 @@ class Views:
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_renderers": {}}
 
-    def _view(self, chosen: str | PinholeCamera, width: int, height: int) -> PinholeCamera:
+    def _make_view(self, chosen: str | PinholeCamera, width: int, height: int) -> PinholeCamera:
         """Return the camera of a picture of this size."""
         if isinstance(chosen, str):
             return viewpoint_camera(chosen, width, height)
         return resize(chosen, width, height)
 
-    def _marked(self, camera: PinholeCamera, seen: Glance, markers: bool) -> Image:
-        """Return a camera's picture, in the light of the sun, with marks and capsules."""
-        (image,) = self._drawn([camera], seen, shadows=True)
+    def _draw_marked(self, camera: PinholeCamera, seen: Glance, markers: bool) -> Image:
+        """Return a camera's picture with shadows, markers and capsules."""
+        (image,) = self._draw([camera], seen, shadows=True)
         stage: Stage = self._renderers["stage"][1]
         if seen.solids:
-            stage.mark(image, camera, marks_of(seen.solids), CAPSULES_SHOWN, CAPSULES_HIDDEN)
+            stage.mark(image, camera, mark_solids(seen.solids), CAPSULES_SHOWN, CAPSULES_HIDDEN)
         if markers and len(seen.markers_world):
-            marks = markers_of(seen.markers_world, camera)
+            marks = mark_points(seen.markers_world, camera)
             stage.mark(image, camera, marks, MARKER_SHOWN, MARKER_HIDDEN)
         return image
 
     def _through_cameras(
         self, width: int, height: int, seen: Glance, cameras: Sequence[PinholeCamera]
     ) -> list[Image]:
-        """Return the cameras' pictures, without shadows."""
+        """Return pictures of cameras with or without lenses, without shadows."""
         if all(camera.lens is None for camera in cameras):
-            return self._drawn([resize(camera, width, height) for camera in cameras], seen)
+            return self._draw([resize(camera, width, height) for camera in cameras], seen)
         size = (SMOOTHING * width, SMOOTHING * width)
         images = LensRenderer(self._renderer("square", size, seen), cameras)
-        views = []
+        views = list[Image]()
         for camera in cameras:
             middle_px = camera.width_px / 2, camera.height_px / 2
             square = images.view(camera, Roi(middle_px, float(camera.width_px), 0.0))
@@ -296,10 +325,10 @@ class Views:
             views.append(overlay.shrink(middle, width, height))
         return views
 
-    def _drawn(
+    def _draw(
         self, cameras: list[PinholeCamera], seen: Glance, shadows: bool = False
     ) -> list[Image]:
-        """What cameras see that stay where they are."""
+        """Return pictures of pinhole cameras at fixed viewpoints."""
         largest = self._renderers["stage"][0] if "stage" in self._renderers else (0, 0)
         sizes = [largest, *((camera.width_px, camera.height_px) for camera in cameras)]
         width, height = np.max(sizes, axis=0).tolist()
@@ -307,7 +336,13 @@ class Views:
         return [stage.picture(camera, shadows) for camera in cameras]
 
     def _renderer(self, purpose: str, size: tuple[int, int], seen: Glance) -> Any:
-        """What draws for a purpose, posed; made anew where pictures have another size."""
+        """Return the posed renderer for a purpose; another size of pictures takes a new one.
+
+        Args:
+            purpose: a key of `_MAKERS`.
+            size: width and height of the pictures [px].
+            seen: the moment that is drawn.
+        """
         had, renderer = self._renderers.get(purpose, (size, None))
         if renderer is None or had != size:
             if renderer is not None:
@@ -319,18 +354,22 @@ class Views:
         return renderer
 
 
-def _chosen(asked: Any, cameras: Sequence[PinholeCamera]) -> str | PinholeCamera:
-    """A camera of a rig, a viewpoint's name, or a camera of the user's own."""
+def _choose(choice: CameraChoice, cameras: Sequence[PinholeCamera]) -> str | PinholeCamera:
+    """Return a camera of a rig, the name of a viewpoint, or a user's own camera.
+
+    Raises:
+        ConfigError: there is no such camera.
+    """
     rig = {camera.name: camera for camera in cameras}
-    if isinstance(asked, PinholeCamera):
-        return asked
-    if isinstance(asked, CameraConfig):
-        return make_cameras([asked])[0]
-    if isinstance(asked, str):
-        if asked not in rig and asked not in VIEWPOINTS:
-            raise unknown("camera or viewpoint", asked, [*rig, *VIEWPOINTS])
-        return rig.get(asked, asked)
-    return cameras[whole(f"camera (of {', '.join(rig)})", asked, 0, len(rig) - 1)]
+    if isinstance(choice, PinholeCamera):
+        return choice
+    if isinstance(choice, CameraConfig):
+        return make_cameras([choice])[0]
+    if isinstance(choice, str):
+        if choice not in rig and choice not in VIEWPOINTS:
+            raise unknown("camera or viewpoint", choice, [*rig, *VIEWPOINTS])
+        return rig.get(choice, choice)
+    return cameras[whole(f"camera (of {', '.join(rig)})", choice, 0, len(rig) - 1)]
 
 
 _MAKERS: dict[str, Callable[..., Canvas]] = {

@@ -12,7 +12,7 @@ from hrc_env.env import HRCEnv
 from hrc_env.geometry.cameras import project, resize
 from hrc_env.geometry.distances import least_separation
 from hrc_env.render import overlay
-from hrc_env.render.marks import solids_of
+from hrc_env.render.marks import find_solids
 from hrc_env.render.stage import Stage
 from hrc_env.scene.canvas import Marks
 from hrc_env.scene.render import viewpoint_camera
@@ -114,7 +114,7 @@ def test_capsules_of_robot_and_people_are_laid_over_the_scene():
         bare.reset(seed=7)
         picture, plain = env.render(), bare.render()
         camera = viewpoint_camera("beside", *SIZE.values())
-        robot, believed, true = solids_of(env.simulation, 0)
+        robot, believed, true = find_solids(env.simulation, 0)
         assert [len(each.radius_m) > 0 for each in (robot, believed, true)] == [True] * 3
         for solids, colour in ((robot, overlay.LEFT), (true, overlay.RIGHT)):
             points = solids.ends_world.mean(1)
@@ -156,7 +156,7 @@ def test_capsules_are_what_distances_are_taken_of():
         env.reset(seed=7)
         for _ in range(10):
             info = env.step(STILL)[4]
-        robot, believed, true = solids_of(env.simulation, 0)
+        robot, believed, true = find_solids(env.simulation, 0)
         for people, expected in (
             (believed, env.simulation.belief.separation.distance_m[0, 0]),
             (true, info["safety/min_separation_m"]),
@@ -170,7 +170,7 @@ def test_capsules_are_what_distances_are_taken_of():
 def test_who_is_not_tracked_has_no_believed_capsules():
     with closing(make(perception="none", overlay="capsules")) as env:
         env.reset(seed=0)
-        assert len(solids_of(env.simulation, 0)[1].radius_m) == 0
+        assert len(find_solids(env.simulation, 0)[1].radius_m) == 0
         assert env.render().std() > 20
 
 

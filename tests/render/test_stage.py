@@ -7,7 +7,7 @@ import pytest
 
 from hrc_env.env import HRCEnv
 from hrc_env.geometry.cameras import PinholeCamera, project
-from hrc_env.render.stage import QUALITY, Stage
+from hrc_env.render.stage import QUALITY, Box, Stage
 from hrc_env.scene.render import PictureRenderer, viewpoint_camera
 
 SIZE = (240, 180)
@@ -78,10 +78,10 @@ def test_nothing_that_moves_is_outside_the_box(env):
     layers, here = Stage(env.simulation.scene, *SIZE), camera()
     q, motion = env.views.pose()
     layers.pose(q, motion)
-    left, top, right, bottom = layers.box(here)
-    _, z = layers.moving(here, (0, 0, *SIZE))
+    left, top, right, bottom = layers.find_box(here)
+    _, z = layers.draw_moving(here, Box(0, 0, *SIZE))
     layers.pose(q, replace(motion, held=None))
-    some_left, some_top, some_right, some_bottom = layers.box(here)
+    some_left, some_top, some_right, some_bottom = layers.find_box(here)
     layers.close()
     rows, columns = np.nonzero(z)
     assert len(rows) > 1000
@@ -96,7 +96,7 @@ def test_nothing_that_moves_is_outside_the_box(env):
 def test_the_picture_from_the_sun_has_things_where_they_are(env):
     layers = Stage(env.simulation.scene, *SIZE)
     layers.pose(*env.views.pose())
-    shade, axes = layers.shade(), layers.sun_axes()
+    shade, axes = layers.draw_shade(), layers.sun_axes()
     layers.close()
     assert shade is not None
     assert axes is not None
