@@ -2,9 +2,10 @@
 
 from collections.abc import Callable
 from operator import itemgetter
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hrc_env.core.declared import dtype_of
 
@@ -25,10 +26,10 @@ def with_fields(declaration: type) -> Callable[[RowType], RowType]:
     return add_fields
 
 
-def _make_setter(name: str) -> Callable[[np.void, Any], None]:
+def _make_setter(name: str) -> Callable[[np.void, ArrayLike], None]:
     """Return a function that sets a field of a row."""
 
-    def set_field(row: np.void, value: Any) -> None:
+    def set_field(row: np.void, value: ArrayLike) -> None:
         row[name] = value
 
     return set_field
