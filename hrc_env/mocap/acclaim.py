@@ -116,7 +116,7 @@ def _read_asf(path: Path) -> _Skeleton:
         elif section == "units" and word == "angle":
             skeleton.is_in_radians = words[1].startswith("rad")
         elif section == "root" and word == "order":
-            skeleton.bones[ROOT].freedoms = tuple(each.lower() for each in words[1:])
+            skeleton.bones[ROOT].freedoms = tuple(freedom.lower() for freedom in words[1:])
         elif section == "bonedata" and word == "begin":
             bone, name = _Bone(), ""
         elif section == "bonedata" and word == "end":

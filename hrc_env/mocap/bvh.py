@@ -203,21 +203,21 @@ def _place_nodes(nodes: list[_Node], parent: Ints, values: Floats) -> _NodePoses
     rotation = np.tile(np.eye(3), (*offset.shape[:2], 1, 1))
     columns, carriers = iter(values.T), _find_carriers(parent)
     stated, added = dict[int, Points3](), list[str]()
-    for node, channels in enumerate(each.channels for each in nodes):
-        own, placed = np.zeros(3), np.zeros((len(values), 3))
+    for node, channels in enumerate(item.channels for item in nodes):
+        position, placed = np.zeros(3), np.zeros((len(values), 3))
         for channel in channels:
             if channel.endswith("position"):
                 axis = "xyz".index(channel[0])
-                own[axis] = nodes[node].offset[axis]
+                position[axis] = nodes[node].offset[axis]
                 offset[:, node, axis] = placed[:, axis] = next(columns)
             else:
                 turn = about_axis(channel[0], np.radians(next(columns)))
                 rotation[:, node] = rotation[:, node] @ turn
         usual = np.linalg.norm(np.nanmedian(placed, axis=0))
         if node in carriers:
-            stated[node] = own
-        elif usual < NEAR_ZERO * np.linalg.norm(own):
-            offset[:, node] += own
+            stated[node] = position
+        elif usual < NEAR_ZERO * np.linalg.norm(position):
+            offset[:, node] += position
             added.append(nodes[node].name)
     note = f"Places of {', '.join(added)} are near 0 and were added to OFFSET."
     return _NodePoses(offset, rotation, stated, (note,) if added else ())

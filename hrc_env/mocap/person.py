@@ -27,11 +27,11 @@ def span(joints: Points3, part: str) -> Points3:
 
 def measure_bone(joints: Points3, first: str, second: str) -> float:
     """Return the median distance of two joints over time, the mean of both sides."""
-    each = [
+    distances = [
         np.linalg.norm(joints[:, JOINT[side + first]] - joints[:, JOINT[side + second]], axis=-1)
         for side in ("left_", "right_")
     ]
-    return float(np.mean(np.nanmedian(each, axis=1)))
+    return float(np.mean(np.nanmedian(distances, axis=1)))
 
 
 def measure_legs(joints: Points3) -> float:

@@ -113,8 +113,8 @@ def add_shift(joints: Points3, shift: Points3) -> Repaired:
     axis = int(np.argmax(np.abs(np.nanmean(way, axis=0))))
     ankles = [JOINT["left_ankle"], JOINT["right_ankle"]]
     off, shifted = (
-        abs(np.nanmedian(np.min(np.abs(each[:, ankles, axis]), axis=1))) / measure_stature(joints)
-        for each in (joints, joints + shift[:, None])
+        abs(np.nanmedian(np.min(np.abs(points[:, ankles, axis]), axis=1))) / measure_stature(joints)
+        for points in (joints, joints + shift[:, None])
     )
     if off < OFF_FLOOR or shifted > ON_FLOOR:
         return Repaired(joints, ())

@@ -46,7 +46,7 @@ def separate_numbers(words: Sequence[str], count: int | None = None) -> list[str
     if not any("," in word or ";" in word for word in words):
         return list(words)
     text = " ".join(words).replace(";", " ")
-    apart = [word for word in (each.strip(",") for each in text.split()) if word]
+    apart = [word for word in (part.strip(",") for part in text.split()) if word]
     is_sign = len(apart) == count
     if count is None:
         is_sign = all(word.count(",") + word.count(".") <= 1 for word in apart)

@@ -68,29 +68,30 @@ def find_joints(moving: Moving, source: str, joints: Mapping[str, str] | None = 
     known = {joint: _list_candidates(joint, readings) for joint in JOINTS}
     known |= {joint: [_Candidate(0.0, node)] for joint, node in given.items() if joint in JOINTS}
     notes = [*_infer_middle_joints(known, names, parent)]
-    found: dict[str, int] = {}
+    nodes: dict[str, int] = {}
     for chain in CHAINS:
-        found |= _choose_chain(chain, known, parent)
-    for joint in sorted((each for each in known if known[each]), key=lambda j: known[j][0].cost):
-        free = [each.node for each in known[joint] if each.node not in found.values()]
-        if joint not in found and free:
-            found[joint] = free[0]
+        nodes |= _choose_chain(chain, known, parent)
+    by_cost = sorted(filter(known.get, known), key=lambda joint: known[joint][0].cost)
+    for joint in by_cost:
+        free = [node for _, node in known[joint] if node not in nodes.values()]
+        if joint not in nodes and free:
+            nodes[joint] = free[0]
     head = given.get("head", _find_head(readings))
-    if head is None and {"left_shoulder", "right_shoulder"} <= {*found}:
-        head = _find_top(found, names, parent)
+    if head is None and {"left_shoulder", "right_shoulder"} <= {*nodes}:
+        head = _find_top(nodes, names, parent)
         if head is not None:
             notes.append(f"The head was taken to be {names[head]}: the trunk ends there.")
-    missed = [joint for joint in JOINTS[1:] if joint not in found]
+    missed = [joint for joint in JOINTS[1:] if joint not in nodes]
     missed += ["head"] if head is None else []
     if missed or head is None:
-        there = [f"{joint} = {names[found[joint]]}" for joint in JOINTS if joint in found]
+        there = [f"{joint} = {names[nodes[joint]]}" for joint in JOINTS if joint in nodes]
         raise ConfigError(
             f"{source}: an unknown skeleton. Missed: {', '.join(missed)}. Found: "
             f"{', '.join(there) or 'none'}. The file has: {', '.join(names)}. Say which is which "
             f"(--joint {missed[0]}=NAME, joints={{{missed[0]!r}: NAME}}), or rename them as in "
             "docs/people_and_scenes.md."
         )
-    return JointNodes(found, head, tuple(notes))
+    return JointNodes(nodes, head, tuple(notes))
 
 
 def _list_candidates(joint: str, readings: list[list[Reading]]) -> list[_Candidate]:
@@ -122,10 +123,10 @@ def _choose_chain(
     choices = [(0.0, list[int]())]
     for joint in chain:
         choices = [
-            (cost + each.cost, [*nodes, each.node])
+            (cost + candidate.cost, [*nodes, candidate.node])
             for cost, nodes in choices
-            for each in known[joint]
-            if not nodes or nodes[-1] in _list_ancestors(each.node, parent)
+            for candidate in known[joint]
+            if not nodes or nodes[-1] in _list_ancestors(candidate.node, parent)
         ]
     return dict(zip(chain, min(choices)[1], strict=True)) if choices else {}
 
@@ -146,14 +147,14 @@ def _infer_middle_joints(
         sides = ("left_", "right_")
         if any(known[side + part] for side in sides):
             continue
-        found = {}
+        inferred = {}
         for side in sides:
             for top, end in itertools.product(known[side + upper], known[side + lower]):
                 path = _list_ancestors(end.node, parent)
-                if path[1:2] == [top.node] and side not in found:
-                    found[side] = path[0], top.node, end.node
-        if len(found) == len(sides):
-            for side, (node, top, end) in found.items():
+                if path[1:2] == [top.node] and side not in inferred:
+                    inferred[side] = path[0], top.node, end.node
+        if len(inferred) == len(sides):
+            for side, (node, top, end) in inferred.items():
                 known[side + part] = [_Candidate(0.0, node)]
                 yield (
                     f"{side + part} was taken to be {names[node]}, which hangs between "
@@ -163,22 +164,22 @@ def _infer_middle_joints(
 
 def _find_head(readings: list[list[Reading]]) -> int | None:
     """Return the node that is called a head, if there is one."""
-    costs = [find_cost(HEAD, "", each) for each in readings]
+    costs = [find_cost(HEAD, "", ways) for ways in readings]
     best = int(np.argmin(costs))
     return best if costs[best] < np.inf else None
 
 
-def _find_top(found: dict[str, int], names: tuple[str, ...], parent: list[int]) -> int | None:
+def _find_top(nodes: dict[str, int], names: tuple[str, ...], parent: list[int]) -> int | None:
     """Return the last node of the only middle branch above the shoulders, if there is one.
 
     Args:
-        found: nodes of the joints.
+        nodes: nodes of the joints.
         names: names of the nodes.
         parent: parent of each node.
     """
-    left, right = (_list_ancestors(found[f"{side}_shoulder"], parent) for side in ("left", "right"))
-    limbs, top = {*left, *right, *found.values()}, None
-    node = next((each for each in left if each in right), -1)
+    left, right = (_list_ancestors(nodes[f"{side}_shoulder"], parent) for side in ("left", "right"))
+    limbs, top = {*left, *right, *nodes.values()}, None
+    node = next((ancestor for ancestor in left if ancestor in right), -1)
     while node >= 0:
         ahead = [
             child

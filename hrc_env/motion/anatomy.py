@@ -60,11 +60,11 @@ def measure_bodies(bodies: Body) -> Anatomy:
     rests = bodies.rest_position.reshape(-1, N_SEGMENTS, 3)
     ends = bodies.capsule_ends.reshape(len(rests), -1, 2, 3)
     radii = bodies.capsule_radius_m.reshape(len(rests), -1)
-    each = [
+    measured = [
         measure_body(replace(bodies, rest_position=rest, capsule_ends=end, capsule_radius_m=radius))
         for rest, end, radius in zip(rests, ends, radii, strict=True)
     ]
-    return Anatomy(*(np.stack([getattr(a, f.name) for a in each]) for f in fields(Anatomy)))
+    return Anatomy(*(np.stack([getattr(a, f.name) for a in measured]) for f in fields(Anatomy)))
 
 
 def measure_body(body: Body) -> Anatomy:

@@ -117,14 +117,15 @@ def load_clip(path: Path) -> Clip:
     names = {item.name for item in fields(Clip)}
     try:
         with np.load(path, allow_pickle=False) as file:
-            found, version = set(file.files), int(file["version"]) if "version" in file.files else 0
-            arrays = {name: file[name] for name in names & found}
+            stored = set(file.files)
+            version = int(file["version"]) if "version" in stored else 0
+            arrays = {name: file[name] for name in names & stored}
     except FileNotFoundError:
         raise ConfigError(f"There is no clip {path}.") from None
     except (zipfile.BadZipFile, ValueError, EOFError, OSError, KeyError) as error:
         raise ConfigError(f"{path} is damaged or no clip: {error}.") from None
     if version != VERSION or set(arrays) != names:
-        got = f"version {version}" if version else f"arrays {', '.join(sorted(found)) or 'none'}"
+        got = f"version {version}" if version else f"arrays {', '.join(sorted(stored)) or 'none'}"
         raise ConfigError(
             f"{path}: expected a clip of version {VERSION}, got {got}. Make it (anew) with: "
             f"python -m hrc_env import-motion RECORDING --out {path}"

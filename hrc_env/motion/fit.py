@@ -35,7 +35,7 @@ def measure_played_s(
     for name, ground in grounds.items():
         stage = make_stage(make_floorplan(ground), config or MotionConfig())
         try:
-            played_s[name] = cut_clips([clip], lengths, stage).lasts_s
+            played_s[name] = cut_clips([clip], lengths, stage).duration_s
         except NoRoomError:
             played_s[name] = 0.0
     return played_s

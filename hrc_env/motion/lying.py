@@ -19,6 +19,7 @@ from hrc_env.motion.activities.loads import BOARD
 from hrc_env.motion.curves import move_point
 from hrc_env.motion.holding import N_HELD, write_prop_pose
 from hrc_env.motion.points import Place
+from hrc_env.motion.rows import with_fields
 from hrc_env.motion.schedule import Job
 from hrc_env.motion.state import NOWHERE, Worker
 from hrc_env.worker.props import BOUNDS_M, PROP_NAMES
@@ -38,7 +39,12 @@ class Load:
     """Kind of that place, an index into `WORKPLACE_KINDS`, or `NOWHERE`."""
 
 
-LOAD = np.dtype((np.record, dtype_of(Load)))
+@with_fields(Load)
+class LoadRow(np.void):
+    """A row of `LOAD` in Python; the fields of `Load` are its attributes."""
+
+
+LOAD = np.dtype((LoadRow, dtype_of(Load)))
 """NumPy's type of a `Load`; its rows have attributes in Python, too."""
 MOVED_M = 0.015
 """Greatest displacement of a load in a pile from its place, along x and y [m]."""

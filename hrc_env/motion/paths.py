@@ -45,8 +45,9 @@ def lay_path(start: Point, via: Floats, end: Point, worker: Worker) -> None:
             next_x, next_y = (via[k + 1, 0], via[k + 1, 1]) if k + 1 < n else (end.x, end.y)
             turn = wrap(math.atan2(next_y - to_y, next_x - to_x) - heading)
             before, after = math.hypot(to_x - x, to_y - y), math.hypot(next_x - to_x, next_y - to_y)
-            own = OWN_EDGE if k == 0 else 1.0  # what the corner before has left is all its own
-            arm = min(via[k, 2], own * before, (SHARED_EDGE if k + 1 < n else OWN_EDGE) * after)
+            own_share = OWN_EDGE if k == 0 else 1.0  # all that the corner before has left
+            next_share = SHARED_EDGE if k + 1 < n else OWN_EDGE
+            arm = min(via[k, 2], own_share * before, next_share * after)
         straight = max(math.hypot(to_x - x, to_y - y) - arm, 0.0)
         worker.path[count, :] = (s, x, y, heading, 0.0, total)
         s, total, count = s + straight, total + heading * straight, count + 1
@@ -64,20 +65,20 @@ def lay_path(start: Point, via: Floats, end: Point, worker: Worker) -> None:
 
 
 @kernel
-def _find_piece(s: float, worker: Worker) -> int:
-    """Return the index of the piece at a distance `s` [m] along the path."""
+def _find_piece(distance: float, worker: Worker) -> int:
+    """Return the index of the piece at a distance [m] along the path."""
     k = worker.n_pieces - 1
-    while k > 0 and worker.path[k, 0] > s:
+    while k > 0 and worker.path[k, 0] > distance:
         k -= 1
     return k
 
 
 @kernel
-def locate_on_path(s: float, worker: Worker) -> Point:
-    """Return the point of the path after `s` metres, held at its ends."""
-    s = min(max(s, 0.0), worker.length)
-    piece = worker.path[_find_piece(s, worker)]
-    way, heading, curvature = s - piece[0], piece[3], piece[4]
+def locate_on_path(distance: float, worker: Worker) -> Point:
+    """Return the point of the path after a distance [m], held at its ends."""
+    distance = min(max(distance, 0.0), worker.length)
+    piece = worker.path[_find_piece(distance, worker)]
+    way, heading, curvature = distance - piece[0], piece[3], piece[4]
     half = 0.5 * curvature * way
     if abs(half) > 1e-9:  # the chord of an arc
         way *= math.sin(half) / half
@@ -85,25 +86,25 @@ def locate_on_path(s: float, worker: Worker) -> Point:
 
 
 @kernel
-def average_heading(s: float, worker: Worker) -> float:
-    """Return the mean direction of the path around `s` metres [rad].
+def average_heading(distance: float, worker: Worker) -> float:
+    """Return the mean direction of the path around a distance [m] along it [rad].
 
     The direction and its rate are continuous.
     """
-    behind, ahead = s - HEADING_WINDOW_M, s + HEADING_WINDOW_M
+    behind, ahead = distance - HEADING_WINDOW_M, distance + HEADING_WINDOW_M
     return (_integrate_heading(ahead, worker) - _integrate_heading(behind, worker)) / (
         2.0 * HEADING_WINDOW_M
     )
 
 
 @kernel
-def _integrate_heading(s: float, worker: Worker) -> float:
-    """Return the integral of the direction from 0 to `s` [rad m].
+def _integrate_heading(distance: float, worker: Worker) -> float:
+    """Return the integral of the direction from 0 to a distance [m] along the path [rad m].
 
     The path goes on straight at its ends.
     """
-    within = min(max(s, 0.0), worker.length)
+    within = min(max(distance, 0.0), worker.length)
     piece = worker.path[_find_piece(within, worker)]
     way, heading, curvature = within - piece[0], piece[3], piece[4]
     total = piece[5] + (heading + 0.5 * curvature * way) * way
-    return total + (s - within) * (heading + curvature * way)
+    return total + (distance - within) * (heading + curvature * way)

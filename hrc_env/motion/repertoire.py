@@ -130,6 +130,7 @@ def _going(activity: int, speed_m_s: float = 1.1, prop: int = 0, way_m: float = 
     """
 
     def start(draws: Floats, height_m: float, worker: Worker) -> float:
+        """Lay the path and start to go along it."""
         x, y, yaw = float(worker.start_x), float(worker.start_y), float(worker.start_yaw)
         lay_path(Point(x, y), np.zeros((0, 3)), move_point(x, y, yaw, way_m, 0.0), worker)
         if activity == st.RUN:
@@ -143,7 +144,10 @@ def _going(activity: int, speed_m_s: float = 1.1, prop: int = 0, way_m: float = 
 
 
 def _hammer(lightly: bool, height_m: float) -> tuple[Act, ...]:
+    """Return the activity of hammering with taps or blows."""
+
     def start(draws: Floats, height_m: float, worker: Worker) -> float:
+        """Start to hammer with taps or blows."""
         chosen = draws.copy()
         chosen[2] = 0.0 if lightly else 1.0  # which decides between taps and blows
         return STARTS[st.HAMMER](chosen, height_m, worker)
@@ -152,22 +156,28 @@ def _hammer(lightly: bool, height_m: float) -> tuple[Act, ...]:
 
 
 def _turn(draws: Floats, height_m: float, worker: Worker) -> float:
+    """Start to turn on the spot by a drawn angle."""
     turn = (1.0 if draws[0] < 0.5 else -1.0) * (0.8 + 2.0 * draws[1])
     return start_turn(float(worker.start_yaw) + turn, worker)
 
 
 def _take(prop: int, on_shoulder: bool, height_m: float) -> Act:
+    """Return the activity of picking up a load."""
+
     def start(draws: Floats, height_m: float, worker: Worker) -> float:
+        """Start to pick up the load."""
         return finish_lift(plan_pick_up(draws, height_m, prop, on_shoulder, worker), worker)
 
     return Act(st.PICK_UP, start, height_m)
 
 
 def _here(activity: int, height_m: float = 0.0) -> tuple[Act, ...]:
+    """Return an activity on the spot."""
     return (Act(activity, STARTS[activity], height_m),)
 
 
 def _stand(draws: Floats, height_m: float, worker: Worker) -> float:
+    """Stand for four seconds."""
     return 4.0
 
 

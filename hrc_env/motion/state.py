@@ -1,8 +1,7 @@
 """State of the workers' motion: one structured array, with axes for environments and workers.
 
 Lengths are in metres, times in seconds, angles in radians. A kernel takes the record of one worker
-(`Worker`) or an array of them. `WORKER` rows are NumPy records, so Python code reads and writes
-fields as attributes, too.
+(`Worker`) or an array of them. The fields are attributes of `WORKER` rows in Python, too.
 """
 
 from typing import Annotated
@@ -13,6 +12,7 @@ from hrc_env.core.declared import dtype_of
 from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import N_ROUND, N_SIZES
+from hrc_env.motion.rows import with_fields
 from hrc_env.worker.body import N_SEGMENTS
 
 MAX_VIA = 8
@@ -324,7 +324,12 @@ class Worker:
     """Share by which the knees of a fallen worker point outwards."""
 
 
-WORKER = np.dtype((np.record, dtype_of(Worker)))
+@with_fields(Worker)
+class WorkerRow(np.void):
+    """A row of `WORKER` in Python; the fields of `Worker` are its attributes."""
+
+
+WORKER = np.dtype((WorkerRow, dtype_of(Worker)))
 """NumPy's type of a `Worker`; its rows have attributes in Python, too."""
 N_START = 16
 """Number of uniform draws that a start function may use."""

@@ -89,8 +89,10 @@ def load_bodies(names: tuple[str, ...]) -> Body:
     if not names:
         raise ConfigError(f"Expected at least one worker of {', '.join(worker_names())}; got none.")
     bodies = [load_body(name) for name in names]
-    own = {f: freeze(np.stack([getattr(body, f) for body in bodies]), np.float64) for f in MEASURED}
-    return replace(bodies[0], names=names, **own)
+    measures = {
+        f: freeze(np.stack([getattr(body, f) for body in bodies]), np.float64) for f in MEASURED
+    }
+    return replace(bodies[0], names=names, **measures)
 
 
 ANY = "any"

@@ -989,7 +989,7 @@ def time_pieces(clips: Any, names: tuple[str, ...], place: str) -> float:
     """Return how long the pieces last into which clips are cut for bodies in a place [s]."""
     sizes = np.stack([measure_anatomy(bodies.load_body(name)).lengths for name in names])
     plan = floorplan.make_floorplan(Floor(place).grounds)
-    return cut_into_pieces(clips, sizes, make_stage(plan, motion_config.MotionConfig())).lasts_s
+    return cut_into_pieces(clips, sizes, make_stage(plan, motion_config.MotionConfig())).duration_s
 
 
 def list_clip(clip: Any) -> Arrays:

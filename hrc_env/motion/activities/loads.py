@@ -82,9 +82,9 @@ def pick_up(t: float, worker: Worker) -> None:
     prop = worker.tool
     q[c.PROP] = prop if t >= gripped or not worker.is_hidden else 0.0
     for side in range(2):
-        here, own = GRIPS[prop, side], worker.load_grip[3 * side : 3 * side + 3]
-        x, y = here[0] + turned * (own[0] - here[0]), here[1] + turned * (own[1] - here[1])
-        grip(side, x, y, here[2] + turned * (own[2] - here[2]), worker)
+        here, carried = GRIPS[prop, side], worker.load_grip[3 * side : 3 * side + 3]
+        x, y = here[0] + turned * (carried[0] - here[0]), here[1] + turned * (carried[1] - here[1])
+        grip(side, x, y, here[2] + turned * (carried[2] - here[2]), worker)
         used = 1.0 + turned * (worker.load_used[side] - 1.0)
         q[c.HAND_SHARE + side] = down * used
 

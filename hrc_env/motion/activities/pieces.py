@@ -89,7 +89,7 @@ class Clips:
         return int(self.count.sum())
 
     @property
-    def lasts_s(self) -> float:
+    def duration_s(self) -> float:
         """Duration of all pieces together [s]."""
         return float(((self.count - 1) / self.fps).sum())
 
