@@ -1,7 +1,8 @@
 """PPO-Lagrangian by FSRL, to validate `train`: python examples/ppo_lagrangian_fsrl.py
 
 FSRL (github.com/liuzuxin/FSRL) reads `info["cost"]` directly, so that no adaptor is needed. It pins
-versions that can no longer be installed, and runs with current ones. In an environment of its own, with hrc_env:
+versions that can no longer be installed, and runs with current ones. In an environment of its own,
+with hrc_env:
 
     pip install -c constraints.txt -e ".[train]"
     pip install --no-deps fast-safe-rl==0.1.0 tianshou==0.5.1 gym==0.26.2
