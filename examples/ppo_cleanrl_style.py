@@ -1,14 +1,14 @@
 """PPO in one plain file over the vector environment: python examples/ppo_cleanrl_style.py
 
-Everything from the first reset to the last gradient step stands below, in the style of CleanRL
+Everything from the first reset to the last gradient step is below, in the style of CleanRL
 (arXiv:2111.08819): no learner's library, only PyTorch. Proximal policy optimisation is Schulman
-et al. 2017, arXiv:1707.06347. Two things are easily done wrong, and marked where they are done:
+et al. 2017, arXiv:1707.06347. Two common mistakes are marked at the lines that avoid them:
 
     the reset step   In gymnasium's mode NEXT_STEP the step after the end of an episode only
                      starts the next one: its action is ignored and its reward is 0. It is no
-                     experience, so it is left out of every gradient.
-    truncation       An episode that the time limit cuts has a future, which the value of its
-                     last observation stands for; one that fails has none.
+                     experience, so it is excluded from every gradient.
+    truncation       An episode that the time limit ends has a future, whose return the value of
+                     its last observation estimates; one that fails has none.
 """
 
 import time

@@ -1,16 +1,16 @@
 """PPO that reaches from camera images: python examples/ppo_from_images.py
 
-A policy of Stable-Baselines3 with convolutions moves the tool to goals one after another. It is
-given two camera images and the place of the goal, and nothing of the robot itself.
+A policy of Stable-Baselines3 with convolutions moves the tool to goals one after another. Its input
+is two camera images and the position of the goal, without the state of the robot.
 
     --sees pixels --pretrain 0       everything is learnt from the reward
-    --sees pixels                    the convolutions first learn where the tool is, from images and
-                                     what the encoders say at the same time; then PPO learns to act
-    --sees belief                    the same recipe without images, to compare with
+    --sees pixels                    the convolutions first learn the tool's position from images
+                                     and encoders; then PPO learns to act
+    --sees belief                    the same settings without images, for comparison
 
 OUT/curve.png and OUT/curve.json have the goals reached, OUT/policy.zip is the policy. After 120,000
 steps mean actions reached, in 32 new episodes, 95 goals a minute from the belief, 79 from images
-after teaching, and 17 from images by reward alone (`examples/ppo_from_images.png` has the curves).
+after pretraining, and 17 from images without it (`examples/ppo_from_images.png` has the curves).
 """
 
 import json

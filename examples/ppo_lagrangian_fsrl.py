@@ -1,14 +1,15 @@
-"""PPO-Lagrangian by FSRL, a check of ours: python examples/ppo_lagrangian_fsrl.py
+"""PPO-Lagrangian by FSRL, to validate `train`: python examples/ppo_lagrangian_fsrl.py
 
-FSRL (github.com/liuzuxin/FSRL) reads `info["cost"]` as it is, so that no adaptor is needed. It pins
-versions that no longer install, and runs with today's. In an environment of its own, with hrc_env:
+FSRL (github.com/liuzuxin/FSRL) reads `info["cost"]` directly, so that no adaptor is needed. It pins
+versions that can no longer be installed, and runs with current ones. In an environment of its own,
+with hrc_env:
 
     pip install -c constraints.txt -e ".[train]"
     pip install --no-deps fast-safe-rl==0.1.0 tianshou==0.5.1 gym==0.26.2
     pip install -c constraints.txt h5py pettingzoo prettytable pyrallis pyyaml "wandb>=0.20"
 
-It steps single environments, some hundred steps a second: give it hours for what takes ours
-minutes. Both are judged on the same seeds, as `train` judges.
+It steps single environments, at a few hundred steps a second, and takes hours where `train` takes
+minutes. Both agents are evaluated on the same seeds, as `train` does.
 """
 
 import time

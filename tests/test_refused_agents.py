@@ -107,7 +107,7 @@ def test_a_run_goes_on_where_there_is_more_to_learn(tmp_path):
     assert restore_arguments(TrainingRequest(), tmp_path).timesteps == 512
     (tmp_path / "run.json").write_text(json.dumps({"arguments": {"timesteps": None}}))
     made(read_meta(num_timesteps=0), tmp_path / "policy.zip")
-    with pytest.raises(CheckpointError, match="has learnt 0 steps already"):
+    with pytest.raises(CheckpointError, match="was trained for 0 steps already"):
         restore_arguments(TrainingRequest(), tmp_path)
 
 

@@ -1,4 +1,4 @@
-"""Textures: flat maps of a surface, rasters of what lies on them, and how they are stored."""
+"""Textures: flat maps of a surface, rasters of values on them, and their storage."""
 
 from collections.abc import Callable
 

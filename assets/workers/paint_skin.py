@@ -1,4 +1,4 @@
-"""Paint what is bare: face, hair, hands and eyes. Where the lips are is MakeHuman's (CC0)."""
+"""Paint bare skin, hair and eyes. The position of the lips is MakeHuman's (CC0)."""
 
 from pathlib import Path
 

@@ -4,8 +4,8 @@ Frames: the file's world is right-handed, +Z up, in millimetres, and becomes `wo
 Its matrix has the camera's axes in its rows (+X right, +Y up, -Z forward), so that OpenCV's
 camera (+X right, +Y down, +Z forward) is that turned half round its +X. Lengths in the image
 come in 64ths of a pixel, counted from the middle of the first pixel; here pixels count from
-the image's corner, half a pixel more. Of an image that is narrower than the calibration
-says the right margin was cut off: moving or stretching it makes the views agree less.
+the image's corner, half a pixel more. Of an image that is narrower than in the
+calibration the right margin was cut off: moving or stretching it makes the views agree less.
 """
 
 import xml.etree.ElementTree as ElementTree

@@ -108,7 +108,7 @@ def test_parts_that_are_there_are_not_played_again(tmp_path):
     assert sum(shares) == pytest.approx(1.5)
     replaced = replace(cache, key="other")
     with pytest.raises(ConfigError):
-        replaced.parts([Part("one", fail)])
+        replaced.make_parts([Part("one", fail)])
 
 
 @pytest.mark.parametrize(
