@@ -42,7 +42,7 @@ from hrc_env.experiments.rigs import ALL, DT_S, N_WARM_UP, SINGLE, Rig, left_wit
 from hrc_env.experiments.runner import run_experiment
 from hrc_env.experiments.versions import key_of
 from hrc_env.geometry.cameras import project, projections
-from hrc_env.geometry.sight import hidden
+from hrc_env.geometry.sight import find_hidden
 from hrc_env.pipeline.levels import make_pipeline
 from hrc_env.pipeline.sensor_input import TrueSensorInput
 from hrc_env.scene.build import build
@@ -161,7 +161,7 @@ def frames(
             off_px = np.linalg.norm(found.px[:, kept, 0] - px, axis=-1)
             stature_m = walks.bodies.stature_m[motion.body[:, 0]][:, None, None]
             inside = (depth_m > 0) & ((px > 0) & (px < size)).all(-1)
-            free = inside & ~hidden(scene.surroundings(q, motion.held), eyes, joints)
+            free = inside & ~find_hidden(scene.surroundings(q, motion.held), eyes, joints)
             share = off_px * depth_m / (focal * stature_m)
             yield Frame(joints, eyes, yaw_of(joints, eyes), free, share, sure, said)
 

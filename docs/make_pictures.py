@@ -34,10 +34,10 @@ from hrc_env.core.batching import copied
 from hrc_env.core.records import Roi
 from hrc_env.env import HRCEnv
 from hrc_env.geometry.cameras import pinhole, project, projections
-from hrc_env.perception.faults.camera_film import CameraFilm, Shot
+from hrc_env.perception.faults.camera_film import CameraFilm, ScenePose, Shot
 from hrc_env.perception.faults.fault import IMAGE, KINDS, FaultConfig
 from hrc_env.perception.faults.schedule import Schedule
-from hrc_env.perception.lensed import Lensed
+from hrc_env.perception.lenses import LensRenderer
 from hrc_env.perception.windows import window_from_joints
 from hrc_env.render.overlay import label, middle_rows, shrink, tile
 from hrc_env.scene.domain_randomization import VARIED, draw_look
@@ -105,7 +105,7 @@ def cameras() -> None:
     renderer = CropRenderer(env.simulation.scene, 1920)
     renderer.pose(*env.views.pose())
     whole = Roi((960.0, 540.0), 1920.0, 0.0)
-    images = [Lensed(renderer, (gopro,)).view(each, whole) for each in (wide, gopro)]
+    images = [LensRenderer(renderer, (gopro,)).view(each, whole) for each in (wide, gopro)]
     shown = [shrink(middle_rows(image, 1080), 800, 450) for image in images]
     for image, text in zip(shown, ("pinhole, 118.2 degrees", "GoPro HERO8 wide"), strict=True):
         label(image, text, (8, 8))
@@ -128,8 +128,9 @@ def faults() -> None:
         env.step(np.zeros(6))
         renderer = CropRenderer(scene)
         schedule = Schedule(scene.rig, tuple(given), env.config.ctrl_dt)
-        film = CameraFilm(Lensed(renderer, scene.cameras), schedule)
-        shot = Shot(0, *copied(env.views.pose()), before, scene.cameras)
+        film = CameraFilm(LensRenderer(renderer, scene.cameras), schedule)
+        now = copied(env.views.pose())
+        shot = Shot(0, ScenePose(*now), ScenePose(*before), scene.cameras)
         film.show([shot] * 4, seed=4)
         joints = env.simulation.estimate.mean_world[:, 0]
         px, depth_m = project(projections(scene.cameras[:1]), joints)

@@ -409,8 +409,8 @@ def infos() -> str:
     rows += [(f"`{name}`", each.unit, _meaning(each)) for name, each in ENTRIES.items()]
     rows += [(f"`worker_N/{name}`", "-", text) for name, text in OF_WORKERS.items()]
     rows += [
-        (f"`{FAULT}{name}`", each.unit, f"drawn: amount of this fault, {each.says}, the most of "
-         f"several; {NEUTRAL.get(name, 0.0):g} without one"
+        (f"`{FAULT}{name}`", each.unit, f"drawn: amount of this fault, {each.description}, the "
+         f"most of several; {NEUTRAL.get(name, 0.0):g} without one"
          f"{', 1 with one' if each.bounds == (0.0, 0.0) else ''}; at `pixels`"
          f"{' and `keypoints`' if each.group != IMAGE or name in EMULATED else ''}")
         for name, each in KINDS.items()
@@ -567,8 +567,8 @@ def shields() -> str:
     heads = ("region", "clamped [N]", "hit [N]", "stiffness [N/mm]", "mass [kg]", "speed [m/s]")
     return SHIELDS.format(
         notice=NOTICE,
-        rows=_doc("hrc_env.safety.rows"),
-        guard=_doc("hrc_env.safety.guard"),
+        rows=_doc("hrc_env.safety.constraints"),
+        guard=_doc("hrc_env.safety.built_in"),
         settings=_fields_of(ShieldConfig, "`ShieldConfig`"),
         separation=f"`hrc_env.safety.separation`: {_doc('hrc_env.safety.separation')}",
         contact=f"`hrc_env.safety.contact`: {_doc('hrc_env.safety.contact')}",

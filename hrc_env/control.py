@@ -16,7 +16,7 @@ from hrc_env.core.batching import flat
 from hrc_env.core.errors import ConfigError, check_fields, check_shape, unknown
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats, JointAngles, JointVelocities, Velocities3
-from hrc_env.geometry.chains import SerialChain, jacobian, turning
+from hrc_env.geometry.chains import SerialChain, angular_jacobian, jacobian
 
 MEANINGS = {
     "joint": "velocities of its joints",
@@ -127,7 +127,7 @@ def resolved_twist(
 ) -> JointVelocities:
     """Joint velocities (..., N) for a velocity and a turn rate of the tool, (..., 6), scaled
     together to their limits; damped only near singular postures, where the tool lags behind."""
-    J = flat(np.concatenate([jacobian(chain, q), turning(chain, q)], axis=-2), 2)
+    J = flat(np.concatenate([jacobian(chain, q), angular_jacobian(chain, q)], axis=-2), 2)
     manipulability, qd = np.empty(len(J)), np.zeros((len(J), chain.n_joints))
     _measure_manipulability(J, manipulability)
     near = np.clip(1.0 - manipulability / SINGULAR_M3, 0.0, 1.0)

@@ -21,13 +21,13 @@ from hrc_env.core.records import Roi
 from hrc_env.env import HRCEnv
 from hrc_env.geometry import chains
 from hrc_env.geometry.camera_config import write_rig
-from hrc_env.perception.detector import own_joints
+from hrc_env.perception.detector import call_detector
 from hrc_env.registration import import_files
 from hrc_env.scene.build import build
 from hrc_env.scene.render import PictureRenderer
 from hrc_env.scene.robot import ROBOTS
 from hrc_env.tasks.task import TASKS
-from hrc_env.tracking.config import ParticleConfig, of_kind
+from hrc_env.tracking.config import ParticleConfig, cast_config
 from hrc_env.tracking.estimators import ESTIMATORS
 from hrc_env.tracking.particle import ParticleEstimator
 from hrc_env.vector.env import HRCVectorEnv
@@ -238,7 +238,7 @@ class Wrong(ParticleEstimator):
     """The default one, whose means are something else."""
 
     def __init__(self, P, dt_s, config, mean):
-        super().__init__(P, dt_s, of_kind(config, ParticleConfig))
+        super().__init__(P, dt_s, cast_config(config, ParticleConfig))
         object.__setattr__(self, "mean", mean)
 
     def estimate(self, state):
@@ -338,13 +338,15 @@ def test_a_detector_finds_the_worker(pixels):
 )
 def test_what_is_wrong_with_keypoints_is_said(found, said):
     with pytest.raises(ConfigError, match=said):
-        own_joints(lambda crop: found, np.zeros((256, 256, 3), np.uint8), Roi((9.0, 9.0), 9.0, 0.0))
+        call_detector(
+            lambda crop: found, np.zeros((256, 256, 3), np.uint8), Roi((9.0, 9.0), 9.0, 0.0)
+        )
 
 
 def test_a_joint_that_is_not_found_is_data():
     found = np.full((15, 3), 0.5)
     found[3] = np.nan
-    joints = own_joints(
+    joints = call_detector(
         lambda crop: found, np.zeros((256, 256, 3), np.uint8), Roi((9.0, 9.0), 9.0, 0.0)
     )
     assert joints[3, 2] == 0.0
@@ -401,7 +403,7 @@ def test_the_geometry_of_a_robot_is_that_of_its_mjcf():
     data = mujoco.MjData(scene.model)
     data.qpos[:] = q
     mujoco.mj_kinematics(scene.model, data)
-    tip = chains.tool(scene.chain, q)[:3, 3]
+    tip = chains.tool_frame(scene.chain, q)[:3, 3]
     np.testing.assert_allclose(data.site("robot/tip").xpos, tip, atol=1e-9)
     for name, ends in zip(scene.robot.capsules, chains.capsules(scene.chain, q), strict=True):
         np.testing.assert_allclose(data.geom(f"robot/{name}").xpos, ends.mean(0), atol=1e-9)

@@ -12,7 +12,7 @@ from hrc_env.control import (
     resolved_twist,
 )
 from hrc_env.core.errors import ConfigError
-from hrc_env.geometry.chains import jacobian, turning
+from hrc_env.geometry.chains import angular_jacobian, jacobian
 from hrc_env.scene.build import build
 
 SCENE = build(n_workers=0)
@@ -63,7 +63,7 @@ def test_a_twist_is_the_damped_least_squares_solution_also_at_singular_postures(
     config, rng = ControlConfig(), np.random.default_rng(5)
     q = np.concatenate([near_home(), np.zeros((1, CHAIN.n_joints))])  # the last: a straight arm
     twist = 0.01 * rng.normal(size=(len(q), 6))
-    J = np.concatenate([jacobian(CHAIN, q), turning(CHAIN, q)], axis=1)
+    J = np.concatenate([jacobian(CHAIN, q), angular_jacobian(CHAIN, q)], axis=1)
     gram = J @ J.swapaxes(1, 2)
     near = 1.0 - np.sqrt(np.maximum(np.linalg.det(gram), 0.0)) / SINGULAR_M3
     damping = np.square(config.damping * np.clip(near, 0.0, 1.0)) + 1e-9

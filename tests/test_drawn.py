@@ -24,11 +24,11 @@ def test_amounts_of_faults_are_those_of_the_episode() -> None:
     for seed in range(5):
         _, info = env.reset(seed=seed)
         late, turned, lost = env.faults
-        assert info["episode/fault_late"] == late.how_much
-        assert info["episode/fault_wrong_rotation"] == turned.how_much
+        assert info["episode/fault_late"] == late.max_amount
+        assert info["episode/fault_wrong_rotation"] == turned.max_amount
         assert (info["episode/fault_lost"], lost.kind) == (1.0, "lost")
-        assert 0 <= info["episode/delay_s"] - late.how_much < 0.04
-        told.add(late.how_much)
+        assert 0 <= info["episode/delay_s"] - late.max_amount < 0.04
+        told.add(late.max_amount)
         stepped = env.step(np.zeros(6, np.float32))[-1]
         assert drawn(stepped) == drawn(info)
     assert len(told) == 5
@@ -72,7 +72,7 @@ def test_light_and_delays_are_told_of_each_environment_of_a_batch() -> None:
     assert 0.2 <= infos["episode/light"][0] <= 0.5
     assert (infos["episode/light"][1:] == 1).all()
     assert infos["episode/fault_late"][1] > 0
-    assert envs.member(1).faults[0].how_much == infos["episode/fault_late"][1]
+    assert envs.member(1).faults[0].max_amount == infos["episode/fault_late"][1]
     assert not infos["episode/fault_late"][[0, 2]].any()
     for k, each in enumerate(options):
         _, alone = HRCEnv(perception="keypoints").reset(seed=4 + k, options=each)

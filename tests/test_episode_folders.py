@@ -42,7 +42,7 @@ def test_an_episode_is_what_the_single_environment_plays(whole):
             np.testing.assert_array_equal(episode.observations[name][t], value)
         now = env.unwrapped.simulation
         np.testing.assert_array_equal(episode.belief["joints_world"][t], now.estimate.mean_world[0])
-        np.testing.assert_array_equal(episode.keypoints.px[t], now.pipeline.given.px[0])
+        np.testing.assert_array_equal(episode.keypoints.px[t], now.pipeline.measurements.px[0])
         for name in ("cost", "safety/min_separation_m"):
             assert episode.truth[name][t] == info[name]
         observation, reward, *_, info = env.step(episode.actions[t])
@@ -131,12 +131,12 @@ def test_drawn_rigs_differ_between_environments_of_a_batch():
     envs = hrc_env.HRCVectorEnv(3, num_threads=1)
     envs.reset(seed=1, options={"each": options})
     envs.step(np.zeros((3, 6), np.float32))
-    together = envs.simulation.pipeline.given
+    together = envs.simulation.pipeline.measurements
     for b, each in enumerate(options):
         env = hrc_env.HRCEnv(perception="keypoints")
         env.reset(seed=1 + b, options=each)
         env.step(np.zeros(6, np.float32))
-        alone = env.simulation.pipeline.given
+        alone = env.simulation.pipeline.measurements
         np.testing.assert_array_equal(together.px[b], alone.px[0])
         np.testing.assert_array_equal(together.sigma_px[b], alone.sigma_px[0])
         if alone.time_s is not None:

@@ -48,7 +48,7 @@ class Crowded(RenderedCameras):
         sim = env.simulation
         recipe, pipeline = sim.scene.recipe, sim.pipeline
         scene = build(*recipe._replace(n_workers=sim.scene.n_workers + 1))
-        plain = pipeline.cameras.recent.schedule
+        plain = pipeline.cameras.history.schedule
         super().__init__(scene, 1, pipeline.cameras.appearance, plain)
         state = generator.make_state(
             1, 1, sim.bodies, sim.config.motion, sim.scene.grounds, 1, sim.scene.robot.girth_m

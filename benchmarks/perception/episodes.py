@@ -84,7 +84,7 @@ def _episode(env: HRCEnv, seed: int, n_steps: int) -> Episode:
         joints, estimate = truth.joints_world[0, 0], simulation.estimate
         family[t] = family_index(int(generator.activity(simulation.motion)[0, 0]))
         off_px[t] = _off_px(env, joints)
-        named[t] = simulation.pipeline.suspected(np.array([0]))[0]
+        named[t] = simulation.pipeline.suspected_cameras(np.array([0]))[0]
         if estimate.tracked[0, 0]:
             offset, cov = estimate.mean_world[0, 0] - joints, estimate.cov_world[0, 0]
             error[t] = np.linalg.norm(offset, axis=-1)

@@ -22,7 +22,7 @@ from rich.console import Console
 from rich.table import Table
 
 from hrc_env.core.results import provenance, write_whole
-from hrc_env.geometry.cameras import resized
+from hrc_env.geometry.cameras import resize
 
 STEP, RENDER = "a step without images", "render(), with shadows"
 
@@ -61,7 +61,7 @@ def contenders(arguments: Arguments, exits: ExitStack) -> dict[str, Callable[[],
     one = make(observe_images={"height": size, "width": size, "cameras": [0]})
     every = make(observe_images=(size, size))
     shown = make(render_mode="rgb_array", width=size, height=size)
-    rig = [resized(camera, size, size) for camera in shown.simulation.scene.cameras]
+    rig = [resize(camera, size, size) for camera in shown.simulation.scene.cameras]
     return {
         STEP: stepped(shown),
         "a step with one image": stepped(one),

@@ -15,12 +15,12 @@ from hrc_env.config import HRCConfig
 from hrc_env.core.records import Keypoints, WorkerTruth
 from hrc_env.core.typing import Bools, Points3
 from hrc_env.geometry.cameras import projections
-from hrc_env.geometry.sight import Surroundings, nothing
+from hrc_env.geometry.sight import Surroundings, no_surroundings
 from hrc_env.motion import generator
 from hrc_env.perception import emulator
 from hrc_env.settings import settle
 from hrc_env.simulation import Simulation
-from hrc_env.tracking.config import ParticleConfig, of_kind
+from hrc_env.tracking.config import ParticleConfig, cast_config
 from hrc_env.worker.body import worker_truth
 
 ENV = "env"
@@ -38,7 +38,7 @@ def make_env_rig() -> Rig:
     simulation = simulate(1)
     P = projections(simulation.scene.cameras)
     simulation.close()
-    return Rig(ENV, P, (np.nan, np.nan), of_kind(HRCConfig().tracker, ParticleConfig))
+    return Rig(ENV, P, (np.nan, np.nan), cast_config(HRCConfig().tracker, ParticleConfig))
 
 
 def record(condition: str, seeds: list[int]) -> tuple[Points3, Keypoints]:
@@ -109,7 +109,7 @@ def _episodes(seeds: tuple[int, ...]) -> tuple[Points3, Keypoints, Keypoints]:
     for truth, lab in watch(simulation, seeds, pushes, ENV_FRAMES):
         joints.append(truth.joints_world.copy())
         for said, detector, between in zip(
-            seen, detectors, (nothing(len(seeds)), lab), strict=True
+            seen, detectors, (no_surroundings(len(seeds)), lab), strict=True
         ):
             said.append(detector.detect(truth, between))
     simulation.close()

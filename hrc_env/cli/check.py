@@ -133,7 +133,7 @@ def _weights() -> Finding:
 def _openvino() -> Finding:
     from hrc_env.perception import vino
 
-    if not vino.installed():
+    if not vino.is_installed():
         return True, f"not installed; it makes pixels faster: {vino.INSTALL}"
     return True, f"computes in {vino.precision()} where detector.runtime is openvino or auto"
 

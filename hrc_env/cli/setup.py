@@ -22,7 +22,7 @@ class Setup:
         console = Console()
         fetch_networks(console, [f"pose_landmark_{network}" for network in self.networks])
         ready, message = find_opengl(console)
-        compile_kernels(console, says=True)
+        compile_kernels(console, is_verbose=True)
         if ready:
             console.print(f"[green]ok[/] headless OpenGL: {message}")
         else:

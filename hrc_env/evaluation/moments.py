@@ -42,7 +42,7 @@ class Kept:
         if self.poses:
             yield from _poses(part)
         if self.keypoints:
-            found = part.pipeline.given
+            found = part.pipeline.measurements
             for name in ("px", "confidence", "sigma_px", "time_s"):
                 if (value := getattr(found, name)) is not None:
                     yield f"keypoints/{name}", value.copy()

@@ -1,17 +1,23 @@
-"""Assignment: each row of a cost matrix gets a column of its own, at the least total cost.
+"""Assignment: every row of a cost matrix is given a column of its own, at the least total cost.
 
-The shortest augmenting paths of the Hungarian method (Jonker and Volgenant, Computing 38, 1987),
-for matrices with a few rows, inside kernels.
+The method is that of the shortest augmenting paths (Jonker and Volgenant, Computing 38, 1987), as a
+kernel for matrices with a few rows.
 """
 
 import numpy as np
 
 from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats, Ints
 
 
 @kernel(makes_arrays=True)
-def assign_rows(cost, column):
-    """Write the column of each row of a finite cost (n, m), m >= n, into column (n,)."""
+def assign_rows(cost: Floats, column: Ints) -> None:
+    """Write the column that each row of a cost matrix is assigned to.
+
+    Args:
+        cost: (n, m) finite costs, with m >= n.
+        column: (n,) is filled.
+    """
     n_rows, n_columns = cost.shape
     if n_columns == 1:
         column[:n_rows] = 0

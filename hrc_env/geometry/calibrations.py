@@ -1,4 +1,4 @@
-"""Rigs out of calibration files that other tools write: anipose, FreeMoCap, Caliscope, Pose2Sim.
+"""Rigs from the calibration files of other tools: anipose, FreeMoCap, Caliscope, Pose2Sim.
 
 Such a file is TOML with a table for each camera:
 
@@ -19,24 +19,26 @@ import math
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.typing import Floats
-from hrc_env.geometry.camera_config import CameraConfig, axes_of, intrinsics, lens_of
+from hrc_env.geometry.camera_config import CameraConfig, axes_of, intrinsics, make_lens
 from hrc_env.geometry.rotations import from_rotation_vector
 
-TABLE = ("size", "matrix", "distortions", "rotation", "translation")
+ENTRIES = ("size", "matrix", "distortions", "rotation", "translation")
 """Entries that the table of a camera must hold."""
 HALF_PX = 0.5
-"""From the middle of the first pixel to the image's corner [px]."""
-FAR_M = 30.0
-"""Cameras that are further from their middle, or one from the origin, are not in metres."""
+"""Distance from the middle of the first pixel to the image's corner [px]."""
+MAX_SPREAD_M = 30.0
+"""Greatest distance of cameras from their middle, or of one from the origin, in metres; lengths
+beyond it are taken to be in millimetres."""
 MM = 1e-3
-CLEARLY = 0.7
-"""An axis is up if the upright direction of the images has a greater component along it."""
+"""A millimetre [m]."""
+MIN_UPRIGHT = 0.7
+"""Least component of the upright direction of the images along the axis of the world that is up."""
 
 
 def is_calibration(content: Mapping[str, Any]) -> bool:
@@ -44,66 +46,66 @@ def is_calibration(content: Mapping[str, Any]) -> bool:
     return any("matrix" in table for table in _tables(content).values())
 
 
-def cameras_of(content: Mapping[str, Any], path: Path | str) -> tuple[CameraConfig, ...]:
+def parse_calibration(content: Mapping[str, Any], path: Path | str) -> tuple[CameraConfig, ...]:
     """Return the cameras of a calibration that another tool has written.
 
-    Lengths in millimetres are turned into metres; a `UserWarning` reports them, and a world whose
+    Lengths in millimetres are converted to metres; a `UserWarning` reports them, and a world whose
     z axis is not up.
 
     Args:
-        content: of the file.
-        path: of the file, for errors.
+        content: content of the file.
+        path: path of the file, for messages.
 
     Raises:
         ConfigError: a camera has no extrinsics, lacks another entry, or has an unknown lens.
     """
-    cameras = []
+    cameras: list[CameraConfig] = []
     for key, table in _tables(content).items():
-        if any(word in table for word in TABLE[1:]) and not table.get("ignore", False):
+        if any(word in table for word in ENTRIES[1:]) and not table.get("ignore", False):
             try:
-                cameras.append(_camera(str(table.get("name", key)), table))
+                cameras.append(_parse_camera(str(table.get("name", key)), table))
             except ConfigError as error:
                 raise ConfigError(f"{path}, table {key!r}: {error}") from error
     if not cameras:
         raise ConfigError(f"{path} holds no camera that is not to be ignored.")
-    return _in_metres(cameras, path)
+    return _convert_to_metres(cameras, path)
 
 
 def _tables(content: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
-    """The tables of a file that may be cameras, by their keys; Caliscope's own nests them."""
+    """Return the tables of a file that may be cameras, by key; Caliscope nests them in one."""
     nested = content.get("cameras")
-    inside = nested if isinstance(nested, Mapping) else content
+    inside = cast("Mapping[str, Any]", nested) if isinstance(nested, Mapping) else content
     return {key: each for key, each in inside.items() if isinstance(each, Mapping)}
 
 
-def _camera(name: str, table: Mapping[str, Any]) -> CameraConfig:
-    """A camera of its table, lengths in the file's unit."""
-    missing = [word for word in TABLE if word not in table or table[word] in ("null", [], None)]
+def _parse_camera(name: str, table: Mapping[str, Any]) -> CameraConfig:
+    """Return the camera of a table, with lengths in the file's unit."""
+    missing = [word for word in ENTRIES if word not in table or table[word] in ("null", [], None)]
     if missing:
-        hint = " It has no place in the world yet: calibrate its extrinsics." if (
-            {"rotation", "translation"} & {*missing}
-        ) else ""  # fmt: skip
-        raise ConfigError(f"it must have {', '.join(TABLE)}; missing {', '.join(missing)}.{hint}")
-    size = _numbers(table, "size", (2,))
-    K, translation = _numbers(table, "matrix", (3, 3)), _numbers(table, "translation", (3,))
+        has_no_pose = {"rotation", "translation"} & {*missing}
+        hint = " It has no place in the world yet: calibrate its extrinsics." if has_no_pose else ""
+        raise ConfigError(f"it must have {', '.join(ENTRIES)}; missing {', '.join(missing)}.{hint}")
+    size = _parse_numbers(table, "size", (2,))
+    matrix = _parse_numbers(table, "matrix", (3, 3))
+    translation = _parse_numbers(table, "translation", (3,))
     rotation = np.ravel(np.asarray(table["rotation"], object))
     R_cam_from_world = (
-        _numbers(table, "rotation", (3, 3))
+        _parse_numbers(table, "rotation", (3, 3))
         if len(rotation) == 9
-        else from_rotation_vector(_numbers(table, "rotation", (3,)))
+        else from_rotation_vector(_parse_numbers(table, "rotation", (3,)))
     )
-    K = K + np.array([[0.0, 0.0, HALF_PX], [0.0, 0.0, HALF_PX], [0.0, 0.0, 0.0]])
+    K = matrix + np.array([[0.0, 0.0, HALF_PX], [0.0, 0.0, HALF_PX], [0.0, 0.0, 0.0]])
     T_world_from_cam = np.eye(4)
     T_world_from_cam[:3, :3] = R_cam_from_world.T
     T_world_from_cam[:3, 3] = -R_cam_from_world.T @ translation
-    distortion = _numbers(table, "distortions", (-1,))
-    lens = lens_of(distortion, fisheye=bool(table.get("fisheye", False)))
+    distortion = _parse_numbers(table, "distortions", (-1,))
+    lens = make_lens(distortion, fisheye=bool(table.get("fisheye", False)))
     width, height = (round(float(each)) for each in size)
     return CameraConfig.from_matrices(name, K, T_world_from_cam, (width, height), lens)
 
 
-def _numbers(table: Mapping[str, Any], word: str, shape: tuple[int, ...]) -> Floats:
-    """An entry as finite numbers of a shape; -1: any length."""
+def _parse_numbers(table: Mapping[str, Any], word: str, shape: tuple[int, ...]) -> Floats:
+    """Return an entry of a table as finite numbers of a shape, in which -1 is any length."""
     try:
         values = np.asarray(table[word], float)
         values = values.reshape(-1 if shape == (-1,) else shape)
@@ -115,33 +117,33 @@ def _numbers(table: Mapping[str, Any], word: str, shape: tuple[int, ...]) -> Flo
     return values
 
 
-def _in_metres(cameras: list[CameraConfig], path: Path | str) -> tuple[CameraConfig, ...]:
+def _convert_to_metres(cameras: list[CameraConfig], path: Path | str) -> tuple[CameraConfig, ...]:
     """Return the cameras in metres, with a warning about another unit or upward axis."""
     eyes = np.array([camera.eye_world for camera in cameras])
     centred = eyes - eyes.mean(0) if len(eyes) > 1 else eyes
-    unit_m = MM if np.linalg.norm(centred, axis=-1).max() > FAR_M else 1.0
-    said = []
+    unit_m = MM if np.linalg.norm(centred, axis=-1).max() > MAX_SPREAD_M else 1.0
+    remarks: list[str] = []
     if unit_m != 1.0:
         far_m = unit_m * max(math.dist(a, b) for a in eyes for b in eyes)
-        said.append(
+        remarks.append(
             "lengths were taken to be in millimetres: the cameras are up to "
             f"{far_m:.2f} m from each other. Multiply the translations if that is wrong"
         )
     upright = -np.mean([axes_of(camera)[:, 1] for camera in cameras], axis=0)
     axis = int(np.argmax(np.abs(upright)))
-    if abs(upright[axis]) > CLEARLY and (axis != 2 or upright[2] < 0.0):
+    if abs(upright[axis]) > MIN_UPRIGHT and (axis != 2 or upright[2] < 0.0):
         name = ("+" if upright[axis] > 0.0 else "-") + "xyz"[axis]
-        said.append(
+        remarks.append(
             f"its world's {name} axis seems to be up, as the images are upright along it; here +z "
             "is up, and the robot stands at the origin. Turn the calibration's world"
         )
-    if said:
-        warnings.warn(f"{path}: {'; '.join(said)}.", UserWarning, stacklevel=2)
-    return tuple(_scaled(camera, unit_m) for camera in cameras)
+    if remarks:
+        warnings.warn(f"{path}: {'; '.join(remarks)}.", UserWarning, stacklevel=2)
+    return tuple(_rescale(camera, unit_m) for camera in cameras)
 
 
-def _scaled(camera: CameraConfig, unit_m: float) -> CameraConfig:
-    """Return a camera with its place converted to metres and the same orientation."""
+def _rescale(camera: CameraConfig, unit_m: float) -> CameraConfig:
+    """Return a camera with its position converted from a unit to metres."""
     if unit_m == 1.0:
         return camera
     T_world_from_cam = np.eye(4)

@@ -1,14 +1,15 @@
-"""What a camera is: where it hangs, what its lens and sensor do, when it takes images; rig files.
+"""Descriptions of cameras (pose, lens, sensor, timing), and rig files.
 
-A rig file is TOML, a `[[camera]]` for each with the fields of `CameraConfig`:
+A rig file is TOML with a `[[camera]]` table for each camera, with the fields of `CameraConfig`:
 
 [[camera]]
 name = "left"
 eye_world = [2.9, 2.6, 2.45]
 lens = {model = "kannala_brandt", coefficients = [0.0667]}
 
-or by `K`, `distortion` and `T_world_from_cam` (see `CameraConfig.from_matrices`), or the
-calibration of another tool (see `calibrations`).
+Instead, a table may have `K`, `distortion` and `T_world_from_cam` (see
+`CameraConfig.from_matrices`), and the file may be the calibration of another tool (see
+`calibrations`).
 """
 
 import dataclasses
@@ -16,7 +17,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, cast
 
 import numpy as np
 
@@ -27,13 +28,14 @@ from hrc_env.geometry.lens import COEFFICIENTS, Lens, distorted_radius, rays_cam
 from hrc_env.geometry.rotations import about_axis, look_at
 
 MOST_CAMERAS = 16
-"""A rig has no more."""
+"""Greatest number of cameras in a rig."""
 SIZE_PX = (64, 16_384)
 """Least and greatest width and height of an image [px]."""
-FIELD_DEG = (1.0, 340.0)
-"""Least and greatest horizontal field of view; without a fisheye lens less than 179 degrees."""
-LONGEST_S = 1.0
-"""Greatest latency [s]: the tracker's memory is no longer."""
+HFOV_DEG = (1.0, 340.0)
+"""Least and greatest horizontal field of view [degrees]; without a fisheye lens the limit is
+179."""
+MAX_LATENCY_S = 1.0
+"""Greatest latency of a camera, which is the length of the tracker's memory [s]."""
 
 
 @answer_unknown_fields
@@ -42,31 +44,34 @@ class CameraConfig:
     """One fixed camera."""
 
     name: str
-    """What the camera is called; unique in its rig."""
+    """Name of the camera, unique in its rig."""
     eye_world: tuple[float, float, float]
-    """Where it hangs [m], world frame."""
+    """Position of the camera in the world frame [m]."""
     target_world: tuple[float, float, float] = (0.2, 0.0, 1.0)
-    """What it looks at [m]: by default the middle of the space that robot and worker share."""
+    """Point in the world frame that the camera looks at [m]; the default is the middle of the space
+    that robot and worker share."""
     hfov_deg: float = 90.0
-    """Horizontal field of view through the lens [degrees], unless `focal_px` is given."""
+    """Horizontal field of view through the lens [degrees]; ignored if `focal_px` is given."""
     width_px: int = 1920
-    """Width of its images [px]."""
+    """Width of the images [px]."""
     height_px: int = 1080
-    """Height of its images [px]."""
+    """Height of the images [px]."""
     roll_deg: float = 0.0
-    """How far it is turned about its axis [degrees], clockwise as it looks."""
+    """Rotation of the camera about its optical axis [degrees], clockwise as seen from behind it."""
     focal_px: tuple[float, ...] = ()
-    """Focal lengths fx, fy [px]; none: the same in x and y, from `hfov_deg`."""
+    """Focal lengths fx, fy [px]; if empty, both follow from `hfov_deg`."""
     centre_px: tuple[float, ...] = ()
-    """Principal point cx, cy [px]; none: the middle of the image."""
+    """Principal point cx, cy [px]; if empty, the middle of the image."""
     lens: Lens = field(default_factory=Lens)
-    """How the lens distorts the image."""
+    """Distortion of the image by the lens."""
     rate_hz: float = 0.0
-    """Images a second; 0: one at every control step. Images are taken at control steps."""
+    """Number of images per second, taken at control steps; 0: one at every control step [Hz]."""
     latency_s: float = 0.0
-    """Time from taking an image to having it [s], up to 1; the tracker uses it at its own time."""
+    """Delay from taking an image to its arrival, at most 1 s; the tracker applies an image at the
+    time at which it was taken [s]."""
     exposure_s: float = 0.0
-    """How long the shutter is open [s], up to 0.1; what moves is smeared (`pixels` only)."""
+    """Time for which the shutter is open, at most 0.1 s; moving things are blurred, at perception
+    level `pixels` only [s]."""
 
     def __post_init__(self) -> None:
         places = (*self.eye_world, *self.target_world, self.roll_deg)
@@ -75,9 +80,12 @@ class CameraConfig:
         if math.dist(self.eye_world, self.target_world) < 1e-3:
             _refuse(self, "it must look at another place than where it hangs", self.eye_world)
         for name, least, most in (
-            ("width_px", *SIZE_PX), ("height_px", *SIZE_PX), ("rate_hz", 0, math.inf),
-            ("latency_s", 0, LONGEST_S), ("exposure_s", 0, 0.1),
-        ):  # fmt: skip
+            ("width_px", *SIZE_PX),
+            ("height_px", *SIZE_PX),
+            ("rate_hz", 0, math.inf),
+            ("latency_s", 0, MAX_LATENCY_S),
+            ("exposure_s", 0, 0.1),
+        ):
             value = getattr(self, name)
             if not least <= value <= most or not math.isfinite(value):
                 _refuse(self, f"{name} must be from {least} to {most}", value)
@@ -94,13 +102,13 @@ class CameraConfig:
         eye_world: tuple[float, float, float],
         target_world: tuple[float, float, float] = (0.2, 0.0, 1.0),
     ) -> "CameraConfig":
-        """Return a camera as it can be bought, at a place.
+        """Return a camera of a commercial model at a place.
 
         Args:
             make: a key of `MAKES`; "gopro_hero8_wide" is the paper's camera.
-            name: of the camera, unique in its rig.
-            eye_world: where it hangs [m], world frame.
-            target_world: the point that it looks at [m], world frame.
+            name: name of the camera, unique in its rig.
+            eye_world: position of the camera in the world frame [m].
+            target_world: point in the world frame that it looks at [m].
 
         Raises:
             ConfigError: there is no such make.
@@ -110,40 +118,53 @@ class CameraConfig:
 
     @classmethod
     def from_matrices(
-        cls, name: str, K: Floats, T_world_from_cam: Transforms, size_px: tuple[int, int],
-        distortion: Lens | Sequence[float] = (), fisheye: bool = False,
-    ) -> "CameraConfig":  # fmt: skip
+        cls,
+        name: str,
+        K: Floats,
+        T_world_from_cam: Transforms,
+        size_px: tuple[int, int],
+        distortion: Lens | Sequence[float] = (),
+        fisheye: bool = False,
+    ) -> "CameraConfig":
         """Return the camera that projects as OpenCV does with these matrices.
 
         Args:
-            name: of the camera, unique in its rig.
+            name: name of the camera, unique in its rig.
             K: (3, 3) intrinsics without skew [px]. Pixels count from the image's corner; to a K of
                 pixels that count from the middle of the first one, add 0.5 to cx and cy.
-            T_world_from_cam: (4, 4) from OpenCV's camera axes to the world, which is z up [m].
+            T_world_from_cam: (4, 4) pose of OpenCV's camera axes in the world, z up [m].
             size_px: width and height of the image [px].
             distortion: a lens, or OpenCV's coefficients.
             fisheye: whether the coefficients are those of OpenCV's fisheye model.
 
         Raises:
-            ConfigError: K has skew, the transform is none, or the lens is not known here.
+            ConfigError: K has skew, the transform is not a pose, or the lens is not supported.
         """
-        K, T = np.asarray(K, float), np.asarray(T_world_from_cam, float)
-        below = K[[1, 2, 2, 2], [0, 0, 1, 2]] if K.shape == (3, 3) else np.full(4, np.nan)
-        if not np.isfinite(K).all() or not np.allclose([*below, K[0, 1]], [0, 0, 0, 1, 0], 0, 1e-3):
+        matrix, T = np.asarray(K, float), np.asarray(T_world_from_cam, float)
+        fixed = np.full(5, np.nan)
+        if matrix.shape == (3, 3) and np.isfinite(matrix).all():
+            fixed = matrix[[1, 2, 2, 2, 0], [0, 0, 1, 2, 1]]
+        if not np.allclose(fixed, [0, 0, 0, 1, 0], 0, 1e-3):
             valid = "K must be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], without skew"
-            raise ConfigError(f"Camera {name!r}: {valid}, got {K.tolist()}.")
+            raise ConfigError(f"Camera {name!r}: {valid}, got {matrix.tolist()}.")
         if T.shape != (4, 4) or not _is_pose(T):
             valid = "T_world_from_cam must be (4, 4), a rotation and a place above 0, 0, 0, 1"
             raise ConfigError(f"Camera {name!r}: {valid}, got {T.tolist()}.")
-        lens = distortion if isinstance(distortion, Lens) else lens_of(distortion, fisheye)
+        lens = distortion if isinstance(distortion, Lens) else make_lens(distortion, fisheye)
         eye, target = T[:3, 3], T[:3, 3] + T[:3, 2]
         rolled = look_at(eye, target).T @ T[:3, :3]
-        (fx, fy), (cx, cy) = K[[0, 1], [0, 1]].tolist(), K[:2, 2].tolist()
+        (fx, fy), (cx, cy) = matrix[[0, 1], [0, 1]].tolist(), matrix[:2, 2].tolist()
         return cls(
-            name, tuple(eye.tolist()), tuple(target.tolist()), width_px=size_px[0],
-            height_px=size_px[1], roll_deg=math.degrees(math.atan2(rolled[1, 0], rolled[0, 0])),
-            focal_px=(fx, fy), centre_px=(cx, cy), lens=lens,
-        )  # fmt: skip
+            name,
+            tuple(eye.tolist()),
+            tuple(target.tolist()),
+            width_px=size_px[0],
+            height_px=size_px[1],
+            roll_deg=math.degrees(math.atan2(rolled[1, 0], rolled[0, 0])),
+            focal_px=(fx, fy),
+            centre_px=(cx, cy),
+            lens=lens,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,12 +183,19 @@ class _Matrices:
     exposure_s: float = 0.0
 
 
-def camera_of(content: Mapping[str, Any], where: str) -> CameraConfig:
-    """Return the camera of a mapping: the fields of `CameraConfig`, or K, distortion and
-    T_world_from_cam. `ConfigError` by `where` it is if that cannot be."""
+def parse_camera(content: Mapping[str, Any], path: str) -> CameraConfig:
+    """Return the camera of a mapping.
+
+    Args:
+        content: the fields of `CameraConfig`, or K, distortion and T_world_from_cam.
+        path: name of the mapping in errors, as "cameras[0]".
+
+    Raises:
+        ConfigError: a field that does not exist, is missing or has a value that cannot work.
+    """
     if "T_world_from_cam" not in content:
-        return from_mapping(CameraConfig, content, f"{where}.")
-    given = from_mapping(_Matrices, plain(content), f"{where}.")
+        return from_mapping(CameraConfig, content, f"{path}.")
+    given = from_mapping(_Matrices, plain(content), f"{path}.")
     size = given.width_px, given.height_px
     K, T_world_from_cam = np.array(given.K), np.array(given.T_world_from_cam)
     camera = CameraConfig.from_matrices(
@@ -177,8 +205,8 @@ def camera_of(content: Mapping[str, Any], where: str) -> CameraConfig:
     return replace(camera, **times)
 
 
-def lens_of(distortion: Sequence[float] | Floats, fisheye: bool = False) -> Lens:
-    """Return the lens of OpenCV's coefficients; `ConfigError` for more than this package knows."""
+def make_lens(distortion: Sequence[float] | Floats, fisheye: bool = False) -> Lens:
+    """Return the lens of OpenCV's coefficients; `ConfigError` for more than a model here has."""
     values = [float(each) for each in distortion]
     while values and values[-1] == 0.0:
         values.pop()
@@ -192,33 +220,35 @@ def lens_of(distortion: Sequence[float] | Floats, fisheye: bool = False) -> Lens
 
 
 def axes_of(camera: CameraConfig) -> Rotations:
-    """Return R_world_from_cam, of OpenCV's camera axes."""
+    """Return the orientation R_world_from_cam of OpenCV's camera axes."""
     look = look_at(np.array(camera.eye_world, float), np.array(camera.target_world, float))
     return look @ about_axis("z", np.radians(camera.roll_deg)) if camera.roll_deg else look
 
 
 def _is_pose(T: Transforms) -> bool:
-    """Whether (4, 4) is a rotation, no mirror, and a place."""
+    """Return whether a transform (4, 4) is a rotation, no reflection, and a finite place."""
     R = T[:3, :3]
     is_rotation = np.allclose(R @ R.T, np.eye(3), atol=1e-4) and np.linalg.det(R) > 0.0
     return bool(is_rotation and np.isfinite(T).all() and np.allclose(T[3], [0.0, 0.0, 0.0, 1.0]))
 
 
 def _refuse(camera: CameraConfig, expected: str, got: object) -> NoReturn:
+    """Raise the error of a camera with a value that cannot work."""
     raise ConfigError(f"Camera {camera.name!r}: {expected}, got {got}.")
 
 
 def intrinsics(camera: CameraConfig) -> Floats:
-    """(3, 3) K [px], pixels continuous from the image's corner."""
+    """Return K (3, 3) [px], for pixels that are continuous from the image's corner."""
     fx, fy = camera.focal_px or (_focal_px(camera),) * 2
     cx, cy = camera.centre_px or (camera.width_px / 2, camera.height_px / 2)
     return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]])
 
 
 def _focal_px(camera: CameraConfig) -> float:
-    most = FIELD_DEG[1] if camera.lens.model == "kannala_brandt" else 179.0
-    if not FIELD_DEG[0] <= camera.hfov_deg < most:
-        valid = f"horizontal field of view must be in [{FIELD_DEG[0]:g}, {most:g}) degrees"
+    """Return the focal length that gives the horizontal field of view [px]."""
+    most = HFOV_DEG[1] if camera.lens.model == "kannala_brandt" else 179.0
+    if not HFOV_DEG[0] <= camera.hfov_deg < most:
+        valid = f"horizontal field of view must be in [{HFOV_DEG[0]:g}, {most:g}) degrees"
         _refuse(camera, valid, camera.hfov_deg)
     half_rad = math.radians(camera.hfov_deg) / 2
     if camera.lens.model == "none":
@@ -231,6 +261,7 @@ def _focal_px(camera: CameraConfig) -> float:
 
 
 def _check_image(camera: CameraConfig, K: Floats) -> None:
+    """Raise an error unless intrinsics K (3, 3) and lens make an image to all of its edges."""
     size = np.array([camera.width_px, camera.height_px])
     focal, centre = K[[0, 1], [0, 1]], K[:2, 2]
     if not (np.isfinite(K).all() and (focal > 0).all()):
@@ -253,29 +284,32 @@ MAKES: dict[str, CameraConfig] = {
         "gopro_hero8_wide", (0.0, 0.0, 2.4), hfov_deg=118.2, lens=Lens("kannala_brandt", (0.0667,))
     )
 }
-"""Cameras as they are made (`CameraConfig.from_make`). The GoPro HERO8 Black with its wide lens
-is the paper's: 118.2 x 69.5 degrees on 1920 x 1080. No pinhole with square pixels has both; the
-fisheye polynomial with this coefficient does."""
+"""Commercial cameras (`CameraConfig.from_make`). The GoPro HERO8 Black with its wide lens is the
+paper's: 118.2 x 69.5 degrees on 1920 x 1080. No pinhole with square pixels has both; the fisheye
+polynomial with this coefficient does."""
 
 
 def read_rig(path: Path | str) -> tuple[CameraConfig, ...]:
     """Return the cameras of a rig file, or of a calibration file of another tool.
 
     Args:
-        path: a TOML file: a [[camera]] for each camera with the fields of `CameraConfig`, or with
-            K, distortion and T_world_from_cam (`CameraConfig.from_matrices`); or a file as anipose,
-            FreeMoCap, Caliscope and Pose2Sim write it.
+        path: a TOML file with a [[camera]] table for each camera, which has the fields of
+            `CameraConfig`, or K, distortion and T_world_from_cam (`CameraConfig.from_matrices`); or
+            a calibration of anipose, FreeMoCap, Caliscope or Pose2Sim.
 
     Raises:
-        ConfigError: a file that cannot be read, or a field that cannot be.
+        ConfigError: the file cannot be read, or a field has a value that cannot work.
     """
     from hrc_env.geometry import calibrations  # it makes cameras
 
     content = read_toml(path)
     if calibrations.is_calibration(content):
-        return calibrations.cameras_of(content, path)
-    others, entries = sorted(set(content) - {"camera"}), content.get("camera", [])
-    tables = isinstance(entries, list) and all(isinstance(entry, dict) for entry in entries)
+        return calibrations.parse_calibration(content, path)
+    others, entries = (
+        sorted(set(content) - {"camera"}),
+        cast("list[Any]", content.get("camera", [])),
+    )
+    tables = type(entries) is list and all(isinstance(entry, dict) for entry in entries)
     if others or not tables or not entries:
         raise ConfigError(
             f"{path} must hold a [[camera]] for each camera and nothing else, "
@@ -283,12 +317,12 @@ def read_rig(path: Path | str) -> tuple[CameraConfig, ...]:
             "a table with size, matrix, distortions, rotation and translation for each."
         )
     try:
-        return tuple(camera_of(entry, f"camera[{k}]") for k, entry in enumerate(entries))
+        return tuple(parse_camera(entry, f"camera[{k}]") for k, entry in enumerate(entries))
     except ConfigError as error:
         raise ConfigError(f"{path}: {error}") from error
 
 
 def write_rig(path: Path | str, cameras: Sequence[CameraConfig]) -> None:
-    """Write a rig, every field of every camera, so that `read_rig` gives the same back."""
+    """Write a rig file with every field of every camera, from which `read_rig` reads the same."""
     content = to_toml({"camera": [dataclasses.asdict(camera) for camera in cameras]})
     Path(path).write_text(content, encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Serial chains of hinges and slides: link frames, tool point, Jacobian, capsules; in numba.
+"""Serial chains of hinges and slides: link frames, tool point, Jacobian and capsules, in numba.
 
 A hinge turns about the z axis of its own frame, a slide moves along it. Link i's frame is joint
 i's frame moved by q_i, so T_world_from_link_i = T_world_from_base @ prod_{j <= i}
@@ -7,6 +7,7 @@ i's frame moved by q_i, so T_world_from_link_i = T_world_from_base @ prod_{j <= 
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,114 +22,155 @@ from hrc_env.core.typing import (
     Ints,
     JointAngles,
     JointVelocities,
+    Points3,
     Transforms,
+    Vector3,
+    Velocities3,
 )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SerialChain:
-    """A robot as its maker's data sheet has it: numbers only. What is an angle [rad] of a hinge is
-    a way [m] of a slide."""
+    """The geometry and the limits of a robot, as in its data sheet.
 
-    T_world_from_base: Transforms  # (4, 4) where it is bolted down, or where its slides begin
-    parent_from_joint: Transforms  # (N, 4, 4) each joint in the previous link (or base) at q = 0
-    link_from_tool: Transforms  # (4, 4) the tool point's frame in the last link
-    range_rad: Floats  # (N, 2) lowest and highest angle
-    velocity_limit_rad_s: Floats  # (N,)
-    slides: Bools  # (N,) which joints are slides; the others are hinges
-    capsule_link: Ints  # (K,) index of the link that carries each capsule
-    capsule_ends: Capsules  # (K, 2, 3) end points in the frame of that link [m]
-    capsule_radius_m: Floats  # (K,)
+    Units are those of hinges; for a slide, read m in place of rad.
+    """
+
+    T_world_from_base: Transforms
+    """(4, 4) where the robot is mounted, or where its slides begin."""
+    parent_from_joint: Transforms
+    """(N, 4, 4) each joint in the previous link (or the base) at q = 0."""
+    link_from_tool: Transforms
+    """(4, 4) the tool point's frame in the last link."""
+    range_rad: Floats
+    """(N, 2) lowest and highest angle [rad]."""
+    velocity_limit_rad_s: Floats
+    """(N,) greatest speed [rad/s]."""
+    slides: Bools
+    """(N,) which joints are slides; the others are hinges."""
+    capsule_link: Ints
+    """(K,) index of the link that carries each capsule."""
+    capsule_ends: Capsules
+    """(K, 2, 3) end points in the frame of that link [m]."""
+    capsule_radius_m: Floats
+    """(K,) radii of the capsules [m]."""
 
     @property
     def n_joints(self) -> int:
-        """N, the number of hinges and slides."""
+        """Number N of hinges and slides."""
         return len(self.range_rad)
 
 
-def forward(chain: SerialChain, q: JointAngles) -> Transforms:
-    """Frames of all links, (..., N, 4, 4) world_from_link, at angles q (..., N)."""
-    angles, lead = _rows(chain, "q", q)
+class RobotPath(NamedTuple):
+    """A robot at the end of a path, and its capsules along the path."""
+
+    robot: RobotState
+    """State at the end."""
+    capsules_world: Capsules
+    """(..., T, K, 2, 3) end points of the capsules at every point of the path [m]."""
+
+
+def link_frames(chain: SerialChain, q: JointAngles) -> Transforms:
+    """Return the frames of all links, (..., N, 4, 4) world_from_link, at angles q (..., N)."""
+    angles = flat(_check_joints(chain, "q", q), 1)
     frames = np.empty((len(angles), chain.n_joints, 4, 4))
-    _forward(angles, chain.slides, chain.T_world_from_base, chain.parent_from_joint, frames)
-    return frames.reshape(*lead, chain.n_joints, 4, 4)
+    _write_frames(angles, chain.slides, chain.T_world_from_base, chain.parent_from_joint, frames)
+    return frames.reshape(*np.shape(q)[:-1], chain.n_joints, 4, 4)
 
 
-def tool(chain: SerialChain, q: JointAngles) -> Transforms:
-    """The tool's frame, (..., 4, 4) world_from_tool, at angles q (..., N)."""
-    return forward(chain, q)[..., -1, :, :] @ chain.link_from_tool
+def tool_frame(chain: SerialChain, q: JointAngles) -> Transforms:
+    """Return the tool's frame, (..., 4, 4) world_from_tool, at angles q (..., N)."""
+    return link_frames(chain, q)[..., -1, :, :] @ chain.link_from_tool
 
 
 def jacobian(chain: SerialChain, q: JointAngles) -> Floats:
-    """Tool velocity per joint velocity, (..., 3, N) [m/rad, of a slide m/m], world axes, at q
-    (..., N)."""
-    angles, lead = _rows(chain, "q", q)
-    result = np.empty((len(angles), 3, chain.n_joints))
-    _jacobian(forward(chain, angles), chain.slides, chain.link_from_tool, result)
-    return result.reshape(*lead, 3, chain.n_joints)
+    """Return the tool's velocity per joint velocity at q (..., N).
+
+    Returns:
+        (..., 3, N) in the world frame [m/rad; of a slide m/m].
+    """
+    frames = flat(link_frames(chain, q), 3)
+    result = np.empty((len(frames), 3, chain.n_joints))
+    _write_jacobian(frames, chain.slides, chain.link_from_tool, result)
+    return result.reshape(*np.shape(q)[:-1], 3, chain.n_joints)
 
 
-def turning(chain: SerialChain, q: JointAngles) -> Floats:
-    """The tool's turn rate per joint velocity, (..., 3, N), world axes, at q (..., N)."""
-    return np.moveaxis(forward(chain, q)[..., :3, 2], -1, -2) * ~chain.slides
+def angular_jacobian(chain: SerialChain, q: JointAngles) -> Floats:
+    """Return the tool's turn rate per joint velocity, (..., 3, N) in the world frame."""
+    return np.moveaxis(link_frames(chain, q)[..., :3, 2], -1, -2) * ~chain.slides
 
 
 def capsules(chain: SerialChain, q: JointAngles) -> Capsules:
-    """The robot's collision capsules, (..., K, 2, 3) end points in the world [m]."""
-    return _carried(chain, forward(chain, q))
+    """Return the robot's collision capsules, (..., K, 2, 3) end points in the world frame [m]."""
+    return _place_capsules(chain, link_frames(chain, q))
 
 
 def robot_state(chain: SerialChain, q: JointAngles, qd: JointVelocities) -> RobotState:
-    """What the encoders tell: angles, tool and capsules of q and qd, both (..., N)."""
-    return robot_along(chain, np.asarray(q, float)[..., None, :], qd)[0]
+    """Return the state of a robot with joint angles q and velocities qd, both (..., N)."""
+    return robot_path(chain, np.asarray(q, float)[..., None, :], qd).robot
 
 
-def robot_along(
-    chain: SerialChain, q_path: JointAngles, qd: JointVelocities
-) -> tuple[RobotState, Capsules]:
-    """The state at the end of paths (..., T, N) with velocities (..., N), and the capsules all
-    along them, (..., T, K, 2, 3)."""
-    frames = forward(chain, q_path)
-    ends = _carried(chain, frames)
-    rates, lead = _rows(chain, "qd", qd)
+def robot_path(chain: SerialChain, q_path: JointAngles, qd: JointVelocities) -> RobotPath:
+    """Return the state of a robot at the end of a path, and its capsules along the path.
+
+    Args:
+        chain: the robot's geometry.
+        q_path: (..., T, N) joint angles at the points of the path.
+        qd: (..., N) joint velocities at its end.
+    """
+    frames = link_frames(chain, q_path)
+    ends = _place_capsules(chain, frames)
+    rates = flat(_check_joints(chain, "qd", qd), 1)
+    lead = np.shape(qd)[:-1]
     last = flat(frames[..., -1, :, :, :], 3)
     tool_world, velocity = np.empty((len(rates), 3)), np.empty((len(rates), 3))
-    _tool_motion(last, chain.slides, rates, chain.link_from_tool, tool_world, velocity)
-    tool_world, velocity = tool_world.reshape(*lead, 3), velocity.reshape(*lead, 3)
+    _write_tool_motion(last, chain.slides, rates, chain.link_from_tool, tool_world, velocity)
     axes = frames[..., -1, -1, :3, :3] @ chain.link_from_tool[:3, :3]
-    q, qd = np.array(q_path[..., -1, :], float), np.array(qd, float)
-    ended = ends[..., -1, :, :, :]
-    radius_m = chain.capsule_radius_m
-    robot = RobotState(q, qd, tool_world, velocity, axes, ended, radius_m, chain.slides)
-    return robot, ends
+    robot = RobotState(
+        q=np.array(q_path[..., -1, :], float),
+        qd=np.array(qd, float),
+        tool_world=tool_world.reshape(*lead, 3),
+        tool_velocity_world=velocity.reshape(*lead, 3),
+        tool_axes_world=axes,
+        capsules_world=ends[..., -1, :, :, :],
+        capsule_radius_m=chain.capsule_radius_m,
+        slides=chain.slides,
+    )
+    return RobotPath(robot, ends)
 
 
-def _carried(chain: SerialChain, frames: Transforms) -> Capsules:
-    """The capsules on links whose frames (..., N, 4, 4) are known."""
-    lead, shape = frames.shape[:-3], chain.capsule_ends.shape
+def _place_capsules(chain: SerialChain, frames: Transforms) -> Capsules:
+    """Return the capsules (..., K, 2, 3) on links with frames (..., N, 4, 4)."""
+    shape = chain.capsule_ends.shape
     stacked = flat(frames, 3)
     ends = np.empty((len(stacked), *shape))
-    _capsules(stacked, chain.capsule_link, chain.capsule_ends, ends)
-    return ends.reshape(*lead, *shape)
+    _write_capsules(stacked, chain.capsule_link, chain.capsule_ends, ends)
+    return ends.reshape(*frames.shape[:-3], *shape)
 
 
-def _rows(chain: SerialChain, name: str, values: Floats) -> tuple[Floats, tuple[int, ...]]:
-    """Values (..., N) as (B, N), contiguous, and the leading axes they had."""
+def _check_joints(chain: SerialChain, name: str, values: Floats) -> Floats:
+    """Return values (..., N) of the joints; `ConfigError` for another number of joints."""
     array = np.asarray(values, float)
     check_shape(f"The last axis of {name}", array.shape[-1:], (chain.n_joints,), "one per joint")
-    return flat(array, 1), array.shape[:-1]
+    return array
 
 
 @kernel
-def _forward(q, slides, base, parent_from_joint, frames):
-    """Multiply the frames up; only the 3 x 4 part takes part."""
+def _write_frames(
+    q: JointAngles,
+    slides: Bools,
+    base: Transforms,
+    parent_from_joint: Transforms,
+    frames: Transforms,
+) -> None:
+    """Write the frames (B, N, 4, 4) of the links at q (B, N); see `SerialChain`."""
     for b in range(q.shape[0]):
         for i in range(q.shape[1]):
             parent = base if i == 0 else frames[b, i - 1]
             fixed, frame = parent_from_joint[i], frames[b, i]
             turn, way = (0.0, q[b, i]) if slides[i] else (q[b, i], 0.0)
             c, s = math.cos(turn), math.sin(turn)
-            for row in range(3):
+            for row in range(3):  # the last row of a product of transforms is known
                 p0, p1, p2 = parent[row, 0], parent[row, 1], parent[row, 2]
                 x = p0 * fixed[0, 0] + p1 * fixed[1, 0] + p2 * fixed[2, 0]
                 y = p0 * fixed[0, 1] + p1 * fixed[1, 1] + p2 * fixed[2, 1]
@@ -143,10 +185,10 @@ def _forward(q, slides, base, parent_from_joint, frames):
 
 
 @kernel
-def _apply(frame, point):
-    """frame @ point."""
+def _transform_point(frame: Transforms, point: Floats) -> Vector3:
+    """Return a point (3,) of a frame (4, 4) in the parent frame [m]."""
     x, y, z = point[0], point[1], point[2]
-    return (
+    return Vector3(
         frame[0, 3] + (frame[0, 0] * x + frame[0, 1] * y + frame[0, 2] * z),
         frame[1, 3] + (frame[1, 0] * x + frame[1, 1] * y + frame[1, 2] * z),
         frame[2, 3] + (frame[2, 0] * x + frame[2, 1] * y + frame[2, 2] * z),
@@ -154,45 +196,64 @@ def _apply(frame, point):
 
 
 @kernel
-def lever(frame, slides, point):
-    """A point's velocity per rate of a frame's joint: a slide's axis; a hinge's axis x (point -
-    origin)."""
-    if slides:
-        return frame[0, 2], frame[1, 2], frame[2, 2]
+def lever(frame: Transforms, is_slide: bool, point: Floats | Vector3) -> Vector3:
+    """Return the velocity of a point per velocity of a joint.
+
+    Args:
+        frame: (4, 4) the joint's frame.
+        is_slide: whether the joint is a slide, whose axis is the result; of a hinge it is the
+            axis times (point - origin).
+        point: (3,) [m].
+    """
+    if is_slide:
+        return Vector3(frame[0, 2], frame[1, 2], frame[2, 2])
     rx, ry, rz = point[0] - frame[0, 3], point[1] - frame[1, 3], point[2] - frame[2, 3]
     ax, ay, az = frame[0, 2], frame[1, 2], frame[2, 2]
-    return ay * rz - az * ry, az * rx - ax * rz, ax * ry - ay * rx
+    return Vector3(ay * rz - az * ry, az * rx - ax * rz, ax * ry - ay * rx)
 
 
 @kernel
-def _jacobian(frames, slides, link_from_tool, out):
-    """Column i is the tool's velocity per rate of joint i."""
+def _write_jacobian(
+    frames: Transforms, slides: Bools, link_from_tool: Transforms, out: Floats
+) -> None:
+    """Write the Jacobian (B, 3, N) of the tool point; column i is of joint i."""
     n = frames.shape[1]
     for b in range(frames.shape[0]):
-        point = _apply(frames[b, n - 1], link_from_tool[:, 3])
+        point = _transform_point(frames[b, n - 1], link_from_tool[:, 3])
         for i in range(n):
-            out[b, 0, i], out[b, 1, i], out[b, 2, i] = lever(frames[b, i], slides[i], point)
+            column = lever(frames[b, i], slides[i], point)
+            out[b, 0, i], out[b, 1, i], out[b, 2, i] = column.x, column.y, column.z
 
 
 @kernel
-def _tool_motion(frames, slides, qd, link_from_tool, point, velocity):
-    """Where the tool points are, and how fast."""
+def _write_tool_motion(
+    frames: Transforms,
+    slides: Bools,
+    qd: JointVelocities,
+    link_from_tool: Transforms,
+    tool_world: Points3,
+    velocity_world: Velocities3,
+) -> None:
+    """Write the tool points (B, 3) [m] and their velocities (B, 3) [m/s]."""
     n = frames.shape[1]
     for b in range(frames.shape[0]):
-        tool = _apply(frames[b, n - 1], link_from_tool[:, 3])
+        tool = _transform_point(frames[b, n - 1], link_from_tool[:, 3])
         vx, vy, vz = 0.0, 0.0, 0.0
         for i in range(n):
             x, y, z = lever(frames[b, i], slides[i], tool)
             vx, vy, vz = vx + x * qd[b, i], vy + y * qd[b, i], vz + z * qd[b, i]
-        point[b, 0], point[b, 1], point[b, 2] = tool
-        velocity[b, 0], velocity[b, 1], velocity[b, 2] = vx, vy, vz
+        tool_world[b, 0], tool_world[b, 1], tool_world[b, 2] = tool.x, tool.y, tool.z
+        velocity_world[b, 0], velocity_world[b, 1], velocity_world[b, 2] = vx, vy, vz
 
 
 @kernel
-def _capsules(frames, link, ends_link, ends_world):
+def _write_capsules(
+    frames: Transforms, link: Ints, ends_link: Capsules, ends_world: Capsules
+) -> None:
+    """Write the capsules (B, K, 2, 3) of links with frames (B, N, 4, 4) in the world frame [m]."""
     for b in range(frames.shape[0]):
         for k in range(len(link)):
             for e in range(2):
-                x, y, z = _apply(frames[b, link[k]], ends_link[k, e])
-                ends_world[b, k, e, 0], ends_world[b, k, e, 1] = x, y
-                ends_world[b, k, e, 2] = z
+                end = _transform_point(frames[b, link[k]], ends_link[k, e])
+                ends_world[b, k, e, 0], ends_world[b, k, e, 1] = end.x, end.y
+                ends_world[b, k, e, 2] = end.z

@@ -1,7 +1,7 @@
 """Lenses: where light that a pinhole would show at one place arrives in the real image.
 
-Places are normalised: pixels less the principal point, over the focal lengths; "undistorted" ones
-are the pinhole's, "distorted" ones the image's. Two models, with OpenCV's coefficients:
+Places are normalised: pixels less the principal point, over the focal lengths. "Undistorted" places
+are the pinhole's, "distorted" ones those in the image. Two models, with OpenCV's coefficients:
 
 | model | distorted from undistorted |
 |---|---|
@@ -9,36 +9,41 @@ are the pinhole's, "distorted" ones the image's. Two models, with OpenCV's coeff
 | `kannala_brandt` | angle t from the axis at radius t (1 + k1 t^2 + k2 t^4 + k3 t^6 + k4 t^8) |
 
 (Kannala and Brandt 2006, in OpenCV's `fisheye`.) A polynomial folds the image over where it no
-longer grows; what lies beyond is not seen.
+longer grows; light from beyond that angle is not imaged.
+
+Kernels take a lens as a row (8,): model, five coefficients, `LIMIT` and `FOLD` (see `lens_row`).
 """
 
 import functools
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
+from hrc_env.core.batching import flat
 from hrc_env.core.errors import ConfigError, check_names
 from hrc_env.core.kernels import kernel
 from hrc_env.core.mapping import answer_unknown_fields
-from hrc_env.core.typing import Floats
+from hrc_env.core.typing import Floats, Points3, Vector3
 
-COEFFICIENTS = {
+COEFFICIENTS: dict[str, tuple[str, ...]] = {
     "none": (),
     "brown_conrady": ("k1", "k2", "p1", "p2", "k3"),
     "kannala_brandt": ("k1", "k2", "k3", "k4"),
 }
-"""Models and what their coefficients are called, in order; those left out are 0."""
+"""Names of each model's coefficients, in order; those that are left out are 0."""
 NONE, BROWN_CONRADY, KANNALA_BRANDT = range(3)
+"""Numbers of the models in a lens' row."""
 LIMIT, FOLD = 6, 7
-"""Columns of a lens' row: the distorted radius from which on nothing is seen, and its angle."""
+"""Columns of a lens' row: the distorted radius beyond which nothing is imaged [focal lengths], and
+the angle from the axis that belongs to it [rad]."""
 WIDEST_RAD = math.radians(175.0)
-"""No lens sees further from its axis."""
+"""Greatest angle from the axis at which a fisheye lens images [rad]."""
 PINHOLE_RAD = math.radians(80.0)
-"""Further from the axis [rad] a pinhole's image has no place for what a lens sees."""
+"""Greatest angle from the axis that has a place in a pinhole's image [rad]."""
 FAR = 1e6
+"""Factor by which places that a lens does not image are moved away."""
 _SAMPLES = 4096
 _NEWTON_STEPS = 12
 _STEP = 1e-5
@@ -47,12 +52,13 @@ _STEP = 1e-5
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class Lens:
-    """How a lens bends the image."""
+    """The distortion model of a lens."""
 
     model: str = "none"
-    """"none", "brown_conrady" or "kannala_brandt"."""
+    """Name of the model: "none", "brown_conrady" or "kannala_brandt"."""
     coefficients: tuple[float, ...] = ()
-    """The model's, in OpenCV's order: k1, k2, p1, p2, k3, or k1, k2, k3, k4; the rest is 0."""
+    """Coefficients of the model in OpenCV's order: k1, k2, p1, p2, k3 of "brown_conrady", k1, k2,
+    k3, k4 of "kannala_brandt"; those that are left out are 0."""
 
     def __post_init__(self) -> None:
         check_names("lens model", [self.model], COEFFICIENTS)
@@ -64,15 +70,24 @@ class Lens:
             )
 
 
+class ImagePoint(NamedTuple):
+    """A place in the image plane, in focal lengths from the principal point."""
+
+    x: float
+    """Distance to the right [focal lengths]."""
+    y: float
+    """Distance down [focal lengths]."""
+
+
 @functools.lru_cache(maxsize=64)
 def lens_row(lens: Lens) -> Floats:
-    """(8,) a lens as numbers for the kernels: model, coefficients, `LIMIT`, `FOLD`."""
+    """Return a lens as numbers (8,) for kernels: model, coefficients, `LIMIT` and `FOLD`."""
     row = np.zeros(FOLD + 1)
     row[0] = list(COEFFICIENTS).index(lens.model)
     row[1 : 1 + len(lens.coefficients)] = lens.coefficients
     widest = WIDEST_RAD if lens.model == "kannala_brandt" else PINHOLE_RAD
     angle = np.linspace(0.0, widest, _SAMPLES)
-    radius = np.array([_radius_of(row, each) for each in angle])
+    radius = np.array([_radius_at(row, each) for each in angle])
     falls = np.flatnonzero(np.diff(radius) <= 0)
     last = falls[0] if len(falls) else -1
     row[LIMIT], row[FOLD] = radius[last], angle[last]
@@ -81,83 +96,106 @@ def lens_row(lens: Lens) -> Floats:
 
 
 def distort(lens: Lens, undistorted: Floats) -> Floats:
-    """Undistorted places (..., 2) to distorted ones."""
-    return _each(distorted, lens, undistorted).reshape(np.shape(undistorted))
+    """Return the distorted places of undistorted ones (..., 2)."""
+    places = flat(np.asarray(undistorted, float), 1)
+    out = np.empty(places.shape)
+    _distort_all(lens_row(lens), places, out)
+    return out.reshape(np.shape(undistorted))
 
 
 def magnification(lens: Lens, undistorted: Floats) -> Floats:
-    """(...,) how many times longer a pinhole shows a short line at undistorted places (..., 2) than
-    the lens does; the mean of both directions."""
-    return _each(magnification_at, lens, undistorted).reshape(np.shape(undistorted)[:-1])
+    """Return how many times longer a pinhole shows a short line than the lens does.
+
+    Args:
+        lens: the lens.
+        undistorted: (..., 2) places of the line in the pinhole's image.
+
+    Returns:
+        (...,) mean of the factors in both directions.
+    """
+    places = flat(np.asarray(undistorted, float), 1)
+    out = np.empty(len(places))
+    _magnify_all(lens_row(lens), places, out)
+    return out.reshape(np.shape(undistorted)[:-1])
 
 
 def undistort(lens: Lens, distorted: Floats) -> Floats:
-    """Distorted places (..., 2) to undistorted ones; NaN beyond `PINHOLE_RAD` from the axis."""
+    """Return the undistorted places of distorted ones (..., 2); NaN beyond `PINHOLE_RAD`."""
     ray = rays_cam(lens, distorted)
     ahead = ray[..., 2:] > math.cos(PINHOLE_RAD)
     return np.where(ahead, ray[..., :2] / np.where(ahead, ray[..., 2:], 1.0), np.nan)
 
 
-def rays_cam(lens: Lens, distorted: Floats) -> Floats:
-    """(..., 3) unit directions, camera axes, of distorted places (..., 2); NaN where none is."""
-    flat = np.ascontiguousarray(distorted, float).reshape(-1, 2)
-    out = np.empty((len(flat), 3))
-    _rays_all(lens_row(lens), flat, out)
+def rays_cam(lens: Lens, distorted: Floats) -> Points3:
+    """Return unit directions (..., 3) in camera axes of distorted places (..., 2), NaN of none."""
+    places = flat(np.asarray(distorted, float), 1)
+    out = np.empty((len(places), 3))
+    _cast_rays(lens_row(lens), places, out)
     return out.reshape(*np.shape(distorted)[:-1], 3)
 
 
 def distorted_radius(lens: Lens, angle_rad: float) -> float:
-    """Where light at an angle to the axis arrives [focal lengths]; NaN beyond the lens."""
+    """Return where light at an angle to the axis arrives [focal lengths]; NaN beyond the lens."""
     row = lens_row(lens)
-    return float(_radius_of(row, angle_rad)) if angle_rad <= row[FOLD] else math.nan
-
-
-def _each(at: Callable[..., Any], lens: Lens, places: Floats) -> Floats:
-    row, flat = lens_row(lens), np.asarray(places, float).reshape(-1, 2)
-    return np.array([at(row, x, y) for x, y in flat.tolist()], float)
+    return float(_radius_at(row, angle_rad)) if angle_rad <= row[FOLD] else math.nan
 
 
 @kernel
-def _rays_all(row, places, out):
+def _distort_all(row: Floats, places: Floats, out: Floats) -> None:
+    """Write the distorted places (n, 2) of undistorted ones (n, 2)."""
     for i in range(len(places)):
-        out[i, 0], out[i, 1], out[i, 2] = _ray(row, places[i, 0], places[i, 1])
+        out[i, 0], out[i, 1] = distort_point(row, places[i, 0], places[i, 1])
 
 
 @kernel
-def distorted(row, x, y):
-    """Where the lens of a row shows what a pinhole shows at x, y; far away what it does not see."""
+def _magnify_all(row: Floats, places: Floats, out: Floats) -> None:
+    """Write the magnification (n,) at undistorted places (n, 2)."""
+    for i in range(len(places)):
+        out[i] = magnification_at(row, places[i, 0], places[i, 1])
+
+
+@kernel
+def _cast_rays(row: Floats, places: Floats, out: Points3) -> None:
+    """Write unit directions (n, 3) in camera axes of distorted places (n, 2)."""
+    for i in range(len(places)):
+        out[i, 0], out[i, 1], out[i, 2] = _unit_ray(row, places[i, 0], places[i, 1])
+
+
+@kernel
+def distort_point(row: Floats, x: float, y: float) -> ImagePoint:
+    """Return where a lens images a place of a pinhole's image; far away if it does not."""
     squared = x * x + y * y
     if row[0] != NONE and squared > math.tan(row[FOLD]) ** 2 and row[FOLD] < 0.5 * math.pi:
-        return FAR * x, FAR * y
+        return ImagePoint(FAR * x, FAR * y)
     if row[0] == BROWN_CONRADY:
         radial = 1.0 + squared * (row[1] + squared * (row[2] + squared * row[5]))
         aside_x = 2.0 * row[3] * x * y + row[4] * (squared + 2.0 * x * x)
         aside_y = row[3] * (squared + 2.0 * y * y) + 2.0 * row[4] * x * y
-        return x * radial + aside_x, y * radial + aside_y
+        return ImagePoint(x * radial + aside_x, y * radial + aside_y)
     if row[0] == KANNALA_BRANDT:
         radius = math.sqrt(squared)
         if radius < 1e-12:
-            return x, y
-        scale = _radius_of(row, math.atan(radius)) / radius
-        return x * scale, y * scale
-    return x, y
+            return ImagePoint(x, y)
+        scale = _radius_at(row, math.atan(radius)) / radius
+        return ImagePoint(x * scale, y * scale)
+    return ImagePoint(x, y)
 
 
 @kernel
-def magnification_at(row, x, y):
-    """`magnification` at one undistorted place."""
+def magnification_at(row: Floats, x: float, y: float) -> float:
+    """Return the `magnification` of a lens at one undistorted place."""
     if row[0] == NONE:
         return 1.0
-    left, right = distorted(row, x - _STEP, y), distorted(row, x + _STEP, y)
-    above, below = distorted(row, x, y - _STEP), distorted(row, x, y + _STEP)
-    area = (right[0] - left[0]) * (below[1] - above[1])
-    area -= (right[1] - left[1]) * (below[0] - above[0])
+    left, right = distort_point(row, x - _STEP, y), distort_point(row, x + _STEP, y)
+    above, below = distort_point(row, x, y - _STEP), distort_point(row, x, y + _STEP)
+    area = (right.x - left.x) * (below.y - above.y)
+    area -= (right.y - left.y) * (below.x - above.x)
     return 2.0 * _STEP / math.sqrt(max(abs(area), 1e-18))
 
 
 @kernel
-def _radius_of(row, angle):
-    """How far from the middle light arrives that comes at an angle [rad] to the axis."""
+def _radius_at(row: Floats, angle: float) -> float:
+    """Return the radius at which light at an angle [rad] to the axis arrives [focal lengths]."""
     if row[0] == KANNALA_BRANDT:
         s = angle * angle
         return angle * (1.0 + s * (row[1] + s * (row[2] + s * (row[3] + s * row[4]))))
@@ -169,37 +207,40 @@ def _radius_of(row, angle):
 
 
 @kernel
-def _ray(row, x, y):
-    """Unit direction of a distorted place; NaN where nothing is seen."""
-    far = math.sqrt(x * x + y * y)
-    if not far < row[LIMIT]:
-        return np.nan, np.nan, np.nan
+def _unit_ray(row: Floats, x: float, y: float) -> Vector3:
+    """Return the unit direction of a distorted place in camera axes; NaN where there is none."""
+    radius = math.sqrt(x * x + y * y)
+    if not radius < row[LIMIT]:
+        return Vector3(np.nan, np.nan, np.nan)
     if row[0] == KANNALA_BRANDT:
-        if far < 1e-12:
-            return 0.0, 0.0, 1.0
-        angle = _angle_of(row, far)
-        aside = math.sin(angle) / far
-        return aside * x, aside * y, math.cos(angle)
+        if radius < 1e-12:
+            return Vector3(0.0, 0.0, 1.0)
+        angle = _solve_angle(row, radius)
+        aside = math.sin(angle) / radius
+        return Vector3(aside * x, aside * y, math.cos(angle))
     u, v = x, y
     if row[0] == BROWN_CONRADY:
-        along = math.tan(_angle_of(row, far)) / max(far, 1e-12)
-        u, v = _without_decentring(row, x, y, along * x, along * y)
+        along = math.tan(_solve_angle(row, radius)) / max(radius, 1e-12)
+        u, v = _remove_decentring(row, x, y, along * x, along * y)
     length = math.sqrt(u * u + v * v + 1.0)
-    return u / length, v / length, 1.0 / length
+    return Vector3(u / length, v / length, 1.0 / length)
 
 
 @kernel
-def _angle_of(row, far):
-    """The angle [rad] whose light arrives at a radius below the limit: Newton or bisection."""
+def _solve_angle(row: Floats, radius: float) -> float:
+    """Return the angle [rad] whose light arrives at a radius below the limit.
+
+    Newton's method, with bisection where a step leaves the bracket.
+    """
     low, high = 0.0, row[FOLD]
-    angle = min(far, 0.5 * high)
+    angle = min(radius, 0.5 * high)
     for _ in range(60):
-        off = _radius_of(row, angle) - far
+        off = _radius_at(row, angle) - radius
         if off > 0.0:
             high = angle
         else:
             low = angle
-        slope = (_radius_of(row, angle + _STEP) - off - far) / _STEP
+        slope = (_radius_at(row, angle + _STEP) - off - radius) / _STEP
         step = off / slope if slope > 0.0 else np.inf
         if abs(step) < 1e-13:
             break
@@ -208,17 +249,25 @@ def _angle_of(row, far):
 
 
 @kernel
-def _without_decentring(row, x, y, u, v):
-    """Newton's steps from a first guess to the undistorted place that is distorted to x, y."""
+def _remove_decentring(row: Floats, x: float, y: float, u: float, v: float) -> ImagePoint:
+    """Return the undistorted place of a distorted one, by Newton's method.
+
+    Args:
+        row: (8,) the lens.
+        x: distorted place.
+        y: distorted place.
+        u: first guess of the undistorted place.
+        v: first guess of the undistorted place.
+    """
     for _ in range(_NEWTON_STEPS):
-        at = distorted(row, u, v)
-        off_x, off_y = at[0] - x, at[1] - y
+        at = distort_point(row, u, v)
+        off_x, off_y = at.x - x, at.y - y
         if off_x * off_x + off_y * off_y < 1e-24:
             break
-        right, below = distorted(row, u + _STEP, v), distorted(row, u, v + _STEP)
-        a, b = (right[0] - at[0]) / _STEP, (below[0] - at[0]) / _STEP
-        c, d = (right[1] - at[1]) / _STEP, (below[1] - at[1]) / _STEP
+        right, below = distort_point(row, u + _STEP, v), distort_point(row, u, v + _STEP)
+        a, b = (right.x - at.x) / _STEP, (below.x - at.x) / _STEP
+        c, d = (right.y - at.y) / _STEP, (below.y - at.y) / _STEP
         det = a * d - b * c
         u -= (d * off_x - b * off_y) / det
         v -= (a * off_y - c * off_x) / det
-    return u, v
+    return ImagePoint(u, v)

@@ -1,35 +1,56 @@
-"""Lines of sight: cameras as centres that look along rays, and where two rays pass each other."""
+"""Lines of sight: cameras as centres and rays, and where two rays pass each other."""
 
 import math
-from typing import Any
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from hrc_env.core.declared import Records1, dtype_of, make_records
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
 
 MIN_CROSSING = 0.1
 """Sine of the smallest angle between two lines that fixes a point."""
-CAMERA = np.dtype(
-    [
-        # projection, rays from pixels; optical centre [m]; focal length [px]
-        ("P", "f8", (3, 4)), ("back", "f8", (3, 3)), ("eye", "f8", (3,)), ("focal", "f8"),
-    ],
-    align=True,
-)  # fmt: skip
-"""A camera of the rig."""
 
 
-def cameras_of(P: Floats) -> Any:
-    """Return the cameras (C,) of projections P (C, 3, 4) as records of `CAMERA`."""
-    cameras = np.empty(len(P), CAMERA)
+class Camera:
+    """A pinhole camera of the rig, derived from its projection."""
+
+    P: Annotated[Floats, (3, 4)]
+    """Projection from homogeneous world coordinates to homogeneous pixels."""
+    back: Annotated[Floats, (3, 3)]
+    """Matrix from homogeneous pixels to directions in the world."""
+    eye: Annotated[Floats, (3,)]
+    """Optical centre in the world frame [m]."""
+    focal: float
+    """Focal length [px]."""
+
+
+CAMERA = dtype_of(Camera)
+"""The dtype of `Camera`."""
+
+
+class Crossing(NamedTuple):
+    """The places at which two lines pass each other."""
+
+    distance_1: float
+    """Distance along the first line [m]; negative: behind its origin."""
+    distance_2: float
+    """Distance along the second line [m]."""
+    squared_gap: float
+    """Squared distance between the lines [m^2]; infinite of lines that are nearly parallel."""
+
+
+def cameras_of(P: Floats) -> Records1[Camera]:
+    """Return the cameras (C,) of projections P (C, 3, 4)."""
+    cameras = make_records(Camera, len(P))
     model_cameras(np.ascontiguousarray(P, np.float64), cameras)
     return cameras
 
 
 @kernel
-def model_cameras(P, cameras):
-    """Fill cameras (C,) in from their projections P (C, 3, 4)."""
+def model_cameras(P: Floats, cameras: Records1[Camera]) -> None:
+    """Fill in cameras (C,) from their projections P (C, 3, 4)."""
     for c in range(len(P)):
         a, camera, inverse = P[c], cameras[c], cameras[c].back
         for i in range(3):
@@ -54,8 +75,18 @@ def model_cameras(P, cameras):
 
 
 @kernel(makes_arrays=True)
-def nearest_places(eye_1, ray_1, eye_2, ray_2, middle):
-    """Distances along two lines to where they pass each other, their squared gap; the middle."""
+def nearest_places(
+    eye_1: Floats, ray_1: Floats, eye_2: Floats, ray_2: Floats, middle: Floats
+) -> Crossing:
+    """Return where two lines pass each other, and write the middle between these places.
+
+    Args:
+        eye_1: (3,) origin of the first line [m].
+        ray_1: (3,) unit direction of the first line.
+        eye_2: (3,) origin of the second line [m].
+        ray_2: (3,) unit direction of the second line.
+        middle: (3,) is filled [m], unless the lines are nearly parallel.
+    """
     cosine, a, b = 0.0, 0.0, 0.0
     for i in range(3):
         between = eye_2[i] - eye_1[i]
@@ -64,18 +95,25 @@ def nearest_places(eye_1, ray_1, eye_2, ray_2, middle):
         b += between * ray_2[i]
     crossing = 1.0 - cosine * cosine
     if crossing < MIN_CROSSING**2:
-        return -1.0, -1.0, np.inf
+        return Crossing(-1.0, -1.0, np.inf)
     far_1, far_2, gap = (a - b * cosine) / crossing, (a * cosine - b) / crossing, 0.0
     for i in range(3):
         first, second = eye_1[i] + far_1 * ray_1[i], eye_2[i] + far_2 * ray_2[i]
         middle[i] = 0.5 * (first + second)
         gap += (first - second) ** 2
-    return far_1, far_2, gap
+    return Crossing(far_1, far_2, gap)
 
 
 @kernel
-def look(back, u, v, ray):
-    """Fill in the unit direction in which a pixel lies; `back` (3, 3) as in `CAMERA`."""
+def look(back: Floats, u: float, v: float, ray: Floats) -> None:
+    """Write the unit direction of a pixel in the world frame.
+
+    Args:
+        back: (3, 3) as of `Camera`.
+        u: column of the pixel [px].
+        v: row of the pixel [px].
+        ray: (3,) is filled.
+    """
     length = 0.0
     for i in range(3):
         ray[i] = back[i, 0] * u + back[i, 1] * v + back[i, 2]

@@ -1,67 +1,90 @@
-"""Where a task has tools get to, and whether an arm can; told before anything is simulated."""
+"""The places that the tool of a robot must reach, and a check that the arm is long enough."""
 
 import itertools
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.mapping import answer_unknown_fields
-from hrc_env.core.typing import Floats, Points3
-from hrc_env.geometry.chains import SerialChain, forward
+from hrc_env.core.typing import Points3
+from hrc_env.geometry.chains import SerialChain, link_frames
 
 Triple = tuple[float, float, float]
+"""Three coordinates."""
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class ReachTarget:
-    """A place that the tool point has to get to."""
+    """A place that the tool point of a robot must reach."""
 
     name: str
-    """What is there, with its article."""
+    """Name of the place with its article, for messages."""
     place_world: Triple | Points3
-    """[m]"""
+    """Position of the place in the world frame [m]."""
     along_world: Triple | None = None
-    """Which way the tool points there, a unit vector; None: any way."""
+    """Unit vector along which the tool points at the place; None: any direction."""
     within_m: float = 0.0
-    """It will do to be so near to it [m]."""
+    """Distance from the place that is near enough [m]."""
 
 
-def check_reach(who: str, robot: str, chain: SerialChain, targets: Iterable[ReachTarget]) -> None:
-    """Raise `ConfigError` for a place that an arm is too short for: its last joint would have to be
-    farther from its second one than it ever is."""
+class WristReach(NamedTuple):
+    """The sphere that contains the last joint of an arm."""
+
+    shoulder_world: Points3
+    """(3,) position of the second joint [m]."""
+    radius_m: float
+    """Greatest distance of the last joint from the second one [m]."""
+
+
+def check_reach(task: str, robot: str, chain: SerialChain, targets: Iterable[ReachTarget]) -> None:
+    """Raise an error if an arm is too short for one of the places.
+
+    Args:
+        task: id of the task, for the message.
+        robot: name of the robot, for the message.
+        chain: its geometry; robots with slides pass.
+        targets: the places.
+
+    Raises:
+        ConfigError: the last joint would have to be farther from the second one than it can be.
+    """
     if chain.slides.any():
         return
-    shoulder_world, most_m = wrist_reach(chain)
+    reach = wrist_reach(chain)
     R, p = chain.link_from_tool[:3, :3], chain.link_from_tool[:3, 3]
     wrist = -R.T @ p
     for target in targets:
         at, slack_m = np.asarray(target.place_world, float), float(np.linalg.norm(wrist))
         if target.along_world is not None:
             at, slack_m = at + wrist[2] * np.array(target.along_world), float(np.hypot(*wrist[:2]))
-        away_m = float(np.linalg.norm(at - shoulder_world)) - slack_m - target.within_m
-        if away_m > most_m:
+        away_m = float(np.linalg.norm(at - reach.shoulder_world)) - slack_m - target.within_m
+        if away_m > reach.radius_m:
             x, y, z = np.asarray(target.place_world, float)
             raise ConfigError(
-                f"{who}: {target.name} at ({x:.2f}, {y:.2f}, {z:.2f}) m is out of reach of "
+                f"{task}: {target.name} at ({x:.2f}, {y:.2f}, {z:.2f}) m is out of reach of "
                 f"the robot {robot!r}, whose wrist would be {away_m:.2f} m from its shoulder "
-                f"and can be {most_m:.2f} m away at most. Put it nearer to the robot, or choose a "
-                "longer arm."
+                f"and can be {reach.radius_m:.2f} m away at most. Put it nearer to the robot, or "
+                "choose a longer arm."
             )
 
 
-def wrist_reach(chain: SerialChain) -> tuple[Floats, float]:
-    """Where an arm's second joint is (3,), and how far from it the last one can be [m]: at most, of
-    all poses whose joints are at right angles, among which arms of the usual kinds are longest."""
+def wrist_reach(chain: SerialChain) -> WristReach:
+    """Return the reach of an arm's last joint.
+
+    It is the greatest of all poses whose joints are at right angles; arms of the usual kinds are
+    longest in one of these.
+    """
     steps = 0.5 * np.pi * np.arange(-2, 3)
     between = [
         [angle for angle in steps if low <= angle <= high] or [low, high]
         for low, high in chain.range_rad[1:-1]
     ]
     poses = np.array([(0.0, *angles, 0.0) for angles in itertools.product(*between)])
-    joints = forward(chain, poses[:, -chain.n_joints :])[..., :3, 3]
+    joints = link_frames(chain, poses[:, -chain.n_joints :])[..., :3, 3]
     second = min(1, chain.n_joints - 1)
     away_m = np.linalg.norm(joints[:, -1] - joints[:, second], axis=-1)
-    return joints[0, second], float(away_m.max())
+    return WristReach(joints[0, second], float(away_m.max()))

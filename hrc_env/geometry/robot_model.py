@@ -1,4 +1,4 @@
-"""What a shield must know of a robot, beside what its encoders say."""
+"""The properties of a robot that a shield needs, beside the state that its encoders measure."""
 
 from dataclasses import dataclass
 
@@ -11,17 +11,20 @@ from hrc_env.geometry.chains import SerialChain
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RobotModel:
-    """A robot's geometry, what it can be asked for, and how hard it hits. Of slides all angles are
-    ways, rad is m."""
+    """A robot's geometry, the limits of its commands and its effective mass.
+
+    Units are those of hinges; for a slide, read m in place of rad.
+    """
 
     chain: SerialChain
+    """Geometry of the links, with the collision capsules."""
     fastest_rad_s: Floats
-    """(N,) the greatest velocity that an action asks of each joint [rad/s]."""
+    """(N,) the greatest velocity that an action can command for each joint [rad/s]."""
     slew_rad_s2: Floats
-    """(N,) fastest change of each joint's commanded velocity [rad/s^2]."""
+    """(N,) the greatest rate of change of each joint's commanded velocity [rad/s^2]."""
     mass_kg: float
-    """Effective mass of a hit without a load: of an arm half of what moves (ISO/TS 15066, A.3), of
-    a base that drives all of it [kg]."""
+    """Effective mass in a collision without a load [kg]: half of an arm's moving mass (ISO/TS
+    15066, A.3), all of the mass of a mobile base."""
     load_kg: Floats
     """(O,) masses of the task's loose objects [kg]."""
 

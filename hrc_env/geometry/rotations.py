@@ -3,11 +3,11 @@
 import numpy as np
 
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Floats, Points3, QuaternionsWxyz, Rotations
+from hrc_env.core.typing import Floats, Points3, QuaternionsWxyz, Rotations, Vector3
 
 
 def about_axis(axis: str, angle_rad: Floats | float) -> Rotations:
-    """Rotation about "x", "y" or "z" by angles of any shape: (..., 3, 3)."""
+    """Return the rotations (..., 3, 3) about "x", "y" or "z" by angles of any shape."""
     angle = np.asarray(angle_rad, float)
     c, s, zero, one = np.cos(angle), np.sin(angle), np.zeros_like(angle), np.ones_like(angle)
     rows = {
@@ -19,8 +19,11 @@ def about_axis(axis: str, angle_rad: Floats | float) -> Rotations:
 
 
 def look_at(eye_world: Points3, target_world: Points3) -> Rotations:
-    """R_world_from_cam (OpenCV: +X right, +Y down, +Z forward), the image upright; of a vertical
-    line of sight +Y of the image is world -Y."""
+    """Return the orientation R_world_from_cam of a camera that looks from one point at another.
+
+    The camera's axes are OpenCV's (+X right, +Y down, +Z forward), and its image is upright. If the
+    line of sight is vertical, +Y of the image is -Y of the world.
+    """
     forward = np.asarray(target_world, float) - np.asarray(eye_world, float)
     forward = forward / np.linalg.norm(forward)
     right = np.cross(forward, [0.0, 0.0, 1.0])
@@ -39,7 +42,7 @@ def from_rotation_vector(vector_rad: Floats) -> Rotations:
 
 
 def matrix(quaternion_wxyz: QuaternionsWxyz) -> Rotations:
-    """Rotations (..., 3, 3) of unit quaternions (..., 4)."""
+    """Return the rotations (..., 3, 3) of unit quaternions (..., 4)."""
     w, x, y, z = np.moveaxis(np.asarray(quaternion_wxyz, float), -1, 0)
     rows = (
         (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
@@ -50,14 +53,16 @@ def matrix(quaternion_wxyz: QuaternionsWxyz) -> Rotations:
 
 
 @kernel
-def turned(quaternion, offset):
-    """An offset (3,) turned by a unit quaternion: v + 2 w (u x v) + 2 u x (u x v)."""
+def rotate(
+    quaternion: Floats | tuple[float, ...], vector: Floats | tuple[float, float, float]
+) -> Vector3:
+    """Return a vector (3,) rotated by a unit quaternion: v + 2 w (u x v) + 2 u x (u x v)."""
     w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
-    a = 2.0 * (y * offset[2] - z * offset[1])
-    b = 2.0 * (z * offset[0] - x * offset[2])
-    c = 2.0 * (x * offset[1] - y * offset[0])
-    return (
-        offset[0] + w * a + y * c - z * b,
-        offset[1] + w * b + z * a - x * c,
-        offset[2] + w * c + x * b - y * a,
+    a = 2.0 * (y * vector[2] - z * vector[1])
+    b = 2.0 * (z * vector[0] - x * vector[2])
+    c = 2.0 * (x * vector[1] - y * vector[0])
+    return Vector3(
+        vector[0] + w * a + y * c - z * b,
+        vector[1] + w * b + z * a - x * c,
+        vector[2] + w * c + x * b - y * a,
     )

@@ -1,12 +1,16 @@
-"""Triangulation: pixels of one point in several cameras to a point with its covariance.
+"""Triangulation: a point in space with its covariance, from its pixels in several cameras.
 
-A linear start is refined by Gauss-Newton on the reprojection error (Hartley and Zisserman, Multiple
-View Geometry, 2nd ed., chapter 12). With a gate, the two cameras whose point most cameras agree
-with come first: a wrong detection in one view does no harm. The kernels work on one point.
+A linear solution is refined by Gauss-Newton on the reprojection error (Hartley and Zisserman,
+Multiple View Geometry, 2nd ed., chapter 12). With a gate, the search starts from the pair of
+cameras whose point agrees with the most others, so that a wrong detection in one view does no harm.
+
+Kernels take one point: projections P (C, 3, 4), pixels z (C, 2), their standard deviations
+sigma (C,) [px], and the views to use (C,).
 """
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,29 +19,47 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Bools, Covariances3, Floats, Points2, Points3
 
 NEAREST_DEPTH_M = 0.05
-"""Points nearer to a camera's plane than this have no usable pixel."""
+"""Least distance from a camera's plane of points with a usable pixel [m]."""
 FURTHEST_PX = 1e5
-"""Pixels beyond this are no measurement of anything in a room."""
+"""Greatest coordinate of a pixel that counts as a measurement [px]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Triangulation:
-    """Points with what is known about them; NaN where fewer than two views could be used."""
+    """Triangulated points with covariances, NaN where fewer than two views could be used."""
 
-    points_world: Points3  # (B, W, J, 3) [m]
-    cov_world: Covariances3  # (B, W, J, 3, 3) [m^2], inverse information of the views used
-    used: Bools  # (B, C, W, J) the views that the point was made from
+    points_world: Points3
+    """(B, W, J, 3) [m]."""
+    cov_world: Covariances3
+    """(B, W, J, 3, 3) inverse information of the views that were used [m^2]."""
+    used: Bools
+    """(B, C, W, J) the views that the point was made from."""
+
+
+class Pixel(NamedTuple):
+    """The image of a point in a camera."""
+
+    u: float
+    """Column [px]."""
+    v: float
+    """Row [px]."""
+    depth: float
+    """Distance of the point from the camera's plane [m]; not positive: behind the camera."""
 
 
 def triangulate(P: Floats, px: Points2, sigma_px: Floats, gate_sigma: float = 0.0) -> Triangulation:
-    """Weighted least-squares points from all views, or from those that agree.
+    """Return the weighted least-squares points of all views, or of those that agree.
 
     Args:
         P: (C, 3, 4) projections.
         px: (B, C, W, J, 2) pixels; NaN where missing.
-        sigma_px: (B, C, W, J) standard deviations [px]; views whose is not finite and positive do
-            not count.
-        gate_sigma: within how many standard deviations views must agree; 0: all are used.
+        sigma_px: (B, C, W, J) standard deviations [px]; views count if theirs is finite and
+            positive.
+        gate_sigma: greatest reprojection error of views that agree, in standard deviations; 0: all
+            views are used.
+
+    Raises:
+        ConfigError: arrays of other shapes, or a negative gate.
     """
     px, sigma_px = np.asarray(px, float), np.asarray(sigma_px, float)
     if not gate_sigma >= 0:
@@ -49,13 +71,29 @@ def triangulate(P: Floats, px: Points2, sigma_px: Floats, gate_sigma: float = 0.
     points = np.full((n_batch, n_workers, n_joints, 3), np.nan)
     cov = np.full((n_batch, n_workers, n_joints, 3, 3), np.nan)
     used = np.zeros(px.shape[:-1], bool)
-    P, px, sigma_px = (np.ascontiguousarray(each, float) for each in (P, px, sigma_px))
-    _triangulate_all(P, px, sigma_px, gate_sigma, points, cov, used)
+    _triangulate_all(
+        np.ascontiguousarray(P, float),
+        np.ascontiguousarray(px),
+        np.ascontiguousarray(sigma_px),
+        gate_sigma,
+        points,
+        cov,
+        used,
+    )
     return Triangulation(points, cov, used)
 
 
 @kernel(makes_arrays=True)
-def _triangulate_all(P, px, sigma_px, gate_sigma, points, cov, used):
+def _triangulate_all(
+    P: Floats,
+    px: Points2,
+    sigma_px: Floats,
+    gate_sigma: float,
+    points: Points3,
+    cov: Covariances3,
+    used: Bools,
+) -> None:
+    """Write the points, covariances and views of `Triangulation`; see `triangulate`."""
     n_batch, n_cameras, n_workers, n_joints, _ = px.shape
     z, sigma = np.empty((n_cameras, 2)), np.empty(n_cameras)
     ok, use = np.empty(n_cameras, np.bool_), np.empty(n_cameras, np.bool_)
@@ -77,8 +115,8 @@ def _triangulate_all(P, px, sigma_px, gate_sigma, points, cov, used):
 
 
 @kernel
-def inverse3(a, out):
-    """Inverse of a symmetric 3x3 matrix into `out`; returns its determinant."""
+def inverse3(a: Floats, out: Floats) -> float:
+    """Write the inverse of a symmetric matrix (3, 3), and return the determinant."""
     m00 = a[1, 1] * a[2, 2] - a[1, 2] * a[1, 2]
     m01 = a[0, 2] * a[1, 2] - a[0, 1] * a[2, 2]
     m02 = a[0, 1] * a[1, 2] - a[0, 2] * a[1, 1]
@@ -95,17 +133,21 @@ def inverse3(a, out):
 
 
 @kernel
-def pixel_of(camera, x, y, z):
-    """(u, v, depth) of a point in one (3, 4) camera; depth <= 0 is behind it."""
+def pixel_of(camera: Floats, x: float, y: float, z: float) -> Pixel:
+    """Return the pixel and the depth of a point [m] in a camera with a projection (3, 4)."""
     depth = camera[2, 0] * x + camera[2, 1] * y + camera[2, 2] * z + camera[2, 3]
     u = (camera[0, 0] * x + camera[0, 1] * y + camera[0, 2] * z + camera[0, 3]) / depth
     v = (camera[1, 0] * x + camera[1, 1] * y + camera[1, 2] * z + camera[1, 3]) / depth
-    return u, v, depth
+    return Pixel(u, v, depth)
 
 
 @kernel(makes_arrays=True)
-def linear_point(P, z, use, out):
-    """Point nearest to the planes of constant u and v of the used views; True if it exists."""
+def linear_point(P: Floats, z: Points2, use: Bools, out: Points3) -> bool:
+    """Write the point (3,) nearest to the planes of constant u and v of the used views [m].
+
+    Returns:
+        Whether there is such a point in front of all of these cameras.
+    """
     information, inverse, right = np.zeros((3, 3)), np.empty((3, 3)), np.zeros(3)
     for c in range(len(P)):
         if not use[c]:
@@ -127,14 +169,14 @@ def linear_point(P, z, use, out):
     for i in range(3):
         out[i] = inverse[i, 0] * right[0] + inverse[i, 1] * right[1] + inverse[i, 2] * right[2]
     for c in range(len(P)):
-        if use[c] and not pixel_of(P[c], out[0], out[1], out[2])[2] > NEAREST_DEPTH_M:
+        if use[c] and not pixel_of(P[c], out[0], out[1], out[2]).depth > NEAREST_DEPTH_M:
             return False
     return True
 
 
 @kernel
-def add_outer(a, n0, n1, n2, weight):
-    """a += weight n n' for a symmetric 3x3 matrix."""
+def add_outer(a: Floats, n0: float, n1: float, n2: float, weight: float) -> None:
+    """Add weight n n' to a symmetric matrix (3, 3)."""
     a[0, 0] += weight * n0 * n0
     a[1, 1] += weight * n1 * n1
     a[2, 2] += weight * n2 * n2
@@ -144,27 +186,43 @@ def add_outer(a, n0, n1, n2, weight):
     a[1, 0], a[2, 0], a[2, 1] = a[0, 1], a[0, 2], a[1, 2]
 
 
-@kernel
-def pixel_jacobian(camera, u, v, depth, jacobian):
-    """Derivatives of (u, v) by the point into `jacobian` (2, 3) [px/m]."""
-    for i in range(3):
-        jacobian[0, i] = (camera[0, i] - u * camera[2, i]) / depth
-        jacobian[1, i] = (camera[1, i] - v * camera[2, i]) / depth
-
-
 @kernel(makes_arrays=True)
-def refine_point(P, z, sigma, use, point, cov, n_steps):
-    """Gauss-Newton on the reprojection error, in place; True if it ended at a proper point."""
+def refine_point(
+    P: Floats,
+    z: Points2,
+    sigma: Floats,
+    use: Bools,
+    point: Points3,
+    cov: Covariances3,
+    n_steps: int,
+) -> bool:
+    """Improve a point by Gauss-Newton on the reprojection error.
+
+    Args:
+        P: (C, 3, 4) projections.
+        z: (C, 2) pixels.
+        sigma: (C,) standard deviations [px].
+        use: (C,) the views to use.
+        point: (3,) is changed [m].
+        cov: (3, 3) is filled with the inverse information [m^2].
+        n_steps: number of iterations.
+
+    Returns:
+        Whether the point is finite, fixed by the views and in front of the cameras.
+    """
     information, step, jacobian = np.empty((3, 3)), np.empty(3), np.empty((2, 3))
     for _ in range(n_steps):
         information[:], step[:] = 0.0, 0.0
         for c in range(len(P)):
             if not use[c]:
                 continue
-            u, v, depth = pixel_of(P[c], point[0], point[1], point[2])
+            camera = P[c]
+            u, v, depth = pixel_of(camera, point[0], point[1], point[2])
             if not depth > NEAREST_DEPTH_M:
                 return False
-            pixel_jacobian(P[c], u, v, depth, jacobian)
+            for i in range(3):  # derivatives of the pixel by the point [px/m]
+                jacobian[0, i] = (camera[0, i] - u * camera[2, i]) / depth
+                jacobian[1, i] = (camera[1, i] - v * camera[2, i]) / depth
             weight = 1.0 / sigma[c] ** 2
             for axis in range(2):
                 a, b, d = jacobian[axis, 0], jacobian[axis, 1], jacobian[axis, 2]
@@ -182,8 +240,14 @@ def refine_point(P, z, sigma, use, point, cov, n_steps):
 
 
 @kernel
-def point_from_views(P, z, sigma, use, point, cov):
-    """Least-squares point of the views in `use`; returns how many there were, 0 if none exists."""
+def point_from_views(
+    P: Floats, z: Points2, sigma: Floats, use: Bools, point: Points3, cov: Covariances3
+) -> int:
+    """Write the least-squares point (3,) [m] of the used views and its covariance (3, 3) [m^2].
+
+    Returns:
+        The number of views, 0 if there is no such point.
+    """
     n_views = 0
     for c in range(len(P)):
         n_views += use[c]
@@ -193,8 +257,16 @@ def point_from_views(P, z, sigma, use, point, cov):
 
 
 @kernel
-def misfit(camera, u, v, sigma, point):
-    """Squared distance in standard deviations between a pixel and the point's image."""
+def misfit(camera: Floats, u: float, v: float, sigma: float, point: Points3) -> float:
+    """Return the squared reprojection error of a point, in units of the variance.
+
+    Args:
+        camera: (3, 4) projection.
+        u: column of the measured pixel [px].
+        v: row of the measured pixel [px].
+        sigma: standard deviation of each coordinate [px].
+        point: (3,) [m].
+    """
     expected_u, expected_v, depth = pixel_of(camera, point[0], point[1], point[2])
     if not depth > NEAREST_DEPTH_M:
         return np.inf
@@ -202,9 +274,31 @@ def misfit(camera, u, v, sigma, point):
 
 
 @kernel(makes_arrays=True)
-def consensus_point(P, z, sigma, ok, gate_sigma, point, cov, use):
-    """Fill `point`, `cov` and `use` of the largest agreeing set of views among `ok`, found from
-    pairs of cameras; returns their number, 0 if fewer than two."""
+def consensus_point(
+    P: Floats,
+    z: Points2,
+    sigma: Floats,
+    ok: Bools,
+    gate_sigma: float,
+    point: Points3,
+    cov: Covariances3,
+    use: Bools,
+) -> int:
+    """Find the largest set of views that agree, starting from each pair of cameras.
+
+    Args:
+        P: (C, 3, 4) projections.
+        z: (C, 2) pixels.
+        sigma: (C,) standard deviations [px].
+        ok: (C,) the views that are candidates.
+        gate_sigma: greatest reprojection error of views that agree, in standard deviations.
+        point: (3,) is filled [m].
+        cov: (3, 3) is filled [m^2].
+        use: (C,) is filled: the views that agree.
+
+    Returns:
+        The number of views that agree, 0 if fewer than two.
+    """
     n_cameras, gate = len(P), gate_sigma * gate_sigma
     best, best_cost = np.zeros(3), np.inf
     for first in range(n_cameras):
@@ -227,7 +321,7 @@ def consensus_point(P, z, sigma, ok, gate_sigma, point, cov, use):
         return 0
     point[:] = best
     n_views = 0
-    for _ in range(2):  # the pair's point is noisy: ask again about the refined one
+    for _ in range(2):  # the point of a pair is noisy: views are chosen again by the refined one
         n_views = 0
         for c in range(n_cameras):
             use[c] = ok[c] and misfit(P[c], z[c, 0], z[c, 1], sigma[c], point) < gate

@@ -1,26 +1,46 @@
-"""Ways on a floor among footprints: gaps on a grid, shortest ways to a place, ranges of rays.
+"""Paths on a floor among footprints: gaps on a grid, shortest paths to a place, ranges of rays.
 
 Footprints (N, 5) are upright rectangles: middle x, y, half length, half width [m], yaw [rad]. Grids
-are square, their points `cell` apart from an origin (2,) on [m]. Shortest ways by Dijkstra (1959,
-doi:10.1007/BF01386390) to eight neighbours; rays by sphere tracing (Hart 1996,
+are square, with points `cell` metres apart from an origin (2,). Shortest paths are by Dijkstra
+(1959, doi:10.1007/BF01386390) with eight neighbours; rays by sphere tracing (Hart 1996,
 doi:10.1007/s003710050084).
 """
 
 import heapq
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Bools, Capsules, Floats, Ints
+from hrc_env.core.typing import Bools, Capsules, Floats, Ints, JointAngles, Points2
 
-NEAREST_M, STEPS = 0.02, 64
-"""A ray ends so near to something, or after so many steps."""
+NEAREST_M = 0.02
+"""Gap at which a ray ends [m]."""
+STEPS = 64
+"""Greatest number of steps along a ray."""
+
+
+class GridPoint(NamedTuple):
+    """A point of a grid by its indices."""
+
+    i: int
+    """Index along x."""
+    j: int
+    """Index along y."""
 
 
 def gaps_m(xs: Floats, ys: Floats, footprints: Floats) -> Floats:
-    """(X, Y) distance of points from the nearest of footprints, negative in one [m]; infinite
-    without any."""
+    """Return the distances of grid points from the nearest footprint.
+
+    Args:
+        xs: (X,) first coordinates of the points [m].
+        ys: (Y,) second coordinates of the points [m].
+        footprints: (N, 5) rectangles.
+
+    Returns:
+        (X, Y) distances, negative inside of a footprint, infinite without any [m].
+    """
     gaps = np.full((len(xs), len(ys)), np.inf)
     for x, y, half_length, half_width, yaw in np.asarray(footprints, float).tolist():
         cos, sin, dx, dy = math.cos(yaw), math.sin(yaw), xs[:, None] - x, ys - y
@@ -33,7 +53,15 @@ def gaps_m(xs: Floats, ys: Floats, footprints: Floats) -> Floats:
 
 @kernel
 def value_at(x: float, y: float, field: Floats, origin: Floats, cell: float) -> float:
-    """A field (X, Y) between its grid points; beyond them as at its edge."""
+    """Return the value of a field at a place, interpolated between its grid points.
+
+    Args:
+        x: first coordinate of the place [m].
+        y: second coordinate of the place [m].
+        field: (X, Y) values at the grid points; beyond them those of the edge count.
+        origin: (2,) first point of the grid [m].
+        cell: distance between the points of the grid [m].
+    """
     u = min(max((x - origin[0]) / cell, 0.0), field.shape[0] - 1.0)
     v = min(max((y - origin[1]) / cell, 0.0), field.shape[1] - 1.0)
     i, j = min(int(u), field.shape[0] - 2), min(int(v), field.shape[1] - 2)
@@ -44,18 +72,29 @@ def value_at(x: float, y: float, field: Floats, origin: Floats, cell: float) -> 
 
 
 def ways_m(price: Floats, goal: tuple[int, int], cell: float) -> Floats:
-    """(X, Y) length of the shortest way from every grid point to the goal [m], a metre counting
-    `price` (X, Y) times, infinite where there is no way. Points that are not free, or cut off,
-    have the length of the nearest that is, and the way there."""
+    """Return the length of the shortest path from every grid point to a goal.
+
+    Args:
+        price: (X, Y) factor on the length of a path at each point; infinite where it is blocked.
+        goal: indices of the goal.
+        cell: distance between the points of the grid [m].
+
+    Returns:
+        (X, Y) lengths [m]. A point that is blocked or cut off has the length of the nearest point
+        that is not, plus the distance to it.
+    """
     ways = np.full(price.shape, np.inf)
-    _spread(np.ascontiguousarray(price, float), goal[0], goal[1], cell, ways)
+    _find_shortest(np.ascontiguousarray(price, float), goal[0], goal[1], cell, ways)
     return ways
 
 
 @kernel(makes_arrays=True)
-def _spread(price: Floats, goal_i: int, goal_j: int, cell: float, ways: Floats) -> None:
-    """First over free points from the goal, in the order of their lengths; then from these over all
-    others, in the order of how far off they are: a wall's two sides do not mix."""
+def _find_shortest(price: Floats, goal_i: int, goal_j: int, cell: float, ways: Floats) -> None:
+    """Write the lengths (X, Y) of shortest paths; see `ways_m`.
+
+    Free points come first, from the goal on; then all others, from the free ones on, in the order
+    of their distance from these, so that the two sides of a wall do not mix.
+    """
     n_x, n_y = price.shape
     order = np.full((n_x, n_y), np.inf)
     queue = [(0.0, goal_i * n_y + goal_j)]
@@ -84,18 +123,42 @@ def _spread(price: Floats, goal_i: int, goal_j: int, cell: float, ways: Floats) 
 
 
 def ranges_m(
-    places: Floats, angles: Floats, gaps: Floats, origin: Floats, cell: float, most_m: float
+    places: Points2 | JointAngles,
+    angles: Floats,
+    gaps: Floats,
+    origin: Floats,
+    cell: float,
+    most_m: float,
 ) -> Floats:
-    """(B, R) how far it is from places (B, 2 or more), x, y [m], to what stands there, at angles
-    (R,) from the x axis [rad]; at most `most_m`."""
-    found = np.empty((len(places), len(angles)))
-    _trace(places, angles, gaps, origin, cell, most_m, found)
-    return found
+    """Return the lengths of horizontal rays from places to the nearest obstacle.
+
+    Args:
+        places: (B, 2 or more) x and y [m], then anything.
+        angles: (R,) directions of the rays from the x axis [rad].
+        gaps: (X, Y) distances of grid points from the nearest obstacle [m].
+        origin: (2,) first point of the grid [m].
+        cell: distance between the points of the grid [m].
+        most_m: greatest length of a ray [m].
+
+    Returns:
+        (B, R) [m].
+    """
+    ranges = np.empty((len(places), len(angles)))
+    _trace_rays(places, angles, gaps, origin, cell, most_m, ranges)
+    return ranges
 
 
 @kernel
-def _trace(places, angles, gaps, origin, cell, most_m, found):
-    """Step on by the gap, which nothing can be nearer than."""
+def _trace_rays(
+    places: Floats,
+    angles: Floats,
+    gaps: Floats,
+    origin: Floats,
+    cell: float,
+    most_m: float,
+    ranges: Floats,
+) -> None:
+    """Write the lengths (B, R) of rays; each step is the gap, which holds no obstacle."""
     for b in range(len(places)):
         for k in range(len(angles)):
             way, c, s = 0.0, math.cos(angles[k]), math.sin(angles[k])
@@ -105,22 +168,35 @@ def _trace(places, angles, gaps, origin, cell, most_m, found):
                 if gap < NEAREST_M or way >= most_m:
                     break
                 way += gap
-            found[b, k] = min(way, most_m)
+            ranges[b, k] = min(way, most_m)
 
 
-def met(capsules_world: Capsules, radius_m: Floats, footprints: Floats) -> Bools:
-    """(B,) whether any of capsules (B, K, 2, 3), seen from above, meets a footprint."""
-    found = np.zeros(len(capsules_world), bool)
-    _meet(capsules_world, radius_m, np.asarray(footprints, float), found)
-    return found
+def find_overlaps(capsules_world: Capsules, radius_m: Floats, footprints: Floats) -> Bools:
+    """Return which robots overlap a footprint, seen from above.
+
+    Args:
+        capsules_world: (B, K, 2, 3) capsules of each robot [m].
+        radius_m: (K,) their radii [m].
+        footprints: (N, 5) rectangles.
+
+    Returns:
+        (B,)
+    """
+    overlaps = np.zeros(len(capsules_world), bool)
+    _find_overlaps(capsules_world, radius_m, np.asarray(footprints, float), overlaps)
+    return overlaps
 
 
 @kernel
-def _meet(capsules, radius, footprints, found):
-    """Two convex shapes that do not cross are nearest to each other at a corner of one."""
+def _find_overlaps(capsules: Capsules, radius: Floats, footprints: Floats, overlaps: Bools) -> None:
+    """Set the robots (B,) that overlap a footprint.
+
+    Two convex shapes that do not intersect are nearest to each other at a corner of one of them.
+    """
     for b in range(len(capsules)):
         for n in range(len(footprints)):
-            x, y, length, width, yaw = footprints[n]
+            x, y, yaw = footprints[n, 0], footprints[n, 1], footprints[n, 4]
+            length, width = footprints[n, 2], footprints[n, 3]
             c, s = math.cos(yaw), math.sin(yaw)
             for k in range(capsules.shape[1]):
                 ends = capsules[b, k]
@@ -132,23 +208,25 @@ def _meet(capsules, radius, footprints, found):
                     continue
                 ax, ay = c * ax + s * ay, c * ay - s * ax
                 bx, by = c * bx + s * by, c * by - s * bx
-                gap = min(_out(ax, ay, length, width), _out(bx, by, length, width))
+                gap = min(
+                    _from_rectangle(ax, ay, length, width), _from_rectangle(bx, by, length, width)
+                )
                 for sx in (-1.0, 1.0):
                     for sy in (-1.0, 1.0):
-                        gap = min(gap, _off(sx * length, sy * width, ax, ay, bx, by))
+                        gap = min(gap, _from_segment(sx * length, sy * width, ax, ay, bx, by))
                 if gap <= radius[k]:
-                    found[b] = True
+                    overlaps[b] = True
 
 
 @kernel
-def _out(x, y, length, width):
-    """How far a point is out of a rectangle."""
+def _from_rectangle(x: float, y: float, length: float, width: float) -> float:
+    """Return the distance of a point from a rectangle around the origin with these half sides."""
     return math.hypot(max(abs(x) - length, 0.0), max(abs(y) - width, 0.0))
 
 
 @kernel
-def _off(x, y, ax, ay, bx, by):
-    """How far a point is from a segment."""
+def _from_segment(x: float, y: float, ax: float, ay: float, bx: float, by: float) -> float:
+    """Return the distance of a point (x, y) from the segment from (ax, ay) to (bx, by)."""
     ux, uy = bx - ax, by - ay
     square = ux * ux + uy * uy
     share = 0.0
@@ -157,17 +235,26 @@ def _off(x, y, ax, ay, bx, by):
     return math.hypot(x - ax - share * ux, y - ay - share * uy)
 
 
-def nearest_point(x: float, y: float, origin: Floats, cell: float) -> tuple[int, int]:
-    """The grid point nearest to a place."""
+def nearest_point(x: float, y: float, origin: Floats, cell: float) -> GridPoint:
+    """Return the grid point nearest to a place.
+
+    Args:
+        x: first coordinate of the place [m].
+        y: second coordinate of the place [m].
+        origin: (2,) first point of the grid [m].
+        cell: distance between the points of the grid [m].
+    """
     i, j = np.rint((np.array([x, y]) - origin) / cell).astype(int).tolist()
-    return i, j
+    return GridPoint(i, j)
 
 
-def spread_out(points: Floats, apart_m: float) -> Ints:
-    """Which of points (n, 2) to keep so that all are so far apart: the first, then always the
-    farthest from those that are kept."""
-    kept, away = [0], np.linalg.norm(points - points[0], axis=1)
+def select_apart(points: Points2, apart_m: float) -> Ints:
+    """Return indices of points (n, 2) that all are at least `apart_m` from each other [m].
+
+    The first point is chosen, then always the farthest from those that are chosen.
+    """
+    chosen, away = [0], np.linalg.norm(points - points[0], axis=1)
     while (k := int(np.argmax(away))) and away[k] >= apart_m:
-        kept.append(k)
+        chosen.append(k)
         away = np.minimum(away, np.linalg.norm(points - points[k], axis=1))
-    return np.array(kept)
+    return np.array(chosen)

@@ -1,12 +1,13 @@
-"""What BlazePose's tensors mean: people, regions of interest, landmarks.
+"""Decoding of BlazePose's tensors: people, regions of interest, landmarks.
 
-Follows the graphs of MediaPipe 0.10.21 number by number. Method: Bazarevsky et al., BlazePose:
+The numbers are those of the graphs of MediaPipe 0.10.21. Method: Bazarevsky et al., BlazePose:
 On-device Real-time Body Pose tracking (2020), arXiv:2006.10204.
 """
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -19,11 +20,11 @@ from hrc_env.core.typing import Floats, Image, Points2, Tensor
 from hrc_env.perception.network import DETECTOR_SIDE, LANDMARK_SIDE, load_landmarker
 
 MIN_SCORE = 0.5
-"""Detector score and person flag from which MediaPipe believes in a person."""
+"""Least detector score and person flag of a person, as in MediaPipe."""
 MAX_OVERLAP = 0.3
-"""Boxes that overlap more (intersection over union) are one person."""
+"""Overlap (intersection over union) beyond which two boxes are of one person."""
 ROI_MARGIN = 1.25
-"""The region of interest is this much larger than the circle round the person."""
+"""Ratio of the region of interest to the circle around the person."""
 _REACH = 4  # a 9 x 9 neighbourhood in the 64 x 64 heatmap
 _HEAT_SIDE = 64
 _N_USED = 35  # 33 body landmarks, then the two that give the next region of interest
@@ -31,16 +32,29 @@ _N_USED = 35  # 33 body landmarks, then the two that give the next region of int
 
 @dataclass(frozen=True, slots=True)
 class Person:
-    """One person as the detector stage sees them, in units of the square image's side."""
+    """A person that the detector stage finds, in units of the square image's side."""
 
     score: float
-    box: Floats  # (4,) left, top, right, bottom of the face
-    hip: Points2  # (2,) midpoint of the hips
-    rim: Points2  # (2,) upright above the hips, on the circle round the whole body
+    """Confidence in [0, 1]."""
+    box: Floats
+    """(4,) left, top, right and bottom of the face."""
+    hip: Points2
+    """(2,) midpoint of the hips."""
+    rim: Points2
+    """(2,) point on the circle around the whole body, upright above the hips."""
+
+
+class DetectorInput(NamedTuple):
+    """An image as the detector stage takes it."""
+
+    image: Tensor
+    """(224, 224, 3) in [-1, 1], with a black border where the image is not square."""
+    window: Roi
+    """The part of the original image that it covers [px]."""
 
 
 def _anchors() -> Floats:
-    """(2254, 2) centres of the detector's cells: strides 8, 16, 32 with 2, 2, 6 each."""
+    """Return the centres (2254, 2) of the detector's cells: strides 8, 16, 32 with 2, 2, 6 each."""
     parts = []
     for stride, per_cell in ((8, 2), (16, 2), (32, 6)):
         n = DETECTOR_SIDE // stride
@@ -51,15 +65,16 @@ def _anchors() -> Floats:
 
 
 ANCHORS: Floats = _anchors()
+"""(2254, 2) centres of the detector's cells, in units of the image's side."""
 
 
 def wrap_angle(angle_rad: float) -> float:
-    """The same direction in [-pi, pi)."""
+    """Return the same direction in [-pi, pi) [rad]."""
     return angle_rad - 2 * math.pi * math.floor((angle_rad + math.pi) / (2 * math.pi))
 
 
 def window_from_points(centre_px: Points2, rim_px: Points2) -> Roi:
-    """BlazePose's region of interest: round mid-hip (2,), upright towards the rim (2,)."""
+    """Return the region of interest around mid-hip (2,), upright towards the rim (2,) [px]."""
     dx, dy = rim_px[0] - centre_px[0], rim_px[1] - centre_px[1]
     side_px = 2 * math.hypot(dx, dy) * ROI_MARGIN
     rotation = wrap_angle(math.pi / 2 - math.atan2(-dy, dx))
@@ -70,9 +85,9 @@ def crop_window(image: Image, window: Roi, side: int = LANDMARK_SIDE) -> Image:
     """Return a window of an image as an upright picture, as MediaPipe does.
 
     Args:
-        image: (H, W, 3) RGB of uint8; outside, its border is continued.
-        window: the turned square of it that is asked for [px].
-        side: of the picture [px].
+        image: (H, W, 3) RGB of uint8; outside of it, its border is continued.
+        window: a turned square of the image [px].
+        side: side of the picture [px].
 
     Returns:
         (side, side, 3) of uint8, interpolated bilinearly, corner to corner.
@@ -92,36 +107,42 @@ def crop_window(image: Image, window: Roi, side: int = LANDMARK_SIDE) -> Image:
 
 
 def to_image(points: Points2, window: Roi) -> Points2:
-    """Points (..., 2) in units of the window's side (0..1 from its corner) to image pixels."""
+    """Return the image pixels of points (..., 2) in units of the window's side, from its corner."""
     matrix = image_from_crop(window, 1)
     return points @ matrix[:, :2].T + matrix[:, 2]
 
 
 def image_from_crop(window: Roi, side: int) -> Floats:
-    """(2, 3) affine map from crop pixels to image pixels."""
+    """Return the affine map (2, 3) from the pixels of a crop to those of the image."""
     scale = window.side_px / side
     c, s = math.cos(window.rotation_rad) * scale, math.sin(window.rotation_rad) * scale
     turn = np.array([[c, -s], [s, c]])
     return np.column_stack([turn, np.array(window.centre_px) - turn @ [side / 2, side / 2]])
 
 
-def detector_input(image: Image) -> tuple[Tensor, Roi]:
-    """An image of any shape, letterboxed for the detector, and the window that it covers."""
+def detector_input(image: Image) -> DetectorInput:
+    """Return an image of any shape as the detector stage takes it."""
     height, width = image.shape[:2]
     window = Roi((width / 2, height / 2), float(max(height, width)), 0.0)
     size = (DETECTOR_SIDE, DETECTOR_SIDE)
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     small = cv2.warpAffine(image, image_from_crop(window, DETECTOR_SIDE), size, flags=flags)
-    return small.astype(np.float32) * np.float32(2 / 255) - np.float32(1), window
+    return DetectorInput(small.astype(np.float32) * np.float32(2 / 255) - np.float32(1), window)
 
 
 def landmark_input(crop: Image) -> Tensor:
-    """A (256, 256, 3) crop as the landmark stage wants it."""
+    """Return a crop (256, 256, 3) as the landmark stage takes it, in [0, 1]."""
     return np.multiply(crop, np.float32(1 / 255), dtype=np.float32)
 
 
 def decode_people(boxes: Tensor, logits: Tensor, min_score: float = MIN_SCORE) -> list[Person]:
-    """People from the detector's boxes (2254, 12) and score logits (2254,), best first."""
+    """Return the people that the detector stage finds, best first.
+
+    Args:
+        boxes: (2254, 12) box and keypoints of each cell.
+        logits: (2254,) logits of the scores.
+        min_score: least score of a person.
+    """
     score = 1 / (1 + np.exp(-np.clip(logits.astype(float), -80, 80)))
     kept = np.flatnonzero(score >= min_score)
     raw, score, anchor = boxes[kept].astype(float) / DETECTOR_SIDE, score[kept], ANCHORS[kept]
@@ -132,9 +153,14 @@ def decode_people(boxes: Tensor, logits: Tensor, min_score: float = MIN_SCORE) -
 
 
 def merge_people(score: Floats, box: Floats, keypoints: Floats) -> list[Person]:
-    """Weighted non-maximum suppression: overlapping boxes (n, 4) and their mid-hips and rims
-    (n, 2, 2) become their mean, weighted by the scores (n,)."""
-    people = []
+    """Return the people of overlapping boxes, by weighted non-maximum suppression.
+
+    Args:
+        score: (n,) scores, the weights.
+        box: (n, 4) boxes.
+        keypoints: (n, 2, 2) mid-hips and rims.
+    """
+    people: list[Person] = []
     order = np.argsort(-score, kind="stable")
     while len(order):
         same = _overlap(box[order[0]], box[order]) > MAX_OVERLAP
@@ -148,17 +174,24 @@ def merge_people(score: Floats, box: Floats, keypoints: Floats) -> list[Person]:
 
 
 def person_window(person: Person, window: Roi) -> Roi:
-    """The region of interest of a person found in the square `window`, in image pixels."""
+    """Return the region of interest of a person that was found in a square window [px]."""
     hip, rim = to_image(np.array([person.hip, person.rim]), window)
     return window_from_points(hip, rim)
 
 
 def decode_landmarks(points: Tensor, heat: Tensor) -> Floats:
-    """(35, 3) x, y in units of the crop's side and visibility in [0, 1] of 33 landmarks, mid-hip
-    and rim, of points (39, 5): x, y, z in crop pixels, logits of visibility and presence. Where
-    heat (64, 64, 39), logits, is sure, a point becomes its neighbourhood's mean weighted by it."""
+    """Return BlazePose's landmarks: 33 of the body, mid-hip and rim.
+
+    Args:
+        points: (39, 5) x, y, z in crop pixels, logits of visibility and presence.
+        heat: (64, 64, 39) logits; where they are high, a point becomes the mean of its
+            neighbourhood with their probabilities as weights.
+
+    Returns:
+        (35, 3) x, y in units of the crop's side and visibility in [0, 1].
+    """
     out = np.empty((_N_USED, 3))
-    refine(np.ascontiguousarray(points), np.ascontiguousarray(heat), out)
+    _refine(np.ascontiguousarray(points), np.ascontiguousarray(heat), out)
     return out
 
 
@@ -169,8 +202,8 @@ def load_blazepose(network: str = "full") -> Callable[[Image], Floats | None]:
         network: "lite", "full" or "heavy".
 
     Returns:
-        A crop (256, 256, 3), RGB of uint8, to (15, 3): x, y [px] from its corner and confidence in
-        [0, 1] of `JOINTS`; None where it shows nobody.
+        A function from a crop (256, 256, 3), RGB of uint8, to (15, 3): x, y [px] from the crop's
+        corner and confidence in [0, 1] of each of `JOINTS`; None if there is no person.
 
     Raises:
         WeightsError: the network's weights are missing.
@@ -188,19 +221,19 @@ def load_blazepose(network: str = "full") -> Callable[[Image], Floats | None]:
 
 
 @kernel
-def refine(points, heat, out):
-    """`decode_landmarks` into `out`: a kernel, so that the other thread need not wait for it."""
+def _refine(points: Tensor, heat: Tensor, out: Floats) -> None:
+    """Write the result (35, 3) of `decode_landmarks`, without Python's lock."""
     for k in range(out.shape[0]):
         x, y = points[k, 0] / np.float64(LANDMARK_SIDE), points[k, 1] / np.float64(LANDMARK_SIDE)
         out[k, 0], out[k, 1] = x, y
-        out[k, 2] = _chance(np.float64(points[k, 3]))
+        out[k, 2] = _probability(np.float64(points[k, 3]))
         column, row = int(x * _HEAT_SIDE), int(y * _HEAT_SIDE)
         if not (0 <= column < _HEAT_SIDE and 0 <= row < _HEAT_SIDE):
             continue
         total, at_column, at_row, surest = 0.0, 0.0, 0.0, 0.0
         for r in range(max(row - _REACH, 0), min(row + _REACH + 1, _HEAT_SIDE)):
             for c in range(max(column - _REACH, 0), min(column + _REACH + 1, _HEAT_SIDE)):
-                weight = _chance(np.float64(heat[r, c, k]))
+                weight = _probability(np.float64(heat[r, c, k]))
                 surest = max(surest, weight)
                 total += weight
                 at_column += weight * c
@@ -211,12 +244,13 @@ def refine(points, heat, out):
 
 
 @kernel
-def _chance(logit):
+def _probability(logit: float) -> float:
+    """Return the probability of a logit."""
     return 1.0 / (1.0 + math.exp(-min(max(logit, -80.0), 80.0)))
 
 
 def _overlap(box: Floats, boxes: Floats) -> Floats:
-    """(n,) intersection over union of one box with many."""
+    """Return the intersection over union (n,) of one box (4,) with many (n, 4)."""
     low, high = np.maximum(box[:2], boxes[:, :2]), np.minimum(box[2:], boxes[:, 2:])
     shared = np.clip(high - low, 0, None).prod(1)
     area = (boxes[:, 2:] - boxes[:, :2]).prod(1)

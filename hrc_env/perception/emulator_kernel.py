@@ -1,149 +1,284 @@
-"""The emulator's inner loop: one environment after the other."""
+"""The emulator's kernels: one environment after the other, see `emulator` for the model."""
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from hrc_env.core.declared import Records1, Records3, dtype_of
 from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import JOINT, MIRROR, N_JOINTS
-from hrc_env.core.typing import Bools, Floats
+from hrc_env.core.typing import Bools, Floats, Points2, Points3, Velocities3
 from hrc_env.perception.calibration import (
+    BODY_KNOTS,
     HAND,
     INNER,
     KIND,
+    KNOTS,
+    N_KINDS,
+    N_SEEN,
+    N_SIGHTS,
     N_VIEWS,
     NEXT,
-    POSTURED,
-    SHAPES,
     VISIBILITY,
 )
-from hrc_env.perception.noise import STANDING, error_share
-from hrc_env.perception.outline import facing, mix, posture_of, seen_from, speed
+from hrc_env.perception.noise import error_share
+from hrc_env.perception.outline import (
+    STANDING,
+    Facing,
+    facing,
+    mix,
+    posture_of,
+    speed,
+    view_angle,
+)
 from hrc_env.perception.sightlines import (
     BEHIND,
-    JOINTS_SEEN,
     OUTSIDE,
     SIDE,
     TURN,
     VIEW,
-    fill,
-    frame,
-    occluders_of,
-    see,
+    WORKER_VIEW,
+    ImageCamera,
+    WorkerView,
+    World,
+    make_room,
+    place_moving,
+    project_worker,
+    view_worker,
 )
 
 N_NORMALS = 6
-"""Normal variables of a joint in an image: two of lasting errors, two of new ones, size, doubt."""
+"""Number of normal variables of a joint in an image: two of lasting errors, two of new ones, one of
+the errors' size, one of the confidence."""
 SWAPPED, CROSSED, MISSED = range(3)
-"""What may happen: left and right of all joints exchanged, of the legs alone, nobody found."""
+"""Mistakes of the detector: left and right of all joints exchanged, of the legs alone, no worker
+found."""
 DOUBT, OVERLOOKED = range(2)
-"""Numbers of a dim picture: factor on errors and deviations, additional share of misses."""
+"""Columns of the quality of a picture: factor on errors and deviations, additional share of
+misses."""
 N_OF_BODY = 4
-"""Normal variables of a worker in an image: one for the errors' size, one for each happening."""
+"""Number of normal variables of a worker in an image: one of the errors' size, one of each
+mistake."""
 FOLLOWED_M = 0.5
-"""A track whose hips are nearer than this to a worker's [m] has its windows round them: about
-`DetectorConfig.max_offset` of a window's side."""
+"""Greatest distance of a track's hips from a worker's [m] at which windows of the track show the
+worker: about `DetectorConfig.max_offset` of a window's side."""
 FIRST_OF_LEGS = JOINT["left_knee"]
-"""From this joint on left and right are exchanged where the legs are."""
-ERRORS = np.dtype(
-    [
-        ("lasting", "f8", (N_JOINTS, 2, 2)),  # of an episode: of cosine and sine of the view; x, y
-        ("slow", "f8", (N_JOINTS, 2)),  # what lasts for a while, along x and y
-        ("size", "f8", (N_JOINTS,)),  # logarithm of the errors' size: a joint's own part
-        ("sure", "f8", (N_JOINTS,)),  # the confidence, as far as it does not follow the size
-        ("body", "f8"),  # the whole body's factor on the errors' size
-        ("happening", "f8", (3,)),  # the lower, the sooner `SWAPPED`, `CROSSED`, `MISSED`
-    ],
-    align=True,
-)
-"""What the errors of a worker in a camera remember from image to image, in standard deviations."""
-POSTURE = np.dtype([(name, "f8", SHAPES[name][1:]) for name in POSTURED])
-"""What a calibration says of a posture; of `size` the logarithm, of `confidence` the logit."""
-SETTINGS = np.dtype(
-    [
-        *((name, "f8", SHAPES[name]) for name in ("space_limb", "bias", "limb", "follows")),
-        ("shares", "f8", SHAPES["shares"]),  # roots
-        ("at_rest", "f8"),  # share of a time constant that an image is, while the worker stands
-        ("per_speed", "f8"),  # how much more for every m/s
-        ("common", "f8"),  # root of the share of the sizes' variance that is the whole body's
-        ("own", "f8"),  # root of the rest
-        ("keep", "f8", (3,)),  # of `SWAPPED`, `CROSSED`, `MISSED`: first-order autoregression
-        ("error_scale", "f8"),
-        ("max_error", "f8"),  # share of the window's side
-        ("min_joints", "f8"),
-        ("outside_confidence", "f8"),
-        ("stature_of_side", "f8"),
-    ],
-    align=True,
-)
-"""What does not depend on the posture."""
+"""First joint of those that are exchanged with the legs."""
+
+
+class Errors:
+    """The state of the errors of a worker in a camera, in standard deviations."""
+
+    lasting: Annotated[Floats, (N_JOINTS, 2, 2)]
+    """Errors that last for the episode: (J, x and y, cosine and sine of the view)."""
+    slow: Annotated[Floats, (N_JOINTS, 2)]
+    """Errors that last for a while, along x and y."""
+    size: Annotated[Floats, (N_JOINTS,)]
+    """Logarithm of the size of each joint's errors, without the part of the whole body."""
+    sure: Annotated[Floats, (N_JOINTS,)]
+    """Confidence of each joint, as far as it is independent of the errors' size."""
+    body: float
+    """Logarithm of the factor of the whole body on the errors' size."""
+    happening: Annotated[Floats, (3,)]
+    """Normal variables in whose lower tails `SWAPPED`, `CROSSED` and `MISSED` happen."""
+
+
+class PostureTables:
+    """The part of a calibration that depends on the posture; see `calibration.Calibration`."""
+
+    offset_m: Annotated[Floats, (N_KINDS, 3)]
+    """Mean reported position from the joint: ahead, to its own side, up [m]."""
+    wander_m: Annotated[Floats, (N_KINDS, 3)]
+    """Standard deviation of that position over time [m]."""
+    tail: float
+    """Weight of rare large errors."""
+    size: Annotated[Floats, (N_SIGHTS, N_KINDS)]
+    """Logarithm of the standard deviation of each coordinate, of side."""
+    spread: Annotated[Floats, (N_SIGHTS, N_KINDS)]
+    """Standard deviation of that logarithm."""
+    body: Annotated[Floats, (len(BODY_KNOTS),)]
+    """Quantiles of the logarithm of the factor of a whole body."""
+    confidence: Annotated[Floats, (N_SIGHTS, N_KINDS, len(KNOTS))]
+    """Logits of the quantiles of the reported visibility."""
+    swap_share: Annotated[Floats, (N_VIEWS, 2)]
+    """Share of the time in which left and right are exchanged: of all joints, of the legs alone."""
+    miss_share: Annotated[Floats, (N_SEEN,)]
+    """Share of the time in which no worker is found, by the number of joints that are seen."""
+    sigma: Annotated[Floats, (N_KINDS, len(VISIBILITY))]
+    """Standard deviation that is reported, a share of the stature, at `VISIBILITY`."""
+
+
+class Settings:
+    """The part of a calibration that does not depend on the posture, and the emulator's
+    settings."""
+
+    space_limb: Annotated[Floats, (N_KINDS, 3)]
+    """Correlation of the reported position in space with the one of the `NEXT` joint."""
+    bias: Annotated[Floats, (N_VIEWS, N_KINDS, 2)]
+    """Mean error in the image by the direction of view, of side."""
+    limb: Annotated[Floats, (N_KINDS,)]
+    """Correlation with the error of the next joint towards the trunk."""
+    follows: Annotated[Floats, (N_SIGHTS, N_KINDS)]
+    """Correlation of the visibility with the smallness of the error."""
+    shares: Annotated[Floats, (N_KINDS, 3)]
+    """Square roots of the shares of the variance: constant, lasting, new in every image."""
+    at_rest: float
+    """Share of the time constant of lasting errors that passes per image, while a worker stands."""
+    per_speed: float
+    """Increase of that share with the worker's speed [s/m]."""
+    common: float
+    """Square root of the share of the sizes' variance that is due to the whole body."""
+    own: float
+    """Square root of the rest of that variance."""
+    keep: Annotated[Floats, (3,)]
+    """Coefficients of the autoregressions of `SWAPPED`, `CROSSED` and `MISSED`."""
+    error_scale: float
+    """Factor on all errors of position."""
+    max_error: float
+    """Greatest error in the image, of side."""
+    min_joints: float
+    """Least number of joints in sight with which a worker is found."""
+    outside_confidence: float
+    """Greatest visibility that is reported of joints outside the image."""
+    stature_of_side: float
+    """Stature of an upright worker, of side."""
+
+
+ERRORS = dtype_of(Errors)
+"""The dtype of `Errors`."""
+POSTURE = dtype_of(PostureTables)
+"""The dtype of `PostureTables`: floats only, so that a row is also (N,) numbers."""
+SETTINGS = dtype_of(Settings)
+"""The dtype of `Settings`."""
+
+
+class Tables(NamedTuple):
+    """A calibration as the kernels take it."""
+
+    postures: Floats
+    """(P, N) the numbers of `PostureTables` for each posture."""
+    settings: Records1[Settings]
+    """(1,) the rest."""
 
 
 class Report(NamedTuple):
     """The keypoints that are written."""
 
-    px: Floats  # (B, C, W, J, 2)
-    confidence: Floats  # (B, C, W, J)
-    sigma_px: Floats  # (B, C, W, J)
+    px: Points2
+    """(B, C, W, J, 2) pixels; NaN where there is no measurement."""
+    confidence: Floats
+    """(B, C, W, J) visibility in [0, 1]; 0 where there is no measurement."""
+    sigma_px: Floats
+    """(B, C, W, J) standard deviation of each coordinate [px]."""
 
 
 class Expected(NamedTuple):
-    """What the tracker predicts."""
+    """The tracker's prediction."""
 
-    joints: Floats  # (B, W, J, 3) [m]
-    velocity: Floats  # (B, W, J, 3) [m/s]
-    tracked: Bools  # (B, W)
+    joints: Points3
+    """(B, W, J, 3) joints [m]."""
+    velocity: Velocities3
+    """(B, W, J, 3) velocities of the joints [m/s]."""
+    tracked: Bools
+    """(B, W) whether there is a track."""
+
+
+class Mistakes(NamedTuple):
+    """The mistakes of the detector about a worker in an image."""
+
+    is_swapped: bool
+    """Whether left and right of all joints are exchanged."""
+    is_crossed: bool
+    """Whether left and right of the legs are exchanged."""
+    is_found: bool
+    """Whether the worker is found at all."""
+
+
+class Between(NamedTuple):
+    """A place between two entries of a table."""
+
+    low: int
+    """Index of the entry before the place."""
+    high: int
+    """Index of the entry behind the place."""
+    part: float
+    """Distance from the first entry, as a share of the distance between both."""
 
 
 @kernel(makes_arrays=True)
-def emulate_batch(errors, wander, normals, world, expected, rig, dim, calibration, report):
-    """Advance errors (B, C, W; `ERRORS`) and wander (B, W, J, 3; the same in every camera) by one
-    image, and write a `Report`.
+def emulate_batch(
+    errors: Records3[Errors],
+    wander: Floats,
+    normals: Floats,
+    world: World,
+    expected: Expected,
+    rig: Records1[ImageCamera],
+    quality: Floats,
+    tables: Tables,
+    report: Report,
+) -> None:
+    """Advance the errors by one image, and write keypoints.
 
-    normals (B, N) are of bodies, then of images; world is a `World`, expected an `Expected`, rig
-    (C,) `CAMERA`, dim (B, C, 2) `DOUBT` and `OVERLOOKED` of pictures, calibration a pair: (P, N)
-    the numbers of a `POSTURE` each, (1,) `SETTINGS`.
+    Args:
+        errors: (B, C, W) state in each camera, which is changed.
+        wander: (B, W, J, 3) state that all cameras share, which is changed.
+        normals: (B, N) standard normal numbers: for bodies, then for images.
+        world: workers and surroundings.
+        expected: the tracker's prediction.
+        rig: (C,) cameras.
+        quality: (B, C, 2) quality of the pictures: `DOUBT` and `OVERLOOKED`.
+        tables: the calibration.
+        report: is filled.
     """
     batch, n_cameras, n_workers = errors.shape
-    postures, settings = calibration
-    occluders, room = occluders_of(world), np.empty(2, JOINTS_SEEN)
+    occluders, views = make_room(world), np.empty(2, WORKER_VIEW)
     mixed, meant, off = np.zeros(2, POSTURE), np.zeros((N_JOINTS, 3)), np.zeros((N_JOINTS, 2))
     numbers, n_image = mixed.view(np.float64).reshape(2, -1), N_NORMALS * N_JOINTS + N_OF_BODY
     for b in range(batch):
-        fill(occluders.table, world, b)
+        place_moving(occluders.table, world, b)
         for w in range(n_workers):
-            joints, here, common = world.joints[b, w], mixed[0], settings[0]
+            joints, here, common = world.joints[b, w], mixed[0], tables.settings[0]
             keep = math.exp(-common.at_rest - common.per_speed * speed(world.velocity[b, w]))
             front = facing(joints)
-            mix(posture_of(joints, world.velocity[b, w]), postures, numbers[0])
-            track = _track_of(joints, expected.joints[b], expected.tracked[b])
+            mix(posture_of(joints, world.velocity[b, w]), tables.postures, numbers[0])
+            track = _find_track(joints, expected.joints[b], expected.tracked[b])
             posture = STANDING
             if track >= 0:
                 posture = posture_of(expected.joints[b, track], expected.velocity[b, track])
-            mix(posture, postures, numbers[1])
+            mix(posture, tables.postures, numbers[1])
             drawn = normals[b, 3 * N_JOINTS * w :]
-            _wander(wander[b, w], drawn, joints, front, keep, here, common, meant)
+            _advance_wander(wander[b, w], drawn, joints, front, keep, here, common, meant)
             for c in range(n_cameras):
-                seen, mine = room[0], errors[b, c, w]
-                n_seen = see(rig[c], joints, meant, occluders, seen)
-                seen.look[VIEW] = seen_from(joints, front[0], front[1], rig[c].eye)
+                view, state = views[0], errors[b, c, w]
+                n_seen = view_worker(rig[c], joints, meant, occluders, view)
+                view.look[VIEW] = view_angle(joints, front, rig[c].eye)
                 first = 3 * N_JOINTS * n_workers + (c * n_workers + w) * n_image
                 drawn = normals[b, first : first + n_image]
-                happens = _happen(mine, drawn, n_seen, seen.look, here, common, dim[b, c])
-                _errors(mine, drawn, keep, seen.look, common, off)
-                factor = dim[b, c, DOUBT]
-                _write(report, (b, c, w), mine, seen, off, here, common, happens, factor)
-                side = seen.look[SIDE]  # a search's window is round whom the image shows
+                missed = quality[b, c, OVERLOOKED]
+                mistakes = _draw_mistakes(
+                    state, drawn, n_seen, view.look[VIEW], here, common, missed
+                )
+                _advance_errors(state, drawn, keep, view.look[VIEW], common, off)
+                factor = quality[b, c, DOUBT]
+                px, confidence = report.px[b, c, w], report.confidence[b, c, w]
+                _write_keypoints(px, confidence, state, view, off, here, common, mistakes, factor)
+                side = view.look[SIDE]  # a search's window is around the worker in the image
                 if track >= 0:
-                    side, _ = frame(rig[c], expected.joints[b, track], room[1].uv, room[1].depth)
+                    side = project_worker(
+                        rig[c], expected.joints[b, track], views[1].uv, views[1].depth
+                    ).side_px
                 stature_px = common.stature_of_side * side * factor
-                _say(report.confidence[b, c, w], stature_px, mixed[1], report.sigma_px[b, c, w])
+                _write_sigma(confidence, stature_px, mixed[1], report.sigma_px[b, c, w])
 
 
 @kernel
-def _track_of(joints, expected, tracked):
-    """The track (W) whose windows show a worker (J, 3): the nearest by the hips; -1: none."""
+def _find_track(joints: Points3, expected: Points3, tracked: Bools) -> int:
+    """Return the track (W) with windows that show a worker (J, 3): the nearest by the hips.
+
+    Returns:
+        Its index; -1 if there is none.
+    """
     nearest, track = FOLLOWED_M, -1
     for t in range(len(tracked)):
         squared = 0.0
@@ -156,20 +291,50 @@ def _track_of(joints, expected, tracked):
 
 
 @kernel
-def _say(confidence, stature_px, expected, sigma):
-    """Write sigma (J,) as the detector does: what it knows is the confidence (J,), the stature in
-    its window [px] and the posture that is expected."""
+def _write_sigma(
+    confidence: Floats, stature_px: float, expected: PostureTables, sigma: Floats
+) -> None:
+    """Write the standard deviations that the detector reports.
+
+    They follow from all that it knows: the confidence, the stature and the expected posture.
+
+    Args:
+        confidence: (J,) reported visibility.
+        stature_px: stature in the worker's window [px].
+        expected: tables of the expected posture.
+        sigma: (J,) is filled [px].
+    """
     for j in range(N_JOINTS):
         sigma[j] = stature_px * error_share(confidence[j], VISIBILITY, expected.sigma[KIND[j]])
 
 
 @kernel
-def _wander(wander, normals, joints, front, keep, here, common, meant):
-    """Write where in space the detector means the joints to be, whatever the camera."""
+def _advance_wander(
+    wander: Floats,
+    normals: Floats,
+    joints: Points3,
+    front: Facing,
+    keep: float,
+    here: PostureTables,
+    common: Settings,
+    meant: Points3,
+) -> None:
+    """Write where in space the detector places the joints, the same for every camera.
+
+    Args:
+        wander: (J, 3) state, which is changed.
+        normals: (3 J or more,) standard normal numbers.
+        joints: (J, 3) true joints [m].
+        front: direction to the front of the body.
+        keep: coefficient of the autoregression.
+        here: tables of the worker's posture.
+        common: tables that do not depend on the posture.
+        meant: (J, 3) is filled [m].
+    """
     renew, scale = math.sqrt(1.0 - keep * keep), common.error_scale
     tail = here.tail / 3.0
     for j in range(len(joints)):
-        before = NEXT[j]
+        before: int = NEXT[j]
         for i in range(3):
             wander[j, i] = keep * wander[j, i] + renew * normals[3 * j + i]
             limb = common.space_limb[KIND[j], i] if before != j else 0.0
@@ -181,92 +346,143 @@ def _wander(wander, normals, joints, front, keep, here, common, meant):
         ahead = offset[0] + spread[0] * far * n[0]
         left = HAND[j] * (offset[1] + spread[1] * far * n[1])
         up = offset[2] + spread[2] * far * n[2]
-        meant[j, 0] = joints[j, 0] + scale * (front[0] * ahead - front[1] * left)
-        meant[j, 1] = joints[j, 1] + scale * (front[1] * ahead + front[0] * left)
+        meant[j, 0] = joints[j, 0] + scale * (front.x * ahead - front.y * left)
+        meant[j, 1] = joints[j, 1] + scale * (front.y * ahead + front.x * left)
         meant[j, 2] = joints[j, 2] + scale * up
 
 
 @kernel
-def _happen(mine, normals, n_seen, look_of, here, common, dim):
-    """Whether left and right of all joints and of the legs are exchanged, and the worker is found;
-    each happens while a slow normal variable is in its lower tail, as large as its share of time.
+def _draw_mistakes(
+    state: Errors,
+    normals: Floats,
+    n_seen: int,
+    view: float,
+    here: PostureTables,
+    common: Settings,
+    overlooked: float,
+) -> Mistakes:
+    """Return the detector's mistakes about a worker in an image.
+
+    Each happens while a slow normal variable is in its lower tail, which is as large as the share
+    of the time in which the mistake happens.
+
+    Args:
+        state: state of the errors, which is changed.
+        normals: (`N_NORMALS` J + `N_OF_BODY`,) standard normal numbers of the image.
+        n_seen: number of joints that are seen.
+        view: direction from which the camera sees the body [rad].
+        here: tables of the worker's posture.
+        common: tables that do not depend on the posture.
+        overlooked: additional share of misses.
     """
-    low, high, part = _between(look_of[VIEW], N_VIEWS)
+    at = _between_views(view)
     share = here.swap_share
-    swap = _lerp(share[low, 0], share[high, 0], part)
-    cross = _lerp(share[low, 1], share[high, 1], part)
-    swapped = _goes_on(mine, SWAPPED, normals, common.keep) < swap
-    crossed = _goes_on(mine, CROSSED, normals, common.keep) < cross
+    swap = _lerp(share[at.low, 0], share[at.high, 0], at.part)
+    cross = _lerp(share[at.low, 1], share[at.high, 1], at.part)
+    is_swapped = _advance_mistake(state, SWAPPED, normals, common.keep) < swap
+    is_crossed = _advance_mistake(state, CROSSED, normals, common.keep) < cross
     miss = here.miss_share[n_seen]
-    miss += dim[OVERLOOKED] * (1.0 - miss)
-    missed = _goes_on(mine, MISSED, normals, common.keep) < miss
-    return swapped, crossed, n_seen >= common.min_joints and not missed
+    miss += overlooked * (1.0 - miss)
+    is_missed = _advance_mistake(state, MISSED, normals, common.keep) < miss
+    return Mistakes(is_swapped, is_crossed, n_seen >= common.min_joints and not is_missed)
 
 
 @kernel
-def _goes_on(mine, which, normals, keeps):
-    """Advance a normal variable; the share of its distribution that is below it."""
+def _advance_mistake(state: Errors, which: int, normals: Floats, keeps: Floats) -> float:
+    """Advance the normal variable of a mistake, and return its cumulative probability."""
     keep, normal = keeps[which], normals[N_NORMALS * N_JOINTS + 1 + which]
-    mine.happening[which] = keep * mine.happening[which] + math.sqrt(1.0 - keep * keep) * normal
-    return 0.5 * math.erfc(-mine.happening[which] / math.sqrt(2.0))
+    state.happening[which] = keep * state.happening[which] + math.sqrt(1.0 - keep * keep) * normal
+    return 0.5 * math.erfc(-state.happening[which] / math.sqrt(2.0))
 
 
 @kernel
-def _between(angle, n):
-    """Of n directions round the circle those beside an angle [rad], and how far it is between."""
-    place = angle * n / (2.0 * math.pi)
+def _between_views(angle: float) -> Between:
+    """Return the place of an angle [rad] between the `N_VIEWS` directions around the circle."""
+    place = angle * N_VIEWS / (2.0 * math.pi)
     low = math.floor(place)
-    return int(low) % n, (int(low) + 1) % n, place - low
+    return Between(int(low) % N_VIEWS, (int(low) + 1) % N_VIEWS, place - low)
 
 
 @kernel
-def _errors(mine, normals, keep, look_of, common, off):
-    """Advance the errors of one worker in one image; write how far joints are off, of `size`."""
+def _advance_errors(
+    state: Errors, normals: Floats, keep: float, view: float, common: Settings, off: Floats
+) -> None:
+    """Advance the errors of a worker in an image.
+
+    Args:
+        state: state of the errors, which is changed.
+        normals: (`N_NORMALS` J + `N_OF_BODY`,) standard normal numbers of the image.
+        keep: coefficient of the autoregressions.
+        view: direction from which the camera sees the body [rad].
+        common: tables that do not depend on the posture.
+        off: (J, 2) is filled with the errors, in units of their size.
+    """
     renew = math.sqrt(1.0 - keep * keep)
-    view_cos, view_sin = math.cos(look_of[VIEW]), math.sin(look_of[VIEW])
-    mine.body = keep * mine.body + renew * normals[N_NORMALS * N_JOINTS]
+    view_cos, view_sin = math.cos(view), math.sin(view)
+    state.body = keep * state.body + renew * normals[N_NORMALS * N_JOINTS]
     for j in range(N_JOINTS):
         kind, first = KIND[j], N_NORMALS * j
-        mine.size[j] = keep * mine.size[j] + renew * normals[first + 4]
-        mine.sure[j] = keep * mine.sure[j] + renew * normals[first + 5]
+        state.size[j] = keep * state.size[j] + renew * normals[first + 4]
+        state.sure[j] = keep * state.sure[j] + renew * normals[first + 5]
         for i in range(2):
-            mine.slow[j, i] = keep * mine.slow[j, i] + renew * normals[first + i]
-            stays = view_cos * mine.lasting[j, i, 0] + view_sin * mine.lasting[j, i, 1]
-            own = common.shares[kind, 0] * stays + common.shares[kind, 1] * mine.slow[j, i]
+            state.slow[j, i] = keep * state.slow[j, i] + renew * normals[first + i]
+            stays = view_cos * state.lasting[j, i, 0] + view_sin * state.lasting[j, i, 1]
+            own = common.shares[kind, 0] * stays + common.shares[kind, 1] * state.slow[j, i]
             own += common.shares[kind, 2] * normals[first + 2 + i]
             limb = common.limb[kind]
             off[j, i] = limb * off[INNER[j], i] + math.sqrt(1.0 - limb * limb) * own
 
 
 @kernel
-def _write(report, at, mine, seen, off, here, common, happens, factor):
-    """What is reported of each joint of the worker in the image `at` (b, c, w)."""
-    px, confidence = report.px[at], report.confidence[at]
-    swapped, crossed, found = happens
-    side, badly = seen.look[SIDE], _quantile(here.body, mine.body)
-    turn_cos, turn_sin = math.cos(seen.look[TURN]), math.sin(seen.look[TURN])
-    from_left = _between(seen.look[VIEW], N_VIEWS)
-    from_right = _between(-seen.look[VIEW], N_VIEWS)
+def _write_keypoints(
+    px: Points2,
+    confidence: Floats,
+    state: Errors,
+    view: WorkerView,
+    off: Floats,
+    here: PostureTables,
+    common: Settings,
+    mistakes: Mistakes,
+    factor: float,
+) -> None:
+    """Write the reported pixels and confidences of a worker in an image.
+
+    Args:
+        px: (J, 2) is filled [px].
+        confidence: (J,) is filled.
+        state: state of the errors.
+        view: how the camera sees the worker.
+        off: (J, 2) errors in units of their size.
+        here: tables of the worker's posture.
+        common: tables that do not depend on the posture.
+        mistakes: mistakes of the detector.
+        factor: factor on the errors by the quality of the picture.
+    """
+    side, badly = view.look[SIDE], _quantile(here.body, state.body)
+    turn_cos, turn_sin = math.cos(view.look[TURN]), math.sin(view.look[TURN])
+    from_left = _between_views(view.look[VIEW])
+    from_right = _between_views(-view.look[VIEW])
     for j in range(N_JOINTS):
-        kind, sight = KIND[j], seen.sight[j]
-        label = MIRROR[j] if swapped != (crossed and j >= FIRST_OF_LEGS) else j
-        if not found or sight == BEHIND:
+        kind, sight = KIND[j], view.sight[j]
+        is_exchanged = mistakes.is_swapped != (mistakes.is_crossed and j >= FIRST_OF_LEGS)
+        label = MIRROR[j] if is_exchanged else j
+        if not mistakes.is_found or sight == BEHIND:
             px[label, 0] = px[label, 1] = np.nan
             confidence[label] = 0.0
             continue
-        z = common.common * mine.body + common.own * mine.size[j]
-        spread = here.spread[sight, kind] * mine.size[j]
+        z = common.common * state.body + common.own * state.size[j]
+        spread = here.spread[sight, kind] * state.size[j]
         scale = math.exp(here.size[sight, kind] + badly + spread)
-        low, high, part = from_left if HAND[j] > 0.0 else from_right
+        at = from_left if HAND[j] > 0.0 else from_right
         bias, x, y = common.bias, scale * off[j, 0], scale * off[j, 1]
-        x += HAND[j] * _lerp(bias[low, kind, 0], bias[high, kind, 0], part)
-        y += _lerp(bias[low, kind, 1], bias[high, kind, 1], part)
+        x += HAND[j] * _lerp(bias[at.low, kind, 0], bias[at.high, kind, 0], at.part)
+        y += _lerp(bias[at.low, kind, 1], bias[at.high, kind, 1], at.part)
         length = max(math.sqrt(x * x + y * y), 1e-12)
         shrink = side * common.error_scale * min(factor, common.max_error / length)
-        px[label, 0] = seen.uv[j, 0] + shrink * (turn_cos * x - turn_sin * y)
-        px[label, 1] = seen.uv[j, 1] + shrink * (turn_sin * x + turn_cos * y)
+        px[label, 0] = view.uv[j, 0] + shrink * (turn_cos * x - turn_sin * y)
+        px[label, 1] = view.uv[j, 1] + shrink * (turn_sin * x + turn_cos * y)
         follows = common.follows[sight, kind]
-        doubt = math.sqrt(1.0 - follows * follows) * mine.sure[j] - follows * z
+        doubt = math.sqrt(1.0 - follows * follows) * state.sure[j] - follows * z
         logit = _quantile(here.confidence[sight, kind], doubt)
         visible = 1.0 / (1.0 + math.exp(-logit))
         if sight == OUTSIDE:
@@ -275,13 +491,17 @@ def _write(report, at, mine, seen, off, here, common, happens, factor):
 
 
 @kernel
-def _lerp(a, b, part):
+def _lerp(a: float, b: float, part: float) -> float:
+    """Return the value at a share of the way from a to b."""
     return a + part * (b - a)
 
 
 @kernel
-def _quantile(known, normal):
-    """Of a distribution given by its quantiles at whole standard deviations, 0 in the middle."""
+def _quantile(known: Floats, normal: float) -> float:
+    """Return the value of a distribution at a normal deviate.
+
+    The distribution is given by its quantiles at whole standard deviations, 0 in the middle.
+    """
     last = len(known) - 1
     place = min(max(normal + 0.5 * last, 0.0), float(last))
     low = min(int(place), last - 1)

@@ -1,4 +1,4 @@
-"""Dark and dull pictures are developed before the networks see them.
+"""Development of dark and dull pictures before the networks get them.
 
 Grey levels between the dark and the bright parts are spread, and noise is smoothed. Pictures of
 usual contrast are returned unchanged, bit for bit. Blank pictures are returned unchanged as well:
@@ -15,27 +15,28 @@ from numpy.typing import NDArray
 from hrc_env.core.typing import Floats, Image
 
 LEAST_CONTRAST = 3.0
-"""Least standard deviation of a colour channel of a picture that is not blank, in `COARSE_PX`."""
+"""Least standard deviation of a colour channel, at size `COARSE_PX`, of a picture that is not blank
+[grey levels]."""
 LEAST_EDGES, EDGE_SHARE = 0.06, 0.98
-"""How much the sharpest parts of a picture, beyond this quantile, differ from their surroundings at
-least, as a share of the span of grey levels: in rooms 0.1 and more, on slopes 0.05 at most."""
+"""Least contrast of edges as a share of the span of grey levels, and the quantile of the local
+contrasts that is compared with it. Rooms have 0.1 and more, slopes 0.05 at most."""
 EDGE_PX, EDGE_SIGMA_PX, EDGE_BORDER_PX = 64, 2.0, 6
-"""Size of the picture in which edges are looked for, the Gaussian that makes the surroundings, and
-the border that is left out [px]."""
+"""Size of the picture in which edges are measured, deviation of the Gaussian that smooths it for
+comparison, and border that is left out [px]."""
 COARSE_PX = 32
-"""Contrast is measured on a picture of this size [px]: the noise of pixels averages out."""
+"""Size of the picture on which contrast is measured [px]; the noise of pixels averages out."""
 DULL, DULLEST = 75.0, 60.0
-"""Pictures that span fewer grey levels than the first number are spread, and those below the second
-in full."""
+"""Spans of grey levels below which a picture begins to be spread, and below which it is spread in
+full."""
 SPAN = 150.0
 """Grey levels between the dark and bright parts of a picture that was spread in full; the lab as it
 was built has 166."""
 ENDS = (0.01, 0.75, 0.99)
 """Quantiles of the grey levels that count as dark, usual and bright."""
 GLARE = 2.0
-"""Parts brighter than the usual level times this number are windows and lamps, which saturate."""
+"""Ratio to the usual grey level beyond which parts are windows and lamps, which may saturate."""
 MOST_NOISE = 20.0
-"""Noise is amplified to at most this standard deviation [grey levels]."""
+"""Greatest standard deviation to which noise is amplified [grey levels]."""
 SMOOTHED = (4.0, 10.0)
 """Noise at which smoothing begins, and at which it is complete [grey levels]."""
 ROUNDING = math.sqrt(1.0 / 12.0)
@@ -43,37 +44,43 @@ ROUNDING = math.sqrt(1.0 / 12.0)
 UNEVEN: NDArray[np.float32] = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)
 """This filter amplifies noise six times and removes edges and slopes (Immerkaer 1996)."""
 NOISE_STEP = 4
-"""Noise is measured on a picture reduced by this factor."""
+"""Factor by which a picture is reduced before its noise is measured."""
 OF_NORMAL = 0.6745
 """Median of the absolute value of a standard normal variable."""
 DOUBT, MOST_DOUBT = 7.0, 3.0
-"""Noise as a share of a dull picture's span, times the first number, is an independent error in
-units of the usual one; the second number bounds the factor. Fitted to crops
+"""Ratio of an additional independent error, in units of the usual one, to the noise as a share of a
+dull picture's span; and the greatest factor on errors. Both are fitted to crops
 (`benchmarks.perception.dim`)."""
 USELESS = 0.165
-"""From this share of noise in the span on, people are missed in dull pictures."""
+"""Share of noise in the span from which on people are missed in dull pictures."""
 SIGMA_PX = 0.6
-"""Of the Gaussian by which noise is smoothed [pixels of a crop]."""
+"""Deviation of the Gaussian that smooths noise [pixels of a crop]."""
 
 
 class Developed(NamedTuple):
     """A picture for the networks."""
 
     picture: Image
-    """The crop itself, or a new one."""
+    """(n, n, 3) the crop itself, or a new picture."""
     doubt: float = 1.0
-    """Factor on the deviations of joints that are found in it; 1 in pictures of usual contrast."""
-    shows: bool = True
+    """Factor on the deviations of joints that are found in it; 1 at usual contrast."""
+    is_usable: bool = True
     """Whether people would be found in it: it is neither blank nor mostly noise."""
 
 
 class _Tones(NamedTuple):
+    """The range of a picture's grey levels."""
+
     dark: float
+    """Grey level of the dark parts."""
     bright: float
+    """Grey level of the bright parts, without windows and lamps."""
     grey: Image
+    """(n, n) the picture in grey levels."""
 
     @property
     def span(self) -> float:
+        """Number of grey levels between the dark and the bright parts, at least 1."""
         return max(self.bright - self.dark, 1.0)
 
 
@@ -92,8 +99,11 @@ def is_blank(crop: Image, mask: Image | None = None) -> bool:
 
 
 def has_edges(crop: Image) -> bool:
-    """Return whether a crop (n, n, 3) shows any edge: a covered lens, fog or a light that shines
-    into the camera show slopes only, however much of the range of grey levels they span."""
+    """Return whether a crop (n, n, 3) shows any edge.
+
+    A covered lens, fog or a light that shines into the camera only show slopes, however large a
+    part of the grey levels these span.
+    """
     tones = _tones(crop, None)
     size = (EDGE_PX, EDGE_PX)
     small = cv2.resize(tones.grey.astype(np.float32), size, interpolation=cv2.INTER_AREA)
@@ -111,34 +121,36 @@ def develop(crop: Image, mask: Image | None = None) -> Developed:
     """
     tones = _tones(crop, mask)
     if is_blank(crop, mask):
-        return Developed(crop, shows=False)
+        return Developed(crop, is_usable=False)
     if tones.span >= DULL:
         return Developed(crop)
-    noise = math.hypot(noise_of(tones.grey), ROUNDING)
+    noise = math.hypot(measure_noise(tones.grey), ROUNDING)
     wanted = tones.span + _ramp(tones.span, DULL, DULLEST) * (SPAN - tones.span)
     gain = max(min(wanted / tones.span, MOST_NOISE / noise), 1.0)
     picture = _smooth(_spread(crop, tones, gain), gain * noise)
-    return Developed(picture, doubt_of(noise, tones.span), noise < USELESS * tones.span)
+    return Developed(picture, noise_factor(noise, tones.span), noise < USELESS * tones.span)
 
 
-def noise_of(grey: Image) -> float:
-    """Return the standard deviation of the noise of a picture (n, n) [grey levels], from its median
-    unevenness at a reduced size: enlarged pictures have coarse noise."""
+def measure_noise(grey: Image) -> float:
+    """Return the standard deviation of the noise of a picture (n, n) [grey levels].
+
+    It is estimated by the median of the picture's second differences at a reduced size, as enlarged
+    pictures have coarse noise.
+    """
     n = len(grey) // NOISE_STEP
     small = cv2.resize(grey.astype(np.float32), (n, n), interpolation=cv2.INTER_AREA)
     uneven = np.abs(cv2.filter2D(small, cv2.CV_32F, UNEVEN))
     return NOISE_STEP * float(np.median(uneven)) / (6.0 * OF_NORMAL)
 
 
-def doubt_of(noise: float, span: float) -> float:
-    """Return the factor on the deviations of joints in a picture of this noise and span [grey
-    levels]."""
+def noise_factor(noise: float, span: float) -> float:
+    """Return the factor on the deviations of joints for a noise and a span [grey levels]."""
     added = _ramp(span, DULL, DULLEST) * DOUBT * noise / max(span, 1.0)
     return min(math.hypot(1.0, added), MOST_DOUBT)
 
 
 def _tones(crop: Image, mask: Image | None) -> _Tones:
-    """Return the grey levels of the dark and of the bright parts, without windows and lamps."""
+    """Return the range of grey levels of a crop inside of its mask."""
     grey = np.asarray(cv2.cvtColor(crop, cv2.COLOR_RGB2GRAY), np.uint8)
     count: Floats = cv2.calcHist([grey], [0], mask, [256], [0, 256]).ravel().cumsum()
     dark, usual, bright = np.searchsorted(count, np.array(ENDS) * count[-1]).tolist()
@@ -146,7 +158,7 @@ def _tones(crop: Image, mask: Image | None) -> _Tones:
 
 
 def _spread(crop: Image, tones: _Tones, gain: float) -> Image:
-    """Stretch grey levels; the span keeps its place between black and white."""
+    """Return a crop with its grey levels stretched by a gain, away from black and white."""
     added = (gain - 1.0) * tones.span
     first = tones.dark - added * tones.dark / max(255.0 - tones.span, 1.0)
     levels = first + gain * (np.arange(256) - tones.dark)
@@ -154,6 +166,7 @@ def _spread(crop: Image, tones: _Tones, gain: float) -> Image:
 
 
 def _smooth(picture: Image, noise: float) -> Image:
+    """Return a picture smoothed as far as its noise [grey levels] demands."""
     share = _ramp(noise, *SMOOTHED)
     if share == 0.0:
         return picture

@@ -13,11 +13,18 @@ from hrc_env.perception.blazepose import crop_window
 
 
 class Frames:
-    """The present images of all cameras."""
+    """The present images of all cameras.
+
+    Args:
+        cameras: the rig.
+        images: (C,) images of the cameras, (H, W, 3) RGB of uint8 each, of the sizes for which the
+            cameras are calibrated.
+
+    Raises:
+        ConfigError: there is no such image for a camera.
+    """
 
     def __init__(self, cameras: Sequence[PinholeCamera], images: Sequence[Image]) -> None:
-        """Check that there is an image for each camera, (H, W, 3) RGB of uint8, of the size for
-        which the camera is calibrated; `ConfigError` says of which one it is not so."""
         is_array = isinstance(images, np.ndarray) and images.ndim > 0
         if not (is_array or isinstance(images, list | tuple)) or len(images) != len(cameras):
             raise ConfigError(

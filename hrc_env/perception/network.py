@@ -8,7 +8,7 @@ of its time, which `prune` drops.
 import functools
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import flatbuffers
 from ai_edge_litert import schema_py_generated as schema
@@ -21,69 +21,95 @@ from hrc_env.perception.vino import Network
 from hrc_env.perception.weights import find_weights
 
 DETECTOR_SIDE = 224
+"""Side of the detector stage's input [px]."""
 LANDMARK_SIDE = 256
+"""Side of the landmark stage's input [px]."""
 NETWORKS = ("lite", "full", "heavy")
-"""Landmark networks, from quick to exact."""
+"""Landmark networks, from the fastest to the most exact."""
 DETECTOR_OUTPUTS = ("Identity", "Identity_1")
-"""Boxes (1, 2254, 12), score logits (1, 2254, 1) in the official graph."""
+"""Outputs of the official graph: boxes (1, 2254, 12), score logits (1, 2254, 1)."""
 LANDMARK_OUTPUTS = ("Identity", "Identity_1", "Identity_3")
-"""Landmarks (1, 195), person flag (1, 1), heatmap (1, 64, 64, 39) in the official graph."""
+"""Outputs of the official graph: landmarks (1, 195), person flag (1, 1), heatmap (1, 64, 64,
+39)."""
 RUNTIMES = ("litert", "openvino", "auto")
-"""LiteRT, the default; OpenVINO, an extra; OpenVINO where it is installed, else LiteRT."""
-PersonDetector: TypeAlias = Callable[[Tensor], tuple[Tensor, Tensor]]
-"""(224, 224, 3) in [-1, 1] -> boxes (2254, 12), score logits (2254,)."""
-Landmarker: TypeAlias = Callable[[Tensor], tuple[Tensor, float, Tensor]]
-"""(256, 256, 3) in [0, 1] -> landmarks (39, 5), person flag, heatmap logits (64, 64, 39)."""
+"""Runtimes: LiteRT (the default), OpenVINO (an extra), and OpenVINO if installed, else LiteRT."""
 
 
-def chosen_runtime(name: str) -> str:
-    """The runtime that `name` comes to here. Raises `ConfigError` for one unknown or missing."""
+class PersonTensors(NamedTuple):
+    """Output of the detector stage."""
+
+    boxes: Tensor
+    """(2254, 12) box and keypoints of each cell."""
+    logits: Tensor
+    """(2254,) logits of the scores."""
+
+
+class LandmarkTensors(NamedTuple):
+    """Output of the landmark stage."""
+
+    points: Tensor
+    """(39, 5) x, y, z in crop pixels, logits of visibility and presence."""
+    presence: float
+    """Person flag in [0, 1]."""
+    heat: Tensor
+    """(64, 64, 39) heatmap logits."""
+
+
+PersonDetector: TypeAlias = Callable[[Tensor], PersonTensors]
+"""Detector stage as a function of an image (224, 224, 3) in [-1, 1]."""
+Landmarker: TypeAlias = Callable[[Tensor], LandmarkTensors]
+"""Landmark stage as a function of a crop (256, 256, 3) in [0, 1]."""
+
+
+def resolve_runtime(name: str) -> str:
+    """Return the runtime of a name of `RUNTIMES`; `ConfigError` for one unknown or missing."""
     if name not in RUNTIMES:
         raise unknown("runtime", name, RUNTIMES)
     if name == "openvino":
-        vino.require()
+        vino.check_installed()
     if name == "auto":
-        return "openvino" if vino.installed() else "litert"
+        return "openvino" if vino.is_installed() else "litert"
     return name
 
 
 def load_person_detector(runtime: str = "litert") -> PersonDetector:
-    """The person detector stage. Raises `WeightsError` where the weights are missing."""
+    """Return the detector stage; `WeightsError` if its weights are missing."""
     run = _load("pose_detection", DETECTOR_OUTPUTS, runtime)
 
-    def detect(image: Tensor) -> tuple[Tensor, Tensor]:
+    def detect(image: Tensor) -> PersonTensors:
         boxes, logits = run(image)
-        return boxes[0], logits[0, :, 0]
+        return PersonTensors(boxes[0], logits[0, :, 0])
 
     return detect
 
 
 def load_landmarker(network: str = "full", runtime: str = "litert") -> Landmarker:
-    """A landmark stage, of `NETWORKS`. Raises `WeightsError` where its weights are missing."""
+    """Return a landmark stage of `NETWORKS`; `WeightsError` if its weights are missing."""
     run = _load(f"pose_landmark_{network}", LANDMARK_OUTPUTS, runtime)
 
-    def landmark(image: Tensor) -> tuple[Tensor, float, Tensor]:
+    def landmark(image: Tensor) -> LandmarkTensors:
         points, flag, heat = run(image)
-        return points.reshape(39, 5), float(flag[0, 0]), heat[0]
+        return LandmarkTensors(points.reshape(39, 5), float(flag[0, 0]), heat[0])
 
     return landmark
 
 
 def _load(weights: str, outputs: tuple[str, ...], runtime: str) -> Network:
+    """Return a network as a function from an image to the named outputs."""
     path = find_weights(weights)
-    if chosen_runtime(runtime) == "openvino":
+    if resolve_runtime(runtime) == "openvino":
         return vino.load(path, outputs)
-    return load_tflite(_pruned(path, outputs), outputs)
+    return load_tflite(_read_pruned(path, outputs), outputs)
 
 
 @functools.lru_cache(maxsize=4)
-def _pruned(path: Path, outputs: tuple[str, ...]) -> bytes:
-    """Every thread has an interpreter of its own; pruning takes half a second."""
+def _read_pruned(path: Path, outputs: tuple[str, ...]) -> bytes:
+    """Return a pruned model, kept for the interpreters of all threads: it takes half a second."""
     return prune(path.read_bytes(), outputs)
 
 
 def load_tflite(content: bytes, outputs: Sequence[str]) -> Network:
-    """A .tflite file's content as a function from an image to the named outputs."""
+    """Return the content of a .tflite file as a function from an image to the named outputs."""
     net = Interpreter(model_content=content, num_threads=1)
     net.allocate_tensors()
     into = net.get_input_details()[0]["index"]
@@ -99,7 +125,7 @@ def load_tflite(content: bytes, outputs: Sequence[str]) -> Network:
 
 
 def prune(content: bytes, outputs: Sequence[str]) -> bytes:
-    """A .tflite model, operators in topological order, without what the outputs do not need."""
+    """Return a .tflite model (operators in topological order) without unused operators."""
     model: Any = schema.ModelT.InitFromPackedBuf(content, 0)  # generated code, loosely typed
     graph = model.subgraphs[0]
     by_name = {graph.tensors[k].name.decode(): int(k) for k in graph.outputs}

@@ -1,19 +1,20 @@
-"""The network's joints against ours: how far one may be off, and where it is meant to be; the same
-numbers for the real pipeline and for its emulator.
+"""Differences between the network's joints and ours: their standard deviations and mean offsets.
 
-A hip of BlazePose is 17 mm above ours, and 60 mm ahead of it in who bends. Trackers follow what the
-network means; estimates are of our joints.
+The real pipeline and its emulator use the same numbers. A hip of BlazePose is 17 mm above ours, and
+60 mm ahead of it in a person who bends. Trackers follow the network's joints; estimates are of
+ours.
 """
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from hrc_env.core.errors import check_shape
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import PoseEstimate
-from hrc_env.core.typing import Floats
+from hrc_env.core.typing import Bools, Covariances3, Floats, Points3, Velocities3
 from hrc_env.perception.calibration import (
     HAND,
     KIND,
@@ -22,14 +23,28 @@ from hrc_env.perception.calibration import (
     Calibration,
     read_calibration,
 )
-from hrc_env.perception.outline import facing, mix, novelty_m, posture_of
+from hrc_env.perception.outline import STANDING, Facing, facing, mix, novelty_m, posture_of
 
 ERROR: Floats = read_calibration().sigma
 """(P, K, V) standard deviation of each image coordinate, a share of stature, by posture and kind of
 joint (`calibration.KINDS`) at `VISIBILITY`; see docs/emulator.md."""
 FARTHEST_M = 0.25
-"""Bodies that are further from poses that are known are no less known [m]."""
-STANDING = (1.0, *(0.0,) * (len(POSTURES) - 1))
+"""Distance from known poses beyond which the uncertainty of a body grows no further [m]."""
+
+
+class Offsets(NamedTuple):
+    """The part of a calibration that turns the network's joints into ours."""
+
+    tables: Floats
+    """(P, K * 6) mean offset (3) [m] and its variance (3) [m^2] by posture and kind of joint; both
+    ahead, to the joint's own side, up."""
+    poses: Floats
+    """(J, 3, M) known poses, as of `outline.pose_of`."""
+    near_m: float
+    """Distance from the nearest of these up to which a body is not new [m]."""
+    novel: Floats
+    """(K,) factor on the square of the distance beyond `near_m`, an addition to the standard
+    deviation [1/m]."""
 
 
 def sigma_px(
@@ -38,9 +53,17 @@ def sigma_px(
     posture: Sequence[float] = STANDING,
     known: Floats = ERROR,
 ) -> Floats:
-    """Standard deviation of each coordinate of joints with these visibilities (..., J) [px],
-    infinite of 0; statures at their distance [px] broadcast; posture: `outline.posture_of`;
-    known: a calibration's `sigma`."""
+    """Return the standard deviation of each coordinate of joints.
+
+    Args:
+        confidence: (..., J) reported visibilities.
+        stature_px: stature at the joints' distance, broadcast to `confidence` [px].
+        posture: shares of the postures, as of `outline.posture_of`.
+        known: table `sigma` of a calibration.
+
+    Returns:
+        (..., J), infinite where the confidence is 0 [px].
+    """
     confidence = np.asarray(confidence, float)
     check_shape("confidence", confidence.shape[-1:], (len(KIND),), "one a joint")
     error = np.tensordot(np.asarray(posture, float), known, 1)
@@ -51,7 +74,13 @@ def sigma_px(
 
 @kernel
 def error_share(confidence: float, visibility: Floats, error: Floats) -> float:
-    """`sigma_px` of one joint and a stature of one, for kernels: the tables are passed in."""
+    """Return the standard deviation of a joint's coordinates, as a share of the stature.
+
+    Args:
+        confidence: reported visibility.
+        visibility: (V,) visibilities at which the deviation is given.
+        error: (V,) the deviation there.
+    """
     if not confidence > 0.0:
         return np.inf
     if confidence <= visibility[0]:
@@ -64,53 +93,77 @@ def error_share(confidence: float, visibility: Floats, error: Floats) -> float:
 
 
 def our_joints(estimate: PoseEstimate, known: Calibration | None = None) -> PoseEstimate:
-    """An estimate (B, W, ...) of what the network means, as one of joints.
+    """Return an estimate of the network's joints as one of ours.
 
-    Means move by where the network means a joint to be (`offset_m`). Covariances grow by how far
-    that differs from moment to moment and from body to body (`wander_m`, `between_m`), which no
-    number of cameras and frames averages out, and by how far the body is from all poses to which
-    this was fitted (`novel`): it is new, or it is wrong. The prior of who is not tracked stays, as
-    velocities do. known: a calibration; None: the package's.
+    Means move by the mean offset of the network's joints (`offset_m`). Covariances grow by the
+    variance of this offset over time and between bodies (`wander_m`, `between_m`), which no number
+    of cameras and frames averages out, and by the distance of the body from all known poses
+    (`novel`), as it is new or wrong. Priors of workers without a track stay as they are, and so do
+    velocities.
+
+    Args:
+        estimate: (B, W, ...) estimate of the network's joints.
+        known: a calibration; None: the package's.
     """
     known = known or read_calibration()
     variance_m2 = known.wander_m**2 + known.between_m**2
     tables = np.concatenate([known.offset_m, variance_m2], -1).reshape(len(POSTURES), -1)
+    offsets = Offsets(tables, known.poses, float(known.near_m), known.novel)
     mean_world, cov_world = estimate.mean_world.copy(), estimate.cov_world.copy()
-    seen = (estimate.velocity_world, estimate.tracked)
-    new = (known.poses, float(known.near_m), known.novel)
-    _put_right(mean_world, cov_world, *seen, tables, new, (KIND, HAND))
+    _correct_joints(mean_world, cov_world, estimate.velocity_world, estimate.tracked, offsets)
     return replace(estimate, mean_world=mean_world, cov_world=cov_world)
 
 
 @kernel(makes_arrays=True)
-def _put_right(mean, cov, velocity, tracked, tables, new, of_joints):
-    row, (poses, near_m, novel), (kinds, hands) = np.empty(tables.shape[1]), new, of_joints
-    told = row.reshape(-1, 6)
+def _correct_joints(
+    mean: Points3, cov: Covariances3, velocity: Velocities3, tracked: Bools, offsets: Offsets
+) -> None:
+    """Turn the network's joints into ours, in place.
+
+    Args:
+        mean: (B, W, J, 3) is changed [m].
+        cov: (B, W, J, 3, 3) is changed [m^2].
+        velocity: (B, W, J, 3) [m/s].
+        tracked: (B, W) the workers that are corrected.
+        offsets: the calibration.
+    """
+    row = np.empty(offsets.tables.shape[1])
+    of_kind = row.reshape(-1, 6)
     for b in range(len(mean)):
         for w in range(mean.shape[1]):
             if not tracked[b, w]:
                 continue
             joints = mean[b, w]
             front = facing(joints)
-            mix(posture_of(joints, velocity[b, w]), tables, row)
-            new_m = min(max(novelty_m(joints, poses) - near_m, 0.0), FARTHEST_M)
+            mix(posture_of(joints, velocity[b, w]), offsets.tables, row)
+            new_m = min(max(novelty_m(joints, offsets.poses) - offsets.near_m, 0.0), FARTHEST_M)
             for j in range(len(joints)):
-                _move(joints[j], cov[b, w, j], front, told[kinds[j]], hands[j])
+                _correct_joint(joints[j], cov[b, w, j], front, of_kind[KIND[j]], HAND[j])
                 for i in range(3):
-                    cov[b, w, j, i, i] += (novel[kinds[j]] * new_m**2) ** 2
+                    cov[b, w, j, i, i] += (offsets.novel[KIND[j]] * new_m**2) ** 2
 
 
 @kernel
-def _move(joint, cov, front, told, hand):
-    """Move a joint (3) by what is told of its kind (6), and add to its covariance (3, 3)."""
-    x, y = front
-    ahead, left, up = told[0], hand * told[1], told[2]
+def _correct_joint(
+    joint: Points3, cov: Covariances3, front: Facing, offset: Floats, hand: float
+) -> None:
+    """Subtract the mean offset of a joint, and add the variance of the offset.
+
+    Args:
+        joint: (3,) is changed [m].
+        cov: (3, 3) is changed [m^2].
+        front: direction to the front of the body.
+        offset: (6,) mean offset [m] and variance [m^2]: ahead, to the joint's own side, up.
+        hand: -1 for a right joint, else 1.
+    """
+    x, y = front.x, front.y
+    ahead, left, up = offset[0], hand * offset[1], offset[2]
     joint[0] -= x * ahead - y * left
     joint[1] -= y * ahead + x * left
     joint[2] -= up
-    cov[0, 0] += x * x * told[3] + y * y * told[4]
-    cov[1, 1] += y * y * told[3] + x * x * told[4]
-    across = x * y * (told[3] - told[4])
+    cov[0, 0] += x * x * offset[3] + y * y * offset[4]
+    cov[1, 1] += y * y * offset[3] + x * x * offset[4]
+    across = x * y * (offset[3] - offset[4])
     cov[0, 1] += across
     cov[1, 0] += across
-    cov[2, 2] += told[5]
+    cov[2, 2] += offset[5]

@@ -1,48 +1,82 @@
-"""A body's posture and facing: the few numbers on which a detector's errors depend."""
+"""A body's posture and facing: the few numbers on which a detector's errors depend.
+
+Joints (J, 3) are in the order of `core.skeleton.JOINTS`: nose 0; left and right shoulder 1 2, elbow
+3 4, wrist 5 6, hip 7 8, knee 9 10, ankle 11 12. Their z axis is up.
+"""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Points3
+from hrc_env.core.typing import Floats, Points3, Velocities3
 
 UPRIGHT, FOLDED = 0.15, 0.50
-"""How much lower the shoulders are above the ankles than they can be, as a share, where a body
-begins to count as folded and is folded up: walking is below .12, bending or kneeling above .3."""
+"""Loss of height of the shoulders above the ankles, as a share of the greatest height, at which a
+body begins to count as folded, and at which it counts fully. Walking is below .12, bending or
+kneeling above .3."""
 SQUATS, KNEELS = 0.40, 0.10
-"""How much higher the lower knee is than its ankle, as a share of the shank, where a folded body
-begins to count as kneeling and does: squatting is above .5, a knee on the ground at 0."""
+"""Height of the lower knee above its ankle, as a share of the shank, at which a folded body begins
+to count as kneeling, and at which it counts fully. Squatting is above .5, a knee on the ground at
+0."""
 STANDS_M_S, WALKS_M_S = 0.3, 0.7
-"""Mean speeds of the joints [m/s] where a body begins to count as walking and does: hammering is at
-the first, walking slowly above the second."""
+"""Mean speeds of the joints at which a body begins to count as walking, and at which it counts
+fully [m/s]. Hammering is at the first, slow walking above the second."""
 HANGS, RAISED = 0.10, 0.25
-"""How much nearer in height a wrist is to its shoulder than when it hangs, as a share of the arm,
-where hands begin to count as busy and do: swinging is at the first, carrying above the second."""
+"""Loss of height of a shoulder above its wrist, as a share of the arm's length, at which hands
+begin to count as busy, and at which they count fully. Swinging arms are at the first, carrying
+above the second."""
 LEAN_RAD = math.radians(30.0)
-"""A torso that leans further is bent: the error of `full` is then half as large again."""
+"""Angle from the vertical beyond which a torso is bent [rad]; the error of the network `full` is
+then half as large again."""
 LOW_HIPS = 0.75
-"""Hips that are less than this share of the leg's length above the lower ankle squat or kneel; in
-a walk they stay above .9."""
+"""Height of the hips above the lower ankle, as a share of the leg's length, below which a body
+squats or kneels; in a walk it stays above .9."""
 
-# Joints: nose 0; left and right shoulder 1 2, elbow 3 4, wrist 5 6, hip 7 8, knee 9 10,
-# ankle 11 12.
+
+class Facing(NamedTuple):
+    """The horizontal unit vector towards the front of a body."""
+
+    x: float
+    """First coordinate in the world frame."""
+    y: float
+    """Second coordinate in the world frame."""
+
+
+class Posture(NamedTuple):
+    """The shares by which a body counts as each of `calibration.POSTURES`; their sum is 1."""
+
+    standing: float
+    """Share of a body that stands with free hands."""
+    walking: float
+    """Share of a body that walks with free hands."""
+    handling: float
+    """Share of an upright body with busy hands."""
+    folded: float
+    """Share of a body that bends or squats."""
+    kneeling: float
+    """Share of a body with a knee on the ground."""
+
+
+STANDING = Posture(1.0, 0.0, 0.0, 0.0, 0.0)
+"""The posture of a body that only stands."""
 
 
 @kernel
-def facing(joints):
-    """(x, y) horizontal unit vector to where a body's (J, 3) front is; +x where there is none."""
+def facing(joints: Points3) -> Facing:
+    """Return the direction to the front of a body (J, 3); +x where there is none."""
     left_x = joints[1, 0] - joints[2, 0] + joints[7, 0] - joints[8, 0]
     left_y = joints[1, 1] - joints[2, 1] + joints[7, 1] - joints[8, 1]
     length = math.sqrt(left_x * left_x + left_y * left_y)
     if length < 1e-9:
-        return 1.0, 0.0
-    return left_y / length, -left_x / length
+        return Facing(1.0, 0.0)
+    return Facing(left_y / length, -left_x / length)
 
 
 @kernel
-def folded(joints):
-    """How folded a body (J, 3) is: 0 upright, 1 folded up."""
+def folding(joints: Points3) -> float:
+    """Return how much a body (J, 3) is folded, from 0 (upright) to 1 (folded up)."""
     height = 0.0
     for side in range(2):
         height += joints[1 + side, 2] - joints[11 + side, 2]
@@ -51,19 +85,19 @@ def folded(joints):
 
 
 @kernel
-def kneeling(joints):
-    """Whether a body (J, 3), if it is folded, has a knee on the ground: 0 not, 1 certainly."""
+def kneeling(joints: Points3) -> float:
+    """Return how much a body (J, 3) kneels if it is folded, from 0 (no knee on the ground) to 1."""
     least = 1.0
     for side in range(2):
         knee, ankle = 9 + side, 11 + side
         rise = joints[knee, 2] - joints[ankle, 2]
-        least = min(least, rise / max(_apart(joints, knee, ankle), 1e-9))
+        least = min(least, rise / max(_distance(joints, knee, ankle), 1e-9))
     return min(max((SQUATS - least) / (SQUATS - KNEELS), 0.0), 1.0)
 
 
 @kernel
-def speed(velocity):
-    """Mean speed of joints (J, 3) [m/s]."""
+def speed(velocity: Velocities3) -> float:
+    """Return the mean speed of joints (J, 3) [m/s]."""
     total = 0.0
     for j in range(len(velocity)):
         x, y, z = velocity[j, 0], velocity[j, 1], velocity[j, 2]
@@ -72,42 +106,50 @@ def speed(velocity):
 
 
 @kernel
-def stepping(mean_speed_m_s):
-    """Whether a body walks, by its joints' mean speed: 0 stands, 1 walks."""
+def stepping(mean_speed_m_s: float) -> float:
+    """Return how much a body walks by the mean speed of its joints, from 0 (it stands) to 1."""
     return min(max((mean_speed_m_s - STANDS_M_S) / (WALKS_M_S - STANDS_M_S), 0.0), 1.0)
 
 
 @kernel
-def handling(joints):
-    """Whether a body (J, 3) has something in its hands or to do with them: 0 not, 1 certainly."""
+def handling(joints: Points3) -> float:
+    """Return how busy the hands of a body (J, 3) are, from 0 (arms hang) to 1."""
     most = 0.0
     for side in range(2):
         shoulder, elbow, wrist = 1 + side, 3 + side, 5 + side
-        arm = _apart(joints, shoulder, elbow) + _apart(joints, elbow, wrist)
+        arm = _distance(joints, shoulder, elbow) + _distance(joints, elbow, wrist)
         drop = joints[shoulder, 2] - joints[wrist, 2]
         most = max(most, 1.0 - drop / max(arm, 1e-9))
     return min(max((most - HANGS) / (RAISED - HANGS), 0.0), 1.0)
 
 
 @kernel
-def weigh(folding, kneels, hands, steps):
-    """How far a body counts as each of `calibration.POSTURES`; together 1."""
-    up = 1.0 - folding
+def weigh(folds: float, kneels: float, hands: float, steps: float) -> Posture:
+    """Return the posture of a body.
+
+    Args:
+        folds: result of `folding`.
+        kneels: result of `kneeling`.
+        hands: result of `handling`.
+        steps: result of `stepping`.
+    """
+    up = 1.0 - folds
     free = up * (1.0 - hands)
-    folded_up = folding * (1.0 - kneels), folding * kneels
-    return free * (1.0 - steps), free * steps, up * hands, folded_up[0], folded_up[1]
+    return Posture(
+        free * (1.0 - steps), free * steps, up * hands, folds * (1.0 - kneels), folds * kneels
+    )
 
 
 @kernel
-def posture_of(joints, velocity):
-    """`weigh` of a body's joints (J, 3) [m] and their velocities (J, 3) [m/s]."""
+def posture_of(joints: Points3, velocity: Velocities3) -> Posture:
+    """Return the posture of a body with joints (J, 3) [m] and their velocities (J, 3) [m/s]."""
     steps = stepping(speed(velocity))
-    return weigh(folded(joints), kneeling(joints), handling(joints), steps)
+    return weigh(folding(joints), kneeling(joints), handling(joints), steps)
 
 
 @kernel
-def mix(posture, tables, out):
-    """Write what tables (P, N), one for each posture, are for a body: (N,)."""
+def mix(posture: Posture, tables: Floats, out: Floats) -> None:
+    """Write the mean (N,) of the tables (P, N) of all postures, weighted by a body's posture."""
     out[:] = 0.0
     for p in range(len(posture)):
         if posture[p] > 0.0:
@@ -116,23 +158,28 @@ def mix(posture, tables, out):
 
 
 @kernel(makes_arrays=True)
-def pose_of(joints):
-    """A body's joints (J, 3) from between its hips: ahead, left, up; its trunk and leg are 1."""
-    x, y = facing(joints)
+def pose_of(joints: Points3) -> Floats:
+    """Return a body's joints (J, 3) from the middle of its hips: ahead, left and up.
+
+    The unit is the length of its trunk and leg.
+    """
+    front = facing(joints)
     pose, length_m = np.empty((len(joints), 3)), _length_m(joints)
     for j in range(len(joints)):
         away_x = (joints[j, 0] - 0.5 * (joints[7, 0] + joints[8, 0])) / length_m
         away_y = (joints[j, 1] - 0.5 * (joints[7, 1] + joints[8, 1])) / length_m
-        pose[j, 0] = x * away_x + y * away_y
-        pose[j, 1] = x * away_y - y * away_x
+        pose[j, 0] = front.x * away_x + front.y * away_y
+        pose[j, 1] = front.x * away_y - front.y * away_x
         pose[j, 2] = (joints[j, 2] - 0.5 * (joints[7, 2] + joints[8, 2])) / length_m
     return pose
 
 
 @kernel(makes_arrays=True)
-def novelty_m(joints, poses):
-    """How far a body (J, 3) is from the nearest of some `pose_of` (J, 3, M): root mean square over
-    its joints [m]."""
+def novelty_m(joints: Points3, poses: Floats) -> float:
+    """Return the distance of a body (J, 3) from the nearest of M poses (J, 3, M) [m].
+
+    The distance is the root mean square over the joints; poses are as of `pose_of`.
+    """
     pose, squared = pose_of(joints), np.zeros(poses.shape[2])
     for j in range(len(pose)):
         for i in range(3):
@@ -142,34 +189,46 @@ def novelty_m(joints, poses):
 
 
 @kernel
-def _length_m(joints):
-    """Length of a body's trunk and leg (J, 3), the mean of both sides [m]."""
+def _length_m(joints: Points3) -> float:
+    """Return the length of a body's trunk and leg (J, 3), the mean of both sides [m]."""
     length = 0.0
     for side in range(2):
         shoulder, hip, knee, ankle = 1 + side, 7 + side, 9 + side, 11 + side
-        length += _apart(joints, shoulder, hip)
-        length += _apart(joints, hip, knee) + _apart(joints, knee, ankle)
+        length += _distance(joints, shoulder, hip)
+        length += _distance(joints, hip, knee) + _distance(joints, knee, ankle)
     return max(0.5 * length, 1e-9)
 
 
 @kernel
-def _apart(joints, i, k):
+def _distance(joints: Points3, i: int, k: int) -> float:
+    """Return the distance between two joints [m]."""
     x, y = joints[i, 0] - joints[k, 0], joints[i, 1] - joints[k, 1]
     z = joints[i, 2] - joints[k, 2]
     return math.sqrt(x * x + y * y + z * z)
 
 
 @kernel
-def seen_from(joints, front_x, front_y, eye):
-    """From where an eye sees a body: 0 its front, pi / 2 its left [rad]."""
+def view_angle(joints: Points3, front: Facing, eye: Floats) -> float:
+    """Return the direction from which an eye sees a body: 0 from its front, pi / 2 from its left.
+
+    Args:
+        joints: (J, 3) [m].
+        front: result of `facing`.
+        eye: (3,) [m].
+
+    Returns:
+        Angle in (-pi, pi] [rad].
+    """
     x = eye[0] - 0.25 * (joints[1, 0] + joints[2, 0] + joints[7, 0] + joints[8, 0])
     y = eye[1] - 0.25 * (joints[1, 1] + joints[2, 1] + joints[7, 1] + joints[8, 1])
-    return math.atan2(front_x * y - front_y * x, front_x * x + front_y * y)
+    return math.atan2(front.x * y - front.y * x, front.x * x + front.y * y)
 
 
 def is_folded(joints_world: Points3) -> bool:
-    """Whether a body (J, 3) is bent, squatting or kneeling: its joints hide each other, and the
-    network errs much more. z is up, NaN is not folded."""
+    """Return whether a body (J, 3) bends, squats or kneels; NaN does not count.
+
+    Its joints then hide each other, and the network's errors are much larger.
+    """
     shoulders, hips, knees, ankles = (joints_world[k : k + 2] for k in (1, 7, 9, 11))
     torso = shoulders.mean(0) - hips.mean(0)
     limbs_m = np.linalg.norm(np.stack([knees - hips, ankles - knees]), axis=-1).mean(-1)

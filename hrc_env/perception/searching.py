@@ -1,14 +1,15 @@
-"""Detects people without a prior: searches of whole images, and who is the same in several.
+"""Search for people without a prior: in whole images, and for the same person in several.
 
-It sees pictures only. The detector stage needs a person to be a third of its window high. Where the
-floor is known, windows are as large as people on it need; else as large as the image. The lines of
-sight to one person's hips meet; those to two people, or to a mistake, rarely do.
+The detector stage needs a person to be a third of its window high. Where the floor is known,
+windows are as large as people on it need; else as large as the image. The lines of sight to one
+person's hips meet; those to two people, or to a mistake, rarely do.
 """
 
+import functools
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 
@@ -28,27 +29,31 @@ from hrc_env.perception.exposure import develop, has_edges
 from hrc_env.perception.network import LANDMARK_SIDE, PersonDetector
 
 SEARCH_RAD = math.radians(75.0)
-"""In a wider search window people are too small for the detector stage."""
+"""Greatest angle of view of a search window [rad]; in wider ones people are too small for the
+detector stage."""
 STATURE_M = 1.75
-"""Of the people for whom a search is laid out [m]."""
+"""Stature of the people for whom search windows are laid out [m]."""
 STATURE_OF_SIDE = 0.75
-"""Stature of an upright worker as a share of the side of BlazePose's window round them."""
-ROOM, FITTING = 2.1, (1.25, 2.8)
-"""Sides of search windows in heights of a person, and where the detector stage still finds most."""
+"""Stature of an upright worker, as a share of the side of BlazePose's window around the worker."""
+ROOM = 2.1
+"""Side of a search window in heights of a person."""
+FITTING = (1.25, 2.8)
+"""Least and greatest side of a window in which the detector stage finds most people, in heights of
+a person."""
 MEETING_M = 0.3
-"""Lines of sight that pass a point within this distance [m] see the same hips there."""
+"""Greatest distance from a point of lines of sight that show the same hips there [m]."""
 SIDE_M = (1.1, 3.6)
-"""Sides of the detector stage's window at a person's distance [m]: folded up, tall and reaching."""
+"""Least and greatest side of the detector stage's window at a person's distance [m]: of a person
+who is folded up, and of a tall one who reaches up."""
 SAME = 0.2
-"""Windows whose middles are nearer than this share of a side show the same person."""
+"""Distance of the middles of two windows of one camera, as a share of the side, below which both
+show the same person."""
 MIN_CROSSING = 0.1
 """Sine of the smallest angle between two lines that fixes a point."""
-Candidates = Sequence[Sequence[Roi]]
-"""(C,) the people found by each camera."""
-Views = list[Roi | None]
-"""One person's window a camera (C,), None where there is none."""
-Found = tuple[int, float, Roi]
-"""Which camera, how sure, where."""
+Candidates: TypeAlias = Sequence[Sequence[Roi]]
+"""(C,) windows of the people that each camera found."""
+Views: TypeAlias = list[Roi | None]
+"""(C,) window of one person in each camera; None where there is none."""
 
 
 class ImageSource(Protocol):
@@ -62,40 +67,89 @@ class ImageSource(Protocol):
 class Sighting(NamedTuple):
     """A person in whole images."""
 
-    hips_world: Points3  # (3,) [m]; of a camera alone, by the size of an upright person
-    windows: Views  # (C,) the window of each camera that detects them
-    cameras: int  # the number of these
+    hips_world: Points3
+    """(3,) middle of the hips [m]; if one camera alone detects the person, by the size of an
+    upright person."""
+    windows: Views
+    """(C,) window of each camera that detects the person."""
+    n_cameras: int
+    """Number of these cameras."""
 
 
-class Searched(NamedTuple):
+class Found(NamedTuple):
+    """A person in a search window."""
+
+    camera: int
+    """Index of the camera."""
+    score: float
+    """Confidence in [0, 1]."""
+    window: Roi
+    """Region of interest [px]."""
+
+
+class SearchResult(NamedTuple):
     """The result of one search window."""
 
     camera: int
-    shows: bool  # whether people would be found in it (`exposure.Developed`)
+    """Index of the camera."""
+    is_usable: bool
+    """Whether people would be found in the picture: it is not blank, mostly noise or without
+    edges."""
     found: list[Found]
+    """The people that the detector stage found."""
+
+
+class _People(NamedTuple):
+    """People who would stand on the floor of an image."""
+
+    middle_px: Points2
+    """(N, 2) middles of their bodies [px]."""
+    height_px: Floats
+    """(N,) their heights [px]."""
+
+
+class _Support(NamedTuple):
+    """The windows that show hips at a point."""
+
+    windows: Views
+    """(C,) the nearest such window of each camera."""
+    n_cameras: int
+    """Number of cameras with such a window."""
+    error_m: float
+    """Sum of the distances of their lines of sight from the point [m]."""
+
+
+SearchJob: TypeAlias = Callable[[PersonDetector], SearchResult]
+"""Search of one window with a detector stage."""
 
 
 def search_jobs(
     source: ImageSource, windows: Sequence[Sequence[Roi]], which: Sequence[int]
-) -> Iterator[Callable[[PersonDetector], Searched]]:
-    """Draw one window (C, ...) after the other; each comes with the work that is to be done."""
+) -> Iterator[SearchJob]:
+    """Draw one search window after the other, and yield the search of each.
+
+    Args:
+        source: the present images.
+        windows: (C, ...) search windows of each camera.
+        which: indices of the cameras whose windows are searched.
+    """
     for c in which:
         for window in windows[c]:
-            crop = np.array(image_crop(source, c, window))
-            yield lambda detect, c=c, k=crop, w=window: _searched(detect, c, k, w)
+            crop = np.array(crop_image(source, c, window))
+            yield functools.partial(_search_window, c=c, crop=crop, window=window)
 
 
-def _searched(detect: PersonDetector, c: int, crop: Image, window: Roi) -> Searched:
-    picture, _, shows = develop(crop)
-    shows = shows and has_edges(crop)
-    found = people(detect, picture)
-    windows = [blazepose.person_window(person, window) for person in found]
-    scores = [person.score for person in found]
-    return Searched(c, shows, [(c, *one) for one in zip(scores, windows, strict=True)])
+def _search_window(detect: PersonDetector, c: int, crop: Image, window: Roi) -> SearchResult:
+    """Return the people in the crop (256, 256, 3) of a window of camera c."""
+    developed = develop(crop)
+    is_usable = developed.is_usable and has_edges(crop)
+    people = find_people(detect, developed.picture)
+    found = [Found(c, each.score, blazepose.person_window(each, window)) for each in people]
+    return SearchResult(c, is_usable, found)
 
 
-def image_crop(source: ImageSource, c: int, window: Roi) -> Image:
-    """Return a crop of an image source's camera c; `ConfigError` unless it is 8-bit RGB."""
+def crop_image(source: ImageSource, c: int, window: Roi) -> Image:
+    """Return a window of camera c, (256, 256, 3); `ConfigError` unless it is 8-bit RGB."""
     crop = source.crop(c, window)
     if not isinstance(crop, np.ndarray) or crop.dtype != np.uint8:
         got = f"{crop.dtype} array" if isinstance(crop, np.ndarray) else type(crop).__name__
@@ -113,17 +167,22 @@ def image_crop(source: ImageSource, c: int, window: Roi) -> Image:
     return crop
 
 
-def people(detect: PersonDetector, crop: Image) -> list[blazepose.Person]:
-    """Whom the detector stage finds in a crop."""
-    image, _ = blazepose.detector_input(crop)
-    return blazepose.decode_people(*detect(image))
+def find_people(detect: PersonDetector, crop: Image) -> list[blazepose.Person]:
+    """Return the people that the detector stage finds in a crop, best first."""
+    return blazepose.decode_people(*detect(blazepose.detector_input(crop).image))
 
 
 def search_windows(camera: PinholeCamera, floor_world: Points3 | None = None) -> list[Roi]:
-    """Upright squares: as few as show whoever stands at points (N, 3) [m] large enough. Where these
-    are not known, as in films, as large as image and lens (`SEARCH_RAD`) allow, overlapping."""
+    """Return the search windows of a camera, upright squares in pixels of the image.
+
+    Args:
+        camera: the camera.
+        floor_world: (N, 3) points where people may stand [m]: as few windows as show all of these
+            people large enough. None: unknown; windows overlap, and are as large as image and lens
+            (`SEARCH_RAD`) allow.
+    """
     if floor_world is not None:
-        return _covering(*_standing(camera, floor_world))
+        return _cover_people(_project_people(camera, floor_world))
     side = float(min(camera.width_px, camera.height_px))
     if camera.lens is not None:
         side = min(side, SEARCH_RAD * float(camera.K[0, 0]))
@@ -131,24 +190,27 @@ def search_windows(camera: PinholeCamera, floor_world: Points3 | None = None) ->
     return [Roi((x, y), side, 0.0) for y in _middles(camera.height_px, side) for x in columns]
 
 
-def _standing(camera: PinholeCamera, floor_world: Points3) -> tuple[Points2, Floats]:
-    """Middles (N, 2) and heights (N,) [px of the image] of people on the floor who are in it."""
+def _project_people(camera: PinholeCamera, floor_world: Points3) -> _People:
+    """Return the people at points (N, 3) of the floor [m] who are in the image of a camera."""
     heights_m = np.array([[0.0], [0.5], [1.0]]) * (0.0, 0.0, STATURE_M)
     px, depth_m = project(camera.P[None], (floor_world + heights_m[:, None])[None])
     feet, middle, head = image_from_pinhole(camera, px[0, 0])
     seen = (depth_m[0, 0] > 0).all(0) & inside_image(camera, middle)
-    return middle[seen], np.linalg.norm(head - feet, axis=-1)[seen]
+    return _People(middle[seen], np.linalg.norm(head - feet, axis=-1)[seen])
 
 
-def _covering(middle_px: Points2, height_px: Floats) -> list[Roi]:
-    """Few windows so that everybody is well inside one that fits: the most useful one each time,
-    of those round somebody."""
+def _cover_people(people: _People) -> list[Roi]:
+    """Return few windows so that each of the people is well inside of one that fits.
+
+    Windows around each person are candidates; the one that covers the most people comes first.
+    """
+    middle_px, height_px = people
     side_px = ROOM * height_px
     fits = side_px[:, None] / height_px
     off_px = np.abs(middle_px[:, None] - middle_px).max(-1)
     covers = (off_px <= (side_px[:, None] - height_px) / 2) & (fits >= FITTING[0])
     covers &= fits <= FITTING[1]
-    windows = []
+    windows: list[Roi] = []
     while covers.any():
         best = int(np.argmax(covers.sum(1)))
         (x, y), side = middle_px[best].tolist(), float(side_px[best])
@@ -157,56 +219,68 @@ def _covering(middle_px: Points2, height_px: Floats) -> list[Roi]:
     return windows
 
 
-def distinct(found: Sequence[Found], n_cameras: int) -> list[list[Roi]]:
-    """Each camera's people, best first, one window each: search windows overlap."""
+def drop_duplicates(found: Sequence[Found], n_cameras: int) -> list[list[Roi]]:
+    """Return one window for each person of each camera (C,), best first: search windows overlap."""
     kept: list[list[Roi]] = [[] for _ in range(n_cameras)]
-    for c, _, window in sorted(found, key=lambda item: -item[1]):
-        if not any(same_person(window, other) for other in kept[c]):
-            kept[c].append(window)
+    for each in sorted(found, key=lambda one: -one.score):
+        if not any(is_same_person(each.window, other) for other in kept[each.camera]):
+            kept[each.camera].append(each.window)
     return kept
 
 
 def _middles(length_px: int, side_px: float) -> list[float]:
-    """Middles of spans of a side that together cover a length, at most half a side apart."""
+    """Return the middles of spans that together cover a length, at most half a side apart [px]."""
     n = 1 + math.ceil(2 * (length_px / side_px - 1))
     return np.linspace(side_px / 2, length_px - side_px / 2, n).tolist()
 
 
 def agreed_windows(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Views:
-    """One person's window a camera (C,), None where it has not found them: those of the candidates
-    (C,), best first, whose hips' lines of sight meet best. Of several cameras, two must have found
-    the same person, and not too small or large a one: else nobody."""
+    """Return the windows of the person on whom cameras agree best.
+
+    These are windows whose lines of sight to the hips meet best. Of several cameras, two must have
+    found the person, at a plausible size; a single camera's first candidate counts.
+
+    Args:
+        candidates: (C,) windows of the people that each camera found, best first.
+        cameras: the rig.
+
+    Returns:
+        (C,) window in each camera, None where it has not found the person.
+    """
     if len(cameras) == 1:
         return [found[0] if found else None for found in candidates]
-    agreed = _agreed(candidates, cameras)
+    agreed = _find_agreed(candidates, cameras)
     return [None] * len(cameras) if agreed is None else agreed.windows
 
 
 def sightings(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> list[Sighting]:
-    """Return the people among candidates (C,): those on whom several cameras agree, best first,
-    then those whom one camera alone detects."""
-    found = []
-    while (agreed := _agreed(candidates, cameras)) is not None:
+    """Return the people among candidates (C,).
+
+    Those on whom several cameras agree come first, best first, then those of one camera alone.
+    """
+    found: list[Sighting] = []
+    while (agreed := _find_agreed(candidates, cameras)) is not None:
         found.append(agreed)
-        candidates = apart_from(candidates, [agreed.windows])
+        candidates = exclude_people(candidates, [agreed.windows])
     for c, (camera, windows) in enumerate(zip(cameras, candidates, strict=True)):
         for window in windows:
             alone: Views = [window if k == c else None for k in range(len(cameras))]
-            found.append(Sighting(_by_size(camera, window), alone, 1))
+            found.append(Sighting(_locate_by_size(camera, window), alone, 1))
     return found
 
 
-def _agreed(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Sighting | None:
+def _find_agreed(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Sighting | None:
     """Return the person on whom most cameras agree best; None unless two do."""
     best, best_rank = None, (1, 0.0)
-    for point in _crossings(candidates, cameras):
-        windows, rank = _support(point, candidates, cameras)
+    for point in _find_crossings(candidates, cameras):
+        support = _find_support(point, candidates, cameras)
+        rank = support.n_cameras, -support.error_m
         if rank > best_rank:
-            best, best_rank = Sighting(point, windows, rank[0]), rank
+            best, best_rank = Sighting(point, support.windows, support.n_cameras), rank
     return best
 
 
-def _by_size(camera: PinholeCamera, window: Roi) -> Points3:
+def _locate_by_size(camera: PinholeCamera, window: Roi) -> Points3:
     """Return the place (3,) at which an upright person has a window of this size [m]."""
     (x, y), half_px = window.centre_px, window.side_px / 2
     along, edge = rays(camera, np.array([[x, y], [x, y + half_px]]))
@@ -215,36 +289,43 @@ def _by_size(camera: PinholeCamera, window: Roi) -> Points3:
     return np.asarray(camera.eye_world + away_m * along)
 
 
-def proposals(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Iterator[Views]:
-    """Who it may be, best first, a window a camera (C,): whom several cameras agree on, then whom
-    only one has found."""
+def propose_people(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Iterator[Views]:
+    """Yield the windows (C,) of possible people among candidates (C,), best first.
+
+    People on whom several cameras agree come first, then those whom only one has found.
+    """
     left = candidates
     while any(agreed := agreed_windows(left, cameras)):
         yield agreed
-        left = apart_from(left, [agreed])
+        left = exclude_people(left, [agreed])
     for c, found in enumerate(left):
         for window in found:
             yield [window if k == c else None for k in range(len(cameras))]
 
 
-def apart_from(candidates: Candidates, others: Sequence[Sequence[Roi | None]]) -> Candidates:
-    """Candidates (C,) without those who are in a window (C,) of somebody else already."""
+def exclude_people(candidates: Candidates, others: Sequence[Sequence[Roi | None]]) -> Candidates:
+    """Return the candidates (C,) without those in a window (C,) of other people."""
     return [
-        [window for window in found if not any(same_person(window, w[c]) for w in others)]
+        [window for window in found if not any(is_same_person(window, w[c]) for w in others)]
         for c, found in enumerate(candidates)
     ]
 
 
-def same_person(window: Roi, other: Roi | None, share: float = SAME) -> bool:
-    """Return whether two windows of one camera have their middle, the hips, in nearly one place:
-    within this share of a side."""
+def is_same_person(window: Roi, other: Roi | None, share: float = SAME) -> bool:
+    """Return whether two windows of one camera have their middles (the hips) in one place.
+
+    Args:
+        window: a window.
+        other: another one; None: there is none.
+        share: greatest distance of the middles, as a share of the other's side.
+    """
     if other is None:
         return False
     return math.dist(window.centre_px, other.centre_px) < share * other.side_px
 
 
-def _crossings(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Iterator[Points3]:
-    """Points (3,) where lines of sight of two cameras pass each other."""
+def _find_crossings(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Iterator[Points3]:
+    """Yield the points (3,) where lines of sight of two cameras pass each other [m]."""
     lines = [
         (c, camera.eye_world, rays(camera, np.array(window.centre_px)))
         for c, (camera, found) in enumerate(zip(cameras, candidates, strict=True))
@@ -262,10 +343,10 @@ def _crossings(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Iter
             yield (eye_1 + far_1 * along_1 + eye_2 + far_2 * along_2) / 2
 
 
-def _support(
+def _find_support(
     point_world: Points3, candidates: Candidates, cameras: Sequence[PinholeCamera]
-) -> tuple[Views, tuple[int, float]]:
-    """Windows that see their hips at a point, with their number and how well they meet."""
+) -> _Support:
+    """Return the candidates (C,) that show hips at a point (3,) [m]."""
     windows: Views = [None] * len(cameras)
     error_m = 0.0
     for c, (camera, found) in enumerate(zip(cameras, candidates, strict=True)):
@@ -285,4 +366,4 @@ def _support(
         if off_m[nearest] < MEETING_M:
             windows[c] = found[nearest]
             error_m += off_m[nearest]
-    return windows, (sum(window is not None for window in windows), -error_m)
+    return _Support(windows, sum(window is not None for window in windows), error_m)

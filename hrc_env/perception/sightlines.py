@@ -1,92 +1,125 @@
 """Lines of sight: how cameras see workers, one environment after the other."""
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from hrc_env.core.declared import Records1, dtype_of
 from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Floats
-from hrc_env.geometry.lens import FOLD, distorted, magnification_at
+from hrc_env.core.typing import Capsules, Floats, Ints, Points2, Points3, Velocities3
+from hrc_env.geometry.lens import FOLD, distort_point, magnification_at
 from hrc_env.geometry.shapes import set_capsules, set_rows
-from hrc_env.geometry.sight import is_hidden, look, make_occluders
+from hrc_env.geometry.sight import Occluders, is_hidden, make_occluders, select_occluders
 from hrc_env.geometry.triangulation import pixel_of
 from hrc_env.perception import outline
-from hrc_env.perception.windows import MIN_DEPTH_M, window_round
+from hrc_env.perception.windows import MIN_DEPTH_M, Window, fit_window
 
 SEEN, HIDDEN, OUTSIDE, BEHIND = range(4)
 """How a camera sees a joint: free, behind something, outside the image, behind the camera."""
 SIDE, TURN, VIEW, FOLDING, KNEELING, HANDLING, STEPPING = range(N_LOOK := 7)
-"""How a camera sees a worker: side [px] and turn [rad] of the window round them, from where
-(`outline.seen_from`) [rad], and what `outline` says of their posture."""
-CAMERA = np.dtype(
-    [
-        ("P", "f8", (3, 4)),  # projection
-        ("eye", "f8", (3,)),  # [m]
-        ("size_px", "f8", (2,)),  # width, height
-        ("focal_px", "f8", (2,)),  # fx, fy
-        ("centre_px", "f8", (2,)),  # cx, cy
-        ("lens", "f8", (FOLD + 1,)),  # `lens.lens_row`
-        ("has_lens", "?"),
-    ],
-    align=True,
-)
-JOINTS_SEEN = np.dtype(
-    [
-        ("uv", "f8", (N_JOINTS, 2)),  # pixels of the image, as the lens distorts it
-        ("depth", "f8", (N_JOINTS,)),  # [m]
-        ("sight", "i8", (N_JOINTS,)),  # `SEEN` to `BEHIND`
-        ("look", "f8", (N_LOOK,)),  # `SIDE` to `STEPPING`
-    ],
-    align=True,
-)
-"""A worker in one image."""
+"""How a camera sees a worker: side [px] and turn [rad] of the window around the body, direction
+from which the camera sees it (`outline.view_angle`) [rad], and four measures of the posture by the
+functions of `outline` with these names."""
+
+
+class ImageCamera:
+    """A camera with its lens and its image."""
+
+    P: Annotated[Floats, (3, 4)]
+    """Projection to pinhole pixels."""
+    eye: Annotated[Floats, (3,)]
+    """Optical centre in the world frame [m]."""
+    size_px: Annotated[Floats, (2,)]
+    """Width and height of the image [px]."""
+    focal_px: Annotated[Floats, (2,)]
+    """Focal lengths fx and fy [px]."""
+    centre_px: Annotated[Floats, (2,)]
+    """Principal point cx and cy [px]."""
+    lens: Annotated[Floats, (FOLD + 1,)]
+    """Row of the lens, as of `lens.lens_row`."""
+    has_lens: bool
+    """Whether the lens distorts the image."""
+
+
+class WorkerView:
+    """A worker in the image of a camera."""
+
+    uv: Annotated[Points2, (N_JOINTS, 2)]
+    """Joints in the image, as the lens distorts it [px]."""
+    depth: Annotated[Floats, (N_JOINTS,)]
+    """Distance of each joint along the camera's axis [m]."""
+    sight: Annotated[Ints, (N_JOINTS,)]
+    """How the camera sees each joint: `SEEN`, `HIDDEN`, `OUTSIDE` or `BEHIND`."""
+    look: Annotated[Floats, (N_LOOK,)]
+    """How the camera sees the worker, by the columns `SIDE` to `STEPPING`."""
+
+
+CAMERA = dtype_of(ImageCamera)
+"""The dtype of `ImageCamera`."""
+WORKER_VIEW = dtype_of(WorkerView)
+"""The dtype of `WorkerView`."""
 
 
 class World(NamedTuple):
-    """What there is to see, in B environments."""
+    """Workers and their surroundings in B environments."""
 
-    joints: Floats  # (B, W, J, 3) [m]
-    velocity: Floats  # (B, W, J, 3) [m/s]
-    capsules: Floats  # (B, W, K, 2, 3) the workers' [m]
-    radius: Floats  # (B, W, K) [m]
-    still: Floats  # (G, `shapes.WIDTH`)
-    moving: Floats  # (B, M, `shapes.WIDTH`)
-    robot: Floats  # (B, N, 2, 3) capsules [m]
-    robot_radius: Floats  # (N,) [m]
+    joints: Points3
+    """(B, W, J, 3) joints of the workers [m]."""
+    velocity: Velocities3
+    """(B, W, J, 3) velocities of the joints [m/s]."""
+    capsules: Capsules
+    """(B, W, K, 2, 3) capsules of the workers' bodies [m]."""
+    radius: Floats
+    """(B, W, K) radii of the workers' capsules [m]."""
+    still: Floats
+    """(G, `shapes.WIDTH`) shapes that never move."""
+    moving: Floats
+    """(B, M, `shapes.WIDTH`) shapes that are carried."""
+    robot: Capsules
+    """(B, N, 2, 3) capsules of the robot [m]."""
+    robot_radius: Floats
+    """(N,) radii of the robot's capsules [m]."""
 
 
 @kernel(makes_arrays=True)
-def sight_batch(world, rig, sight, look_of):
-    """Write how joints (B, C, W, J) and workers (B, C, W, `N_LOOK`) are seen; nothing errs."""
-    occluders, room = occluders_of(world), np.empty(1, JOINTS_SEEN)
+def view_workers(world: World, rig: Records1[ImageCamera], sight: Ints, look_of: Floats) -> None:
+    """Write how cameras see joints and workers, without errors.
+
+    Args:
+        world: workers and surroundings in B environments.
+        rig: (C,) cameras.
+        sight: (B, C, W, J) is filled with `SEEN` to `BEHIND`.
+        look_of: (B, C, W, `N_LOOK`) is filled with the columns `SIDE` to `STEPPING`.
+    """
+    occluders, views = make_room(world), np.empty(1, WORKER_VIEW)
     for b in range(len(world.joints)):
-        fill(occluders.table, world, b)
+        place_moving(occluders.table, world, b)
         for w in range(world.joints.shape[1]):
             joints = world.joints[b, w]
-            front_x, front_y = outline.facing(joints)
+            front = outline.facing(joints)
             for c in range(len(rig)):
-                seen = room[0]  # within the loop: a record does not keep its array alive
-                see(rig[c], joints, joints, occluders, seen)
-                seen.look[VIEW] = outline.seen_from(joints, front_x, front_y, rig[c].eye)
-                seen.look[FOLDING] = outline.folded(joints)
-                seen.look[KNEELING] = outline.kneeling(joints)
-                seen.look[HANDLING] = outline.handling(joints)
-                seen.look[STEPPING] = outline.stepping(outline.speed(world.velocity[b, w]))
-                sight[b, c, w], look_of[b, c, w] = seen.sight, seen.look
+                view = views[0]  # within the loop: a record does not keep its array alive
+                view_worker(rig[c], joints, joints, occluders, view)
+                view.look[VIEW] = outline.view_angle(joints, front, rig[c].eye)
+                view.look[FOLDING] = outline.folding(joints)
+                view.look[KNEELING] = outline.kneeling(joints)
+                view.look[HANDLING] = outline.handling(joints)
+                view.look[STEPPING] = outline.stepping(outline.speed(world.velocity[b, w]))
+                sight[b, c, w], look_of[b, c, w] = view.sight, view.look
 
 
 @kernel(makes_arrays=True)
-def occluders_of(world):
-    """Room for all that can stand in the way in an environment, and what never moves of it."""
+def make_room(world: World) -> Occluders:
+    """Return a table of the shapes that never move, with room for all others of an environment."""
     n_bodies, n_body = world.radius.shape[1:]
     n_more = len(world.robot_radius) + world.moving.shape[1]
     return make_occluders(world.still, n_more, n_bodies * n_body)
 
 
 @kernel
-def fill(table, world, b):
-    """Write everything that moves in environment b behind what never does."""
+def place_moving(table: Floats, world: World, b: int) -> None:
+    """Write the moving shapes of environment b into a table, behind those that never move."""
     row, n_body = len(world.still), world.radius.shape[2]
     set_capsules(table, row, world.robot[b], world.robot_radius)
     row += len(world.robot_radius)
@@ -97,25 +130,44 @@ def fill(table, world, b):
 
 
 @kernel
-def see(camera, joints, meant, occluders, seen):
-    """Project what is meant (J, 3), find out what hides the joints. How many of these are seen."""
-    uv, depth = seen.uv, seen.depth
-    seen.look[SIDE], seen.look[TURN] = frame(camera, meant, uv, depth)
-    n_view, n_seen = look(camera.eye, joints, occluders), 0
+def view_worker(
+    camera: ImageCamera, joints: Points3, meant: Points3, occluders: Occluders, view: WorkerView
+) -> int:
+    """Project a worker into an image, and find the joints that are hidden.
+
+    Args:
+        camera: the camera.
+        joints: (J, 3) the joints, which may be hidden [m].
+        meant: (J, 3) the points that are projected [m]: where the detector places the joints.
+        occluders: all shapes of the environment.
+        view: is filled, except the columns of `look` after `TURN`.
+
+    Returns:
+        The number of joints that are seen.
+    """
+    uv, depth = view.uv, view.depth
+    view.look[SIDE], view.look[TURN] = project_worker(camera, meant, uv, depth)
+    n_view, n_seen = select_occluders(camera.eye, joints, occluders), 0
     for j in range(len(joints)):
-        seen.sight[j] = _in_image(camera, uv[j], depth[j])
-        if seen.sight[j] == SEEN:
+        view.sight[j] = _locate_pixel(camera, uv[j], depth[j])
+        if view.sight[j] == SEEN:
             if is_hidden(camera.eye, joints, j, occluders, n_view):
-                seen.sight[j] = HIDDEN
+                view.sight[j] = HIDDEN
             else:
                 n_seen += 1
     return n_seen
 
 
 @kernel
-def frame(camera, joints, uv, depth):
-    """Side [px] and turn [rad] of the window round joints (J, 3); where in the image these are
-    (J, 2) and their depths (J,) are written."""
+def project_worker(camera: ImageCamera, joints: Points3, uv: Points2, depth: Floats) -> Window:
+    """Project joints into an image, and return the window around them.
+
+    Args:
+        camera: the camera.
+        joints: (J, 3) [m].
+        uv: (J, 2) is filled with pixels of the image.
+        depth: (J,) is filled with distances along the camera's axis [m].
+    """
     for j in range(len(joints)):
         x, y, z = joints[j, 0], joints[j, 1], joints[j, 2]
         uv[j, 0], uv[j, 1], depth[j] = pixel_of(camera.P, x, y, z)
@@ -124,13 +176,14 @@ def frame(camera, joints, uv, depth):
         total += depth[j] + depth[j + 6]
     px_per_m = 4.0 * camera.focal_px[0] / max(total, 4.0 * MIN_DEPTH_M)
     if camera.has_lens:
-        px_per_m /= _distort(camera, uv, depth)
-    return window_round(uv, depth, px_per_m, MIN_DEPTH_M)
+        px_per_m /= _distort_joints(camera, uv, depth)
+    return fit_window(uv, depth, px_per_m, MIN_DEPTH_M)
 
 
 @kernel
-def _distort(camera, uv, depth):
-    """Distort pinhole pixels in place. How many times longer the pinhole shows the body."""
+def _distort_joints(camera: ImageCamera, uv: Points2, depth: Floats) -> float:
+    """Distort pinhole pixels (J, 2) in place, and return how many times longer the pinhole shows
+    the body."""
     fx, fy = camera.focal_px[0], camera.focal_px[1]
     cx, cy = camera.centre_px[0], camera.centre_px[1]
     total, n = 0.0, 0
@@ -139,14 +192,14 @@ def _distort(camera, uv, depth):
             x, y = (uv[j, 0] - cx) / fx, (uv[j, 1] - cy) / fy
             total += magnification_at(camera.lens, x, y)
             n += 1
-            x, y = distorted(camera.lens, x, y)
+            x, y = distort_point(camera.lens, x, y)
             uv[j, 0], uv[j, 1] = x * fx + cx, y * fy + cy
     return total / n if n > 0 else 1.0
 
 
 @kernel
-def _in_image(camera, pixel, depth):
-    """`SEEN` for a pixel that lies in the image, else `OUTSIDE` or `BEHIND`."""
+def _locate_pixel(camera: ImageCamera, pixel: Floats, depth: float) -> int:
+    """Return `SEEN` of a pixel (2,) in the image, else `OUTSIDE` or `BEHIND`."""
     if depth < MIN_DEPTH_M:
         return BEHIND
     for i in range(2):

@@ -17,18 +17,19 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.typing import Tensor
 
 Network: TypeAlias = Callable[[Tensor], list[Tensor]]
-"""An image (H, W, 3) -> copies of the outputs that were asked for; for one thread at a time."""
+"""Function from an image (H, W, 3) to copies of the named outputs, for one thread at a time."""
 INSTALL = 'pip install "hrc_env[openvino]"'
+"""Command that installs OpenVINO."""
 
 
-def installed() -> bool:
-    """Whether OpenVINO is there; it is not imported for that."""
+def is_installed() -> bool:
+    """Return whether OpenVINO is installed, without importing it."""
     return importlib.util.find_spec("openvino") is not None
 
 
-def require() -> None:
+def check_installed() -> None:
     """Raise `ConfigError` where OpenVINO is missing."""
-    if not installed():
+    if not is_installed():
         raise ConfigError(
             f'runtime="openvino" needs OpenVINO, which is not installed: {INSTALL}, or choose '
             'runtime="litert".'
@@ -36,13 +37,18 @@ def require() -> None:
 
 
 def precision() -> str:
-    """What networks are computed in here: "bf16" where the processor has it, else "f32"."""
+    """Return the precision of networks: "bf16" if the processor has it, else "f32"."""
     return "bf16" if "BF16" in _core().get_property("CPU", "OPTIMIZATION_CAPABILITIES") else "f32"
 
 
 def load(path: Path, outputs: Sequence[str], bits: str | None = None) -> Network:
-    """A .tflite file as a function from an image to the named outputs, on one thread, computed in
-    `bits` ("f32" or "bf16"; `precision()` unless given)."""
+    """Return a .tflite file as a function from an image to named outputs, on one thread.
+
+    Args:
+        path: path of the file.
+        outputs: names of the outputs.
+        bits: precision, "f32" or "bf16"; None: `precision()`.
+    """
     whole = _core().read_model(path)
     wanted = [out.node for name in outputs for out in whole.outputs if name in out.names]
     model = _openvino().Model(wanted, whole.get_parameters())
@@ -50,23 +56,25 @@ def load(path: Path, outputs: Sequence[str], bits: str | None = None) -> Network
     settings = {**one_thread, "INFERENCE_PRECISION_HINT": bits or precision()}
     request = _core().compile_model(model, "CPU", settings).create_infer_request()
     image_in = request.get_input_tensor().data
-    said = [request.get_output_tensor(k).data for k in range(len(outputs))]
+    tensors = [request.get_output_tensor(k).data for k in range(len(outputs))]
 
     def run(image: Tensor) -> list[Tensor]:
         image_in[0] = image
         request.infer()
-        return [np.array(tensor) for tensor in said]
+        return [np.array(tensor) for tensor in tensors]
 
     return run
 
 
 @functools.cache
 def _core() -> Any:
+    """Return OpenVINO's core, one for the process."""
     return _openvino().Core()
 
 
 def _openvino() -> Any:
-    """The package, without its telemetry, which would keep usage counts in the user's home."""
-    require()
+    """Return the package without its telemetry, which would keep usage counts in the home
+    folder."""
+    check_installed()
     sys.modules.setdefault("openvino_telemetry", None)  # type: ignore[arg-type]
     return importlib.import_module("openvino")

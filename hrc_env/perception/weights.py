@@ -1,7 +1,8 @@
-"""The pose network's weights: fetched when first needed, checked always, kept in the user's cache.
+"""Weights of the pose networks, which are fetched when needed and kept in the user's cache.
 
-Google's BlazePose (Apache-2.0): detector and `full` out of the official `mediapipe` wheel, which is
-never installed; `lite` and `heavy`, when asked for, out of Google's package on npm.
+They are Google's BlazePose (Apache-2.0), and are checked by every process. The detector and `full`
+are in the official `mediapipe` wheel, which is never installed; `lite` and `heavy` are in Google's
+package on npm.
 """
 
 import functools
@@ -17,80 +18,99 @@ from pathlib import Path
 
 from hrc_env.core import folders
 from hrc_env.core.errors import DownloadError, WeightsError, unknown
-from hrc_env.perception.downloads import download_file, download_wheel, member_of
+from hrc_env.perception.downloads import download_file, download_wheel, read_member
 
 log = logging.getLogger("hrc_env.weights")
 
 WHEEL = "mediapipe==0.10.21"
-"""The last release of mediapipe that carries both files."""
+"""Last release of mediapipe with the detector and `full`."""
 WHEEL_BYTES = 35_622_638.0
+"""Size of that wheel [bytes]."""
 TARBALL = "https://registry.npmjs.org/@mediapipe/pose/-/pose-0.5.1675469404.tgz"
-"""The package `@mediapipe/pose`, which carries all landmark networks."""
+"""Package `@mediapipe/pose`, with all landmark networks."""
 SETUP = "python -m hrc_env setup"
+"""Command that fetches weights."""
 
 
 @dataclass(frozen=True, slots=True)
 class WeightsFile:
-    """One official file: in which archive it lies and what it must be."""
+    """An official file of weights in an archive."""
 
     archive: str
+    """Requirement or address of the archive."""
     member: str
+    """Path of the file in the archive."""
     size_bytes: int
+    """Size of the file [bytes]."""
     sha256: str
+    """Checksum of the file."""
 
 
 WEIGHTS: dict[str, WeightsFile] = {
     "pose_detection": WeightsFile(
-        WHEEL, "mediapipe/modules/pose_detection/pose_detection.tflite", 2_959_046,
+        WHEEL,
+        "mediapipe/modules/pose_detection/pose_detection.tflite",
+        2_959_046,
         "9ba9dd3d42efaaba86b4ff0122b06f29c4122e756b329d89dca1e297fd8f866c",
     ),
     "pose_landmark_full": WeightsFile(
-        WHEEL, "mediapipe/modules/pose_landmark/pose_landmark_full.tflite", 6_440_512,
+        WHEEL,
+        "mediapipe/modules/pose_landmark/pose_landmark_full.tflite",
+        6_440_512,
         "e9a5c5cb17f736fafd4c2ec1da3b3d331d6edbe8a0d32395855aeb2cdfd64b9f",
     ),
     "pose_landmark_lite": WeightsFile(
-        TARBALL, "package/pose_landmark_lite.tflite", 2_819_824,
+        TARBALL,
+        "package/pose_landmark_lite.tflite",
+        2_819_824,
         "f17bfbecadb61c3be1baa8b8d851cc6619c870a87167b32848ad20db306b9d61",
     ),
     "pose_landmark_heavy": WeightsFile(
-        TARBALL, "package/pose_landmark_heavy.tflite", 27_709_200,
+        TARBALL,
+        "package/pose_landmark_heavy.tflite",
+        27_709_200,
         "59e42d71bcd44cbdbabc419f0ff76686595fd265419566bd4009ef703ea8e1fe",
     ),
-}  # fmt: skip
+}
+"""All files by name."""
 ALWAYS = ("pose_detection", "pose_landmark_full")
-"""What the defaults need."""
+"""Names of the weights of the default networks."""
 
 
-def setup_for(names: Iterable[str]) -> str:
-    """The command that fetches weights."""
+def setup_command(names: Iterable[str]) -> str:
+    """Return the command that fetches these weights."""
     extra = [name.removeprefix("pose_landmark_") for name in names if name not in ALWAYS]
     return " ".join([SETUP, *(["--networks", *extra] if extra else [])])
 
 
 def cache_dir() -> Path:
-    """Return the folder that keeps the weights: $HRC_ENV_CACHE, or `hrc_env` in the user's caches;
-    a temporary one where those cannot be written."""
+    """Return the folder of the weights.
+
+    It is $HRC_ENV_CACHE, or `hrc_env` in the user's caches, or a temporary folder if these cannot
+    be written.
+    """
     if chosen := os.environ.get("HRC_ENV_CACHE"):
         return Path(chosen).expanduser()
     return folders.user_cache()
 
 
 def find_weights(name: str) -> Path:
-    """A weights file, checked once per process. Raises `WeightsError` if missing or another."""
+    """Return the path of a weights file; `WeightsError` if it is missing or not the official
+    one."""
     if name not in WEIGHTS:
         raise unknown("weights", name, WEIGHTS)
-    path = _place_of(name)
+    path = _path_of(name)
     if not path.is_file():
         raise WeightsError(
             f"The pose network's weights {path.name!r} are not in {path.parent}. "
-            f"Fetch them once with: {setup_for([name])}"
+            f"Fetch them once with: {setup_command([name])}"
         )
-    _verified(name, path, path.stat().st_mtime_ns, path.stat().st_size)
+    _verify(name, path, path.stat().st_mtime_ns, path.stat().st_size)
     return path
 
 
-def _place_of(name: str) -> Path:
-    """Return the path of a weights file: also in caches that can be read only."""
+def _path_of(name: str) -> Path:
+    """Return the path of a weights file, which may be in a cache that is read-only."""
     usual, file = folders.usual_cache(), f"{name}.tflite"
     if not os.environ.get("HRC_ENV_CACHE") and usual is not None and (usual / file).is_file():
         return usual / file
@@ -98,8 +118,11 @@ def _place_of(name: str) -> Path:
 
 
 def fetch_weights(names: Iterable[str] = ALWAYS) -> dict[str, Path]:
-    """Weights by name; downloads and logs those that are not there yet. Raises
-    `WeightsError` where that fails, with the ways out."""
+    """Return the paths of weights by name, and download those that are missing.
+
+    Raises:
+        WeightsError: they cannot be downloaded or written.
+    """
     names = list(dict.fromkeys(names))
     found = {name: path for name in names if (path := _found(name)) is not None}
     if len(found) == len(names):
@@ -118,7 +141,7 @@ def fetch_weights(names: Iterable[str] = ALWAYS) -> dict[str, Path]:
 
 
 def _found(name: str) -> Path | None:
-    """Return the path of a weights file that is there and the official one."""
+    """Return the path of a weights file; None if it is missing or not the official one."""
     try:
         return find_weights(name)
     except WeightsError:
@@ -126,11 +149,11 @@ def _found(name: str) -> Path | None:
 
 
 def _fetch(archive: str, names: list[str], folder: Path) -> None:
-    """Download an archive and put these weights out of it into a folder."""
-    is_wheel, again = archive == WHEEL, setup_for(names)
+    """Download an archive and unpack the weights with these names into a folder."""
+    is_wheel, again = archive == WHEEL, setup_command(names)
     size = f", {WHEEL_BYTES / 1e6:.0f} MB" if is_wheel else ""
-    what = archive if is_wheel else archive.rsplit("/", 1)[-1]
-    log.warning("Fetching the pose network's weights (%s%s), once, into %s ...", what, size, folder)
+    name = archive if is_wheel else archive.rsplit("/", 1)[-1]
+    log.warning("Fetching the pose network's weights (%s%s), once, into %s ...", name, size, folder)
     with tempfile.TemporaryDirectory() as scratch:
         try:
             if is_wheel:
@@ -149,30 +172,31 @@ def _fetch(archive: str, names: list[str], folder: Path) -> None:
 
 
 @functools.cache
-def _verified(name: str, path: Path, _mtime_ns: int, _size: int) -> None:
-    """Raise unless the file is the official one (errors are not remembered)."""
+def _verify(name: str, path: Path, _mtime_ns: int, _size: int) -> None:
+    """Raise `WeightsError` unless a file is the official one (success is remembered)."""
     _check(name, path.read_bytes(), str(path))
 
 
-def _check(name: str, content: bytes, where: str) -> None:
+def _check(name: str, content: bytes, origin: str) -> None:
+    """Raise `WeightsError` unless the content is that of the official file."""
     expected = WEIGHTS[name]
-    came = hashlib.sha256(content).hexdigest()
-    if came != expected.sha256:
+    checksum = hashlib.sha256(content).hexdigest()
+    if checksum != expected.sha256:
         raise WeightsError(
-            f"{where} is not the official {name}.tflite: expected {expected.size_bytes} bytes "
-            f"with sha256 {expected.sha256}, got {len(content)} bytes with sha256 {came}. "
-            f"Fetch it anew with: {setup_for([name])}"
+            f"{origin} is not the official {name}.tflite: expected {expected.size_bytes} bytes "
+            f"with sha256 {expected.sha256}, got {len(content)} bytes with sha256 {checksum}. "
+            f"Fetch it anew with: {setup_command([name])}"
         )
 
 
 def _unpack(place: Path, name: str) -> None:
-    """One file out of an archive into the cache, checked before it appears there."""
+    """Write a file of an archive into the cache, after it has been checked."""
     try:
-        content = member_of(place, WEIGHTS[name].member)
+        content = read_member(place, WEIGHTS[name].member)
     except (zipfile.BadZipFile, tarfile.TarError, EOFError, KeyError) as error:
         raise WeightsError(
             f"{place.name} does not hold {WEIGHTS[name].member}: {error}. "
-            f"Try again with: {setup_for([name])}"
+            f"Try again with: {setup_command([name])}"
         ) from error
     _check(name, content, f"{name}.tflite from {place.name}")
     folder = cache_dir()

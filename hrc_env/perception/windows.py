@@ -1,10 +1,12 @@
-"""Where to look: the crop round a worker whose joints are predicted.
+"""Windows: the crop around a worker whose joints are predicted.
 
-As BlazePose's detector stage has it: round mid-hip, the torso upright, as large as the body. The
-landmark stage forgives a shift of 0.2 of the side, a scale of 0.8 to 1.25, a turn of 20 degrees.
+As in BlazePose's detector stage, it is around the middle of the hips, as large as the body, with
+the torso upright. The landmark stage tolerates a shift of 0.2 of the side, a scale of 0.8 to 1.25,
+and a turn of 20 degrees.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,25 +23,46 @@ from hrc_env.geometry.cameras import (
 from hrc_env.perception.blazepose import ROI_MARGIN, wrap_angle
 
 MIN_DEPTH_M = 0.5
-"""A worker whose torso is nearer to the camera's plane is not looked at."""
+"""Least distance of a worker's torso from the camera's plane [m]; there is no window for nearer
+ones."""
 MIN_JOINTS_INSIDE = 6
-"""Fewer joints in the image, of 15, are not worth a look."""
+"""Least number of joints in the image, of 15, for which there is a window."""
 MIN_REACH_M = 0.85
-"""A window is never tighter than round somebody upright: whoever is folded up may rise."""
+"""Least radius of a window [m]: that of an upright person, as a person who is folded up may
+rise."""
 MIN_TORSO_M = 0.15
-"""A torso that looks shorter is seen end on and gives no direction; then up is the image's."""
+"""Length of the torso in the image below which it is seen end on [m], and has no direction: the
+window is then upright in the image."""
 CROWN = 0.8
-"""The hat reaches so much further beyond the nose as the nose is from the shoulders."""
+"""Reach of the hat beyond the nose, as a share of the distance from the shoulders to the nose."""
 HAND = 0.6
-"""Hands reach so much further beyond the wrists as the wrists are from the elbows."""
+"""Reach of the hands beyond the wrists, as a share of the distance from elbow to wrist."""
 STEADY_SHIFT, STEADY_SCALE, STEADY_TURN_RAD = 0.10, 0.15, 0.2
-"""A window stays while the wanted one is off by less than this share of its side, this
-logarithm of its size and this turn: half of what the landmark stage forgives."""
+"""Shift (share of the side), scale (logarithm) and turn [rad] of the predicted window below which
+the last one is kept: half of the landmark stage's tolerance."""
+
+
+class Window(NamedTuple):
+    """Size and orientation of the window around a worker."""
+
+    side_px: float
+    """Length of its sides [px]."""
+    turn_rad: float
+    """Turn of its upright, clockwise in the image [rad]."""
 
 
 def window_from_joints(joints_px: Points2, depth_m: Floats, camera: PinholeCamera) -> Roi | None:
-    """The region of interest of a camera's image [px of the image] round joints (J, 2) [pinhole
-    px] with depths (J,) [m]; None if the worker is behind, very close or outside."""
+    """Return the window around joints.
+
+    Args:
+        joints_px: (J, 2) joints in pinhole pixels.
+        depth_m: (J,) their distances along the camera's axis [m].
+        camera: the camera.
+
+    Returns:
+        The window in pixels of the image; None if the worker is behind the camera, very near to it
+        or outside of its image.
+    """
     if depth_m[TORSO].min() < MIN_DEPTH_M:
         return None
     magnification = pinhole_magnification(camera, joints_px[TORSO].mean(0))
@@ -48,17 +71,23 @@ def window_from_joints(joints_px: Points2, depth_m: Floats, camera: PinholeCamer
     if np.count_nonzero(inside) < MIN_JOINTS_INSIDE:
         return None
     px_per_m = camera.K[0, 0] / (depth_m[TORSO].mean() * magnification)
-    side_px, turn_rad = window_round(
+    window = fit_window(
         np.ascontiguousarray(joints_px), np.ascontiguousarray(depth_m), px_per_m, MIN_DEPTH_M
     )
     u, v = joints_px[[JOINT["left_hip"], JOINT["right_hip"]]].mean(0).tolist()
-    return Roi((u, v), side_px, turn_rad)
+    return Roi((u, v), window.side_px, window.turn_rad)
 
 
 @kernel
-def window_round(uv, depth, px_per_m, nearest_m):
-    """Side [px] and turn [rad] of the window round joints (J, 2); those nearer than `nearest_m` do
-    not count, and `px_per_m` is at the worker's distance."""
+def fit_window(uv: Points2, depth: Floats, px_per_m: float, nearest_m: float) -> Window:
+    """Return the window around joints.
+
+    Args:
+        uv: (J, 2) joints in pixels of the image.
+        depth: (J,) their distances along the camera's axis [m].
+        px_per_m: scale of the image at the worker's distance [px/m].
+        nearest_m: least distance of joints that count [m].
+    """
     hip_x, hip_y = 0.5 * (uv[7, 0] + uv[8, 0]), 0.5 * (uv[7, 1] + uv[8, 1])
     neck_x, neck_y = 0.5 * (uv[1, 0] + uv[2, 0]), 0.5 * (uv[1, 1] + uv[2, 1])
     x, y = neck_x - hip_x, neck_y - hip_y
@@ -67,27 +96,30 @@ def window_round(uv, depth, px_per_m, nearest_m):
     reach *= reach
     for j in range(len(depth)):
         if depth[j] > nearest_m:
-            reach = max(reach, _squared(uv[j, 0] - hip_x, uv[j, 1] - hip_y))
+            reach = max(reach, _squared_norm(uv[j, 0] - hip_x, uv[j, 1] - hip_y))
     for j in range(5, 7):
         hand_x = uv[j, 0] + HAND * (uv[j, 0] - uv[j - 2, 0]) - hip_x
         hand_y = uv[j, 1] + HAND * (uv[j, 1] - uv[j - 2, 1]) - hip_y
         if depth[j] > nearest_m and depth[j - 2] > nearest_m:
-            reach = max(reach, _squared(hand_x, hand_y))
+            reach = max(reach, _squared_norm(hand_x, hand_y))
     if depth[0] > nearest_m:
         crown_x = uv[0, 0] + CROWN * (uv[0, 0] - neck_x) - hip_x
         crown_y = uv[0, 1] + CROWN * (uv[0, 1] - neck_y) - hip_y
-        reach = max(reach, _squared(crown_x, crown_y))
-    return 2.0 * ROI_MARGIN * math.sqrt(reach), math.atan2(x, -y)
+        reach = max(reach, _squared_norm(crown_x, crown_y))
+    return Window(2.0 * ROI_MARGIN * math.sqrt(reach), math.atan2(x, -y))
 
 
 @kernel
-def _squared(x, y):
+def _squared_norm(x: float, y: float) -> float:
+    """Return the squared length of a vector (x, y)."""
     return x * x + y * y
 
 
 def steady_window(kept: Roi | None, wanted: Roi | None) -> Roi | None:
-    """The window of the last look while it is still good for the wanted one, else the latter:
-    steady crops make steady landmarks, and need not be drawn again."""
+    """Return the last window if it still fits the predicted one, else the predicted one.
+
+    Steady crops give steady landmarks, and need not be drawn again.
+    """
     if kept is None or wanted is None:
         return wanted
     steady = (

@@ -1,13 +1,13 @@
-"""Cameras that differ from episode to episode: environments with a pipeline of their own.
+"""Cameras that differ from episode to episode, by pipelines for single environments.
 
-A pipeline knows one rig, one list of faults and one appearance. An environment whose episode has
-others gets a pipeline for itself; as no result depends on the size of a batch, it sees what a
-single environment with that rig sees, bit for bit.
+A pipeline has one rig, one list of faults and one appearance. An environment whose episode has
+others gets a pipeline of its own. As no result depends on the size of a batch, its results are
+those of a single environment with that rig, bit for bit.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Protocol, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
@@ -19,8 +19,8 @@ from hrc_env.core.vacancy import Coverage, Vacancy
 from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.perception.faults.schedule import Schedule
-from hrc_env.pipeline.sensor_input import Generators, Sensor, SensorInput, Windows
-from hrc_env.pipeline.tracking import PerceptionPipeline
+from hrc_env.pipeline.sensor_input import Generators, Sensor, SensorInput
+from hrc_env.pipeline.tracking import Detections, PerceptionPipeline
 from hrc_env.scene.domain_randomization import AppearanceConfig, Look
 
 RecordT = TypeVar("RecordT")
@@ -31,18 +31,28 @@ class CameraSetup:
     """The cameras of one episode."""
 
     rig: tuple[CameraConfig, ...]
-    """As they hang, and as the estimator knows them."""
+    """The cameras, which the estimator knows."""
     faults: tuple[FaultConfig, ...]
     """Their faults."""
     appearance: AppearanceConfig
-    """How the scene looks to them."""
+    """Appearance of the scene."""
 
 
 class MakePipeline(Protocol):
-    """Makes a pipeline of one environment with other cameras, which borrows renderer and
-    networks."""
+    """A factory of pipelines for single environments with other cameras."""
 
-    def __call__(self, setup: CameraSetup, like: PerceptionPipeline) -> PerceptionPipeline: ...
+    def __call__(self, setup: CameraSetup, like: PerceptionPipeline) -> PerceptionPipeline:
+        """Return a pipeline with these cameras, which borrows renderer and networks of `like`."""
+        ...
+
+
+class OwnState(NamedTuple):
+    """The state of an environment with cameras of its own."""
+
+    setup: CameraSetup
+    """Its cameras."""
+    state: Any
+    """State of its pipeline."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,42 +60,66 @@ class EpisodicState:
     """The state of an `EpisodicPipeline`."""
 
     shared: Any
-    own: dict[int, tuple[CameraSetup, Any]]
-    """By environment: its cameras, and the state of its pipeline."""
+    """State of the pipeline that most environments share."""
+    own: dict[int, OwnState]
+    """States of environments with cameras of their own."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Own:
+    """The pipeline of an environment with cameras of its own."""
+
     setup: CameraSetup
+    """Its cameras."""
     pipeline: PerceptionPipeline
+    """Its pipeline, with a batch of one."""
+
+    def get_state(self) -> OwnState:
+        """Return the cameras and a copy of the pipeline's state."""
+        return OwnState(self.setup, self.pipeline.get_state())
 
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """Environments of a call that one pipeline works on."""
+    """The environments of a call that belong to one pipeline."""
 
     pipeline: PerceptionPipeline
+    """The pipeline."""
     rows: Ints
-    """Their rows among those of the call."""
+    """(n,) their rows in the call."""
     ids: Ints
-    """Their numbers in that pipeline."""
+    """(n,) their indices in the pipeline."""
     columns: Ints
-    """The rig's cameras among those of the environment."""
+    """(C,) indices of the pipeline's cameras in the names of the environment."""
+
+
+class _Place(NamedTuple):
+    """The place of an environment."""
+
+    pipeline: PerceptionPipeline
+    """Its pipeline."""
+    row: int
+    """Its index in the pipeline."""
 
 
 class EpisodicPipeline(PerceptionPipeline):
-    """The pipeline that most environments share, and one for each whose cameras are others."""
+    """A pipeline that most environments share, and one for each environment with other cameras.
+
+    Args:
+        shared: the pipeline of most environments.
+        names: names of all cameras; every rig has some of them.
+        make: factory of the other pipelines.
+    """
 
     def __init__(
         self, shared: PerceptionPipeline, names: tuple[str, ...], make: MakePipeline
     ) -> None:
-        """`names` are the cameras' that infos know: of any rig these or some of them."""
         self.shared, self.names, self._make = shared, names, make
         self.sensor = EpisodicSensor(shared.sensor.NEEDS_TRUTH, self._parts)
         self._own: dict[int, _Own] = {}
 
     def assign(self, b: int, setup: CameraSetup | None) -> None:
-        """Let the next episode of environment `b` have these cameras; None: the shared ones."""
+        """Give the next episode of environment `b` these cameras; None: the shared ones."""
         had = self._own.get(b)
         if had is not None and had.setup == setup:
             return
@@ -112,34 +146,36 @@ class EpisodicPipeline(PerceptionPipeline):
     def perceive(
         self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators
     ) -> PoseEstimate:
-        """What is believed of environments `ids` after what the sensor measures of them."""
+        """Return the belief about environments `ids` after the sensors' measurements."""
 
-        def believed(part: _Part) -> PoseEstimate:
+        def perceive(part: _Part) -> PoseEstimate:
             streams = ([rngs[row] for row in part.rows] for rngs in (sensor_rngs, tracker_rngs))
             return part.pipeline.perceive(part.ids, *streams)
 
-        return self._gathered(ids, believed)
+        return self._gather(ids, perceive)
 
     def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
-        """What is expected in `horizon_s` of rows `ids`, of which `now` is believed."""
-        return self._gathered(
+        """Return the belief about a time ahead; see `PerceptionPipeline.forecast`."""
+        return self._gather(
             ids,
             lambda part: part.pipeline.forecast(rows(now, part.rows), part.ids, horizon_s),
         )
 
-    def last_detections(self, b: int) -> tuple[Keypoints | None, Windows]:
+    def last_detections(self, b: int) -> Detections:
         """Return the last keypoints of environment `b`, and their windows."""
-        pipeline, b = self._of(b)
+        pipeline, b = self._place(b)
         return pipeline.last_detections(b)
 
     @property
-    def given(self) -> Keypoints:
-        """The keypoints (B, C, W, J) that estimators were given last, by `names`: a camera that
-        does not hang in an episode finds nothing at no time."""
-        shared = self.shared.given
+    def measurements(self) -> Keypoints:
+        """Last keypoints (B, C, W, J) that estimators got, with cameras by `names`.
+
+        A camera that is not in an episode's rig has neither keypoints nor a time.
+        """
+        shared = self.shared.measurements
         whole = replace(mapped(shared, np.copy), time_s=self._times_s(self.shared, shared))
         for b, own in self._own.items():
-            seen, columns = own.pipeline.given, self._columns(own)
+            seen, columns = own.pipeline.measurements, self._columns(own)
             seen = replace(seen, time_s=self._times_s(own.pipeline, seen))
             whole.px[b], whole.confidence[b], whole.sigma_px[b] = np.nan, 0.0, np.inf
             needed(whole.time_s, "Times of frames")[b] = np.nan
@@ -147,36 +183,40 @@ class EpisodicPipeline(PerceptionPipeline):
         return whole
 
     def crops(self, b: int) -> list[Image | None]:
-        """Return the crops of `b`'s first worker that the network was given, one a camera."""
-        pipeline, b = self._of(b)
+        """Return the last crop (C,) of environment `b`'s first worker in each camera."""
+        pipeline, b = self._place(b)
         return pipeline.crops(b)
 
     def look_of(self, b: int) -> Look | None:
-        """How environment `b` looks in its episode; None: as it was built."""
-        pipeline, b = self._of(b)
+        """Return the appearance of environment `b` in its episode; None: as it was built."""
+        pipeline, b = self._place(b)
         return pipeline.look_of(b)
 
     def schedule_of(self, b: int) -> Schedule | None:
         """Return the schedule of environment `b`'s cameras in its episode."""
-        pipeline, b = self._of(b)
+        pipeline, b = self._place(b)
         return pipeline.schedule_of(b)
 
     def light_of(self, b: int) -> float:
         """Return the strength of the light in environment `b`'s episode."""
-        pipeline, b = self._of(b)
+        pipeline, b = self._place(b)
         return pipeline.light_of(b)
 
-    def suspected(self, ids: Ints) -> Bools:
-        """(B, C) which cameras are thought to be miscalibrated, by `names`; those that do not hang
-        in an episode are not."""
+    def suspected_cameras(self, ids: Ints) -> Bools:
+        """Return the cameras (B, C), by `names`, that may be miscalibrated.
+
+        Cameras that are not in an episode's rig are not.
+        """
         found = np.zeros((len(ids), len(self.names)), np.bool_)
         for part in self._parts(ids):
-            found[np.ix_(part.rows, part.columns)] = part.pipeline.suspected(part.ids)
+            found[np.ix_(part.rows, part.columns)] = part.pipeline.suspected_cameras(part.ids)
         return found
 
     def vacancy(self, ids: Ints) -> Vacancy | None:
-        """Return the state of the floor of environments `ids`: of each piece by itself where these
-        have several rigs."""
+        """Return the state of the floor of environments `ids`; None without cameras.
+
+        If they have several rigs, every piece of the floor is a group of its own.
+        """
         parts = self._parts(ids)
         found = [(part, part.pipeline.vacancy(part.ids)) for part in parts]
         known = [(part, each) for part, each in found if each is not None]
@@ -193,9 +233,9 @@ class EpisodicPipeline(PerceptionPipeline):
         ]
         return replace(
             states[0][1],
-            level=_joined(len(ids), [(part, each.level) for part, each in states]),
-            age_s=_joined(len(ids), [(part, each.age_s) for part, each in states]),
-            others=_joined(len(ids), [(part, each.others) for part, each in states]),
+            level=_join(len(ids), [(part, each.level) for part, each in states]),
+            age_s=_join(len(ids), [(part, each.age_s) for part, each in states]),
+            others=_join(len(ids), [(part, each.others) for part, each in states]),
         )
 
     def close(self) -> None:
@@ -205,23 +245,23 @@ class EpisodicPipeline(PerceptionPipeline):
         self.shared.close()
 
     def get_state(self) -> EpisodicState:
-        """A copy of everything that changes, the environments' own cameras among it."""
-        own = {b: (each.setup, each.pipeline.get_state()) for b, each in self._own.items()}
+        """Return a copy of everything that changes, including cameras of single environments."""
+        own = {b: each.get_state() for b, each in self._own.items()}
         return EpisodicState(self.shared.get_state(), own)
 
     def set_state(self, state: Any) -> None:
-        """Continue from a state, also of a pipeline that all environments shared."""
+        """Continue from a state, which may be of a pipeline that all environments shared."""
         if not isinstance(state, EpisodicState):
             state = EpisodicState(state, {})
         self.shared.set_state(state.shared)
         for b in {*self._own} - {*state.own}:
             self.assign(b, None)
-        for b, (setup, of_own) in state.own.items():
-            self.assign(b, setup)
-            self._own[b].pipeline.set_state(of_own)
+        for b, own in state.own.items():
+            self.assign(b, own.setup)
+            self._own[b].pipeline.set_state(own.state)
 
     def __getstate__(self) -> dict[str, Any]:
-        own = {b: (each.setup, each.pipeline.get_state()) for b, each in self._own.items()}
+        own = {b: each.get_state() for b, each in self._own.items()}
         return {"shared": self.shared, "names": self.names, "make": self._make, "own": own}
 
     def __setstate__(self, saved: dict[str, Any]) -> None:
@@ -230,12 +270,12 @@ class EpisodicPipeline(PerceptionPipeline):
             self.assign(b, setup)
             self._own[b].pipeline.set_state(state)
 
-    def _of(self, b: int) -> tuple[PerceptionPipeline, int]:
-        """The pipeline of environment `b`, and its number there."""
-        return (self._own[b].pipeline, 0) if b in self._own else (self.shared, b)
+    def _place(self, b: int) -> _Place:
+        """Return the pipeline of environment `b`, and its index there."""
+        return _Place(self._own[b].pipeline, 0) if b in self._own else _Place(self.shared, b)
 
     def _parts(self, ids: Ints) -> list[_Part]:
-        """Environments `ids` by pipeline: the shared one first."""
+        """Return environments `ids` by pipeline, those of the shared one first."""
         mine = np.array([b in self._own for b in ids.tolist()], bool)
         shared = np.flatnonzero(~mine)
         everything = np.arange(len(self.names))
@@ -246,35 +286,41 @@ class EpisodicPipeline(PerceptionPipeline):
         return parts
 
     def _columns(self, own: _Own) -> Ints:
-        """The rig's cameras among `names`."""
+        """Return the indices of a rig's cameras in `names` (C,)."""
         return np.array([self.names.index(camera.name) for camera in own.setup.rig])
 
     @staticmethod
     def _times_s(pipeline: PerceptionPipeline, seen: Keypoints) -> Floats:
-        """(B, C) when frames were taken [s]; where a pipeline tells no times, all were now."""
+        """Return the times of frames (B, C), which are present in a pipeline without times [s]."""
         if seen.time_s is not None:
             return seen.time_s.copy()
         return np.repeat(pipeline.now_s[:, None], seen.px.shape[1], axis=1)
 
-    def _gathered(self, ids: Ints, find: Callable[[_Part], PoseEstimate]) -> PoseEstimate:
-        return _joined(len(ids), [(part, find(part)) for part in self._parts(ids)])
+    def _gather(self, ids: Ints, find: Callable[[_Part], PoseEstimate]) -> PoseEstimate:
+        """Return the results of a function of each part as one estimate (B, W, ...)."""
+        return _join(len(ids), [(part, find(part)) for part in self._parts(ids)])
 
 
 class EpisodicSensor(Sensor):
-    """The sensors of an `EpisodicPipeline`: each is shown the environments that it is of."""
+    """The sensors of an `EpisodicPipeline`, each of which gets its own environments.
+
+    Args:
+        needs_truth: whether they take a `TrueSensorInput`.
+        parts: function that groups environments by pipeline.
+    """
 
     def __init__(self, needs_truth: bool, parts: Callable[[Ints], list[_Part]]) -> None:
         self.NEEDS_TRUTH, self._parts = needs_truth, parts
 
     def expose(self, now: SensorInput) -> None:
-        """The shutters open before `now`."""
+        """Take in the scene, which is kept until the next exposure."""
         self.now = now
         for part in self._parts(now.ids):
             part.pipeline.sensor.expose(replace(rows(now, part.rows), ids=part.ids))
 
 
-def _joined(n: int, parts: list[tuple[_Part, RecordT]]) -> RecordT:
-    """Records of parts of n environments as one."""
+def _join(n: int, parts: list[tuple[_Part, RecordT]]) -> RecordT:
+    """Return the records of parts of n environments as one."""
     (first, record), *_ = parts
     if len(parts) == 1 and len(first.rows) == n:
         return record

@@ -1,11 +1,11 @@
-"""Perception levels: how a belief about the workers comes about, behind one protocol.
+"""Perception levels: pipelines from sensors to a belief about the workers, with one interface.
 
-| level | what the estimator is given |
+| level | input of the estimator |
 |---|---|
-| `pixels` | MediaPipe Pose on crops rendered round the worker it predicts |
-| `keypoints` | an emulator of that: projected truth with the detector's errors |
-| `truth` | nothing: the estimate is the worker as they are |
-| `none` | nothing: the estimate stays the prior |
+| `pixels` | MediaPipe Pose on crops rendered around the workers that it predicts |
+| `keypoints` | an emulator of that: the projected truth with the detector's errors |
+| `truth` | none: the estimate is the truth |
+| `none` | none: the estimate is the prior |
 """
 
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ from hrc_env.perception.weights import fetch_weights
 from hrc_env.pipeline.emulated import EmulatorPipeline
 from hrc_env.pipeline.episodic import CameraSetup
 from hrc_env.pipeline.rendered import PixelPipeline
-from hrc_env.pipeline.sensor_input import Generators, Sensor, TrueState, with_truth
+from hrc_env.pipeline.sensor_input import Generators, Sensor, TrueState, require_truth
 from hrc_env.pipeline.tracking import PerceptionPipeline
 from hrc_env.scene.build import Scene, with_rig
 from hrc_env.scene.domain_randomization import AS_BUILT, AppearanceConfig
@@ -35,52 +35,62 @@ from hrc_env.tracking.estimators import EstimatorChoice, make_estimator
 from hrc_env.tracking.forecast import forecast
 
 LEVELS = ("pixels", "keypoints", "truth", "none")
+"""Names of the perception levels."""
 CAMERA_LEVELS = LEVELS[:2]
-"""Those that have cameras."""
+"""Levels that have cameras."""
 EMULATED = ("darkness",)
-"""Faults of images that level `keypoints` emulates."""
+"""Kinds of faults of images that level `keypoints` emulates."""
 
 
 def prepare(level: str, detector: DetectorConfig) -> None:
-    """Fetch and compile a perception level's needs that are missing, the quickest first. Raises
-    `WeightsError` without the network's weights, and with no way to them."""
+    """Fetch the weights and compile the kernels that a perception level needs.
+
+    Raises:
+        WeightsError: the weights are missing and cannot be fetched.
+    """
     if level == "pixels":
         fetch_weights(detector.weights)
     ahead.ensure(level)
 
 
 def make_pipeline(
-    level: str, estimator: EstimatorChoice, scene: Scene, batch: int, config: HRCConfig,
+    level: str,
+    estimator: EstimatorChoice,
+    scene: Scene,
+    batch: int,
+    config: HRCConfig,
     shows_images: bool = False,
     like: PerceptionPipeline | None = None,
-) -> PerceptionPipeline:  # fmt: skip
+) -> PerceptionPipeline:
     """Return the pipeline of a perception level.
 
     Args:
         level: one of `LEVELS`.
-        estimator: as of `EnvConfig`.
+        estimator: the estimator, as in `EnvConfig`.
         scene: with the rig's cameras.
         batch: number of environments.
-        config: of the environment.
-        shows_images: whether observations hold images, too, whatever the level.
-        like: a pipeline of the same level and scene with other cameras, which lends what takes
-            time; None: there is none.
+        config: settings of the environment.
+        shows_images: whether observations contain images.
+        like: a pipeline of the same level and scene with other cameras, which lends its renderer
+            and networks; None: there is none.
 
     Raises:
-        ConfigError: an unknown level, or one that cannot have what `config` wants.
-        WeightsError, RenderingError: level "pixels" is impossible here.
+        ConfigError: an unknown level, or one that does not support the settings.
+        WeightsError: the weights of level "pixels" are missing.
+        RenderingError: there is no OpenGL for level "pixels".
     """
     if level not in LEVELS:
         raise unknown("perception", level, LEVELS)
-    check_knows(level, config.appearance, config.faults, shows_images)
+    check_supported(level, config.appearance, config.faults, shows_images)
     schedule = Schedule(scene.rig, config.faults, config.ctrl_dt)
     memory_s = max(config.tracker.longest_delay_s, min(schedule.longest_delay_s, 1.0))
     settings = replace(config.tracker, longest_delay_s=memory_s)
     tracker = make_estimator(estimator, projections(scene.cameras), config.ctrl_dt, settings)
     if level == "truth":
-        return Oracle(config.tracker, oracle.nobody(batch, scene.n_workers, config.tracker))
+        absence = oracle.estimate_absence(batch, scene.n_workers, config.tracker)
+        return Oracle(config.tracker, absence)
     if level == "none":
-        prior = oracle.prior(batch, scene.n_workers, config.tracker)
+        prior = oracle.estimate_prior(batch, scene.n_workers, config.tracker)
         return NoPerception(prior, config.ctrl_dt)
     if level == "keypoints":
         return EmulatorPipeline(scene, batch, tracker, config, schedule)
@@ -90,38 +100,51 @@ def make_pipeline(
 
 @dataclass(frozen=True, slots=True)
 class PipelineOfEpisode:
-    """Makes the pipeline of one environment whose episode has cameras of its own."""
+    """A factory of pipelines for single environments, whose episodes have other cameras."""
 
     level: str
+    """Perception level."""
     estimator: EstimatorChoice
+    """The estimator, as in `EnvConfig`."""
     scene: Scene
+    """The scene of all environments."""
     config: HRCConfig
+    """Settings of all environments."""
     shows_images: bool
-    """Whether observations hold images, too."""
+    """Whether observations contain images."""
 
     def __call__(self, setup: CameraSetup, like: PerceptionPipeline) -> PerceptionPipeline:
-        """Return the pipeline; `like` is that of the others."""
+        """Return the pipeline of an episode's cameras, which borrows from `like`."""
         scene = with_rig(self.scene, setup.rig)
         config = replace(self.config, faults=setup.faults, appearance=setup.appearance)
         return make_pipeline(self.level, self.estimator, scene, 1, config, self.shows_images, like)
 
 
-def _knows(level: str, appearance: AppearanceConfig) -> bool:
-    """Return whether a perception level can show this appearance."""
+def _supports(level: str, appearance: AppearanceConfig) -> bool:
+    """Return whether a perception level supports an appearance."""
     if level == "keypoints":
         appearance = replace(appearance, light=AS_BUILT.light)
     return level == "pixels" or appearance == AS_BUILT
 
 
-def check_knows(
+def check_supported(
     level: str,
     appearance: AppearanceConfig,
     faults: Sequence[FaultConfig],
     shows_images: bool = False,
 ) -> None:
-    """Raise `ConfigError` for looks and faults that a perception level does not know; observations
-    that hold images show all looks."""
-    if not (shows_images or _knows(level, appearance)):
+    """Check that a perception level supports an appearance and faults.
+
+    Args:
+        level: the perception level.
+        appearance: the appearance of scenes.
+        faults: the faults of cameras.
+        shows_images: whether observations contain images, which show every appearance.
+
+    Raises:
+        ConfigError: the level does not support one of them.
+    """
+    if not (shows_images or _supports(level, appearance)):
         raise ConfigError(
             f"Looks are of images, and perception={level!r} has none: leave appearance out, or use "
             "perception='pixels' or observe_images. perception='keypoints' knows the strength of "
@@ -143,7 +166,12 @@ def check_knows(
 
 
 class Oracle(PerceptionPipeline):
-    """Level `truth`: the worker as they are."""
+    """Level `truth`: the estimate is the truth.
+
+    Args:
+        config: settings of the tracker.
+        nobody: (B, W, ...) estimate of slots without a worker.
+    """
 
     def __init__(self, config: TrackerConfig, nobody: PoseEstimate) -> None:
         self.sensor = TrueState()
@@ -152,8 +180,8 @@ class Oracle(PerceptionPipeline):
     def perceive(
         self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators
     ) -> PoseEstimate:
-        """The truth, as an estimate; of who is not there, the prior, and nobody is unknown."""
-        known = with_truth(self.sensor.now)
+        """Return the truth as an estimate; absent workers have the prior, and none is unknown."""
+        known = require_truth(self.sensor.now)
         seen = oracle.estimate_from_truth(known.truth)
         if known.present.all():
             return seen
@@ -162,12 +190,17 @@ class Oracle(PerceptionPipeline):
         return believed
 
     def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
-        """Where a body that moves so goes: nobody is given the future."""
+        """Return a forecast of the motion, as the future is not part of the truth."""
         return forecast(now, horizon_s, self.config)
 
 
 class NoPerception(PerceptionPipeline):
-    """Level `none`: the prior, whatever happens, and whoever could be there is unknown."""
+    """Level `none`: the estimate is the prior, and every worker is unknown.
+
+    Args:
+        prior: (B, W, ...) the prior.
+        dt_s: time between steps [s].
+    """
 
     CHANGES = ("prior",)
 
@@ -175,16 +208,16 @@ class NoPerception(PerceptionPipeline):
         self.sensor, self.prior, self.dt_s = Sensor(), prior, dt_s
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
-        """Nobody has looked since now."""
+        """Begin environments `ids` anew, with a prior of age zero."""
         self.prior.blind_s[ids] = 0.0
 
     def perceive(
         self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators
     ) -> PoseEstimate:
-        """The prior."""
+        """Return the prior of environments `ids`, older by a step."""
         self.prior.blind_s[ids] += self.dt_s
         return rows(self.prior, ids)
 
     def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
-        """The prior, then as now."""
+        """Return the prior of environments `ids`, which does not change."""
         return rows(self.prior, ids)

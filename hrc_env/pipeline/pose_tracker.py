@@ -1,4 +1,4 @@
-"""Images to poses without a simulator: recorded films, live cameras, anybody's renderer.
+"""Images to poses without a simulator: recorded films, live cameras, other renderers.
 
 tracker = PoseTracker(cameras)
 for images in films:
@@ -27,28 +27,32 @@ from hrc_env.geometry.cameras import PinholeCamera, projections
 from hrc_env.geometry.shapes import WIDTH
 from hrc_env.perception.detector import DetectorConfig
 from hrc_env.perception.frames import Frames
-from hrc_env.perception.searching import ImageSource, image_crop
+from hrc_env.perception.searching import ImageSource, crop_image
 from hrc_env.pipeline.image_tracking import ImageSensor, ImageTracking
-from hrc_env.pipeline.looking import Looking
 from hrc_env.pipeline.tracking import TrackingSetup
+from hrc_env.pipeline.worker_detector import WorkerDetector
 from hrc_env.scene.rig import make_cameras
 from hrc_env.scene.rigs import common_views, coverage_of
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import EstimatorChoice, make_estimator
 
 MOST_WORKERS = 16
-"""The most people that one tracker follows."""
+"""Greatest number of people that one tracker follows."""
 MOST_SUMS = 1000
-"""Number of checksums that are kept: windows move with people."""
+"""Number of checksums that are kept, as windows move with people."""
 _ALONE = np.arange(1)
-"""The one row of a batch of one."""
+"""Indices of a batch of one environment."""
 
 
 class _Films(ImageSensor):
-    """The images that somebody shows; a camera whose images repeat bit for bit is stuck."""
+    """The images of a caller; a camera whose images repeat bit for bit is stuck.
+
+    Args:
+        n_cameras: number C of cameras.
+    """
 
     CHANGES = ("sums", "repeats")
-    tells_times = False
+    has_times = False
 
     def __init__(self, n_cameras: int) -> None:
         self.n_cameras = n_cameras
@@ -57,9 +61,9 @@ class _Films(ImageSensor):
         self.robot_world: Capsules | None = None
         """(K, 2, 3) the robot's capsules [m]; None: unknown."""
         self.sums: dict[tuple[int, Roi], int] = {}
-        """Checksums of the crops of each camera and window."""
+        """Checksum of the last crop of each camera and window."""
         self.repeats: dict[int, bool] = {}
-        """Of the cameras that gave a crop of a former window again, whether it is the same."""
+        """Whether all crops in windows that were used before are the same, by camera."""
 
     def take(self, source: ImageSource, robot_world: Capsules | None) -> None:
         """Take the next images in."""
@@ -68,12 +72,12 @@ class _Films(ImageSensor):
             self.sums.clear()
 
     def show(self, b: int) -> Floats:
-        """Return when the images were taken: all of them now."""
+        """Return the times of the images (C,): all are present [s]."""
         return np.zeros(self.n_cameras)
 
     def crop(self, camera_index: int, window: Roi) -> Image:
-        """Return a crop of the source."""
-        crop = image_crop(needed(self.source, "The image source"), camera_index, window)
+        """Return a window of the source's image, (256, 256, 3)."""
+        crop = crop_image(needed(self.source, "The image source"), camera_index, window)
         new, key = zlib.crc32(crop.tobytes()), (camera_index, window)
         if key in self.sums:
             same = self.sums[key] == new
@@ -81,27 +85,28 @@ class _Films(ImageSensor):
         self.sums[key] = new
         return crop
 
-    def stuck(self, ids: Ints) -> Bools:
-        """Return (1, C) the cameras all of whose crops are the same as before."""
+    def stuck_cameras(self, ids: Ints) -> Bools:
+        """Return the cameras (1, C) of which all crops are the same as before."""
         return np.array([[self.repeats.get(c, False) for c in range(self.n_cameras)]])
 
     def robots_world(self) -> Capsules | None:
-        """Return (1, K, 2, 3) the robot's capsules [m]; None: unknown."""
+        """Return the robot's capsules (1, K, 2, 3) [m]; None: unknown."""
         return None if self.robot_world is None else self.robot_world[None]
 
 
 class PoseTracker:
-    """Follow people in images of a rig, without a simulator, as level `pixels` does.
+    """A tracker of people in the images of a rig, without a simulator, as at level `pixels`.
 
     Args:
-        cameras: the rig: `CameraConfig`s, as `read_rig` returns them, of which the place, the image
+        cameras: the rig: `CameraConfig`s, as `read_rig` returns them, of which the pose, the image
             and the lens count; or cameras as of `make_cameras`.
-        n_workers: how many are followed at most.
-        dt_s: the usual time between two sets of frames [s].
-        estimator: as of an environment.
-        tracker, detector: settings; None: the defaults.
-        floor_world: (N, 3) points of the floor where people may be, some 0.25 m apart [m]; absence
-            is claimed once cameras see all of it empty. None: the views of several cameras.
+        n_workers: greatest number of people who are tracked.
+        dt_s: usual time between two sets of frames [s].
+        estimator: the estimator, as of an environment.
+        tracker: settings of the tracker; None: the defaults.
+        detector: settings of the detector; None: the defaults.
+        floor_world: (N, 3) points of the floor where people may be, some 0.25 m apart [m]; people
+            count as absent once cameras see all of it empty. None: the common views of cameras.
 
     Raises:
         ConfigError: an argument that cannot work.
@@ -139,7 +144,7 @@ class PoseTracker:
             TrackingSetup(rig, n_workers, seen, dt_s),
             make_estimator(estimator, projections(rig), dt_s, tracker),
             self._films,
-            Looking(1, rig, n_workers, settings, floor_world),
+            WorkerDetector(1, rig, n_workers, settings, floor_world),
         )
 
     def update(
@@ -149,15 +154,15 @@ class PoseTracker:
         rngs: Sequence[np.random.Generator] = (),
         robot_world: Capsules | None = None,
     ) -> PoseEstimate:
-        """Take the present images in and return the belief about the people in them.
+        """Take in the present images and return the belief about the people in them.
 
         Args:
-            source: the images of all cameras, (H, W, 3) RGB of uint8 each, or what gives windows of
-                them. Cameras whose images repeat bit for bit are stuck: they prove no absence.
+            source: (C,) images of the cameras, (H, W, 3) RGB of uint8 each, or a source of windows
+                of them. Cameras whose images repeat bit for bit are stuck: they prove no absence.
             dt_s: time since the last frames [s]; None: the usual.
-            rngs: one generator, for estimators that draw; none: one with seed 0.
-            robot_world: the robot's capsules (K, 2, 3) [m]: of more people than `n_workers` those
-                nearest to it are followed. None: those who were followed first.
+            rngs: one generator, for estimators that draw; empty: one with seed 0.
+            robot_world: (K, 2, 3) the robot's capsules [m]; of more people than `n_workers` those
+                nearest to it are tracked. None: those who were tracked first.
 
         Returns:
             Workers (1, W, J, ...) in the frame of the cameras' poses.
@@ -173,18 +178,18 @@ class PoseTracker:
         given: Any = source
         shown = given if hasattr(given, "crop") else Frames(setup.cameras, given)
         self._films.take(shown, robot_world)
-        return self._tracking.follow(_ALONE, dt_s, drawn, drawn)
+        return self._tracking.track(_ALONE, dt_s, drawn, drawn)
 
     @property
     def more_people(self) -> bool:
-        """Whether cameras detect more people than `n_workers`; all are then `unknown` as well."""
+        """Whether cameras detect more people than `n_workers`; all slots are then `unknown`."""
         return bool(self._tracking.vacancy(_ALONE).others.any[0])
 
     def forget(self) -> None:
-        """Forget everybody, as at the beginning."""
+        """Forget all people, as at the beginning."""
         rngs = [np.random.default_rng(0)]
         self._tracking.reset(_ALONE, rngs, rngs)
 
     def close(self) -> None:
-        """Stop the detector's thread."""
+        """Stop the detector's threads."""
         self._tracking.close()

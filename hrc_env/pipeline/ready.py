@@ -1,12 +1,13 @@
-"""Bring a machine to where a command can begin, the quickest first: weights, OpenGL, kernels.
+"""Preparation of a machine for a command: weights, OpenGL, kernels.
 
-Imports are inside the functions: `--help` loads neither simulator nor compiler.
+Imports are inside the functions, so that `--help` loads neither simulator nor compiler.
 """
 
 import os
 import shutil
 import subprocess
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from rich.console import Console
 
@@ -14,55 +15,80 @@ from hrc_env.core.errors import RenderingError
 from hrc_env.core.progress import progress_bar
 
 
+class OpenGL(NamedTuple):
+    """The state of OpenGL on a machine."""
+
+    is_ready: bool
+    """Whether a pixel can be drawn."""
+    message: str
+    """A sentence that describes the state."""
+
+
 def make_ready(console: Console, level: str, draws: bool = False, installs: bool = False) -> None:
     """Fetch and compile what a perception level needs and this machine lacks.
 
     Args:
-        console: where it is reported.
-        level: of perception.
-        draws: whether pictures are drawn at any level.
-        installs: whether OpenGL may be installed, as `find_opengl` does it.
+        console: console for messages.
+        level: perception level.
+        draws: whether pictures are drawn at every level.
+        installs: whether OpenGL may be installed (see `find_opengl`).
 
     Raises:
         WeightsError: weights are missing and cannot be fetched.
         RenderingError: there is no OpenGL.
     """
     if level == "pixels":
-        fetch_networks(console, says=False)
+        fetch_networks(console, is_verbose=False)
     if draws or level == "pixels":
-        ready, message = find_opengl(console, installs)
-        if not ready:
-            raise RenderingError(message)
+        opengl = find_opengl(console, installs)
+        if not opengl.is_ready:
+            raise RenderingError(opengl.message)
     compile_kernels(console, level)
 
 
-def fetch_networks(console: Console, names: Sequence[str] = (), says: bool = True) -> None:
-    """Fetch the weights of the default networks and of others that are missing."""
+def fetch_networks(console: Console, names: Sequence[str] = (), is_verbose: bool = True) -> None:
+    """Fetch the weights of the default networks and of others, if they are missing.
+
+    Args:
+        console: console for messages.
+        names: names of other weights.
+        is_verbose: whether success is reported.
+    """
     from hrc_env.perception import weights
 
     weights.fetch_weights([*weights.ALWAYS, *names])
-    if says:
+    if is_verbose:
         console.print(f"[green]ok[/] pose network: official weights in {weights.cache_dir()}")
 
 
-def find_opengl(console: Console, installs: bool = True) -> tuple[bool, str]:
-    """Return whether a pixel can be drawn, and a sentence; where there is no OpenGL, root
-    installs Debian's if `installs`."""
+def find_opengl(console: Console, installs: bool = True) -> OpenGL:
+    """Return whether pictures can be drawn.
+
+    Args:
+        console: console for messages.
+        installs: whether Debian's OpenGL is installed if there is none and the user is root.
+    """
     from hrc_env.scene import gl
 
-    ready, message = gl.gl_status()
-    others = os.environ.get("MUJOCO_GL", "").lower().strip() not in ("", "egl")
-    if ready or others or not (installs and _may_install()):
-        return ready, message
+    status = OpenGL(*gl.gl_status())
+    is_other = os.environ.get("MUJOCO_GL", "").lower().strip() not in ("", "egl")
+    if status.is_ready or is_other or not (installs and _may_install()):
+        return status
     console.print(f"Installing OpenGL: {gl.APT_LINE}")
     subprocess.run(["apt-get", "update", "-qq"], check=False)
     apt, install, *packages = gl.APT_LINE.removeprefix("sudo ").split()
     subprocess.run([apt, install, "-qq", "-y", *packages], check=False)
-    return gl.gl_status()
+    return OpenGL(*gl.gl_status())
 
 
-def compile_kernels(console: Console, level: str | None = None, says: bool = False) -> None:
-    """Compile the kernels of a perception level (None: any) that are missing, under a bar."""
+def compile_kernels(console: Console, level: str | None = None, is_verbose: bool = False) -> None:
+    """Compile missing kernels, with a progress bar.
+
+    Args:
+        console: console for messages.
+        level: perception level; None: all levels.
+        is_verbose: whether success is reported.
+    """
     from hrc_env.core.kernels import ahead
     from hrc_env.core.kernels.cache import folder
 
@@ -70,10 +96,10 @@ def compile_kernels(console: Console, level: str | None = None, says: bool = Fal
         console.print(f"Compiling {n_missing} kernels for this machine, once ...")
         with progress_bar(console, "kernels") as say:
             ahead.compile_missing(level, say)
-    if says:
+    if is_verbose:
         console.print(f"[green]ok[/] kernels: compiled, in {folder()}")
 
 
 def _may_install() -> bool:
-    """Root on a machine with apt-get (not on Windows, which has no users by number)."""
+    """Return whether the user is root on a machine with apt-get."""
     return shutil.which("apt-get") is not None and getattr(os, "geteuid", lambda: 1)() == 0

@@ -1,7 +1,7 @@
-"""The loop of following people with cameras: predict, look, update, judge presence."""
+"""The loop of tracking people with cameras: predict, detect, update, judge presence."""
 
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from hrc_env.core.vacancy import Coverage, Others, Vacancy, no_others
 from hrc_env.geometry.cameras import PinholeCamera, projections
 from hrc_env.perception.calibration import Calibration, read_calibration
 from hrc_env.perception.faults.schedule import Schedule
-from hrc_env.perception.lensed import pinhole_keypoints
+from hrc_env.perception.lenses import pinhole_keypoints
 from hrc_env.perception.noise import our_joints
 from hrc_env.pipeline.sensor_input import Generators, Sensor, Windows
 from hrc_env.scene.build import Scene
@@ -25,55 +25,82 @@ from hrc_env.tracking.calibration_monitor import forget_monitor, make_monitor, m
 from hrc_env.tracking.contradiction import find_unexplained
 from hrc_env.tracking.estimators import Estimator
 from hrc_env.tracking.frozen_frames import (
-    believed,
+    find_live_cameras,
     forget_frozen,
     leave_out_frozen,
     make_frozen,
 )
 from hrc_env.tracking.people.association import AssociationConfig, associate
-from hrc_env.tracking.presence import IMAGES, Looks, Presence
+from hrc_env.tracking.presence import IMAGES, ImageSearches, Presence
+
+
+class Detections(NamedTuple):
+    """The last detections of an environment, for pictures."""
+
+    keypoints: Keypoints | None
+    """(1, C, W, J, ...) keypoints by worker; None: there are no cameras."""
+    windows: Windows
+    """(W, C) windows in which they were found; empty: there are none."""
 
 
 class PerceptionPipeline(Stateful):
-    """One perception level with its estimator, for a batch; here, without cameras and memory."""
+    """A perception level with its estimator, for a batch; the base class has no cameras."""
 
     sensor: Sensor
-    """To be shown the scene (`Sensor.expose`) before `perceive`, which is not."""
+    """The sensor, which must be exposed to the scene (`Sensor.expose`) before `perceive`."""
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
-        """Forget environments `ids`; there is a generator for each environment of the batch."""
+        """Forget environments `ids`.
+
+        Args:
+            ids: indices of environments.
+            sensor_rngs: one generator for each environment of the batch.
+            tracker_rngs: one generator for each environment of the batch.
+        """
 
     def perceive(
         self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators
     ) -> PoseEstimate:
-        """What is believed of environments `ids` after what the sensor measures of them."""
+        """Return the belief about environments `ids` after the sensor's measurement.
+
+        Args:
+            ids: (B,) indices of environments.
+            sensor_rngs: one generator for each of `ids`.
+            tracker_rngs: one generator for each of `ids`.
+        """
         raise NotImplementedError
 
     def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
-        """What is expected in `horizon_s` of rows `ids`, of which `now` is believed."""
+        """Return the belief about a time ahead.
+
+        Args:
+            now: (B, W, ...) present belief about environments `ids`.
+            ids: (B,) indices of environments.
+            horizon_s: the time ahead [s].
+        """
         raise NotImplementedError
 
-    def last_detections(self, b: int) -> tuple[Keypoints | None, Windows]:
-        """What environment `b` saw last, and through which windows (for pictures)."""
-        return None, []
+    def last_detections(self, b: int) -> Detections:
+        """Return the last detections of environment `b`, for pictures."""
+        return Detections(None, [])
 
     @property
-    def given(self) -> Keypoints:
-        """The keypoints (B, C, W, J) that the estimator was given last; `ConfigError` without
-        cameras."""
+    def measurements(self) -> Keypoints:
+        """Last keypoints (B, C, W, J) that the estimator got; `ConfigError` without cameras."""
         raise ConfigError("Keypoints are of cameras, and this perception level has none.")
 
     @property
     def now_s(self) -> Floats:
-        """(B,) the present moment by the clock of `Keypoints.time_s` [s]; as `given`."""
+        """(B,) present time by the clock of `Keypoints.time_s` [s]; `ConfigError` without
+        cameras."""
         raise ConfigError("Frames are of cameras, and this perception level has none.")
 
     def crops(self, b: int) -> list[Image | None]:
-        """What the network was given of `b`'s first worker, one a camera (for pictures)."""
+        """Return the last crop (C,) of environment `b`'s first worker in each camera."""
         return []
 
     def look_of(self, b: int) -> Look | None:
-        """How environment `b` looks in its episode (for pictures); None: as it was built."""
+        """Return the appearance of environment `b` in its episode; None: as it was built."""
         return None
 
     def schedule_of(self, b: int) -> Schedule | None:
@@ -81,16 +108,15 @@ class PerceptionPipeline(Stateful):
         return None
 
     def light_of(self, b: int) -> float:
-        """Return the strength of the light in environment `b`'s episode; 1: as it was built."""
+        """Return the strength of the light in environment `b`'s episode; 1 is as it was built."""
         return 1.0
 
-    def suspected(self, ids: Ints) -> Bools:
-        """(B, C) which cameras of environments `ids` are thought to be miscalibrated."""
+    def suspected_cameras(self, ids: Ints) -> Bools:
+        """Return the cameras (B, C) of environments `ids` that may be miscalibrated."""
         return np.zeros((len(ids), 0), np.bool_)
 
     def vacancy(self, ids: Ints) -> Vacancy | None:
-        """Return the state of the floor of environments `ids`, by groups of the scene's `coverage`;
-        None without cameras."""
+        """Return the state of the floor of environments `ids`; None without cameras."""
         return None
 
     def close(self) -> None:
@@ -99,41 +125,47 @@ class PerceptionPipeline(Stateful):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackingSetup:
-    """Where people are followed, how many and how often."""
+    """The cameras, the people and the settings of a tracker."""
 
     cameras: tuple[PinholeCamera, ...]
     """The rig, as it is calibrated."""
     n_workers: int
-    """People who are followed at most."""
+    """Greatest number W of people who are tracked."""
     coverage: Coverage
-    """Which cameras would see a person on each piece of the floor."""
+    """Pieces of the floor, and the cameras that would see a person there."""
     dt_s: float
-    """The usual time between two updates [s]."""
+    """Usual time between two updates [s]."""
     association: AssociationConfig = field(default_factory=AssociationConfig)
+    """Settings of the association of poses to workers."""
     calibration: Calibration = field(default_factory=read_calibration)
-    """Where the network means joints to be."""
+    """Calibration of the network's joints."""
 
 
-def setup_in(scene: Scene, config: HRCConfig) -> TrackingSetup:
-    """Return how the workers of a scene are followed."""
-    calibration = config.emulator.calibrated()
-    followed = scene.cameras, scene.n_workers, coverage(scene)
-    return TrackingSetup(*followed, config.ctrl_dt, config.association, calibration)
+def make_setup(scene: Scene, config: HRCConfig) -> TrackingSetup:
+    """Return the setup for the workers of a scene."""
+    return TrackingSetup(
+        cameras=scene.cameras,
+        n_workers=scene.n_workers,
+        coverage=coverage(scene),
+        dt_s=config.ctrl_dt,
+        association=config.association,
+        calibration=config.emulator.make_calibration(),
+    )
 
 
 class PoseTracking(PerceptionPipeline):
-    """Follows people with cameras: predict, look where they should be, update, judge presence.
+    """A pipeline that tracks people with cameras: predict, detect, update, judge presence.
 
     Args:
         batch: number of environments.
-        setup: where people are followed.
+        setup: cameras, people and settings.
         tracker: the estimator.
-        sensor: in whose images keypoints are found.
+        sensor: the sensor.
     """
 
     CHANGES = ("state", "keypoints", "sensor", "steps", "frozen", "monitored", "presence")
-    LOOKS = IMAGES
-    """So many say that nobody is there (`looked`)."""
+    N_IMAGES = IMAGES
+    """Number of whole images without people that prove absence (see `searched_cameras`)."""
 
     def __init__(
         self, batch: int, setup: TrackingSetup, tracker: Estimator, sensor: Sensor
@@ -150,7 +182,7 @@ class PoseTracking(PerceptionPipeline):
         """(C, 3) principal point and focal length [px]."""
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
-        """Forget the tracks of environments `ids`, and what their cameras gave."""
+        """Forget the tracks and the images of environments `ids`."""
         self.tracker.reset(self.state, ids, tracker_rngs)
         forget_monitor(self.monitored, ids)
         forget_frozen(self.frozen, ids)
@@ -161,31 +193,32 @@ class PoseTracking(PerceptionPipeline):
     def perceive(
         self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators
     ) -> PoseEstimate:
-        """Take in the measurements after the usual time."""
-        return self.follow(ids, self.setup.dt_s, sensor_rngs, tracker_rngs)
+        """Return the belief about environments `ids` after the usual time; see `track`."""
+        return self.track(ids, self.setup.dt_s, sensor_rngs, tracker_rngs)
 
-    def follow(
+    def track(
         self, ids: Ints, dt_s: float, sensor_rngs: Generators, tracker_rngs: Generators
     ) -> PoseEstimate:
-        """Predict the workers, look at them where they should be, and update.
+        """Predict the workers, detect them, and update the estimator.
 
         Args:
-            ids: (B,) environments.
+            ids: (B,) indices of environments.
             dt_s: time since their last update [s].
-            sensor_rngs, tracker_rngs: (B,) a generator for each of `ids`.
+            sensor_rngs: one generator for each of `ids`.
+            tracker_rngs: one generator for each of `ids`.
 
         Returns:
-            What is believed of the workers (B, W, ...), and who is there or unknown.
+            Belief about the workers (B, W, ...), with the slots that are tracked or unknown.
         """
         whole = len(ids) == len(self.keypoints.px)
         state = self.state if whole else rows(self.state, ids)
         self.tracker.predict(state, dt_s, tracker_rngs)
-        expected = self.followed(ids, self.tracker.estimate(state))
+        expected = self.drop_given_up(ids, self.tracker.estimate(state))
         found = pinhole_keypoints(self.detect(ids, expected, sensor_rngs), self.setup.cameras)
         self.steps[ids] += 1
         if found.time_s is not None:
             leave_out_frozen(self.frozen, ids, found)
-        keypoints = self._sorted(found, expected)
+        keypoints = self._associate(found, expected)
         self.tracker.update(state, keypoints, tracker_rngs)
         if whole:
             self.keypoints = keypoints
@@ -195,36 +228,43 @@ class PoseTracking(PerceptionPipeline):
         estimate = self.tracker.estimate(state)
         age_s = self._age_s(ids, keypoints)
         monitor(self.monitored, ids, keypoints, age_s, estimate, self.P, self.axes)
-        whole_images = self.looked(ids, age_s) & believed(self.frozen, ids)
+        whole_images = self.searched_cameras(ids, age_s) & find_live_cameras(self.frozen, ids)
         shown = find_unexplained(keypoints, age_s, estimate, self.P, self.axes[:, 2])
-        shown.unexplained[:] |= whole_images & self.strangers(ids)
-        looks = Looks(whole_images, age_s, self.LOOKS, shown, self.others(ids))
+        shown.unexplained[:] |= whole_images & self.cameras_with_others(ids)
+        looks = ImageSearches(whole_images, age_s, self.N_IMAGES, shown, self.others(ids))
         ours, config = our_joints(estimate, self.setup.calibration), self.tracker.config
         return self.presence.update(ids, ours, found, keypoints, looks, dt_s, config)
 
-    def strangers(self, ids: Ints) -> Bools:
-        """Return (B, C) the cameras whose last search found people beside the workers; here the
-        keypoints hold all people."""
+    def cameras_with_others(self, ids: Ints) -> Bools:
+        """Return the cameras (B, C) whose last search found people besides the workers.
+
+        There are none where keypoints hold all people.
+        """
         return np.zeros((len(ids), len(self.setup.cameras)), np.bool_)
 
-    def followed(self, ids: Ints, expected: PoseEstimate) -> PoseEstimate:
-        """Return what is expected of the workers who are to be followed; here, of all."""
+    def drop_given_up(self, ids: Ints, expected: PoseEstimate) -> PoseEstimate:
+        """Return a prediction without the tracks that are given up; the base class keeps all."""
         return expected
 
     def others(self, ids: Ints) -> Others:
-        """Return the people beyond the slots; here, there are none."""
+        """Return the people beyond the slots; the base class knows none."""
         return no_others(len(ids))
 
     def vacancy(self, ids: Ints) -> Vacancy:
         """Return the state of the floor."""
         return self.presence.vacancy(ids)
 
-    def looked(self, ids: Ints, age_s: Floats) -> Bools:
-        """(B, C) which cameras have looked over whole images, of these ages [s]: here, all."""
+    def searched_cameras(self, ids: Ints, age_s: Floats) -> Bools:
+        """Return the cameras (B, C) whose whole images have been searched for people.
+
+        Args:
+            ids: (B,) indices of environments.
+            age_s: (B, C) ages of the images [s]; NaN: there is none.
+        """
         return np.isfinite(age_s)
 
     def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
-        """What the estimator expects."""
+        """Return the estimator's forecast, with the present belief about presence."""
         whole = len(ids) == len(self.keypoints.px)
         state = self.state if whole else rows(self.state, ids)
         later = our_joints(self.tracker.forecast(state, horizon_s), self.setup.calibration)
@@ -232,42 +272,47 @@ class PoseTracking(PerceptionPipeline):
         return replace(later, **kept)
 
     def detect(self, ids: Ints, expected: PoseEstimate, sensor_rngs: Generators) -> Keypoints:
-        """Keypoints of environments `ids` in pixels of the images, by the level's detector; whose
-        they are is open. `expected` is what the tracker predicts before the measurement."""
+        """Return the keypoints of people in pixels of the images, without identities.
+
+        Args:
+            ids: (B,) indices of environments.
+            expected: (B, W, ...) the tracker's prediction.
+            sensor_rngs: one generator for each of `ids`.
+        """
         raise NotImplementedError
 
-    def _sorted(self, keypoints: Keypoints, expected: PoseEstimate) -> Keypoints:
-        """Keypoints by worker; where there is one worker, whatever was found is theirs."""
+    def _associate(self, keypoints: Keypoints, expected: PoseEstimate) -> Keypoints:
+        """Return keypoints by worker; a single worker gets all of them."""
         if self.setup.n_workers < 2:
             return keypoints
         return associate(self.P, keypoints, expected, self.setup.association).keypoints
 
-    def suspected(self, ids: Ints) -> Bools:
-        """(B, C) which cameras of environments `ids` are thought to be miscalibrated."""
+    def suspected_cameras(self, ids: Ints) -> Bools:
+        """Return the cameras (B, C) of environments `ids` that may be miscalibrated."""
         return self.monitored["suspected"][ids] | self.presence.contradicted(ids)
 
     def _age_s(self, ids: Ints, keypoints: Keypoints) -> Floats:
-        """(B, C) how old the images of this update are, as they say [s]; NaN: none."""
+        """Return the ages (B, C) of the images by their own times [s]; NaN: there is none."""
         if keypoints.time_s is None:
             return np.zeros(keypoints.px.shape[:2])
         return self.steps[ids, None] * self.setup.dt_s - keypoints.time_s
 
     @property
-    def given(self) -> Keypoints:
-        """The keypoints (B, C, W, J) that the estimator was given last."""
+    def measurements(self) -> Keypoints:
+        """Last keypoints (B, C, W, J) that the estimator got."""
         return self.keypoints
 
     @property
     def now_s(self) -> Floats:
-        """(B,) the present moment by the clock of `Keypoints.time_s` [s]."""
+        """(B,) present time by the clock of `Keypoints.time_s` [s]."""
         return self.steps * self.setup.dt_s
 
-    def last_detections(self, b: int) -> tuple[Keypoints | None, Windows]:
-        """The keypoints of environment `b`."""
-        return rows(self.keypoints, np.array([b])), []
+    def last_detections(self, b: int) -> Detections:
+        """Return the last keypoints of environment `b`."""
+        return Detections(rows(self.keypoints, np.array([b])), [])
 
 
 def no_keypoints(batch: int, n_cameras: int, n_workers: int) -> Keypoints:
-    """Nobody is seen by any camera."""
+    """Return keypoints of which no camera has any."""
     shape = (batch, n_cameras, n_workers, N_JOINTS)
     return Keypoints(np.full((*shape, 2), np.nan), np.zeros(shape), np.full(shape, np.inf))

@@ -13,10 +13,10 @@ from hrc_env.core.records import Keypoints, PoseEstimate, Roi, WorkerMotion
 from hrc_env.core.typing import Floats, Image, Points3
 from hrc_env.env_config import PICTURE_SIZE
 from hrc_env.geometry.camera_config import CameraConfig
-from hrc_env.geometry.cameras import PinholeCamera, image_from_pinhole, pinhole, resized
+from hrc_env.geometry.cameras import PinholeCamera, image_from_pinhole, pinhole, resize
 from hrc_env.geometry.chains import capsules
 from hrc_env.motion import generator
-from hrc_env.perception.lensed import Lensed
+from hrc_env.perception.lenses import LensRenderer
 from hrc_env.render import overlay
 from hrc_env.render.marks import (
     CAPSULES_HIDDEN,
@@ -267,7 +267,7 @@ class Views:
         """Return the camera of a picture of this size."""
         if isinstance(chosen, str):
             return viewpoint_camera(chosen, width, height)
-        return resized(chosen, width, height)
+        return resize(chosen, width, height)
 
     def _marked(self, camera: PinholeCamera, seen: Glance, markers: bool) -> Image:
         """Return a camera's picture, in the light of the sun, with marks and capsules."""
@@ -285,9 +285,9 @@ class Views:
     ) -> list[Image]:
         """Return the cameras' pictures, without shadows."""
         if all(camera.lens is None for camera in cameras):
-            return self._drawn([resized(camera, width, height) for camera in cameras], seen)
+            return self._drawn([resize(camera, width, height) for camera in cameras], seen)
         size = (SMOOTHING * width, SMOOTHING * width)
-        images = Lensed(self._renderer("square", size, seen), cameras)
+        images = LensRenderer(self._renderer("square", size, seen), cameras)
         views = []
         for camera in cameras:
             middle_px = camera.width_px / 2, camera.height_px / 2

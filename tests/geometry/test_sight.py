@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.geometry.shapes import BOX, CAPSULE, CYLINDER, PLANE, WIDTH, absent, shape
-from hrc_env.geometry.sight import Surroundings, hidden, nothing
+from hrc_env.geometry.shapes import BOX, CAPSULE, CYLINDER, PLANE, WIDTH, absent_shape, shape
+from hrc_env.geometry.sight import Surroundings, find_hidden, no_surroundings
 
 UPRIGHT = np.eye(3)
 EMPTY = (np.zeros((1, 0, WIDTH)), np.zeros((1, 0, 2, 3)), np.zeros(0))
@@ -28,7 +28,7 @@ def room(*rows):
 
 
 def sees(solid, point, eye=EYE):
-    return not hidden(room(SOLIDS[solid]), eye, np.array([[point]], float))[0, 0, 0]
+    return not find_hidden(room(SOLIDS[solid]), eye, np.array([[point]], float))[0, 0, 0]
 
 
 @pytest.mark.parametrize("solid", SOLIDS)
@@ -58,8 +58,8 @@ def test_a_plane_is_seen_through_from_behind():
 
 def test_a_free_line_of_sight_is_free():
     points = np.random.default_rng(0).uniform(-2, 2, (2, 15, 3))
-    assert not hidden(nothing(2), np.zeros((4, 3)), points).any()
-    assert hidden(nothing(2), np.zeros((4, 3)), points[:, :0]).shape == (2, 4, 0)
+    assert not find_hidden(no_surroundings(2), np.zeros((4, 3)), points).any()
+    assert find_hidden(no_surroundings(2), np.zeros((4, 3)), points[:, :0]).shape == (2, 4, 0)
 
 
 @settings(max_examples=50, deadline=None)
@@ -76,25 +76,25 @@ def test_points_are_hidden_or_not_whatever_else_is_looked_at(seed):
     )
     eyes = rng.uniform(-3, 3, (3, 3))
     points = rng.uniform(-2, 2, 3) + rng.uniform(-0.8, 0.8, (1, 15, 3))
-    alone = [hidden(around, eyes, points[:, j : j + 1]) for j in range(15)]
-    np.testing.assert_array_equal(hidden(around, eyes, points), np.concatenate(alone, -1))
+    alone = [find_hidden(around, eyes, points[:, j : j + 1]) for j in range(15)]
+    np.testing.assert_array_equal(find_hidden(around, eyes, points), np.concatenate(alone, -1))
 
 
 def test_points_of_another_number_of_environments_are_refused():
     with pytest.raises(ConfigError, match="points_world must have shape"):
-        hidden(nothing(2), EYE, np.zeros((3, 15, 3)))
+        find_hidden(no_surroundings(2), EYE, np.zeros((3, 15, 3)))
 
 
 @pytest.mark.parametrize("solid", SOLIDS)
 def test_what_is_carried_hides_as_what_stands(solid):
     carried = Surroundings(np.zeros((0, WIDTH)), SOLIDS[solid][None, None], *EMPTY[1:])
     points = np.random.default_rng(2).uniform((-4, -1, 0), (-0.5, 1, 2), (1, 40, 3))
-    behind = hidden(room(SOLIDS[solid]), EYE, points)
+    behind = find_hidden(room(SOLIDS[solid]), EYE, points)
     assert 0 < behind.sum() < behind.size
-    np.testing.assert_array_equal(hidden(carried, EYE, points), behind)
+    np.testing.assert_array_equal(find_hidden(carried, EYE, points), behind)
 
 
 def test_a_shape_that_is_absent_hides_nothing():
-    gone = Surroundings(absent()[None], absent()[None, None], *EMPTY[1:])
+    gone = Surroundings(absent_shape()[None], absent_shape()[None, None], *EMPTY[1:])
     points = np.random.default_rng(3).uniform(-3, 3, (1, 60, 3))
-    assert not hidden(gone, EYE, points).any()
+    assert not find_hidden(gone, EYE, points).any()

@@ -4,8 +4,8 @@ import numpy as np
 
 from hrc_env.core.records import Roi
 from hrc_env.geometry.cameras import pinhole, project, projections
-from hrc_env.perception.believing import is_body, stands
-from hrc_env.perception.searching import agreed_windows, apart_from, proposals
+from hrc_env.perception.plausibility import has_body, is_standing
+from hrc_env.perception.searching import agreed_windows, exclude_people, propose_people
 from hrc_env.tracking.tree.state import STANDING_M
 
 CAMERAS = tuple(
@@ -52,7 +52,7 @@ def test_of_two_people_all_cameras_choose_the_same():
 def test_somebody_already_followed_is_not_found_again():
     both = seen(ANNA, BEN)
     anna, ben = ([found[k] for found in both] for k in (0, 1))
-    assert agreed_windows(apart_from(both, [anna]), CAMERAS) == ben
+    assert agreed_windows(exclude_people(both, [anna]), CAMERAS) == ben
 
 
 def test_a_camera_that_is_alone_is_believed_and_one_of_several_is_not():
@@ -81,7 +81,7 @@ def test_an_empty_room_has_nobody():
 def test_whom_several_cameras_agree_on_comes_before_whom_only_one_has_found():
     candidates = [list(found) for found in seen(ANNA)]
     candidates[2] = [Roi((100.0, 200.0), 400.0, 0.0)]
-    together, *alone = proposals(candidates, CAMERAS)
+    together, *alone = propose_people(candidates, CAMERAS)
     assert [window is not None for window in together] == [True, True, False, True]
     assert alone == [[None, None, candidates[2][0], None]]
 
@@ -99,13 +99,13 @@ def keypoints(joints_world, n_cameras=4):
 
 def test_a_person_is_a_body_and_what_has_other_bones_is_not():
     rng = np.random.default_rng(0)
-    assert is_body(*keypoints(UPRIGHT), CAMERAS)
-    assert is_body(*keypoints(UPRIGHT, 2), CAMERAS)
-    assert not is_body(*keypoints(UPRIGHT, 1), CAMERAS)
+    assert has_body(*keypoints(UPRIGHT), CAMERAS)
+    assert has_body(*keypoints(UPRIGHT, 2), CAMERAS)
+    assert not has_body(*keypoints(UPRIGHT, 1), CAMERAS)
     shrunk = ANNA + 0.5 * (UPRIGHT - ANNA)
     scattered = ANNA + rng.uniform(-0.6, 0.6, UPRIGHT.shape)
     for nobody in (shrunk, scattered):
-        assert not is_body(*keypoints(nobody), CAMERAS)
+        assert not has_body(*keypoints(nobody), CAMERAS)
 
 
 def test_one_camera_is_believed_of_who_stands_on_the_floor():
@@ -113,9 +113,9 @@ def test_one_camera_is_believed_of_who_stands_on_the_floor():
     half, above = UPRIGHT * [1, 1, 0.5], UPRIGHT + np.array([0, 0, 1.0])
     px = {name: keypoints(body)[0][0] for name, body in
           (("upright", UPRIGHT), ("half", half), ("above", above))}  # fmt: skip
-    assert stands(px["upright"], sure, CAMERAS[0], floor_world)
-    assert not stands(px["half"], sure, CAMERAS[0], floor_world)
-    assert not stands(px["above"], sure, CAMERAS[0], floor_world)
-    assert not stands(px["upright"], sure, CAMERAS[0], floor_world + np.array([2.0, 0, 0]))
-    assert not stands(px["upright"], 0.5 * sure, CAMERAS[0], floor_world)
-    assert not stands(px["upright"] * np.nan, sure, CAMERAS[0], floor_world)
+    assert is_standing(px["upright"], sure, CAMERAS[0], floor_world)
+    assert not is_standing(px["half"], sure, CAMERAS[0], floor_world)
+    assert not is_standing(px["above"], sure, CAMERAS[0], floor_world)
+    assert not is_standing(px["upright"], sure, CAMERAS[0], floor_world + np.array([2.0, 0, 0]))
+    assert not is_standing(px["upright"], 0.5 * sure, CAMERAS[0], floor_world)
+    assert not is_standing(px["upright"] * np.nan, sure, CAMERAS[0], floor_world)

@@ -5,7 +5,7 @@ import pytest
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCEnv
-from hrc_env.perception.dimness import quality_of
+from hrc_env.perception.dimness import picture_quality
 from hrc_env.perception.faults.fault import FaultConfig
 
 DARK = FaultConfig("darkness", ("all",), 0.02)
@@ -26,15 +26,15 @@ def looked(n_steps=3, **kwargs):
 
 def test_usual_light_is_as_it_was_built():
     for light in (1.0, 0.6, 1.4):
-        quality = quality_of(light)
+        quality = picture_quality(light)
         assert (quality.doubt, quality.missed, quality.blank) == (1.0, 0.0, False)
 
 
 def test_less_light_and_more_noise_are_worse_in_every_way():
     for row in (
-        [quality_of(light) for light in np.arange(0.5, 0.04, -0.01)],
-        [quality_of(1.0, [share]) for share in np.geomspace(0.2, 0.001, 30)],
-        [quality_of(light, [0.1]) for light in np.arange(1.0, 0.04, -0.02)],
+        [picture_quality(light) for light in np.arange(0.5, 0.04, -0.01)],
+        [picture_quality(1.0, [share]) for share in np.geomspace(0.2, 0.001, 30)],
+        [picture_quality(light, [0.1]) for light in np.arange(1.0, 0.04, -0.02)],
     ):
         for parts in zip(*row, strict=True):
             assert (np.diff(np.array(parts, float)) >= -0.01).all()
@@ -49,7 +49,7 @@ def test_light_at_keypoints_changes_what_light_changes_and_nothing_else():
     for one, other in zip(plain, usual, strict=True):
         np.testing.assert_array_equal(one.px, other.px)
         np.testing.assert_array_equal(one.sigma_px, other.sigma_px)
-    factor = float(quality_of(0.15).doubt)
+    factor = float(picture_quality(0.15).doubt)
     seen = plain[0].confidence > 0
     np.testing.assert_allclose(dark[0].sigma_px[seen], factor * plain[0].sigma_px[seen])
 
@@ -57,7 +57,7 @@ def test_light_at_keypoints_changes_what_light_changes_and_nothing_else():
 def test_errors_and_what_is_told_of_them_grow_alike_in_the_dark():
     plain, _ = looked(1)
     dark, _ = looked(1, faults=[DARK])
-    factor = float(quality_of(1.0, [0.02]).doubt)
+    factor = float(picture_quality(1.0, [0.02]).doubt)
     both = (plain[0].confidence > 0) & (dark[0].confidence > 0)
     assert factor > 1.2
     np.testing.assert_allclose(dark[0].sigma_px[both], factor * plain[0].sigma_px[both])

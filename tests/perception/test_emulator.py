@@ -14,7 +14,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import PoseEstimate
 from hrc_env.core.skeleton import JOINT, MIRROR, N_JOINTS
 from hrc_env.geometry.cameras import pinhole, project, projections
-from hrc_env.geometry.sight import Surroundings, nothing
+from hrc_env.geometry.sight import Surroundings, no_surroundings
 from hrc_env.perception.calibration import KINDS, SHAPES, read_calibration
 from hrc_env.perception.emulator import (
     EmulatorConfig,
@@ -54,7 +54,10 @@ def before(cameras, points, radius_m):
     centres = points[:, None] - 0.3 * ray / np.linalg.norm(ray, axis=-1, keepdims=True)
     balls = np.repeat(centres.reshape(len(points), -1, 1, 3), 2, axis=2)
     return Surroundings(
-        nothing(1).still, nothing(len(balls)).moving, balls, np.full(balls.shape[1], radius_m)
+        no_surroundings(1).still,
+        no_surroundings(len(balls)).moving,
+        balls,
+        np.full(balls.shape[1], radius_m),
     )
 
 
@@ -78,7 +81,7 @@ def test_without_errors_keypoints_are_the_projected_truth():
     state, rngs = start(2, EXACT)
     true = truth(2)
     px, _ = project(projections(CAMERAS), true.joints_world)
-    seen = emulate(state, rngs, true, nothing(2), CAMERAS, EXACT)
+    seen = emulate(state, rngs, true, no_surroundings(2), CAMERAS, EXACT)
     np.testing.assert_allclose(seen.px, px, atol=1e-9)
 
 
@@ -140,7 +143,7 @@ def test_who_moves_gets_new_errors_sooner(tmp_path):
     true.velocity_world[...] = (1.0, 0.0, 0.0)  # and yet stays: only what the errors hear of it
     px, _ = project(projections(FRONT), true.joints_world)
     for _ in range(200):
-        errors.append(emulate(state, rngs, true, nothing(16), FRONT, config).px - px)
+        errors.append(emulate(state, rngs, true, no_surroundings(16), FRONT, config).px - px)
     errors, lag = np.array(errors), 5
     correlation = (errors[lag:] * errors[:-lag]).mean() / (errors**2).mean()
     assert correlation == pytest.approx(np.exp(-lag * DT * (1 / 5.0 + 1 / 0.2)), abs=0.05)
@@ -155,7 +158,7 @@ def test_offsets_in_space_are_the_same_in_every_camera(tmp_path):
     raised = true.joints_world.copy()
     raised[..., [JOINT["left_hip"], JOINT["right_hip"]], 2] += 0.03
     px, _ = project(projections(CAMERAS), raised)
-    seen = emulate(state, rngs, true, nothing(1), CAMERAS, config)
+    seen = emulate(state, rngs, true, no_surroundings(1), CAMERAS, config)
     np.testing.assert_allclose(seen.px, px, atol=0.05)
 
 
@@ -196,7 +199,7 @@ def test_who_walks_errs_as_the_file_says_of_who_walks(tmp_path):
         true = truth(200)
         true.velocity_world[...] = (speed_m_s, 0.0, 0.0)
         px, _ = project(projections(FRONT), true.joints_world)
-        errors = emulate(state, rngs, true, nothing(200), FRONT, config).px - px
+        errors = emulate(state, rngs, true, no_surroundings(200), FRONT, config).px - px
         spread.append(np.std(errors))
     np.testing.assert_allclose(np.array(spread) / spread[0], [1.0, math.sqrt(3.0), 3.0], rtol=0.1)
 
@@ -215,7 +218,7 @@ def test_what_it_reports_as_sigma_is_about_what_it_errs():
     px, _ = project(projections(FRONT), true.joints_world)
     whitened = []
     for _ in range(50):
-        seen = emulate(state, rngs, true, nothing(64), FRONT, STEADY)
+        seen = emulate(state, rngs, true, no_surroundings(64), FRONT, STEADY)
         whitened.append((seen.px - px) / seen.sigma_px[..., None])
     assert 0.3 < np.std(whitened) < 1.2  # with room for errors that last and that cameras share
 
@@ -248,7 +251,7 @@ def test_sigma_is_what_the_detector_says_of_whom_the_tracker_expects(bent):
     joints[..., 5:7, 2] += 0.6 * bent
     expected = believed(joints, velocity=0.0 if bent else 0.5)
     state, rngs = start(1, STEADY)
-    seen = emulate(state, rngs, truth(), nothing(1), CAMERAS, STEADY, expected)
+    seen = emulate(state, rngs, truth(), no_surroundings(1), CAMERAS, STEADY, expected)
     told = as_the_detector_says(seen, expected, CAMERAS)
     np.testing.assert_allclose(seen.sigma_px[0, :, 0], told, rtol=1e-6)
 
@@ -260,7 +263,9 @@ def test_whose_track_it_is_decides_and_not_its_number():
     for order in ([0, 1], [1, 0]):
         state, rngs = start(1, STEADY, n_workers=2)
         expected = believed(joints[:, order])
-        seen = emulate(state, rngs, truth(n_workers=2), nothing(1), CAMERAS, STEADY, expected)
+        seen = emulate(
+            state, rngs, truth(n_workers=2), no_surroundings(1), CAMERAS, STEADY, expected
+        )
         told.append(seen.sigma_px)
     np.testing.assert_array_equal(told[0], told[1])
 
@@ -275,11 +280,11 @@ def test_who_is_not_followed_is_told_of_as_a_search_does():
         believed(truth().joints_world + 1.0),
     ):
         state, rngs = start(1, EXACT)
-        seen = emulate(state, rngs, true, nothing(1), CAMERAS, EXACT, expected)
+        seen = emulate(state, rngs, true, no_surroundings(1), CAMERAS, EXACT, expected)
         told.append(seen.sigma_px)
     np.testing.assert_array_equal(told[0], told[1])
     np.testing.assert_array_equal(told[0], told[2])
-    side_px = lines_of_sight(true, nothing(1), CAMERAS)[1][0, :, 0, SIDE]
+    side_px = lines_of_sight(true, no_surroundings(1), CAMERAS)[1][0, :, 0, SIDE]
     for c, side in enumerate(side_px):
         known = sigma_px(seen.confidence[0, c, 0], STATURE_OF_SIDE * side)
         np.testing.assert_allclose(told[0][0, c, 0], known)
@@ -288,7 +293,9 @@ def test_who_is_not_followed_is_told_of_as_a_search_does():
 def test_a_blocked_camera_is_nan_without_confidence_and_with_infinite_sigma():
     state, rngs = start(1, STEADY)
     around = CAMERAS[2].eye_world + np.zeros((1, 1, 2, 3))
-    lid = Surroundings(nothing(1).still, nothing(len(around)).moving, around, np.array([0.1]))
+    lid = Surroundings(
+        no_surroundings(1).still, no_surroundings(len(around)).moving, around, np.array([0.1])
+    )
     seen = emulate(state, rngs, truth(), lid, CAMERAS, STEADY)
     assert np.isnan(seen.px[0, 2]).all()
     assert np.all(seen.confidence[0, 2] == 0)
@@ -298,13 +305,13 @@ def test_a_blocked_camera_is_nan_without_confidence_and_with_infinite_sigma():
 
 def test_a_worker_behind_a_camera_is_not_seen():
     state, rngs = start(1, STEADY, FRONT)
-    seen = emulate(state, rngs, truth(at=(8.0, 0, 0)), nothing(1), FRONT, STEADY)
+    seen = emulate(state, rngs, truth(at=(8.0, 0, 0)), no_surroundings(1), FRONT, STEADY)
     assert np.isnan(seen.px).all()
 
 
 def test_joints_outside_the_image_are_guesses_with_a_large_sigma():
     state, rngs = start(1, EXACT, FRONT)
-    seen = emulate(state, rngs, truth(at=(3.1, 0, 0)), nothing(1), FRONT, EXACT)
+    seen = emulate(state, rngs, truth(at=(3.1, 0, 0)), no_surroundings(1), FRONT, EXACT)
     v = seen.px[0, 0, 0, :, 1]
     outside = (v < 0) | (v >= 1080)
     assert outside.any()
@@ -317,7 +324,7 @@ def test_a_worker_in_front_hides_the_one_behind():
     true = truth(n_workers=2)
     true.joints_world[0, 1] += [-1.0, -1.0, 0.0]
     true.capsules_world[0, 1] += [-1.0, -1.0, 0.0]  # now behind the first, seen from x
-    sight, _ = lines_of_sight(true, nothing(1), FRONT)
+    sight, _ = lines_of_sight(true, no_surroundings(1), FRONT)
     hip = JOINT["left_hip"]
     assert sight[0, 0, 0, hip] == SEEN
     assert sight[0, 0, 1, hip] == HIDDEN
@@ -328,7 +335,7 @@ def test_a_swap_exchanges_left_and_right():
     state, rngs = start(1, config)
     true = truth()
     px, _ = project(projections(CAMERAS), true.joints_world)
-    seen = emulate(state, rngs, true, nothing(1), CAMERAS, config)
+    seen = emulate(state, rngs, true, no_surroundings(1), CAMERAS, config)
     np.testing.assert_allclose(seen.px, px[..., MIRROR, :], atol=1e-9)
 
 
@@ -341,7 +348,7 @@ def test_swaps_and_misses_take_their_share_of_the_time_and_last(tmp_path):
     true, swapped, missed = truth(64), [], []
     px, _ = project(projections(CAMERAS), true.joints_world)
     for _ in range(300):
-        seen = emulate(state, rngs, true, nothing(64), CAMERAS, config).px
+        seen = emulate(state, rngs, true, no_surroundings(64), CAMERAS, config).px
         swapped.append((np.abs(seen - px[..., MIRROR, :]) < 1e-6).all((-1, -2)))
         missed.append(np.isnan(seen[..., 0]).all(-1))
     looked = ~np.array(missed)
@@ -358,18 +365,18 @@ def test_an_environment_sees_the_same_in_any_company(batch):
     """Environment 0 of a batch is the batch of one, bit for bit."""
     alone, crowd = start(1, CONFIG), start(batch, CONFIG)
     for _ in range(20):
-        one = emulate(*alone, truth(1), nothing(1), CAMERAS, CONFIG)
-        many = emulate(*crowd, truth(batch), nothing(batch), CAMERAS, CONFIG)
+        one = emulate(*alone, truth(1), no_surroundings(1), CAMERAS, CONFIG)
+        many = emulate(*crowd, truth(batch), no_surroundings(batch), CAMERAS, CONFIG)
         np.testing.assert_array_equal(one.px[0], many.px[0])
         np.testing.assert_array_equal(one.sigma_px[0], many.sigma_px[0])
 
 
 def test_a_copied_state_replays_the_same_errors():
     state, rngs = start(2, CONFIG)
-    emulate(state, rngs, truth(2), nothing(2), CAMERAS, CONFIG)
+    emulate(state, rngs, truth(2), no_surroundings(2), CAMERAS, CONFIG)
     saved = copy.deepcopy((state, rngs))
-    first = emulate(state, rngs, truth(2), nothing(2), CAMERAS, CONFIG)
-    again = emulate(*saved, truth(2), nothing(2), CAMERAS, CONFIG)
+    first = emulate(state, rngs, truth(2), no_surroundings(2), CAMERAS, CONFIG)
+    again = emulate(*saved, truth(2), no_surroundings(2), CAMERAS, CONFIG)
     np.testing.assert_array_equal(first.px, again.px)
 
 
@@ -383,7 +390,7 @@ def test_a_reset_touches_only_its_own_environments():
 
 def test_a_room_without_workers_has_no_keypoints():
     state, rngs = start(2, CONFIG, n_workers=0)
-    seen = emulate(state, rngs, truth(2, 0), nothing(2), CAMERAS, CONFIG)
+    seen = emulate(state, rngs, truth(2, 0), no_surroundings(2), CAMERAS, CONFIG)
     assert seen.px.shape == (2, 4, 0, N_JOINTS, 2)
 
 
@@ -394,4 +401,4 @@ def test_settings_and_shapes_that_cannot_work_are_explained():
         EmulatorConfig(error_scale=-1.0)
     state, rngs = start(1, CONFIG)
     with pytest.raises(ConfigError, match="capsules_world must have shape"):
-        emulate(state, rngs, truth(), nothing(2), CAMERAS, CONFIG)
+        emulate(state, rngs, truth(), no_surroundings(2), CAMERAS, CONFIG)

@@ -15,7 +15,7 @@ from hrc_env.perception.exposure import (
     develop,
     has_edges,
     is_blank,
-    noise_of,
+    measure_noise,
 )
 from hrc_env.scene.build import build
 from hrc_env.scene.domain_randomization import AppearanceConfig, draw_look
@@ -107,7 +107,7 @@ def test_pictures_in_which_noise_hides_people_show_nothing(pictures, share, nois
     for crop in pictures.values():
         dull = darker(crop, share, noise, base=40.0)
         assert not is_blank(dull)
-        assert develop(dull).shows == shows
+        assert develop(dull).is_usable == shows
 
 
 def test_dull_pictures_without_noise_stay_sharp():
@@ -124,7 +124,7 @@ def test_noise_stays_small_beside_what_pictures_span(pictures, noise):
     for crop in pictures.values():
         picture = develop(darker(crop, 0.14, noise, base=40.0)).picture
         assert span(picture) > 0.4 * SPAN
-        assert noise_of(cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)) < 0.12 * SPAN
+        assert measure_noise(cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)) < 0.12 * SPAN
 
 
 X, Y = np.meshgrid(np.arange(256.0), np.arange(256.0))

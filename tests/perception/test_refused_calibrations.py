@@ -10,10 +10,10 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Roi
 from hrc_env.perception import vino
 from hrc_env.perception.calibration import FORMAT, PACKAGED, SHAPES, VERSION, read_calibration
-from hrc_env.perception.detector import own_joints
+from hrc_env.perception.detector import call_detector
 from hrc_env.perception.emulator import EmulatorConfig, make_state
 from hrc_env.perception.faults.fault import ALL, KINDS, FaultConfig, check_cameras
-from hrc_env.perception.network import RUNTIMES, chosen_runtime
+from hrc_env.perception.network import RUNTIMES, resolve_runtime
 from hrc_env.perception.weights import find_weights
 
 CONTENT = json.loads(PACKAGED.read_text())
@@ -160,33 +160,33 @@ def test_confidences_are_shares(joint, confidence, taken):
     found[joint, 2] = confidence
     crop, window = np.zeros((256, 256, 3), np.uint8), Roi((9.0, 9.0), 9.0, 0.0)
     if taken:
-        assert own_joints(lambda crop: found, crop, window)[joint, 2] == confidence
+        assert call_detector(lambda crop: found, crop, window)[joint, 2] == confidence
         return
     with pytest.raises(ConfigError, match=r"confidences must be in \[0, 1\]"):
-        own_joints(lambda crop: found, crop, window)
+        call_detector(lambda crop: found, crop, window)
 
 
 @pytest.mark.parametrize("shape", [(15, 2), (14, 3), (1, 15, 3)])
 def test_findings_of_another_shape_are_refused(shape):
     crop, window = np.zeros((256, 256, 3), np.uint8), Roi((9.0, 9.0), 9.0, 0.0)
     with pytest.raises(ConfigError, match=r"keypoints must have shape \(15, 3\)"):
-        own_joints(lambda crop: np.full(shape, 0.5), crop, window)
+        call_detector(lambda crop: np.full(shape, 0.5), crop, window)
 
 
 def test_nobody_found_is_no_mistake():
     crop, window = np.zeros((256, 256, 3), np.uint8), Roi((9.0, 9.0), 9.0, 0.0)
-    assert own_joints(lambda crop: None, crop, window) is None
+    assert call_detector(lambda crop: None, crop, window) is None
 
 
 def test_openvino_is_wanted_where_it_is_chosen_only(monkeypatch):
-    monkeypatch.setattr(vino, "installed", lambda: False)
-    assert chosen_runtime("auto") == chosen_runtime("litert") == "litert"
+    monkeypatch.setattr(vino, "is_installed", lambda: False)
+    assert resolve_runtime("auto") == resolve_runtime("litert") == "litert"
     with pytest.raises(ConfigError, match="needs OpenVINO, which is not installed"):
-        chosen_runtime("openvino")
-    monkeypatch.setattr(vino, "installed", lambda: True)
-    assert chosen_runtime("openvino") == "openvino"
+        resolve_runtime("openvino")
+    monkeypatch.setattr(vino, "is_installed", lambda: True)
+    assert resolve_runtime("openvino") == "openvino"
     with pytest.raises(ConfigError, match="Unknown runtime"):
-        chosen_runtime("tensorrt")
+        resolve_runtime("tensorrt")
     assert set(RUNTIMES) == {"auto", "litert", "openvino"}
 
 

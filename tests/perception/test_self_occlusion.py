@@ -9,7 +9,7 @@ from people import STANDING
 from hrc_env.core.skeleton import JOINT, SEGMENT_RADIUS_M
 from hrc_env.geometry.distances import segments
 from hrc_env.geometry.shapes import CENTRE, WIDTH, set_capsules
-from hrc_env.geometry.sight import body_blocks, line
+from hrc_env.geometry.sight import is_behind_body, line_to
 
 POST = np.array([[[0.0, 0, 0], [0, 0, 2.0]]])
 
@@ -18,9 +18,9 @@ def hidden(eye, joint, capsules=POST, radius=(0.1,)):
     table = np.empty((len(radius), WIDTH))
     set_capsules(table, 0, capsules, np.asarray(radius, float))
     eye, joints = np.asarray(eye, float), np.asarray(joint, float)[None]
-    d, length = line(eye, joints, 0)
+    d, length = line_to(eye, joints, 0)
     p = eye - table[:, CENTRE : CENTRE + 3]
-    return any(body_blocks(table, k, tuple(row), d, length) for k, row in enumerate(p))
+    return any(is_behind_body(table, k, tuple(row), d, length) for k, row in enumerate(p))
 
 
 @pytest.mark.parametrize(

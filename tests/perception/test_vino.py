@@ -12,11 +12,11 @@ from hrc_env.geometry.cameras import pinhole
 from hrc_env.perception import vino
 from hrc_env.perception.blazepose import crop_window, decode_landmarks, landmark_input
 from hrc_env.perception.detector import DetectorConfig, PoseDetector
-from hrc_env.perception.network import LANDMARK_OUTPUTS, chosen_runtime, load_landmarker
+from hrc_env.perception.network import LANDMARK_OUTPUTS, load_landmarker, resolve_runtime
 
 MIDDLE = Roi((118.0, 138.0), 220.0, 0.1)
 needs_openvino = pytest.mark.skipif(
-    not vino.installed(), reason=f"OpenVINO, an extra, is not installed: {vino.INSTALL}"
+    not vino.is_installed(), reason=f"OpenVINO, an extra, is not installed: {vino.INSTALL}"
 )
 
 
@@ -83,7 +83,7 @@ def test_where_openvino_is_missing_auto_is_litert_and_an_order_names_the_remedy(
     weights, monkeypatch
 ):
     monkeypatch.setattr(vino.importlib.util, "find_spec", lambda _: None)
-    assert chosen_runtime("auto") == "litert"
+    assert resolve_runtime("auto") == "litert"
     camera = pinhole("still", np.array([4.0, 0, 1]), np.array([0, 0, 1.0]), 60, 256, 256)
     with pytest.raises(ConfigError, match=r"hrc_env\[openvino\].*litert"):
         PoseDetector([camera], DetectorConfig(runtime="openvino"))

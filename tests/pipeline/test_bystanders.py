@@ -138,7 +138,7 @@ def test_cameras_search_more_often_while_there_are_others():
     def next_search():
         for step in range(1, 2 * EVERY):
             bystanders.tick(0)
-            if bystanders.due(0, 5):
+            if bystanders.is_search_due(0, 5):
                 return step
         return None
 
@@ -161,10 +161,10 @@ def test_the_slot_goes_to_whoever_is_clearly_nearer_to_the_robot():
 
 def test_of_more_people_than_vacant_slots_the_nearest_are_proposed():
     bystanders, found = Bystanders(1, 1, RIG), shown(FAR, NEAR)
-    nearest = bystanders.nearest(found, 1, ROBOT)
+    nearest = bystanders.select_nearest(found, 1, ROBOT)
     assert [row[0] for row in nearest] == windows(NEAR)
-    assert bystanders.nearest(found, 2, ROBOT) == found
-    assert bystanders.nearest(found, 1, None) == found
+    assert bystanders.select_nearest(found, 2, ROBOT) == found
+    assert bystanders.select_nearest(found, 1, None) == found
 
 
 def test_their_state_is_brought_back():

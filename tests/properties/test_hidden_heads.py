@@ -5,8 +5,8 @@ import pytest
 from figures import Figure, count
 
 from hrc_env.core.typing import Bools, Floats
+from hrc_env.geometry import sight
 from hrc_env.geometry.cameras import project, projections
-from hrc_env.geometry.sight import hidden
 from hrc_env.scene.build import Scene, SceneConfig, build
 from hrc_env.world import Grounds
 
@@ -31,7 +31,7 @@ def draw_heads(grounds: Grounds, n: int, rng: np.random.Generator) -> Floats:
 def find_hidden(scene: Scene, heads: Floats) -> Bools:
     """Return (C, n) whether each camera does not see each head, the robot being at rest."""
     eyes = np.stack([camera.eye_world for camera in scene.cameras])
-    return hidden(scene.surroundings(scene.home_q[None]), eyes, heads[None])[0]
+    return sight.find_hidden(scene.surroundings(scene.home_q[None]), eyes, heads[None])[0]
 
 
 @pytest.fixture(scope="module")

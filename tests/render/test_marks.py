@@ -9,7 +9,7 @@ import pytest
 import hrc_env
 from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCEnv
-from hrc_env.geometry.cameras import project, resized
+from hrc_env.geometry.cameras import project, resize
 from hrc_env.geometry.distances import least_separation
 from hrc_env.render import overlay
 from hrc_env.render.marks import solids_of
@@ -196,7 +196,7 @@ def test_a_camera_of_ones_own_sees_what_it_looks_at():
         env.simulation.task_state["goal_world"][0] = goal
         marked = env.views.picture(size=(320, 240), camera=own)
         (camera,) = hrc_env.make_cameras([own])
-        row, column = at(resized(camera, 320, 240), goal)
+        row, column = at(resize(camera, 320, 240), goal)
         assert (row, column) == (120, 160)
         assert unlike(picture, marked)[row, column]
 

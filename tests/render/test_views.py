@@ -113,7 +113,7 @@ def test_crops_are_what_the_network_was_given(weights):
     pictures = env.views.crops(64, env.views.glance())
     assert [picture.shape for picture in pictures] == [(64, 64, 3)] * 4
     before = env.simulation.get_state()
-    env.simulation.pipeline.looking.windows[0][0] = [None] * 4  # as after `set_state`
+    env.simulation.pipeline.worker_detector.windows[0][0] = [None] * 4  # as after `set_state`
     assert env.simulation.pipeline.crops(0) == [None] * 4
     env.simulation.set_state(before)
     assert [crop is None for crop in env.simulation.pipeline.crops(0)] == [

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.geometry.sight import hidden
+from hrc_env.geometry.sight import find_hidden
 from hrc_env.scene.build import SceneConfig, build, drawing_model
 from hrc_env.scene.primitives import DECORATION, OVERHEAD, ROBOT_LOOKS, SOLID
 from hrc_env.worker.props import PROPS
@@ -66,7 +66,7 @@ def test_the_shared_workspace_is_in_sight_of_every_camera():
     eyes = np.stack([camera.eye_world for camera in scene.cameras])
     grid = np.stack(np.meshgrid([0.3, 0.8, 1.6], [-1.0, 0.0, 1.0], [0.4, 1.1, 1.6]), -1)
     between = scene.surroundings(scene.home_q[None])
-    assert hidden(between, eyes, grid.reshape(1, -1, 3)).mean() < 0.1
+    assert find_hidden(between, eyes, grid.reshape(1, -1, 3)).mean() < 0.1
 
 
 def test_the_textures_are_the_same_every_time():

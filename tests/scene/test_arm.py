@@ -59,7 +59,7 @@ def test_each_joint_has_a_holding_and_a_rate_servo_and_a_torque_limit():
 
 def test_the_last_capsule_ends_at_the_tool_point():
     ends = chains.capsules(SCENE.chain, HOME_Q)[-1]
-    tool = chains.tool(SCENE.chain, HOME_Q)[:3, 3]
+    tool = chains.tool_frame(SCENE.chain, HOME_Q)[:3, 3]
     radius = SCENE.chain.capsule_radius_m[-1]
     assert np.linalg.norm(tool - ends[1]) == pytest.approx(radius)
 

@@ -7,9 +7,9 @@ import pytest
 from hrc_env.core.errors import HRCError
 from hrc_env.geometry.chains import capsules
 from hrc_env.geometry.shapes import WIDTH
-from hrc_env.geometry.sight import NEAR_POINT_M, Surroundings, hidden
+from hrc_env.geometry.sight import NEAR_POINT_M, Surroundings, find_hidden
 from hrc_env.scene.build import SceneConfig, build
-from hrc_env.scene.places import obstacles
+from hrc_env.scene.places import find_obstacles
 from hrc_env.scene.primitives import ROBOT_CAPSULES, SOLID
 
 TIE_M = 1e-9
@@ -34,7 +34,7 @@ def by_mujoco(model, data, eyes, points):
 def assert_same(surroundings, model, data, eyes, points):
     beyond = by_mujoco(model, data, eyes, points)
     clear = np.abs(beyond) > TIE_M
-    ours = hidden(surroundings, eyes, points[None])[0]
+    ours = find_hidden(surroundings, eyes, points[None])[0]
     np.testing.assert_array_equal(ours[clear], (beyond < 0)[clear])
     return ours.mean()
 
@@ -63,7 +63,7 @@ def test_every_kind_of_geom_hides_as_for_mujoco(kind):
     )
     data, rng = mujoco.MjData(model), np.random.default_rng(6)
     mujoco.mj_kinematics(model, data)
-    alone = Surroundings(obstacles(model), *EMPTY)
+    alone = Surroundings(find_obstacles(model), *EMPTY)
     eyes, points = rng.uniform(-1, 1, (40, 3)), rng.uniform(-1, 1, (60, 3))
     assert assert_same(alone, model, data, eyes, points) > 0.03
 
@@ -73,25 +73,25 @@ def test_what_cannot_be_asked_is_refused():
         '<mujoco><worldbody><geom name="egg" type="ellipsoid" size="1 2 3"/></worldbody></mujoco>'
     )
     with pytest.raises(HRCError, match="'egg' cannot block sight"):
-        obstacles(model)
+        find_obstacles(model)
 
 
 def test_a_point_behind_the_pedestal_is_hidden_and_one_beside_it_is_not():
     points = np.array([[[-1.5, 0.0, 0.4], [-1.5, 0.5, 0.4]]])
     between = LAB.surroundings(LAB.home_q[None])
-    seen = hidden(between, np.array([[2.0, 0.0, 0.4]]), points)
+    seen = find_hidden(between, np.array([[2.0, 0.0, 0.4]]), points)
     np.testing.assert_array_equal(seen, [[[True, False]]])
 
 
 def test_the_arm_hides_what_is_behind_it():
     elbow, aside = capsules(LAB.chain, LAB.home_q)[2].mean(0), np.array([0.0, 1.0, 0.0])
     eye, beyond = elbow - aside, elbow + aside
-    assert hidden(LAB.surroundings(LAB.home_q[None]), eye[None], beyond[None, None]).all()
+    assert find_hidden(LAB.surroundings(LAB.home_q[None]), eye[None], beyond[None, None]).all()
 
 
 def test_what_a_joint_touches_does_not_hide_it():
     sole = np.array([[[1.0, 0.5, -0.02]]])
-    assert not hidden(LAB.surroundings(LAB.home_q[None]), EYES[:1], sole).any()
+    assert not find_hidden(LAB.surroundings(LAB.home_q[None]), EYES[:1], sole).any()
 
 
 def test_an_environment_has_the_same_lines_of_sight_in_any_company():
@@ -99,6 +99,6 @@ def test_an_environment_has_the_same_lines_of_sight_in_any_company():
     q, points = rng.uniform(-2, 2, (4, 6)), rng.uniform(-1.5, 1.5, (4, 15, 3))
     ids = [1, 3]
     np.testing.assert_array_equal(
-        hidden(LAB.surroundings(q), EYES, points)[ids],
-        hidden(LAB.surroundings(q[ids]), EYES, points[ids]),
+        find_hidden(LAB.surroundings(q), EYES, points)[ids],
+        find_hidden(LAB.surroundings(q[ids]), EYES, points[ids]),
     )

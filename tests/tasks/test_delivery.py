@@ -11,16 +11,16 @@ from hrc_env.agents.experts import expert
 from hrc_env.agents.scripted import Yielding
 from hrc_env.core.errors import ConfigError
 from hrc_env.geometry import chains
-from hrc_env.geometry.ways import gaps_m, met, ranges_m, value_at, ways_m
+from hrc_env.geometry.ways import find_overlaps, gaps_m, ranges_m, value_at, ways_m
 from hrc_env.motion import generator
 from hrc_env.motion.anatomy import CHEST
 from hrc_env.scene.build import build
-from hrc_env.scene.robot import ROBOTS, chain_of
+from hrc_env.scene.robot import ROBOTS, make_chain
 from hrc_env.tasks import delivery
 from hrc_env.world import World
 
 ID = "HRCDelivery-v0"
-BASE = chain_of(ROBOTS["mobile_base"], (0.0, 0.0, 0.0))
+BASE = make_chain(ROBOTS["mobile_base"], (0.0, 0.0, 0.0))
 SITE = build(name="site", robot="mobile_base")
 TASK = delivery.Delivery()
 CONFIG = TASK.config
@@ -93,7 +93,7 @@ def test_rays_end_at_what_stands_there():
 )
 def test_a_base_meets_a_wall_where_its_outline_does(x, yaw, touches):
     robot = chains.robot_state(BASE, np.array([[x, 0.0, yaw]]), np.zeros((1, 3)))
-    assert met(robot.capsules_world, robot.capsule_radius_m, WALL)[0] == touches
+    assert find_overlaps(robot.capsules_world, robot.capsule_radius_m, WALL)[0] == touches
 
 
 def test_zones_are_free_and_where_nobody_works():

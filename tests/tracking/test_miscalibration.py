@@ -52,7 +52,7 @@ def test_a_vector_names_what_its_environments_would():
     for _ in range(40):
         infos = env.step(np.tile(REST, (3, 1)))[-1]
     pipeline, one = single.simulation.pipeline, np.array([0])
-    suspected, vacancy = pipeline.suspected(one), pipeline.vacancy(one)
+    suspected, vacancy = pipeline.suspected_cameras(one), pipeline.vacancy(one)
     cameras = single.simulation.settings["cameras"]
     assert infos[MISCALIBRATED][1] == perception_info(cameras, suspected, vacancy)[MISCALIBRATED][0]
     assert infos[f"_{MISCALIBRATED}"].all()

@@ -25,7 +25,7 @@ from hrc_env.experiments.plots import new_figure, save
 from hrc_env.experiments.recording import Recording, replay
 from hrc_env.experiments.report import Metrics, Report, picture
 from hrc_env.geometry.cameras import image_from_pinhole
-from hrc_env.perception.lensed import Lensed
+from hrc_env.perception.lenses import LensRenderer
 from hrc_env.render import overlay
 from hrc_env.scene.render import CropRenderer
 
@@ -81,7 +81,7 @@ def _crop(recording: Recording, t: int, c: int) -> Image:
     renderer.pose(scene.home_q, one(recording.motions, t))
     if window is None:
         raise AssertionError("a camera is chosen that has looked")
-    image = np.array(Lensed(renderer, scene.cameras).crop(c, window))
+    image = np.array(LensRenderer(renderer, scene.cameras).crop(c, window))
     renderer.close()
     found = recording.keypoints
     px = image_from_pinhole(scene.cameras[c], found.px[t, c, 0])

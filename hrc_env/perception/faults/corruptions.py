@@ -1,8 +1,8 @@
-"""What faults do to an image."""
+"""Effects of faults on an image."""
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -16,66 +16,80 @@ from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.perception.faults.schedule import draws
 
 GAMMA = 2.2
-"""Of the images: light is their value to this power."""
+"""Exponent of images: light is their value to this power."""
 DIRT_RGB = (72, 64, 54)
+"""Colour of dirt."""
 N_SPOTS = 14
+"""Number of spots on a dirty lens."""
 COVER = 0.9
-"""How much of the light a spot takes away in its middle."""
+"""Share of the light that the middle of a spot takes away."""
 RIM = 1.25
-"""A spot ends at so many of its radii; from there inwards it grows darker over half a radius."""
+"""Radius at which a spot ends, in its radii; inwards from there it grows darker over half a
+radius."""
 GLARE_REACH = 0.25
-"""Of a light in the lens: the radius of its disc of haze as a share of the image's width."""
+"""Radius of the disc of haze around a light in the lens, as a share of the image's width."""
 GLARE_VEIL = 0.35
-"""Haze all over the image as a share of that in the middle of the disc."""
+"""Haze all over the image, as a share of that in the middle of the disc."""
 DARK_NOISE = 5.0
-"""Standard deviation of the noise [grey levels] of an image with 1/20 of the light; it falls with
-the root of the light. A judgement, of cheap sensors."""
+"""Standard deviation of the noise of an image with 1/20 of the light [grey levels], a judgement of
+cheap sensors."""
 
 
-class Shown(NamedTuple):
-    """A part of an image that is to be spoilt."""
+class CropView(NamedTuple):
+    """A crop of an image that is to be corrupted."""
 
-    crop: Image  # (n, n, 3) RGB; it stays as it is
+    crop: Image
+    """(n, n, 3) RGB, which is not changed."""
     camera: PinholeCamera
+    """Camera of the image."""
     window: Roi
-    seeds: tuple[int, ...]  # the numbers of episode, fault, camera and step
+    """Window of the image that the crop shows [px]."""
+    seeds: tuple[int, ...]
+    """Seed of the episode's faults, then the numbers of fault, camera and step."""
 
 
 def darkness_noise(share: float) -> float:
-    """Standard deviation of the noise [grey levels] of an image with a share of the light."""
+    """Return the standard deviation of the noise of an image with a share of the light."""
     return DARK_NOISE * math.sqrt(max(1.0 - share, 0.0) / 0.95)
 
 
-def spoil(shown: Shown, fault: FaultConfig) -> Image:
-    """A crop with one fault of the group `IMAGE`; motion blur is made as the image is taken."""
-    return _SPOIL[fault.kind](shown, fault.how_much)
+def corrupt(view: CropView, fault: FaultConfig) -> Image:
+    """Return a crop with a fault of the group `IMAGE`, except motion blur (see `CameraFilm`)."""
+    return _CORRUPT[fault.kind](view, fault.max_amount)
 
 
-def _defocused(shown: Shown, radius_px: float) -> Image:
-    radius = radius_px * len(shown.crop) / shown.window.side_px
+def _defocus(view: CropView, radius_px: float) -> Image:
+    """Return a crop in which points are discs of a radius in the image [px]."""
+    radius = radius_px * len(view.crop) / view.window.side_px
     reach = math.ceil(radius)
     away = np.hypot(*np.mgrid[-reach : reach + 1, -reach : reach + 1])
     disc = np.clip(radius + 0.5 - away, 0.0, 1.0)
-    return _image(cv2.filter2D(shown.crop, -1, disc / disc.sum(), borderType=cv2.BORDER_REPLICATE))
+    return _image(cv2.filter2D(view.crop, -1, disc / disc.sum(), borderType=cv2.BORDER_REPLICATE))
 
 
-def _noisy(shown: Shown, levels: float) -> Image:
-    """Every pixel of the camera for itself; where the crop is finer, noise is coarser than it."""
-    crop = shown.crop
-    n = min(max(round(shown.window.side_px), 8), len(crop))
-    noise = levels * draws(*shown.seeds).standard_normal((n, n, 3), np.float32)
+def _add_noise(view: CropView, levels: float) -> Image:
+    """Return a crop with independent noise of each pixel of the camera [grey levels].
+
+    If the crop is finer than the image, the noise is coarser than the crop.
+    """
+    crop = view.crop
+    n = min(max(round(view.window.side_px), 8), len(crop))
+    noise = levels * draws(*view.seeds).standard_normal((n, n, 3), np.float32)
     if n < len(crop):
         noise = cv2.resize(noise, crop.shape[:2], interpolation=cv2.INTER_LINEAR)
     return _image(crop + noise)
 
 
-def _dirty(shown: Shown, share: float) -> Image:
-    """The same spots for the whole episode, blurred: they are far before the focus."""
-    crop, rng, size_px = shown.crop, draws(*shown.seeds[:3]), _size_px(shown)
+def _add_dirt(view: CropView, share: float) -> Image:
+    """Return a crop with spots that hide a share of the image, the same for the whole episode.
+
+    They are blurred, as they are out of focus.
+    """
+    crop, rng, size_px = view.crop, draws(*view.seeds[:3]), _size_px(view)
     middles = rng.uniform(0.0, 1.0, (N_SPOTS, 2)) * size_px
     area = rng.uniform(0.3, 1.0, N_SPOTS)
     area *= -math.log(1.0 - share) * size_px.prod() / area.sum()  # spots overlap
-    at, scale = _in_crop(middles, shown), len(crop) / shown.window.side_px
+    at, scale = _in_crop(middles, view), len(crop) / view.window.side_px
     free = np.ones(crop.shape[:2])
     rows, columns = np.indices(crop.shape[:2]) + 0.5
     for (x, y), radius in zip(at, np.sqrt(area / math.pi) * scale, strict=True):
@@ -85,50 +99,55 @@ def _dirty(shown: Shown, share: float) -> Image:
     return _image(crop * free[..., None] + np.array(DIRT_RGB) * (1.0 - free[..., None]))
 
 
-def _tinted(shown: Shown, share: float) -> Image:
-    return _image(shown.crop * np.array([1.0 + share, 1.0, 1.0 - share]))
+def _tint(view: CropView, share: float) -> Image:
+    """Return a crop with more red and less blue by a share."""
+    return _image(view.crop * np.array([1.0 + share, 1.0, 1.0 - share]))
 
 
-def _exposed(shown: Shown, stops: float) -> Image:
+def _expose(view: CropView, stops: float) -> Image:
+    """Return a crop with more light by a number of stops."""
     values = 255.0 * (np.arange(256) / 255.0) * 2.0 ** (stops / GAMMA)
-    return _image(cv2.LUT(shown.crop, _image(values)))
+    return _image(cv2.LUT(view.crop, _image(values)))
 
 
-def _dark(shown: Shown, share: float) -> Image:
-    return _noisy(shown._replace(crop=_exposed(shown, math.log2(share))), darkness_noise(share))
+def _darken(view: CropView, share: float) -> Image:
+    """Return a crop with a share of the light, and with noise."""
+    return _add_noise(view._replace(crop=_expose(view, math.log2(share))), darkness_noise(share))
 
 
-def _glaring(shown: Shown, share: float) -> Image:
-    """A light somewhere in the image, in one place for the whole episode, and haze round it."""
-    crop = shown.crop
-    middle = draws(*shown.seeds[:3]).uniform(0.2, 0.8, (1, 2)) * _size_px(shown)
-    (x, y), scale = _in_crop(middle, shown)[0], len(crop) / shown.window.side_px
+def _add_glare(view: CropView, share: float) -> Image:
+    """Return a crop with haze around a light, at one place for the whole episode."""
+    crop = view.crop
+    middle = draws(*view.seeds[:3]).uniform(0.2, 0.8, (1, 2)) * _size_px(view)
+    (x, y), scale = _in_crop(middle, view)[0], len(crop) / view.window.side_px
     rows, columns = np.indices(crop.shape[:2]) + 0.5
-    away = np.hypot(columns - x, rows - y) / (scale * GLARE_REACH * shown.camera.width_px)
+    away = np.hypot(columns - x, rows - y) / (scale * GLARE_REACH * view.camera.width_px)
     haze = share * (GLARE_VEIL + (1.0 - GLARE_VEIL) * np.exp(-(away**2)))
     return _image(crop + (255.0 - crop) * haze[..., None])
 
 
-_SPOIL: dict[str, Callable[..., Image]] = {
-    "defocus": _defocused,
-    "noise": _noisy,
-    "dirt": _dirty,
-    "white_balance": _tinted,
-    "exposure": _exposed,
-    "darkness": _dark,
-    "glare": _glaring,
+_CORRUPT: dict[str, Callable[..., Image]] = {
+    "defocus": _defocus,
+    "noise": _add_noise,
+    "dirt": _add_dirt,
+    "white_balance": _tint,
+    "exposure": _expose,
+    "darkness": _darken,
+    "glare": _add_glare,
 }
 
 
-def _size_px(shown: Shown) -> Floats:
-    return np.array([shown.camera.width_px, shown.camera.height_px], float)
+def _size_px(view: CropView) -> Floats:
+    """Return width and height (2,) of the camera's image [px]."""
+    return np.array([view.camera.width_px, view.camera.height_px], float)
 
 
-def _in_crop(px: Points2, shown: Shown) -> Points2:
-    """Image pixels (n, 2) to pixels of the crop."""
-    matrix = image_from_crop(shown.window, len(shown.crop))
+def _in_crop(px: Points2, view: CropView) -> Points2:
+    """Return the pixels of the crop of image pixels (n, 2)."""
+    matrix = image_from_crop(view.window, len(view.crop))
     return (px - matrix[:, 2]) @ np.linalg.inv(matrix[:, :2]).T
 
 
-def _image(values: NDArray) -> Image:
+def _image(values: NDArray[Any]) -> Image:
+    """Return values rounded to grey levels."""
     return np.clip(np.round(values), 0, 255).astype(np.uint8)

@@ -1,5 +1,8 @@
-"""Faults of cameras by name: what each does, how much, and when. Draws for them come from the
-episode's number for faults: all else is that of the same seed without faults."""
+"""Faults of cameras: their kinds, amounts and times.
+
+Random numbers of faults come from a seed of their own in each episode: everything else is as with
+the same seed without faults.
+"""
 
 import numbers
 from collections.abc import Sequence
@@ -12,43 +15,61 @@ from hrc_env.core.errors import ConfigError, unknown, whole
 from hrc_env.core.mapping import answer_unknown_fields
 
 FOREVER_S = 1e9
+"""End of a fault that does not end [s]."""
 TIMING, PLACE, IMAGE = "timing", "place", "image"
+"""Groups of faults: of the times of images, of the pose and intrinsics of a camera, of the look of
+an image."""
 
 
 class Kind(NamedTuple):
-    """One kind of fault."""
+    """A kind of fault."""
 
-    group: str  # when images come, where the camera really is, how an image looks
-    unit: str  # of the amount
-    usual: float  # the amount if none is given: clearly visible, not absurd; a judgement
-    bounds: tuple[float, float]  # least and greatest amount
-    says: str
+    group: str
+    """Its group: `TIMING`, `PLACE` or `IMAGE`."""
+    unit: str
+    """Unit of its amount."""
+    usual: float
+    """Default of its amount, in the unit: clearly visible, but not absurd."""
+    bounds: tuple[float, float]
+    """Least and greatest amount, in the unit."""
+    description: str
+    """A phrase that describes it."""
 
 
 KINDS: dict[str, Kind] = {
     "lost": Kind(TIMING, "-", 0.0, (0.0, 0.0), "no images"),
     "frozen": Kind(TIMING, "-", 0.0, (0.0, 0.0), "the last image again and again, as if new"),
     "late": Kind(TIMING, "s", 0.2, (0.0, 1.0), "images come later, with their true times"),
-    "dropped": Kind(TIMING, "share", 0.3, (0.0, 1.0), "so many images are missing, at random"),
+    "dropped": Kind(TIMING, "share", 0.3, (0.0, 1.0), "this share of images is missing, at random"),
     "out_of_step": Kind(
-        TIMING, "control steps", 2.0, (0.0, 25.0), "images are so old and claim to be new"
+        TIMING, "control steps", 2.0, (0.0, 25.0), "images are this old, but claim to be new"
     ),
-    "wrong_rotation": Kind(PLACE, "rad", 0.02, (0.0, 0.5), "it looks so far beside what is told"),
-    "wrong_translation": Kind(PLACE, "m", 0.05, (0.0, 1.0), "it hangs so far from where is told"),
-    "wrong_focal": Kind(PLACE, "share", 0.03, (-0.5, 0.5), "its focal length is so much longer"),
-    "knocked": Kind(PLACE, "rad", 0.1, (0.0, 1.0), "it has been turned by so much"),
-    "motion_blur": Kind(IMAGE, "s", 0.04, (0.0, 0.1), "the shutter is open for so long"),
+    "wrong_rotation": Kind(
+        PLACE, "rad", 0.02, (0.0, 0.5), "the camera is rotated from its calibrated pose"
+    ),
+    "wrong_translation": Kind(
+        PLACE, "m", 0.05, (0.0, 1.0), "the camera is shifted from its calibrated pose"
+    ),
+    "wrong_focal": Kind(
+        PLACE, "share", 0.03, (-0.5, 0.5), "the focal length is longer than calibrated"
+    ),
+    "knocked": Kind(PLACE, "rad", 0.1, (0.0, 1.0), "the camera has been rotated by a knock"),
+    "motion_blur": Kind(IMAGE, "s", 0.04, (0.0, 0.1), "the shutter is open for this time"),
     "defocus": Kind(IMAGE, "px", 8.0, (0.0, 60.0), "points are discs of this radius"),
     "noise": Kind(IMAGE, "grey levels", 20.0, (0.0, 100.0), "standard deviation of each pixel"),
-    "dirt": Kind(IMAGE, "share", 0.15, (0.0, 0.9), "spots on the lens hide so much of the image"),
-    "white_balance": Kind(IMAGE, "share", 0.4, (-0.9, 0.9), "more red and less blue by so much"),
-    "exposure": Kind(IMAGE, "stops", 2.0, (-6.0, 6.0), "brighter by so many stops"),
-    "darkness": Kind(IMAGE, "share", 0.05, (0.001, 1.0), "so much light is left, and noise"),
+    "dirt": Kind(
+        IMAGE, "share", 0.15, (0.0, 0.9), "spots on the lens hide this share of the image"
+    ),
+    "white_balance": Kind(IMAGE, "share", 0.4, (-0.9, 0.9), "more red and less blue"),
+    "exposure": Kind(IMAGE, "stops", 2.0, (-6.0, 6.0), "the image is brighter"),
+    "darkness": Kind(
+        IMAGE, "share", 0.05, (0.001, 1.0), "this share of the light is left, and noise"
+    ),
     "glare": Kind(IMAGE, "share", 0.8, (0.0, 1.0), "a light shines into the lens"),
 }
-"""All faults; amounts are refused outside their bounds."""
+"""All kinds of faults by name."""
 ALL = "all"
-"""In the place of a camera's name: every camera."""
+"""Word for every camera, in the place of a camera's name."""
 
 
 @answer_unknown_fields
@@ -57,16 +78,17 @@ class FaultConfig:
     """One fault of some cameras during a part of every episode."""
 
     kind: str
-    """A key of `KINDS`."""
+    """Kind of the fault, a key of `KINDS`."""
     cameras: tuple[int | str, ...]
-    """Those that have it, by name or index (from 0) among those in use; ("all",) is every one."""
+    """Cameras with the fault, by name or by index (from 0) in the rig; ("all",) means every
+    camera."""
     amount: float | tuple[float, float] | None = None
-    """How much, in the kind's unit; (least, most): drawn evenly, anew for every episode; None is
-    the kind's usual amount."""
+    """Amount of the fault in the kind's unit; a pair (least, greatest) is a range from which each
+    episode's amount is drawn uniformly, None the kind's default."""
     from_s: float = 0.0
-    """When in the episode it begins [s]; 0 is the reset."""
+    """Time in the episode at which the fault begins [s]; 0 is the reset."""
     until_s: float = FOREVER_S
-    """When it ends [s]."""
+    """Time in the episode at which the fault ends [s]."""
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
@@ -78,7 +100,7 @@ class FaultConfig:
                 f"got {self.cameras!r}."
             )
         low, high = KINDS[self.kind].bounds
-        ends = self.amount if isinstance(self.amount, tuple | list) else (self.how_much,)
+        ends = self.amount if isinstance(self.amount, tuple | list) else (self.max_amount,)
         if not all(map(_is_number, ends)) or not all(low <= end <= high for end in ends):
             raise ConfigError(
                 f"Fault {self.kind!r}: amount must be from {low:g} to {high:g} "
@@ -99,46 +121,48 @@ class FaultConfig:
 
     @property
     def group(self) -> str:
-        """The group of its kind."""
+        """Group of its kind."""
         return KINDS[self.kind].group
 
     @property
-    def how_much(self) -> float:
-        """The amount, in the kind's unit; of a range the greatest."""
+    def max_amount(self) -> float:
+        """Amount in the kind's unit; of a range the greatest."""
         if isinstance(self.amount, tuple):
             return self.amount[1]
         return KINDS[self.kind].usual if self.amount is None else self.amount
 
     @property
     def is_range(self) -> bool:
-        """Whether every episode has an amount of its own."""
+        """Whether each episode's amount is drawn from a range."""
         return isinstance(self.amount, tuple)
 
-    def drawn(self, rng: np.random.Generator) -> "FaultConfig":
-        """Return the fault of one episode: with an amount drawn from the range, if it is one."""
+    def draw(self, rng: np.random.Generator) -> "FaultConfig":
+        """Return the fault of one episode, with an amount drawn from its range."""
         if not isinstance(self.amount, tuple):
             return self
         return replace(self, amount=float(rng.uniform(*self.amount)))
 
-    def active(self, time_s: float) -> bool:
-        """Return whether an image of this time of the episode has it; 0.5 ms are nothing."""
+    def is_active(self, time_s: float) -> bool:
+        """Return whether an image of a time in the episode has the fault, to within 0.5 ms."""
         return self.from_s - 5e-4 <= time_s < self.until_s - 5e-4
 
 
 def check_cameras(faults: Sequence[FaultConfig], names: Sequence[str]) -> None:
-    """Raise `ConfigError` for a fault of a camera that is not one of those in use, by name."""
+    """Raise `ConfigError` for a fault of a camera that is not in the rig with these names."""
     for fault in faults:
         for camera in fault.cameras:
             if not isinstance(camera, str):
-                what = f"Camera index of fault {fault.kind!r} (of {', '.join(names)})"
-                whole(what, camera, 0, len(names) - 1)
+                label = f"Camera index of fault {fault.kind!r} (of {', '.join(names)})"
+                whole(label, camera, 0, len(names) - 1)
             elif camera not in (*names, ALL):
                 raise unknown(f"camera of fault {fault.kind!r}:", camera, (*names, ALL))
 
 
 def _is_number(value: object) -> bool:
+    """Return whether a value is a number, and no truth value."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _is_choice(camera: object) -> bool:
+    """Return whether a value is a name or an index."""
     return isinstance(camera, str | numbers.Integral) and not isinstance(camera, bool)

@@ -6,11 +6,11 @@ import pytest
 from assets.workers.poses import rest_motion
 from hrc_env.core.batching import mapped
 from hrc_env.core.records import Roi
-from hrc_env.perception.faults.camera_film import BLUR_IMAGES, CameraFilm, Shot
-from hrc_env.perception.faults.corruptions import Shown, spoil
+from hrc_env.perception.faults.camera_film import BLUR_IMAGES, CameraFilm, ScenePose, Shot
+from hrc_env.perception.faults.corruptions import CropView, corrupt
 from hrc_env.perception.faults.fault import KINDS, FaultConfig
 from hrc_env.perception.faults.schedule import Schedule
-from hrc_env.perception.lensed import Lensed
+from hrc_env.perception.lenses import LensRenderer
 from hrc_env.scene.rig import LAB_CAMERAS, make_cameras
 from hrc_env.worker.body import load_body
 
@@ -22,8 +22,8 @@ OF_LOOKS = [k for k, each in KINDS.items() if each.group == "image" and k != "mo
 
 
 def spoilt(kind, image, amount=None, window=CLOSE, seeds=SEEDS):
-    shown = Shown(image, CAMERA, window, seeds)
-    return spoil(shown, FaultConfig(kind, ("camera_1",), amount))
+    shown = CropView(image, CAMERA, window, seeds)
+    return corrupt(shown, FaultConfig(kind, ("camera_1",), amount))
 
 
 def grey(level=120, size=256):
@@ -110,9 +110,10 @@ def film(*faults):
     motions = [mapped(rest_motion(body), lambda a: a[None].copy()) for _ in range(2)]
     motions[0].position_world[..., 0], motions[1].position_world[..., 0] = 0.4, 0.8
     rig = make_cameras(LAB_CAMERAS)
-    shown = CameraFilm(Lensed(FakeStage(), rig), Schedule(LAB_CAMERAS, faults, 0.04))
+    shown = CameraFilm(LensRenderer(FakeStage(), rig), Schedule(LAB_CAMERAS, faults, 0.04))
     q = np.zeros(6)
-    shown.show([Shot(5, q, motions[1], (q, motions[0]), rig), None, None, None], seed=1)
+    before, now = (ScenePose(q, motion) for motion in motions)
+    shown.show([Shot(5, now, before, rig), None, None, None], seed=1)
     return shown
 
 

@@ -117,9 +117,9 @@ def test_wrong_calibrations_are_as_large_as_said_and_drawn_for_the_episode():
     amounts = {"wrong_rotation": 0.1, "wrong_translation": 0.2, "wrong_focal": 0.1, "knocked": 0.3}
     for kind, amount in amounts.items():
         plan = schedule(first(kind, amount, from_s=1.0))
-        assert plan.actual(rig, 5, 0) is rig
-        real, told = plan.actual(rig, 5, 25)[0], rig[0]
-        assert plan.actual(rig, 5, 30)[0] is real
+        assert plan.actual_cameras(rig, 5, 0) is rig
+        real, told = plan.actual_cameras(rig, 5, 25)[0], rig[0]
+        assert plan.actual_cameras(rig, 5, 30)[0] is real
         turn = real.T_world_from_cam[:3, :3].T @ told.T_world_from_cam[:3, :3]
         angle = np.arccos(np.clip((np.trace(turn) - 1) / 2, -1, 1))
         turned = amount if kind in ("wrong_rotation", "knocked") else 0.0
@@ -128,7 +128,7 @@ def test_wrong_calibrations_are_as_large_as_said_and_drawn_for_the_episode():
         assert moved == pytest.approx(amount if kind == "wrong_translation" else 0.0, abs=1e-9)
         longer = real.K[0, 0] / told.K[0, 0] - 1
         assert longer == pytest.approx(amount if kind == "wrong_focal" else 0.0)
-        assert plan.actual(rig, 5, 25)[1] is rig[1]
+        assert plan.actual_cameras(rig, 5, 25)[1] is rig[1]
 
 
 @pytest.mark.parametrize("kind", NOT_OF_IMAGES)

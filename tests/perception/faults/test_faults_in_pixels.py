@@ -38,7 +38,7 @@ def test_where_nobody_is_found_a_search_comes_only_now_and_then():
         searched.extend([which] if which else [])
         return [[] for _ in env.simulation.scene.cameras]
 
-    env.simulation.pipeline.looking.detector.search = nobody
+    env.simulation.pipeline.worker_detector.pose_detector.search = nobody
     env.reset(seed=0)
     for _ in range(10):
         env.step(np.zeros(6, np.float32))

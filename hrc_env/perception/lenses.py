@@ -1,7 +1,7 @@
-"""Lenses before a renderer that draws like a pinhole, and behind the detector.
+"""Lens distortion in front of a renderer that draws pinhole images, and behind the detector.
 
-A window of a distorted image is resampled from a pinhole's picture, turned to the window's middle
-and just wide enough to cover it. Keypoints go to the tracker in pinhole pixels.
+A window of a distorted image is resampled from a pinhole image, which is turned to the window's
+middle and just wide enough to cover it. Trackers get keypoints in pinhole pixels.
 """
 
 import functools
@@ -25,59 +25,72 @@ from hrc_env.geometry.cameras import (
 from hrc_env.perception.blazepose import to_image
 
 WIDEST = float(np.tan(np.radians(78.0)))
-"""A pinhole's picture reaches so far from its middle [focal lengths]; beyond, a window is black."""
+"""Half width of a pinhole image, beyond which a window is black [focal lengths]."""
 MAPS_KEPT = 64
-"""Windows whose resampling is kept."""
+"""Number of windows whose resampling maps are kept."""
 
 
-class Drawer(Protocol):
-    """What poses a scene and draws it through any pinhole."""
+class PinholeRenderer(Protocol):
+    """A renderer that poses a scene and draws pinhole images of it."""
 
     size_px: int
+    """Side of its images [px]."""
 
     def pose(self, q: JointAngles, motion: WorkerMotion) -> None:
         """Pose the scene for the views that follow."""
         ...
 
     def view(self, camera: PinholeCamera, window: Roi) -> Image:
-        """The window of what a pinhole would see, (size, size, 3) RGB, top row first."""
+        """Return a window of a pinhole camera's image, (size, size, 3) RGB, top row first."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
-class _Cover:
-    """How a window of a distorted image is made."""
+class _Resampling:
+    """A pinhole image that covers a window of a distorted image, and the map between them."""
 
-    camera: PinholeCamera  # turned to the window's middle, in units of its focal length
-    window: Roi  # what of it is drawn
-    x: NDArray[np.float32]  # (size, size) which of the drawn pixels every pixel shows,
-    y: NDArray[np.float32]  # counted from pixel centres
+    camera: PinholeCamera
+    """Camera turned to the window's middle, with K = 1."""
+    window: Roi
+    """The part of its image that is drawn."""
+    x: NDArray[np.float32]
+    """(size, size) column in the drawn image for every pixel, counted from pixel centres."""
+    y: NDArray[np.float32]
+    """(size, size) row in the drawn image for every pixel, counted from pixel centres."""
 
 
-class Lensed:
-    """Windows of a rig's images as its lenses distort them: an `ImageSource`."""
+class LensRenderer:
+    """An `ImageSource` of images as the lenses of a rig distort them.
 
-    def __init__(self, drawer: Drawer, cameras: Sequence[PinholeCamera]) -> None:
-        self.drawer, self.cameras = drawer, tuple(cameras)
+    Args:
+        renderer: draws the pinhole images.
+        cameras: the rig.
+    """
+
+    def __init__(self, renderer: PinholeRenderer, cameras: Sequence[PinholeCamera]) -> None:
+        self.renderer, self.cameras = renderer, tuple(cameras)
 
     def crop(self, camera_index: int, window: Roi) -> Image:
-        """The window of a camera's present image, upright, (size, size, 3) RGB."""
+        """Return a window of a camera's present image, upright, (size, size, 3) RGB."""
         return self.view(self.cameras[camera_index], window)
 
     def view(self, camera: PinholeCamera, window: Roi) -> Image:
-        """The same of any camera."""
+        """Return a window of the image of any camera, upright, (size, size, 3) RGB."""
         if camera.lens is None:
-            return self.drawer.view(camera, window)
-        cover = _cover(camera, window, self.drawer.size_px)
-        if cover is None:
-            return np.zeros((self.drawer.size_px, self.drawer.size_px, 3), np.uint8)
-        drawn = self.drawer.view(cover.camera, cover.window)
-        return np.asarray(cv2.remap(drawn, cover.x, cover.y, cv2.INTER_LINEAR), np.uint8)
+            return self.renderer.view(camera, window)
+        maps = _resample(camera, window, self.renderer.size_px)
+        if maps is None:
+            return np.zeros((self.renderer.size_px, self.renderer.size_px, 3), np.uint8)
+        drawn = self.renderer.view(maps.camera, maps.window)
+        return np.asarray(cv2.remap(drawn, maps.x, maps.y, cv2.INTER_LINEAR), np.uint8)
 
 
 def pinhole_keypoints(found: Keypoints, cameras: Sequence[PinholeCamera]) -> Keypoints:
-    """Keypoints (B, C, ...) in pixels of the images to pinhole pixels, the tracker's; deviations
-    grow with the magnification, and what a pinhole has no place for is missing."""
+    """Return keypoints (B, C, ...) in pinhole pixels, given those in pixels of the images.
+
+    Standard deviations grow with the magnification; joints without a place in a pinhole image are
+    missing.
+    """
     if all(camera.lens is None for camera in cameras):
         return found
     px, confidence = found.px.copy(), found.confidence.copy()
@@ -92,8 +105,8 @@ def pinhole_keypoints(found: Keypoints, cameras: Sequence[PinholeCamera]) -> Key
 
 
 @functools.lru_cache(maxsize=MAPS_KEPT)
-def _cover(camera: PinholeCamera, window: Roi, size: int) -> _Cover | None:
-    """None where the lens shows nothing in the window."""
+def _resample(camera: PinholeCamera, window: Roi, size: int) -> _Resampling | None:
+    """Return how a window is resampled; None if the lens images nothing in it."""
     middles = (np.arange(size) + 0.5) / size
     places = np.stack(np.meshgrid(middles, middles), -1)
     px = to_image(places, window)
@@ -114,11 +127,11 @@ def _cover(camera: PinholeCamera, window: Roi, size: int) -> _Cover | None:
     x, y = (
         _pixels(at + (side / 2 - mid), side, size) for at, mid in ((u, middle[0]), (v, middle[1]))
     )
-    return _Cover(view, Roi(middle, side, 0.0), x, y)
+    return _Resampling(view, Roi(middle, side, 0.0), x, y)
 
 
 def _axes(ray: Floats, window: Roi, camera: PinholeCamera) -> Floats:
-    """R_world_from_view: forward to the middle of what is seen, upright with the window."""
+    """Return R_world_from_view: forward to the middle of the rays, upright with the window."""
     forward = np.asarray(np.nanmean(ray.reshape(-1, 3), 0), float)
     forward /= np.linalg.norm(forward)
     c, s = np.cos(window.rotation_rad), np.sin(window.rotation_rad)
@@ -129,5 +142,5 @@ def _axes(ray: Floats, window: Roi, camera: PinholeCamera) -> Floats:
 
 
 def _pixels(place: Floats, side: float, size: int) -> NDArray[np.float32]:
-    """Places in [0, side] to pixels counted from pixel centres; far outside where unknown."""
+    """Return pixels, counted from their centres, of places in [0, side]; far outside of NaN."""
     return np.nan_to_num(place / side * size - 0.5, nan=-size).astype(np.float32)

@@ -17,9 +17,9 @@ from hrc_env.geometry.cameras import (
     rays,
 )
 from hrc_env.geometry.lens import Lens
-from hrc_env.perception import lensed
+from hrc_env.perception import lenses
 from hrc_env.perception.blazepose import to_image
-from hrc_env.perception.lensed import Lensed, pinhole_keypoints
+from hrc_env.perception.lenses import LensRenderer, pinhole_keypoints
 from hrc_env.scene.build import SceneConfig, build
 from hrc_env.scene.primitives import SOLID
 from hrc_env.scene.render import CropRenderer
@@ -61,7 +61,7 @@ def test_a_pattern_through_the_lens_and_back_is_the_pinholes(
     scene = build(SceneConfig(clutter=False, cameras=(config,)))
     camera, renderer = scene.cameras[0], CropRenderer(scene)
     mujoco.mj_forward(renderer._model, renderer._data)
-    images = Lensed(renderer, scene.cameras)
+    images = LensRenderer(renderer, scene.cameras)
     for ball in BALLS:
         px = project(projections((camera,)), ball[None])[0][0, 0]
         straight = Roi(tuple(px + SHIFT_PX), 90.0, rotation_rad)
@@ -88,7 +88,7 @@ class Plain:
 def test_every_pixel_shows_the_light_that_the_lens_brings_there(config):
     (camera,) = make_cameras((config,))
     window = Roi((700.0, 500.0), 620.0, 0.4)
-    crop = Lensed(Plain(), (camera,)).crop(0, window)
+    crop = LensRenderer(Plain(), (camera,)).crop(0, window)
     middles = (np.arange(64) + 0.5) / 64
     light = rays(camera, to_image(np.stack(np.meshgrid(middles, middles), -1), window))
     assert np.abs(crop - (light * 127 + 127)).max() < 2.0
@@ -96,14 +96,14 @@ def test_every_pixel_shows_the_light_that_the_lens_brings_there(config):
 
 def test_outside_the_image_it_is_black():
     (camera,) = make_cameras((GOPRO,))
-    crop = Lensed(Plain(), (camera,)).crop(0, Roi((0.0, 540.0), 400.0, 0.0))
+    crop = LensRenderer(Plain(), (camera,)).crop(0, Roi((0.0, 540.0), 400.0, 0.0))
     assert (crop[:, :31] == 0).all()
     assert (crop[:, 33:] > 0).any()
 
 
 def test_where_the_lens_shows_nothing_it_is_black():
     (camera,) = make_cameras((GOPRO,))
-    crop = Lensed(Plain(), (camera,)).crop(0, Roi((5000.0, 540.0), 400.0, 0.0))
+    crop = LensRenderer(Plain(), (camera,)).crop(0, Roi((5000.0, 540.0), 400.0, 0.0))
     assert not crop.any()
 
 
@@ -111,16 +111,16 @@ def test_a_camera_without_lens_is_the_renderers_own():
     (camera,) = make_cameras(LAB_CAMERAS[:1])
     window = Roi((900.0, 500.0), 300.0, 0.3)
     np.testing.assert_array_equal(
-        Lensed(Plain(), (camera,)).crop(0, window), Plain().view(camera, window)
+        LensRenderer(Plain(), (camera,)).crop(0, window), Plain().view(camera, window)
     )
 
 
 def test_maps_are_kept_and_not_without_end():
     (camera,) = make_cameras((GOPRO,))
-    images = Lensed(Plain(), (camera,))
-    for k in range(lensed.MAPS_KEPT + 8):
+    images = LensRenderer(Plain(), (camera,))
+    for k in range(lenses.MAPS_KEPT + 8):
         images.crop(0, Roi((700.0 + k, 500.0), 300.0, 0.0))
-    assert lensed._cover.cache_info().currsize == lensed.MAPS_KEPT
+    assert lenses._resample.cache_info().currsize == lenses.MAPS_KEPT
 
 
 def test_keypoints_go_to_the_tracker_in_pinhole_pixels_with_their_deviations_stretched():

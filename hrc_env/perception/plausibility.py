@@ -1,0 +1,105 @@
+"""Plausibility of detections: networks mistake robots for people now and then.
+
+If several cameras show a body, its bones must be about as long as people's. If only one does, the
+body must stand upright on the floor, where its line of sight meets it: its size then tells whether
+it is too large.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hrc_env.core.records import Keypoints
+from hrc_env.core.skeleton import BONE_LENGTH_M, BONES, JOINT
+from hrc_env.core.typing import Floats, Points2, Points3
+from hrc_env.geometry.cameras import PinholeCamera, projections, rays
+from hrc_env.geometry.triangulation import triangulate
+from hrc_env.perception.lenses import pinhole_keypoints
+
+MIN_VISIBILITY = 0.6
+"""Least mean confidence of the joints of a person whom one camera alone shows."""
+NEAR_FLOOR_M = 0.5
+"""Greatest distance of a standing person from the points of the floor [m]."""
+GATE_SIGMA = 4.0
+"""Greatest reprojection error of cameras that agree on a joint, in standard deviations."""
+BONE_RATIO = 1.42
+"""Greatest ratio of a bone's length to an adult's mean, or of the mean to it, that is plausible."""
+MIN_BONES = 0.65
+"""Least share of all bones that must be plausible."""
+LEVELS = tuple(
+    [JOINT[f"{side}_{name}"] for side in ("left", "right")]
+    for name in ("ankle", "knee", "hip", "shoulder")
+)
+"""Pairs of joints whose heights show whether a person stands."""
+ANKLE_M = 0.1
+"""Height of the ankles of a standing person above the floor [m]."""
+LEVELS_M: Floats = np.array([(0.2, 0.9), (0.6, 1.4), (1.0, 2.0), (1.2, 2.3)])
+"""(4, 2) lower and upper bounds of the heights of knees, hips, shoulders and nose [m]."""
+
+
+def is_person(
+    px: Points2,
+    confidence: Floats,
+    sigma_px: Floats,
+    cameras: Sequence[PinholeCamera],
+    floor_world: Points3 | None,
+) -> bool:
+    """Return whether the detection of a search is a person.
+
+    Args:
+        px: (C, J, 2) joints in pixels of the images.
+        confidence: (C, J) their confidences; 0 where a camera does not show them.
+        sigma_px: (C, J) their standard deviations [px].
+        cameras: the rig.
+        floor_world: (N, 3) points of the floor where people may be [m]; None: unknown, and
+            detections of one camera count only if there is no other camera.
+    """
+    shown = np.flatnonzero(confidence.any(1)).tolist()
+    if len(shown) > 1:
+        return has_body(px, confidence, sigma_px, cameras)
+    if not shown or floor_world is None:
+        return shown == [0] and len(cameras) == 1
+    (c,) = shown
+    return is_standing(px[c], confidence[c], cameras[c], floor_world)
+
+
+def has_body(
+    px: Points2, confidence: Floats, sigma_px: Floats, cameras: Sequence[PinholeCamera]
+) -> bool:
+    """Return whether joints have the bones of a person.
+
+    Args:
+        px: (C, J, 2) joints in pixels of the images of two cameras or more.
+        confidence: (C, J) their confidences.
+        sigma_px: (C, J) their standard deviations [px].
+        cameras: the rig.
+    """
+    found = Keypoints(*(each[None, :, None] for each in (px, confidence, sigma_px)))
+    views = pinhole_keypoints(found, cameras)
+    joints = triangulate(projections(tuple(cameras)), views.px, views.sigma_px, GATE_SIGMA)
+    start, end = np.moveaxis(joints.points_world[0, 0, BONES], 1, 0)
+    ratio = np.linalg.norm(end - start, axis=-1) / BONE_LENGTH_M
+    return bool(np.mean((ratio < BONE_RATIO) & (ratio > 1 / BONE_RATIO)) >= MIN_BONES)
+
+
+def is_standing(
+    joints_px: Points2, confidence: Floats, camera: PinholeCamera, floor_world: Points3
+) -> bool:
+    """Return whether a person is mostly visible and stands upright on the floor.
+
+    Args:
+        joints_px: (J, 2) joints in pixels of the image.
+        confidence: (J,) their confidences.
+        camera: the camera.
+        floor_world: (N, 3) points of the floor [m].
+    """
+    levels_px = [joints_px[pair].mean(0) for pair in LEVELS]
+    ray = rays(camera, np.stack([*levels_px, joints_px[JOINT["nose"]]]))
+    eye, level = camera.eye_world, np.linalg.norm(ray[:, :2], axis=-1)
+    away_m = (ANKLE_M - eye[2]) / ray[0, 2] * level[0]  # along the floor
+    height_m = eye[2] + away_m * ray[1:, 2] / level[1:]
+    upright = away_m > 0 and ((height_m > LEVELS_M[:, 0]) & (height_m < LEVELS_M[:, 1])).all()
+    if not upright or confidence.mean() < MIN_VISIBILITY:
+        return False
+    place = eye[:2] + away_m * ray[0, :2] / level[0]
+    return bool(np.linalg.norm(floor_world[:, :2] - place, axis=-1).min() < NEAR_FLOOR_M)

@@ -1,0 +1,250 @@
+"""Detection of every worker of a scene, by windows at predicted places and by searches."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from hrc_env.core.batching import Stateful
+from hrc_env.core.records import Keypoints, PoseEstimate
+from hrc_env.core.typing import Bools, Capsules, Floats, Image, Ints, Points3
+from hrc_env.geometry.cameras import PinholeCamera, project, projections
+from hrc_env.perception.detector import Detection, DetectorConfig, PoseDetector
+from hrc_env.perception.noise import ERROR
+from hrc_env.perception.outline import STANDING, is_folded, posture_of
+from hrc_env.perception.searching import Candidates, ImageSource, Sighting, Views, exclude_people
+from hrc_env.perception.windows import steady_window, window_from_joints
+from hrc_env.pipeline.bystanders import HIPS, Bystanders
+from hrc_env.pipeline.reacquisition import ENOUGH, Reacquisition, SearchSchedule
+from hrc_env.pipeline.sensor_input import Windows
+
+
+class ExpectedPosture(NamedTuple):
+    """The posture in which a worker is expected."""
+
+    is_folded: bool
+    """Whether the worker is expected to be folded (`outline.is_folded`)."""
+    shares: Sequence[float]
+    """Shares of the postures (`outline.Posture`)."""
+
+
+class Crops(NamedTuple):
+    """The last crops of a worker, for pictures."""
+
+    windows: Views
+    """(C,) window of each camera."""
+    images: list[Image | None]
+    """(C,) crop of each window, as the network got it."""
+
+
+class WorkerDetector(Stateful):
+    """A detector of the workers of a batch of environments in the images of a rig.
+
+    Tracked workers are detected in windows at their predicted places, others by searches of whole
+    images.
+
+    Args:
+        batch: number B of environments.
+        cameras: the rig.
+        n_workers: number W of workers.
+        config: settings of the detector.
+        floor_world: (N, 3) points where people may stand, for whom searches are laid out [m]; None:
+            unknown.
+        error: table `sigma` of a calibration, from which standard deviations follow.
+    """
+
+    CHANGES = ("pose_detector", "windows", "schedule", "reacquisition", "bystanders", "unexplained")
+
+    def __init__(
+        self,
+        batch: int,
+        cameras: Sequence[PinholeCamera],
+        n_workers: int,
+        config: DetectorConfig,
+        floor_world: Points3 | None = None,
+        error: Floats = ERROR,
+    ) -> None:
+        self.cameras, self.n_workers = tuple(cameras), n_workers
+        self.P = projections(self.cameras)
+        self.pose_detector = PoseDetector(self.cameras, config, floor_world, error)
+        self.windows: list[Windows] = [
+            [[None] * len(self.cameras) for _ in range(n_workers)] for _ in range(batch)
+        ]
+        self.schedule = SearchSchedule(batch, len(self.cameras), config.search_every)
+        self.reacquisition = Reacquisition(batch, n_workers, self.cameras)
+        self.bystanders = Bystanders(batch, n_workers, self.cameras)
+        self.unexplained = np.zeros((batch, len(self.cameras)), np.bool_)
+        """(B, C) whether a camera's last search found a person who is neither a worker nor one of
+        the `bystanders`."""
+        self.last_crops: dict[int, Crops] = {}
+        """Last crops of each environment's first worker, for pictures; they are no state."""
+
+    def detect(
+        self,
+        source: ImageSource,
+        expected: PoseEstimate,
+        b: int,
+        has_image: Sequence[bool],
+        out: Keypoints,
+        robot_world: Capsules | None = None,
+    ) -> None:
+        """Detect every worker of environment b.
+
+        Workers with a window come first; one search serves all the others. Workers who are in view
+        only of cameras without an image are left out.
+
+        Args:
+            source: the present images.
+            expected: (W, ...) the tracker's prediction.
+            b: the environment.
+            has_image: (C,) whether each camera has an image now.
+            out: (C, W, ...) is filled with keypoints.
+            robot_world: (K, 2, 3) the robot's capsules [m]; if there are more people than slots,
+                those nearest to it get one. None: those who were tracked first.
+        """
+        self.schedule.tick(b)
+        self.bystanders.tick(b)
+        predicted = [self._predict_windows(expected, w) for w in range(self.n_workers)]
+        taken: Windows = []
+        people, nearest, missed = None, None, False
+        for worker in sorted(range(len(predicted)), key=lambda w: not any(predicted[w])):
+            steady = list(map(steady_window, self.windows[b][worker], predicted[worker]))
+            windows = [w if has else None for w, has in zip(steady, has_image, strict=True)]
+            if not any(has_image) or (any(steady) and not any(windows)):
+                continue
+            if any(windows):
+                windows = self._choose_windows(source, b, worker, windows, taken, has_image)
+            elif people is None:
+                people = self._search(source, b, self.schedule.due_cameras(b, has_image))
+                vacant = self.n_workers - sum(map(any, predicted))
+                others = exclude_people(people, taken)
+                nearest = self.bystanders.select_nearest(others, vacant, robot_world)
+            track = self._track(b, worker)
+            folded, posture = _expected_posture(expected, worker)
+            seen = self.pose_detector.detect(
+                source, windows, track, taken, nearest, folded, posture
+            )
+            taken.append(seen.windows)
+            shown = seen.confidence.max(-1) > 0.0
+            self.reacquisition.count(b, worker, shown)
+            missed |= not any(windows) and shown.sum() < min(ENOUGH, len(shown))
+            self._keep(b, worker, seen, has_image, out)
+        is_due = self.bystanders.is_search_due(b, self.schedule.every)
+        if people is None and any(has_image) and is_due:
+            people = self._search(source, b, np.flatnonzero(has_image).tolist())
+        if people is not None:
+            hips = np.where(expected.tracked[:, None], expected.mean_world[:, HIPS].mean(1), np.nan)
+            beside = self.bystanders.update(b, people, taken, hips, robot_world)
+            self._explain(b, beside, bool(expected.tracked.all()))
+        if missed:
+            self.schedule.rest(b)
+
+    def drop_given_up(self, ids: Ints, expected: PoseEstimate) -> PoseEstimate:
+        """Return a prediction of environments `ids` without the tracks that are given up.
+
+        These lose their slots to people nearer to the robot.
+        """
+        given_up = self.bystanders.given_up[ids] > 0
+        return (
+            replace(expected, tracked=expected.tracked & ~given_up) if given_up.any() else expected
+        )
+
+    def searched_cameras(self, ids: Ints) -> Bools:
+        """Return the cameras (B, C) whose whole images were just searched and are not blank."""
+        return (self.schedule.ages[ids] == 0) & ~self.schedule.blank[ids]
+
+    def forget(self, b: int) -> None:
+        """Forget the workers of environment b."""
+        self.unexplained[b] = False
+        self.schedule.reset(b)
+        self.bystanders.forget(b)
+        for worker in range(self.n_workers):
+            self.pose_detector.forget(self._track(b, worker))
+            self.reacquisition.reset(b, worker)
+            self.windows[b][worker] = [None] * len(self.cameras)
+
+    def crops(self, b: int) -> list[Image | None]:
+        """Return the last crop (C,) of the first worker of environment b in each camera."""
+        windows, crops = self.last_crops.get(b, Crops([], []))
+        current = self.windows[b][0] if self.windows[b] else []
+        return crops if windows == current else [None] * len(current)
+
+    def close(self) -> None:
+        """Stop the threads of the networks."""
+        self.pose_detector.close()
+
+    def _search(self, source: ImageSource, b: int, cameras: Sequence[int]) -> Candidates:
+        """Search the images of cameras, and return the people (C,) of all recent searches."""
+        found = self.pose_detector.search(source, cameras)
+        return self.schedule.remember(b, cameras, found, self.pose_detector.blank)
+
+    def _explain(self, b: int, beside: Sequence[Sighting], no_vacancy: bool) -> None:
+        """Note the searched cameras that show a person who is not explained.
+
+        Args:
+            b: the environment.
+            beside: people besides the workers.
+            no_vacancy: whether all slots are tracked; a person then counts only if no other camera
+                agrees.
+        """
+        for c in np.flatnonzero(self.schedule.ages[b] == 0).tolist():
+            shown = [one for one in beside if one.windows[c] is not None]
+            self.unexplained[b, c] = any(one.n_cameras == 1 or not no_vacancy for one in shown)
+
+    def _keep(
+        self, b: int, worker: int, seen: Detection, has_image: Sequence[bool], out: Keypoints
+    ) -> None:
+        """Write the detection of a worker into keypoints (C, W, ...), and keep its windows."""
+        out.px[:, worker], out.confidence[:, worker] = seen.px, seen.confidence
+        out.sigma_px[:, worker] = seen.sigma_px
+        for c, has in enumerate(has_image):
+            if has:
+                self.windows[b][worker][c] = seen.windows[c]
+        if worker == 0:
+            self.last_crops[b] = Crops(list(seen.windows), seen.crops)
+
+    def _choose_windows(
+        self,
+        source: ImageSource,
+        b: int,
+        worker: int,
+        windows: Views,
+        taken: Windows,
+        has_image: Sequence[bool],
+    ) -> Views:
+        """Return the windows of a tracked worker, after a search if most cameras miss the worker.
+
+        Args:
+            source: the present images.
+            b: the environment.
+            worker: the worker.
+            windows: (C,) windows by the track.
+            taken: windows (C,) of other workers.
+            has_image: (C,) whether each camera has an image now.
+        """
+        blind = self.reacquisition.blind_cameras(b, worker, has_image)
+        if blind:
+            people = self.pose_detector.search(source, blind)
+            self.reacquisition.learn(b, worker, people, windows, taken)
+        there = self.reacquisition.choose_windows(b, worker, windows)
+        return [window if has else None for window, has in zip(there, has_image, strict=True)]
+
+    def _track(self, b: int, worker: int) -> int:
+        """Return the number of a worker's track in the detector."""
+        return b * self.n_workers + worker
+
+    def _predict_windows(self, expected: PoseEstimate, worker: int) -> Views:
+        """Return a worker's window in each camera (C,); None without a track or out of view."""
+        if not expected.tracked[worker]:
+            return [None] * len(self.cameras)
+        px, depth_m = project(self.P, expected.mean_world[worker : worker + 1])
+        return list(map(window_from_joints, px[0], depth_m[0], self.cameras))
+
+
+def _expected_posture(expected: PoseEstimate, worker: int) -> ExpectedPosture:
+    """Return the posture in which a worker is expected; without a track, standing."""
+    if not expected.tracked[worker]:
+        return ExpectedPosture(False, STANDING)
+    joints = expected.mean_world[worker]
+    return ExpectedPosture(is_folded(joints), posture_of(joints, expected.velocity_world[worker]))
