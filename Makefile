@@ -8,7 +8,7 @@
 # make docs         the site, in out/docs
 # make results      all numbers and pictures of the documentation made at older versions (hours)
 # make behaviour    whether anything behaves otherwise than recorded
-# make check        style, types, floors
+# make check        style, types, floors, language
 PYTHON ?= python3
 VENV ?= .venv
 STOCK := out/stock
@@ -84,6 +84,7 @@ check: $(DEV)
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/lint-imports
+	$(RUN) -m tests.language
 	$(VENV)/bin/pyright
 
 bench: $(DEV)

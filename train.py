@@ -1,7 +1,7 @@
-"""Train a policy with PPO: `python -m hrc_env train`, of which this is another door.
+"""Train a policy with PPO, as `python -m hrc_env train` does.
 
 python train.py                                           # minutes on two cores
-python train.py --resume runs/quick --timesteps 2000000   # go on where it stopped
+python train.py --resume runs/quick --timesteps 2000000   # continue it
 python train.py --proximity 0 --out runs/reckless         # without the safety term
 """
 

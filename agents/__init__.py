@@ -1,5 +1,5 @@
-"""Agents: one file each. An agent turns observations (..., n) into actions (..., A).
+"""Agents, one file each. An agent turns observations (..., n) into actions (..., A).
 
-What they know beforehand is the robot and how to read an observation (`env_info.EnvInfo`); what
-they know of a worker is the estimate in the observation.
+An agent knows the robot and the layout of observations in advance (`env_info.EnvInfo`); of workers
+it knows the estimate in the observation.
 """

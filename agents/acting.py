@@ -1,4 +1,5 @@
-"""Checkpoints for acting: their environment, and their policy; nothing in files is run."""
+"""Checkpoints for acting: their environment and their policy, without executing code of the
+file."""
 
 import json
 import zipfile
@@ -17,25 +18,27 @@ from .env_info import EnvInfo
 
 TRAIN = "python -m hrc_env train"
 Size = int | dict[str, int]
-"""Entries of an observation, by name where goals or images stand apart."""
+"""Number of entries of an observation, by name if goals or images are separate."""
 
 
 def load(path: Path, env_info: EnvInfo, trust: bool = False) -> sb3_files.SB3Agent:
-    """Return the policy of a checkpoint, of ours or of Stable-Baselines3, by its weights alone.
+    """Return the policy of a checkpoint of this package or of Stable-Baselines3, from its weights
+    alone.
 
     Raises:
-        CheckpointError: it was made for another version or environment; or as of `sb3_files.load`.
+        CheckpointError: it was made for another version or environment, or it fails in
+            `sb3_files.load`.
     """
-    if meta := meta_of(path):
+    if meta := read_meta(path):
         check_made_for(path, meta, env_info)
     return sb3_files.load(path, env_info, trust)
 
 
 def describe(path: Path) -> dict[str, Any]:
-    """Return the description that a checkpoint holds.
+    """Return the description in a checkpoint.
 
     Raises:
-        CheckpointError: no file, or not one of ours.
+        CheckpointError: the file does not exist, or is not a checkpoint of this package.
     """
     if not path.exists():
         raise CheckpointError(f"No checkpoint at {path}. Train one with: {TRAIN}")
@@ -48,11 +51,11 @@ def describe(path: Path) -> dict[str, Any]:
         ) from error
 
 
-def meta_of(path: Path) -> dict[str, Any]:
-    """Return the description that a checkpoint holds; nothing of one that Stable-Baselines3 wrote.
+def read_meta(path: Path) -> dict[str, Any]:
+    """Return the description in a checkpoint; an empty one for a file of Stable-Baselines3.
 
     Raises:
-        CheckpointError: no file, or neither of them.
+        CheckpointError: the file does not exist, or is neither of them.
     """
     try:
         return describe(path)
@@ -62,11 +65,11 @@ def meta_of(path: Path) -> dict[str, Any]:
 
 
 def check_made_for(path: Path, meta: dict[str, Any], env_info: EnvInfo) -> None:
-    """Raise `CheckpointError` unless a checkpoint of ours is for an environment."""
-    size, seen = len(env_info.layout.low), meta["observation_size"]
+    """Raise `CheckpointError` if a checkpoint of this package is for another environment."""
+    size, saved = len(env_info.layout.low), meta["observation_size"]
     beside = dict.fromkeys((ACHIEVED, DESIRED), env_info.goal_size) if env_info.goal_size else {}
-    if isinstance(seen, dict):  # a policy need not look at images that there are
-        images = {name: shape for name, shape in env_info.images.items() if name in seen}
+    if isinstance(saved, dict):  # a policy need not use all images
+        images = {name: shape for name, shape in env_info.images.items() if name in saved}
         beside |= {name: int(np.prod(shape)) for name, shape in images.items()}
     parts: Size = {**beside, FLAT: size} if beside else size
     check_fits(path, meta, parts, env_info.n_actions)
@@ -75,12 +78,13 @@ def check_made_for(path: Path, meta: dict[str, Any], env_info: EnvInfo) -> None:
 
 
 def check_fits(path: Path, meta: dict[str, Any], observation: Size, action: Size) -> None:
-    """Raise `CheckpointError` unless a checkpoint of ours is of this version and these sizes."""
+    """Raise `CheckpointError` if a checkpoint of this package is of another version or of other
+    sizes."""
     made_with = meta["hrc_env"]
     if made_with.split(".")[:2] != __version__.split(".")[:2]:
         raise CheckpointError(
             f"{path} was made with hrc_env {made_with}, this is {__version__}; checkpoints fit the "
-            f"same minor version. Install hrc_env {made_with} or train anew: {TRAIN}"
+            f"same minor version. Install hrc_env {made_with} or train again: {TRAIN}"
         )
     sizes = meta["observation_size"], meta["action_size"]
     if sizes != (observation, action):

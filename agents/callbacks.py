@@ -1,4 +1,4 @@
-"""While an agent learns: the safety term grows, progress, curves, checkpoints, Ctrl-C."""
+"""Callbacks of a training: growing safety term, progress, curves, checkpoints, Ctrl-C."""
 
 import json
 import signal
@@ -9,7 +9,7 @@ from collections import deque
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from types import FrameType
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from matplotlib.ticker import EngFormatter
@@ -21,7 +21,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.progress import Meter
 from hrc_env.core.results import write_whole
 from hrc_env.evaluation.episodes import summarize
-from hrc_env.experiments.plots import label, new_figure, save
+from hrc_env.experiments.plots import label_axes, make_figure, save
 from hrc_env.sb3 import HRCVecEnv
 
 from . import checkpoints
@@ -30,15 +30,15 @@ from .ppo_lagrangian import PPOLagrangian
 RECENT_EPISODES = 64
 """Number of finished episodes over which curves average."""
 SAVE_EVERY_S = 60.0
-"""Between checkpoints [s]."""
+"""Time between checkpoints [s]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Ramp:
-    """A share that grows evenly from 0 to 1."""
+    """A share that grows linearly from 0 to 1."""
 
     n_steps: int
-    """Environment steps that it takes; 0: all of it from the start."""
+    """Number of environment steps until 1; 0: it is 1 from the start."""
 
     def __post_init__(self) -> None:
         if self.n_steps < 0:
@@ -50,11 +50,11 @@ class Ramp:
 
 
 class Curriculum(BaseCallback):
-    """Before every rollout sets the proximity term's weight, and of a limit what is in force; a
-    resumed run goes on in it.
+    """Sets the proximity term's weight, and the limit in force, before every rollout.
 
-    With the whole weight from the start a learner first learns to stay away, and finds its goals
-    about nine times later; it is then the more careful one (docs/learning.md has both).
+    A resumed run continues it. With the whole weight from the start a learner first learns to stay
+    away, and finds its goals about nine times later; its final policy is more careful
+    (docs/learning.md has both).
     """
 
     def __init__(self, ramp: Ramp, env: HRCVecEnv) -> None:
@@ -65,7 +65,7 @@ class Curriculum(BaseCallback):
 
     @property
     def weight(self) -> float:
-        """The proximity term's weight in the last rollout."""
+        """Weight of the proximity term in the last rollout."""
         return self.share * self.whole.proximity
 
     def _on_rollout_start(self) -> None:
@@ -79,18 +79,19 @@ class Curriculum(BaseCallback):
 
 
 class ProximityRamp(Curriculum):
-    """Lets the proximity term's weight grow from 0, for a learner of Stable-Baselines3.
+    """Increases the proximity term's weight from 0, for a learner of Stable-Baselines3.
 
         env = VecNormalize(HRCVecEnv(64, stagger=True), norm_obs=False, gamma=0.98)
         model = PPO("MlpPolicy", env, **PPOSettings().keywords())
         model.learn(1_000_000, callback=ProximityRamp(400_000))
 
     Args:
-        n_steps: environment steps until the weight is the environment's (`RewardConfig`), as
-            `train --ramp` has them.
+        n_steps: environment steps until the weight is the environment's (`RewardConfig`), as `train
+            --ramp`.
 
     Raises:
-        ConfigError: fewer than 0 steps; or, when it learns, no `HRCVecEnv`.
+        ConfigError: fewer than 0 steps; or, at the start of the training, the environment is not an
+            `HRCVecEnv`.
     """
 
     def __init__(self, n_steps: int = 400_000) -> None:
@@ -102,12 +103,13 @@ class ProximityRamp(Curriculum):
         while isinstance(env, VecEnvWrapper):
             env = env.venv
         if not isinstance(env, HRCVecEnv):
-            raise ConfigError(f"ProximityRamp wants an HRCVecEnv, got {type(env).__name__}.")
+            raise ConfigError(f"ProximityRamp needs an HRCVecEnv, got {type(env).__name__}.")
         self.env, self.whole = env, env.env.config.reward
 
 
 class Interrupt:
-    """After `listen` the first Ctrl-C is kept in `asked`; the second one interrupts as ever."""
+    """Handler of Ctrl-C: after `listen` the first one sets `asked`, and the second one
+    interrupts."""
 
     def __init__(self) -> None:
         self.asked = False
@@ -121,8 +123,8 @@ class Interrupt:
             signal.signal(signal.SIGINT, self._before)
 
     def listen(self) -> None:
-        """From now on."""
-        if threading.current_thread() is threading.main_thread():  # signals come nowhere else
+        """Begin to handle Ctrl-C."""
+        if threading.current_thread() is threading.main_thread():  # other threads get no signals
             self._before = signal.signal(signal.SIGINT, self._answer)
 
     def _answer(self, number: int, frame: FrameType | None) -> None:
@@ -132,21 +134,23 @@ class Interrupt:
 
 
 Curve = list[dict[str, float]]
-"""A learning curve: one entry a rollout; of SAC, whose rollouts are single steps, one in
-`LEAST_STEPS`."""
+"""A learning curve, with one entry per rollout.
+
+For SAC, with rollouts of single steps, it has one entry per `LEAST_STEPS`.
+"""
 LEAST_STEPS = 2048
-"""Environment steps."""
+"""Environment steps between entries of SAC's curve."""
 
 
 class TrainingLog:
-    """The curve of a run, its checkpoints, and what is shown of it while it goes on.
+    """The curve of a run, its checkpoints, and its progress display.
 
     Args:
-        learner: its logger writes for TensorBoard.
-        folder: of the run.
-        facts: what the checkpoint was made for.
-        curve: of what was learnt before; it grows.
-        meter: shows the progress.
+        learner: the learner; its logger writes for TensorBoard.
+        folder: folder of the run.
+        facts: description to store in the checkpoint.
+        curve: the curve of an earlier part of the run; it is extended.
+        meter: the progress display.
     """
 
     def __init__(
@@ -159,14 +163,14 @@ class TrainingLog:
         self.begin()
 
     def begin(self) -> None:
-        """Count time from now on."""
+        """Start the clock."""
         self.started_s = self.saved_s = time.monotonic()
 
     def note(self, weights: dict[str, float]) -> None:
-        """Add a point to the curve, if an episode has ended; show it.
+        """Add a point to the curve if an episode has ended, and show the progress.
 
         Args:
-            weights: what was in force, by name.
+            weights: weights of the last rollout by name.
         """
         n_steps, note = self.learner.num_timesteps, ""
         if self.recent:
@@ -186,21 +190,21 @@ class TrainingLog:
         return time.monotonic() - self.saved_s > SAVE_EVERY_S
 
     def save(self) -> None:
-        """Write checkpoint and curve."""
+        """Write the checkpoint and the curve."""
         self.saved_s = time.monotonic()
         checkpoints.save(self.learner, self.folder / "policy.zip", self.facts)
         write_whole(self.folder / "curve.json", json.dumps(self.curve, indent=1))
 
 
 class TrainingMonitor(BaseCallback):
-    """Keeps the log of a run of Stable-Baselines3: a checkpoint every minute and at the end.
+    """Keeps the log of a run of Stable-Baselines3, with a checkpoint every minute and at the end.
 
-    Where it is interrupted it ends the training at the next step, as if that had been the last.
+    Ctrl-C ends the training after the current step.
     """
 
-    def __init__(self, log: TrainingLog, care: Curriculum, interrupt: Interrupt) -> None:
+    def __init__(self, log: TrainingLog, curriculum: Curriculum, interrupt: Interrupt) -> None:
         super().__init__()
-        self.log, self.care, self.interrupt = log, care, interrupt
+        self.log, self.curriculum, self.interrupt = log, curriculum, interrupt
 
     def _on_training_start(self) -> None:
         self.log.begin()
@@ -213,51 +217,61 @@ class TrainingMonitor(BaseCallback):
 
     def _on_rollout_end(self) -> None:
         if isinstance(self.model, OffPolicyAlgorithm):
-            noted = self.log.curve[-1]["steps"] if self.log.curve else 0
-            if self.num_timesteps - noted < LEAST_STEPS:
+            last = self.log.curve[-1]["steps"] if self.log.curve else 0
+            if self.num_timesteps - last < LEAST_STEPS:
                 return
-        self._note()
+        self._add_point()
         if self.log.is_due:
             self.log.save()
 
     def _on_training_end(self) -> None:
-        self._note()
+        self._add_point()
         self.log.save()
 
-    def _note(self) -> None:
+    def _add_point(self) -> None:
         weights = {
-            "safety_share": self.care.ramp.at(self.num_timesteps),
-            "proximity": self.care.weight,
+            "safety_share": self.curriculum.ramp.at(self.num_timesteps),
+            "proximity": self.curriculum.weight,
         }
         if isinstance(self.model, PPOLagrangian):
-            held = self.model.multiplier
-            weights |= {"cost": held.cost, "limit": held.limit, "multiplier": held.value}
+            limited = self.model.multiplier
+            weights |= {"cost": limited.cost, "limit": limited.limit, "multiplier": limited.value}
         self.log.note(weights)
 
 
 Y_WIDTH = 20
-"""Characters of a line beside an axis."""
+"""Greatest number of characters in a line beside an axis."""
+
+
+class Panel(NamedTuple):
+    """A panel of a learning curve."""
+
+    label: str
+    colour: str
+
+
 PANELS = {
-    "success_rate": ("attempts achieved (dashed: episodes with is_success)", "tab:green"),
-    "goals_per_minute": ("goals per minute", "tab:blue"),
-    "contacts_per_episode": ("true contacts per episode", "tab:red"),
-    "close_steps_per_episode": ("steps < 15 cm per episode", "tab:orange"),
+    "success_rate": Panel("attempts achieved (dashed: episodes with is_success)", "tab:green"),
+    "goals_per_minute": Panel("goals per minute", "tab:blue"),
+    "contacts_per_episode": Panel("true contacts per episode", "tab:red"),
+    "close_steps_per_episode": Panel("steps < 15 cm per episode", "tab:orange"),
 }
+"""Panels of a learning curve by metric."""
 LIMITED = {
-    "cost": ("cost per episode, smoothed (dashed: the limit)", "tab:brown"),
-    "multiplier": ("multiplier", "tab:purple"),
+    "cost": Panel("cost per episode, smoothed (dashed: the limit)", "tab:brown"),
+    "multiplier": Panel("multiplier", "tab:purple"),
 }
-"""What is drawn of a run that keeps a limit, too."""
+"""Further panels for a run with a cost limit."""
 
 
 def plot_curve(curve: Curve, path: Path, title: str) -> None:
-    """Goals, contacts and cost over environment steps as a PNG."""
+    """Draw goals, contacts and cost over environment steps into a PNG."""
     steps = np.array([point["steps"] for point in curve])
     share = np.array([point.get("safety_share", 1.0) for point in curve])
     growing = steps[(share > 0) & (share < 1)]
     limited = bool(curve) and "limit" in curve[-1]
     panels = PANELS | (LIMITED if limited else {})
-    figure = new_figure(9, 9 if limited else 6)
+    figure = make_figure(9, 9 if limited else 6)
     axes = figure.subplots(len(panels) // 2, 2, sharex=True)
     for axis, (name, (words, colour)) in zip(axes.ravel(), panels.items(), strict=True):
         axis.plot(steps, [point[name] for point in curve], color=colour)
@@ -266,7 +280,7 @@ def plot_curve(curve: Curve, path: Path, title: str) -> None:
             axis.plot(steps, succeeded, color=colour, linestyle="--")
         if name == "cost":
             axis.axhline(curve[-1]["limit"], color="grey", linestyle="--")
-        label(axis, "environment steps", textwrap.fill(words, Y_WIDTH))
+        label_axes(axis, "environment steps", textwrap.fill(words, Y_WIDTH))
         axis.set_ylim(bottom=0)
         axis.xaxis.set_major_formatter(EngFormatter(sep=" "))
         if len(growing):

@@ -1,4 +1,4 @@
-"""Checkpoints: a learner of Stable-Baselines3, and what it was made for."""
+"""Checkpoints: a learner of Stable-Baselines3, and a description of its environment."""
 
 import json
 import os
@@ -19,23 +19,23 @@ from hrc_env.sb3 import HRCVecEnv
 from .acting import Size, check_fits, check_made_for, describe
 from .env_info import EnvInfo, Observation
 from .ppo_lagrangian import PPOLagrangian
-from .sac import ResumedSAC, first_steps
+from .sac import ResumedSAC, count_first_steps
 
 with learner():
     from stable_baselines3 import PPO, SAC
     from stable_baselines3.common.vec_env import VecNormalize
 
 KINDS = {"ppo": PPO, "ppo_lagrangian": PPOLagrangian, "sac": SAC}
-"""By algorithm."""
+"""Classes of learners by algorithm."""
 NO_BUFFER = {"buffer_size": 1, "replay_buffer_class": None, "replay_buffer_kwargs": {}}
-"""What acts needs none, and hindsight wants an environment."""
+"""Arguments that load a learner for acting, without replay buffer."""
 Learner: TypeAlias = "PPO | SAC"
 
 
 def save(learner: Learner, path: Path, facts: dict[str, Any]) -> None:
-    """Write a checkpoint: the learner, the reward's scale, and what it was made for.
+    """Write a checkpoint: the learner, the scale of rewards, and a description of its environment.
 
-    The file appears whole or not at all (temporary file, then rename).
+    An interrupted write leaves no partial file (temporary file, then rename).
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_suffix(".draft.zip")
@@ -43,8 +43,8 @@ def save(learner: Learner, path: Path, facts: dict[str, Any]) -> None:
     scale = learner.get_vec_normalize_env()
     meta = {
         "hrc_env": __version__,
-        "algorithm": algorithm_of(learner),
-        "observation_size": _size(learner.observation_space),
+        "algorithm": get_algorithm(learner),
+        "observation_size": _get_size(learner.observation_space),
         "action_size": int(np.prod(learner.action_space.shape or ())),
         "num_timesteps": learner.num_timesteps,
         "return_mean": None if scale is None else float(scale.ret_rms.mean),
@@ -57,26 +57,28 @@ def save(learner: Learner, path: Path, facts: dict[str, Any]) -> None:
     os.replace(draft, path)
 
 
-def algorithm_of(learner: Learner) -> str:
-    """Return the name of a learner's algorithm; `StopIteration` for one that is not in `KINDS`."""
+def get_algorithm(learner: Learner) -> str:
+    """Return the name of a learner's algorithm; raise `StopIteration` if it is not in `KINDS`."""
     kinds = {kind: name for name, kind in KINDS.items()}
     return next(kinds[kind] for kind in type(learner).__mro__ if kind in kinds)
 
 
 def resume(path: Path, env: HRCVecEnv, tensorboard: Path | None = None) -> Learner:
-    """Go on from a checkpoint: PPO with its scale of rewards; SAC acts as it has learnt, and learns
-    again when its buffer holds an episode of every environment.
+    """Return the learner of a checkpoint, ready to continue on environments.
+
+    PPO keeps its scale of rewards. SAC acts by its policy, and learns again when its buffer holds
+    an episode of every environment.
 
     Raises:
         CheckpointError: it was made for another version or another environment.
     """
     meta = describe(path)
-    check_fits(path, meta, _size(env.observation_space), _size(env.action_space))
+    check_fits(path, meta, _get_size(env.observation_space), _get_size(env.action_space))
     log = None if tensorboard is None else str(tensorboard)
     kind = KINDS[meta.get("algorithm", "ppo")]
     if kind is SAC:
         learner = ResumedSAC.load(path, env=env, device="cpu", tensorboard_log=log)
-        learner.learning_starts = learner.num_timesteps + first_steps(env)
+        learner.learning_starts = learner.num_timesteps + count_first_steps(env)
         return learner
     normalised = VecNormalize(env, norm_obs=False, norm_reward=True)
     if meta["return_variance"] is not None:
@@ -89,7 +91,8 @@ def resume(path: Path, env: HRCVecEnv, tensorboard: Path | None = None) -> Learn
 
 
 def load(path: Path, env_info: EnvInfo) -> "TrainedAgent":
-    """A trained policy for acting, with its learner, which is unpickled: for runs of one's own.
+    """Return a trained policy for acting, with its learner, which is unpickled: for the user's own
+    runs.
 
     Raises:
         CheckpointError: it was made for another version or another environment.
@@ -107,17 +110,18 @@ class TrainedAgent:
         self.learner = learner
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
-        """Deterministic actions (..., A); it is given the parts from which it learnt."""
+        """Return deterministic actions (..., A); only the observation's parts used in training
+        count."""
         space = self.learner.observation_space
         if isinstance(observation, Mapping):
-            known = space.spaces if isinstance(space, spaces.Dict) else None
+            parts = space.spaces if isinstance(space, spaces.Dict) else None
             observation = (
-                {name: observation[name] for name in known} if known else observation[FLAT]
+                {name: observation[name] for name in parts} if parts else observation[FLAT]
             )
         return self.learner.predict(observation, deterministic=True)[0]  # type: ignore[arg-type]
 
 
-def _size(space: spaces.Space[Any]) -> Size:
+def _get_size(space: spaces.Space[Any]) -> Size:
     if isinstance(space, spaces.Dict):
         return {name: int(np.prod(part.shape or ())) for name, part in space.items()}
     return int(np.prod(space.shape or ()))

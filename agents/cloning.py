@@ -1,15 +1,15 @@
-"""Behaviour cloning: a policy learns to do what the scripted agent would do where it goes itself.
+"""Behaviour cloning: a policy learns the scripted agent's actions in states that it reaches itself.
 
-The scripted agents have no memory, so that they can be asked about any observation: rounds of
-DAgger (Ross et al. 2011, arXiv:1011.0686), in which policy and expert act by turns, so that what
-comes late in an episode is seen, too; in the first round it is the expert alone, now and then
-disturbed. What is learnt is always what the expert would do.
+The scripted agents have no memory, so they can be queried for any observation: rounds of DAgger
+(Ross et al. 2011, arXiv:1011.0686), in which policy and expert act in turns, so that late parts of
+an episode are reached, too. In the first round the expert acts alone, with occasional disturbances.
+Targets are always the expert's actions.
 """
 
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from hrc_env.core.errors import learner
 from hrc_env.sb3 import HRCVecEnv
 
 from .env_info import Observation, env_info
-from .experts import expert
+from .experts import make_expert
 
 with learner():
     import torch
@@ -26,29 +26,37 @@ with learner():
 
 Arrays = dict[str, NDArray[np.float32]]
 LEAST_SPREAD = 0.05
-"""Of a policy's actions, as a standard deviation, when it has been taught."""
+"""Least standard deviation of a policy's actions after the cloning."""
 FLAT = ""
-"""The name of an observation that has no parts."""
+"""Name of an observation without parts."""
+
+
+class Demonstrations(NamedTuple):
+    """Observations with the expert's actions."""
+
+    observations: Arrays
+    """Observations (N, ...) by part."""
+    actions: NDArray[np.float32]
+    """Actions of the expert (N, A)."""
 
 
 @dataclass(frozen=True, slots=True)
 class CloningSettings:
-    """How much is shown, and how it is learnt."""
+    """Amount of demonstrations, and settings of the optimization."""
 
     rounds: int = 4
-    """Of gathering and learning."""
+    """Number of rounds of gathering and learning."""
     steps: int = 2000
-    """Gradient steps of each round, over all that has been gathered; three times as many in the
-    last."""
+    """Gradient steps of each round, over all demonstrations; three times as many in the last."""
     batch_size: int = 256
-    """Observations in a gradient step."""
+    """Number of observations in a gradient step."""
     learning_rate: float = 1e-3
-    """Adam's step size; it falls to nothing within each round."""
+    """Step size of Adam, which falls to 0 within each round."""
     stretch: float = 25.0
     """Mean number of steps after which policy and expert take turns in an environment."""
     disturbance: float = 0.3
-    """In the first round, what is added to the expert's actions where it is the policy's turn:
-    standard deviation."""
+    """Standard deviation of noise on the expert's actions, in the policy's turns of the first
+    round."""
 
 
 def clone(
@@ -59,64 +67,65 @@ def clone(
     seed: int,
     tick: Callable[[float], None] = lambda share: None,
 ) -> list[float]:
-    """Teach a policy what the task's scripted agent does, without yielding: care comes later.
+    """Train a policy to imitate the task's scripted agent without yielding; returns errors per
+    round.
 
     Args:
-        policy: of a learner of Stable-Baselines3; its mean action is taught.
-        env: where it is gathered; it is seeded and reset.
-        n_episodes: of the task's length, of all rounds together.
-        settings: of the learning.
-        seed: of episodes, disturbances and the order of what is learnt.
-        tick: told by how much the share that is done grew.
+        policy: policy of a learner of Stable-Baselines3; its mean action is trained.
+        env: environments for the demonstrations, which are seeded and reset.
+        n_episodes: number of episodes of the task's length, in all rounds together.
+        settings: settings of the training.
+        seed: seed of episodes, disturbances and batches.
+        tick: is called with the growth of the completed share.
 
     Returns:
-        The mean error of actions after each round.
+        Mean error of actions after each round.
     """
     rng, simulation = np.random.default_rng(seed), env.simulation
-    teacher = expert(env_info(simulation))
+    teacher = make_expert(env_info(simulation))
     n_steps = -(-n_episodes * env.env.max_episode_steps // (settings.rounds * env.num_envs))
     env.seed(seed)
     observation, shown, errors = env.reset(), [], []
     alone = rng.random(env.num_envs) < 0.5
     for k in range(settings.rounds):
         for _ in range(n_steps):
-            told = np.clip(teacher.act(observation), -1, 1)
-            shown.append((_named(observation), told))
+            target = np.clip(teacher.act(observation), -1, 1)
+            shown.append((_split_parts(observation), target))
             alone ^= rng.random(env.num_envs) < 1 / settings.stretch
             if k == 0:
-                own = told + settings.disturbance * rng.standard_normal(told.shape)
+                own = target + settings.disturbance * rng.standard_normal(target.shape)
             else:
                 own = policy.predict(observation, deterministic=True)[0]  # type: ignore[arg-type]
-            acts = np.where(alone[:, None], own, told)
+            acts = np.where(alone[:, None], own, target)
             env.step_async(np.clip(acts, -1, 1).astype(np.float32))
             observation = env.step_wait()[0]
             tick(1 / (settings.rounds * n_steps))
         n = settings.steps if k < settings.rounds - 1 else 3 * settings.steps
-        errors.append(_learn(policy, _stacked(shown), n, settings, rng))
-    if isinstance(policy, ActorCriticPolicy):  # it tries no more than it is unsure of
+        errors.append(_learn(policy, _stack(shown), n, settings, rng))
+    if isinstance(policy, ActorCriticPolicy):  # exploration no larger than the error
         policy.log_std.data.fill_(math.log(max(errors[-1], LEAST_SPREAD)))
     return errors
 
 
 def _learn(
     policy: BasePolicy,
-    shown: tuple[Arrays, NDArray[np.float32]],
+    shown: Demonstrations,
     n_steps: int,
     settings: CloningSettings,
     rng: np.random.Generator,
 ) -> float:
-    """Fit the mean action in so many gradient steps; its mean error in the last tenth of them."""
-    seen, told = shown
+    """Fit the mean action; return its mean error in the last tenth of the gradient steps."""
+    targets = shown.actions
     optimiser = torch.optim.Adam(policy.parameters(), settings.learning_rate)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, n_steps)
     policy.set_training_mode(True)
     errors = []
     for _ in range(n_steps):
-        batch = rng.integers(len(told), size=settings.batch_size)
-        tensors: Any = {name: torch.as_tensor(part[batch]) for name, part in seen.items()}
-        meant = policy._predict(tensors.get(FLAT, tensors), deterministic=True)
-        off = (meant - torch.as_tensor(told[batch])).abs()
-        loss = (off + off.square()).mean()  # small motions matter, and the few moments to switch
+        batch = rng.integers(len(targets), size=settings.batch_size)
+        parts: Any = {k: torch.as_tensor(v[batch]) for k, v in shown.observations.items()}
+        mean = policy._predict(parts.get(FLAT, parts), deterministic=True)
+        off = (mean - torch.as_tensor(targets[batch])).abs()
+        loss = (off + off.square()).mean()  # small motions and rare switches matter
         optimiser.zero_grad()
         loss.backward()
         optimiser.step()
@@ -126,10 +135,10 @@ def _learn(
     return float(np.mean(errors[-max(n_steps // 10, 1) :]))
 
 
-def _named(observation: Observation) -> Arrays:
+def _split_parts(observation: Observation) -> Arrays:
     return dict(observation) if isinstance(observation, Mapping) else {FLAT: observation}
 
 
-def _stacked(shown: list[tuple[Arrays, Any]]) -> tuple[Arrays, NDArray[np.float32]]:
+def _stack(shown: list[tuple[Arrays, Any]]) -> Demonstrations:
     parts = {name: np.concatenate([seen[name] for seen, _ in shown]) for name in shown[0][0]}
-    return parts, np.concatenate([told for _, told in shown])
+    return Demonstrations(parts, np.concatenate([target for _, target in shown]))

@@ -1,11 +1,14 @@
-"""Drives without learning: what to do next follows from the observation and the map alone.
+"""A driver without learning, which decides from the observation and the map alone.
 
-The way is the fall of a field of lengths (Dijkstra) from the zone, on which people who stand are
-dear ground; fields are kept, as they change only when somebody stops or sets off. Velocities are
-judged as in a dynamic window (Fox, Burgard and Thrun 1997, doi:10.1109/100.580977): where each of
-some leads in two seconds, along the field, past what stands there and past where people will be.
-Who stands and waits for the base is gone round, so that the two do not wait for each other.
+The route is the descent of a field of path lengths (Dijkstra) from the zone, in which ground near
+standing people is expensive; fields are cached, as they change only when a person stops or sets
+off. Velocities are chosen as in a dynamic window (Fox, Burgard and Thrun 1997,
+doi:10.1109/100.580977): by the position after two seconds, along the field, past obstacles and past
+the predicted positions of people. The base drives around people who stand and wait for it, so that
+the two do not wait for each other.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,33 +22,73 @@ from .scripted import Yielding
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
-CELL_M, BEYOND_M = 0.2, 3.0
-"""Grid of the fields; how far beyond where people walk the base drives [m]."""
+CELL_M = 0.2
+"""Cell size of the fields [m]."""
+BEYOND_M = 3.0
+"""Margin of the fields beyond the area where people walk [m]."""
 FREE_M, NARROW_M, DEAR = 0.68, 0.54, 4.0
-"""Room that counts as free, and that a way needs at least [m]; a metre between counts so often."""
+"""Clearance of free ground, least clearance of a route [m], and the factor on lengths between."""
 BODY_M, BASE_M, DISC_M, DISC_AT_M = 0.30, 0.60, 0.47, 0.22
-"""Radius of a person; of a base turned anyhow; of two discs ahead and behind that hold it [m]."""
+"""Radii of a person, of the base in any orientation, and of two discs that contain it [m].
+
+The discs are ahead of and behind its middle by the last number.
+"""
 STANDS_M_S, STOOD_M, STOOD_DEAR, SPOT_M = 0.25, 1.1, 6.0, 0.4
-"""Who is slower stands; ground so near to them counts so many times more; places are rounded."""
+"""Speed below which a person stands; radius of expensive ground around them; its factor; rounding.
+
+Positions of standing people are rounded to the last number [m].
+"""
 BRAKE_M_S2, GONE_S, KEEP_M = 1.5, 0.3, 0.2
-"""Towards a person no faster than sqrt(2 a (gap - 0.3 s v - 0.2 m)), v their speed."""
+"""Parameters of the speed limit towards a person: sqrt(2 a (gap - 0.3 s v - 0.2 m)).
+
+a is the deceleration, v the person's speed.
+"""
 SPEEDS_M_S, HEADINGS = (0.25, 0.6, 1.0, 1.35), 24
+"""Speeds of the velocities that are compared, and number of their headings."""
 TIMES_S = np.array([0.2, 0.5, 0.8, 1.2, 1.6, 2.0])
+"""Times at which velocities are evaluated [s]."""
 NEAR_M, NEAR_GAIN_HZ, STOP_M = 1.0, 1.2, 0.15
-"""Distance to its zone below which the base makes straight for the middle, and stops."""
+"""Distance to its zone below which the base makes straight for the middle, gain, and stop [m]."""
 GOOD_M, PEOPLE_PRICE, TOUCH_PRICE, FAST_PRICE, WALL_PRICE = 0.7, 6.0, 60.0, 20.0, 200.0
-"""Room past people that costs nothing; prices against a metre of the way."""
+"""Clearance to people without a price [m], and prices relative to a metre of the route."""
 BESIDE_M, NEAR_PRICE = 0.25, 4.0
-"""So much more room past what stands there costs nothing; price of less: who imitates errs."""
+"""Further clearance to obstacles without a price [m], and the price of less.
+
+An imitating policy makes errors, for which this leaves room.
+"""
 SLOW_M_S, STAY_M = 0.2, 0.25
-"""Who drives slower turns towards the way, so as to fit between walls; not so near to people."""
+"""Speed below which the base turns along the route [m/s], unless a person is this close [m]."""
 CHANGE_PRICE_S, TURN_HZ, TURN_RAD_S = 0.1, 1.5, 1.0
+"""Price of a change of velocity, gain of turns [1/s], and fastest turn [rad/s]."""
 FIELDS = 1024
+"""Number of cached fields."""
+
+
+class People(NamedTuple):
+    """Estimated workers, far away if they are not tracked."""
+
+    position: Array
+    """Horizontal positions relative to the base (n, W, 2) [m]."""
+    velocity: Array
+    """Horizontal velocities (n, W, 2) [m/s]."""
+
+
+class Cells(NamedTuple):
+    """Positions in a grid."""
+
+    i: Indices
+    j: Indices
+    u: Array
+    """Share of a cell along the first axis."""
+    v: Array
+    """Share of a cell along the second axis."""
+
+
 """Number that is kept."""
 
 
 class Deliverer:
-    """Route and dynamic window, with or without yielding."""
+    """Drives by a route and a dynamic window, with or without yielding."""
 
     def __init__(self, env_info: EnvInfo, yielding: Yielding | None = None) -> None:
         self.env_info, self.yielding = env_info, yielding
@@ -66,17 +109,17 @@ class Deliverer:
         self._most = env_info.control_config.joint_speed_share * fastest
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
-        """Actions (..., 3): towards the zone, round people."""
+        """Return actions (..., 3) towards the zone, around people."""
         terms = split(observation, self.env_info.layout)
         shape = terms["slide_position"].shape[:-1]
         terms = {name: np.atleast_2d(term) for name, term in terms.items()}
         place, speed = terms["slide_position"], terms["slide_velocity"]
         yaw = np.arctan2(terms["joint_angle_sin"], terms["joint_angle_cos"])[:, 0]
-        people, moving = _people(terms)
-        field = self._field_rows(place, terms["zone_from_base"], people, moving)
-        velocity = self._chosen(place, speed, yaw, terms["zone_from_base"], field, (people, moving))
+        people = _read_people(terms)
+        field = self._find_fields(place, terms["zone_from_base"], people)
+        velocity = self._choose_velocity(place, speed, yaw, terms["zone_from_base"], field, people)
         driving = np.linalg.norm(velocity, axis=1, keepdims=True) > SLOW_M_S
-        turn = self._turn(place, yaw, np.where(driving, velocity, terms["way_direction"]))
+        turn = self._compute_turn(place, yaw, np.where(driving, velocity, terms["way_direction"]))
         near_m = terms["worker_separation"].min(axis=-1, initial=np.inf)
         waits = (near_m < STAY_M) | (np.linalg.norm(terms["zone_from_base"], axis=1) < NEAR_M)
         turn = np.where(waits & ~driving[:, 0], 0.0, turn)
@@ -90,24 +133,22 @@ class Deliverer:
         action = np.clip(action, -1.0, 1.0)
         return action.reshape(*shape, -1).astype(np.float32)
 
-    def _field_rows(self, place: Array, zone: Array, people: Array, moving: Array) -> Indices:
-        """(n,) which field each base follows: of its zone, with who stands on the ground."""
-        stands = np.linalg.norm(moving, axis=-1) < STANDS_M_S
-        spots = np.rint((place[:, None] + people) / SPOT_M)
+    def _find_fields(self, place: Array, zone: Array, people: People) -> Indices:
+        """Return the row of the field that each base follows (n,), for its zone and people."""
+        stands = np.linalg.norm(people.velocity, axis=-1) < STANDS_M_S
+        spots = np.rint((place[:, None] + people.position) / SPOT_M)
         rows = np.empty(len(place), np.int64)
-        if len(place) > len(self._fields):  # all that are followed now must fit
+        if len(place) > len(self._fields):  # all current fields must fit
             self._fields, self._rows = np.zeros((len(place), *self._gaps.shape), np.float32), {}
         for b, (x, y) in enumerate((place + zone).tolist()):
             standing = {(int(i), int(j)) for i, j in spots[b, stands[b]] if abs(i) < 1e3}
             key = (nearest_point(x, y, self._origin, CELL_M), *sorted(standing))
             row = self._rows.pop(key, None)
-            self._rows[key] = rows[b] = (
-                self._made(key) if row is None else row
-            )  # the last used last
+            self._rows[key] = rows[b] = self._make_field(key) if row is None else row
         return rows
 
-    def _made(self, key: tuple[tuple[int, int], ...]) -> int:
-        """Make a field in place of that which was not used for longest; its row."""
+    def _make_field(self, key: tuple[tuple[int, int], ...]) -> int:
+        """Compute a field in place of the least recently used one; return its row."""
         row = len(self._rows)
         if row == len(self._fields):
             row = self._rows.pop(next(iter(self._rows)))
@@ -119,75 +160,81 @@ class Deliverer:
         self._fields[row] = ways_m(price, goal, CELL_M)
         return row
 
-    def _chosen(
-        self, place: Array, speed: Array, yaw: Array, zone: Array, field: Indices,
-        others: tuple[Array, Array],
-    ) -> Array:  # fmt: skip
-        """(n, 2) the cheapest velocity [m/s]."""
+    def _choose_velocity(
+        self, place: Array, speed: Array, yaw: Array, zone: Array, field: Indices, people: People
+    ) -> Array:
+        """Return the cheapest velocities (n, 2) [m/s]."""
         n, away_m = len(place), np.linalg.norm(zone, axis=1)
         straight = (
             zone * np.minimum(NEAR_GAIN_HZ, SPEEDS_M_S[-1] / np.maximum(away_m, 1e-6))[:, None]
         )
         window = np.broadcast_to(self._window, (n, *self._window.shape))
         window = np.concatenate([straight[:, None], window], axis=1)
-        shift = _shifts(speed[:, None], window)  # (n, C, T, 2) from the place now
+        shift = _predict_shifts(speed[:, None], window)  # (n, C, T, 2)
         at = place[:, None, None] + shift
         ahead = DISC_AT_M * np.stack([np.cos(yaw), np.sin(yaw)], axis=1)[:, None, None]
-        room = np.minimum(self._at(self._gaps, at + ahead), self._at(self._gaps, at - ahead))
+        room = np.minimum(
+            self._interpolate(self._gaps, at + ahead), self._interpolate(self._gaps, at - ahead)
+        )
         price = WALL_PRICE * np.maximum(DISC_M - room, 0.0).sum(-1)
         price += NEAR_PRICE * np.maximum(DISC_M + BESIDE_M - room, 0.0).sum(-1)
-        price += self._left(field, at[:, :, -1]) + 0.5 * self._left(field, at[:, :, 2])
+        price += self._get_lengths(field, at[:, :, -1]) + 0.5 * self._get_lengths(
+            field, at[:, :, 2]
+        )
         price += CHANGE_PRICE_S * np.linalg.norm(window - speed[:, None], axis=-1)
-        price += _people_price(shift, window, *others)
+        price += _price_people(shift, window, people)
         direct = (away_m < NEAR_M) & (price[:, 0] < price[:, 1:].min(1) + 1.0)
         best = window[np.arange(n), np.where(direct, 0, np.argmin(price, axis=1))]
         return np.where((away_m < STOP_M)[:, None], 0.0, best)
 
-    def _left(self, field: Indices, at: Array) -> Array:
-        """(n, C) length of the way from places (n, C, 2)."""
-        i, j, u, v = self._cells(at)
+    def _get_lengths(self, field: Indices, at: Array) -> Array:
+        """Return lengths of the routes (n, C) from positions (n, C, 2) [m]."""
+        i, j, u, v = self._locate(at)
         k = field[:, None]
         low = self._fields[k, i, j] * (1 - v) + self._fields[k, i, j + 1] * v
         high = self._fields[k, i + 1, j] * (1 - v) + self._fields[k, i + 1, j + 1] * v
         return low * (1 - u) + high * u
 
-    def _at(self, grid: Array, at: Array) -> Array:
-        """A grid between its points, at places (..., 2)."""
-        i, j, u, v = self._cells(at)
+    def _interpolate(self, grid: Array, at: Array) -> Array:
+        """Return a grid's values between its points, at positions (..., 2)."""
+        i, j, u, v = self._locate(at)
         low = grid[i, j] * (1 - v) + grid[i, j + 1] * v
         return low * (1 - u) + (grid[i + 1, j] * (1 - v) + grid[i + 1, j + 1] * v) * u
 
-    def _cells(self, at: Array) -> tuple[Indices, Indices, Array, Array]:
+    def _locate(self, at: Array) -> Cells:
         most = np.array(self._gaps.shape) - 1.001
-        where = np.clip((at - self._origin) / CELL_M, 0.0, most)
-        low = where.astype(np.int64)
-        share = where - low
-        return low[..., 0], low[..., 1], share[..., 0], share[..., 1]
+        cells = np.clip((at - self._origin) / CELL_M, 0.0, most)
+        low = cells.astype(np.int64)
+        share = cells - low
+        return Cells(low[..., 0], low[..., 1], share[..., 0], share[..., 1])
 
-    def _turn(self, place: Array, yaw: Array, towards: Array) -> Array:
-        """(n,) turn rate [rad/s] towards a direction (n, 2), where there is room to turn."""
+    def _compute_turn(self, place: Array, yaw: Array, towards: Array) -> Array:
+        """Return turn rates (n,) [rad/s] towards directions (n, 2), 0 without room to turn."""
         wanted = np.arctan2(towards[:, 1], towards[:, 0])
         error = (wanted - yaw + np.pi) % (2 * np.pi) - np.pi
         rate = np.clip(TURN_HZ * error, -TURN_RAD_S, TURN_RAD_S)
         then = yaw + 0.4 * np.sign(rate)
         ahead = DISC_AT_M * np.stack([np.cos(then), np.sin(then)], axis=1)
-        room = np.minimum(self._at(self._gaps, place + ahead), self._at(self._gaps, place - ahead))
-        roomy = self._at(self._gaps, place) > BASE_M + 0.04
+        gaps = self._gaps
+        room = np.minimum(
+            self._interpolate(gaps, place + ahead), self._interpolate(gaps, place - ahead)
+        )
+        roomy = self._interpolate(gaps, place) > BASE_M + 0.04
         return np.where(roomy | (room > DISC_M), rate, 0.0)
 
 
-def _people(terms: dict[str, Array]) -> tuple[Array, Array]:
-    """(n, W, 2) from the base to the middle of each worker, and how they move; very far away who
-    is not known."""
+def _read_people(terms: dict[str, Array]) -> People:
+    """Return the workers of observations."""
     n = len(terms["way_left"])
     joints = terms["worker_joints_from_tool"].reshape(n, -1, N_JOINTS, 3)[..., :2].mean(2)
     moving = terms["worker_joints_velocity"].reshape(n, -1, N_JOINTS, 3)[..., :2].mean(2)
     known = (terms["worker_tracked"] > 0.5)[..., None]
-    return np.where(known, joints, 1e4), np.where(known, moving, 0.0)
+    return People(np.where(known, joints, 1e4), np.where(known, moving, 0.0))
 
 
-def _shifts(speed: Array, window: Array) -> Array:
-    """(n, C, T, 2) where velocities lead, which are reached at the base's slew."""
+def _predict_shifts(speed: Array, window: Array) -> Array:
+    """Return the displacements (n, C, T, 2) of velocities that the base reaches at its slew
+    rate."""
     change = window - speed
     ramp = np.abs(change) / BRAKE_M_S2
     t, ramp, change = TIMES_S[:, None], ramp[:, :, None], change[:, :, None]
@@ -196,17 +243,18 @@ def _shifts(speed: Array, window: Array) -> Array:
     return np.where(t < ramp, early, late)
 
 
-def _people_price(shift: Array, window: Array, people: Array, moving: Array) -> Array:
-    """(n, C) of coming near to where people will be, and of driving at them."""
+def _price_people(shift: Array, window: Array, people: People) -> Array:
+    """Return the price (n, C) of future proximity to people, and of driving towards them."""
     price = np.zeros(shift.shape[:2])
-    for w in range(people.shape[1]):
-        there = people[:, w, None] + moving[:, w, None] * TIMES_S[:, None]  # (n, T, 2)
+    for w in range(people.position.shape[1]):
+        position, moving = people.position[:, w], people.velocity[:, w]
+        there = position[:, None] + moving[:, None] * TIMES_S[:, None]  # (n, T, 2)
         gap = np.linalg.norm(there[:, None] - shift, axis=-1) - BODY_M - BASE_M
         price += PEOPLE_PRICE * np.square(np.maximum(GOOD_M - gap, 0.0)).sum(-1)
         price += TOUCH_PRICE * np.maximum(0.1 - gap, 0.0).sum(-1)
-        away_m = np.linalg.norm(people[:, w], axis=-1)
-        towards = people[:, w] / np.maximum(away_m, 1e-6)[:, None]
-        walking = np.linalg.norm(moving[:, w], axis=-1)
+        away_m = np.linalg.norm(position, axis=-1)
+        towards = position / np.maximum(away_m, 1e-6)[:, None]
+        walking = np.linalg.norm(moving, axis=-1)
         left_m = np.maximum(away_m - BODY_M - BASE_M - GONE_S * walking - KEEP_M, 0.0)
         closing = (window * towards[:, None]).sum(-1)
         most = np.sqrt(2 * BRAKE_M_S2 * left_m)[:, None]

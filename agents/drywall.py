@@ -1,8 +1,11 @@
-"""Holds a board against studs without learning: what to do next follows from the observation alone.
+"""A board holder without learning, which decides from the observation alone.
 
-The cups go to above the board, down onto it, and suck. The board goes up and is set upright on the
-way, round the robot to before its place, and against the studs, where it stays until it is fixed.
+The cups move above the board, down onto it, and suck. The board is lifted and set upright, carried
+around the robot to a point before its place, and pressed against the studs, where it stays until it
+is fixed.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,83 +13,116 @@ from numpy.typing import NDArray
 from hrc_env.observations import split
 
 from .env_info import EnvInfo, Observation
-from .manipulating import arm_action, round_the_foot, turn_towards
+from .manipulating import make_arm_action, plan_around_foot, turn_towards
 from .scripted import Yielding, fastest_m_s, speed_m_s
 
 Array = NDArray[np.float64]
 HALF_THICK_M, CUPS_M = 0.00625, (-0.12, -0.15)
-"""From the board's middle: its face, and where cups sit across and along it [m]."""
+"""Offsets from the board's middle: of its face, and of the cups across and along it [m]."""
 ABOVE_M, SUCK_M = 0.12, 0.05
-"""How high above the board the cups travel; so near they suck."""
+"""Height at which the cups travel above the board, and distance below which they suck [m]."""
 OVER_M, OVER_RAD, FUNNEL_M, FUNNEL_RAD = 0.015, 0.05, 0.03, 0.2
-"""So near above it they go down onto it, and the lower the less they are beyond that: a funnel,
-which leaves who imitates no height at which to hesitate."""
+"""Errors below which the cups go down, and widths of a funnel above.
+
+In the funnel the height grows with the error, so an imitating policy never hesitates at one height.
+"""
 PRESS_M = 0.02
-"""How far below the board's surface the cups aim."""
+"""Distance below the board's surface at which the cups aim [m]."""
 FLAT_Z_M, UPRIGHT_Z_M = -0.12, 0.34
-"""Heights above the foot between which the board is set upright."""
+"""Heights above the foot between which the board is set upright [m]."""
 NEAR_M, FAR_M = 0.72, 1.0
-"""Its distance from the robot's axis when it is upright, and on the stack."""
+"""Distance of the board from the robot's axis when it is upright, and on the stack [m]."""
 BEFORE_M, ALIGNED_M, ALIGNED_RAD = 0.13, 0.012, 0.03
-"""Distance before its place at which it is aligned, and then pressed to it."""
+"""Distance before its place at which the board is aligned, and errors of an aligned one."""
 STAYS = 3.0
-"""It stays aligned on the way, and there, while it is off by less than so many times as much."""
+"""Factor on these errors within which an aligned board stays so on the last part."""
 THERE_M = np.array([0.003, 0.0, 0.003])
-"""So near to its place along each axis it is held where it is: noise must not move it."""
+"""Distance along each axis within which the board is held still, so that noise does not move it."""
 CORNER_M = 0.86
-"""The board's farthest corner from between the cups."""
+"""Distance of the board's farthest corner from the middle of the cups [m]."""
 LAST_RAD = 0.25
-"""Last angle of the way round the robot, on which it goes straight."""
+"""Last angle of the path around the robot, on which the board moves straight."""
 CARRY_M_S, PRESS_M_S, TURN_RAD_S = 0.40, 0.12, 0.9
-"""Fastest with the board, and against the studs; fastest turn."""
+"""Fastest motion with the board, fastest against the studs, and fastest turn."""
 STACK_RAD, PLACE_RAD = np.arctan2(-0.98, 0.26), np.arctan2(1.0, 0.29)
-"""Where round the robot the stack is, and the board's place."""
+"""Directions of the stack and of the board's place around the robot."""
+
+
+class ToolAxes(NamedTuple):
+    """Desired axes of the tool, each (n, 3)."""
+
+    x: Array
+    z: Array
+
+
+class Fetch(NamedTuple):
+    """The motion towards the board."""
+
+    velocity: Array
+    """Velocity of the tool (n, 3) [m/s]."""
+    axes: ToolAxes
+    near: NDArray[np.bool_]
+    """Whether the cups are close to the board (n,)."""
+
+
+class Bring(NamedTuple):
+    """The motion with the board."""
+
+    velocity: Array
+    """Velocity of the tool (n, 3) [m/s]."""
+    axes: ToolAxes
+
+
+class Plan(NamedTuple):
+    """The motion of the tool."""
+
+    velocity: Array
+    """Velocity (n, 3) [m/s]."""
+    turn: Array
+    """Turn rate (n, 3) [rad/s]."""
+    sucks: NDArray[np.bool_]
+    """Whether the cups suck (n,)."""
 
 
 class BoardHolder:
-    """Resolved-rate carrying and holding, with or without yielding."""
+    """Carries and holds the board by resolved rates, with or without yielding."""
 
     def __init__(self, env_info: EnvInfo, yielding: Yielding | None = None) -> None:
         self.env_info, self.yielding = env_info, yielding
         self._foot = env_info.chain.T_world_from_base[:3, 3]
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
-        """Actions (..., A): towards the board, or with it to its place."""
+        """Return actions (..., A) towards the board, or with it to its place."""
         terms = split(observation, self.env_info.layout)
         shape = terms["tool_position"].shape[:-1]
         terms = {name: np.atleast_2d(term) for name, term in terms.items()}
-        velocity, turn, sucks = self._wanted(terms)
+        velocity, turn, sucks = self._plan(terms)
         if self.yielding is not None:
             nearest_m = terms["worker_separation"].min(axis=-1, initial=np.inf)
             share = self.yielding.share(nearest_m)[:, None]
-            share = np.where(_pressing(terms)[:, None], 1.0, share)
+            share = np.where(_is_pressing(terms)[:, None], 1.0, share)
             velocity, turn = velocity * share, turn * share
-        moves = arm_action(self.env_info, terms, velocity, turn)
+        moves = make_arm_action(self.env_info, terms, velocity, turn)
         if self.yielding is not None:
             wanted_m_s = fastest_m_s(velocity, turn, CORNER_M)
             moves *= self.yielding.blind_share(terms, wanted_m_s)[:, None]
         action = np.concatenate([moves, 2.0 * sucks[:, None] - 1.0], axis=1)
         return action.reshape(*shape, -1).astype(np.float32)
 
-    def _wanted(self, terms: dict[str, Array]) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """Velocity and turn rate of the tool (n, 3), and whether the cups suck (n,)."""
+    def _plan(self, terms: dict[str, Array]) -> Plan:
         held, fixed = terms["object_held"][:, 0] > 0.5, terms["screws_driven"][:, 0] > 3.5
-        fetched, fetch_axes, near = self._fetch(terms)
-        brought, bring_axes = self._bring(terms)
-        velocity = np.where(held[:, None], brought, fetched)
-        x = np.where(held[:, None], bring_axes[0], fetch_axes[0])
-        z = np.where(held[:, None], bring_axes[1], fetch_axes[1])
+        fetch, bring = self._fetch(terms), self._bring(terms)
+        velocity = np.where(held[:, None], bring.velocity, fetch.velocity)
+        x = np.where(held[:, None], bring.axes.x, fetch.axes.x)
+        z = np.where(held[:, None], bring.axes.z, fetch.axes.z)
         turn = turn_towards(terms["tool_axes"], x, z, TURN_RAD_S)
         back = np.where(terms["place_from_object"][:, 1:2] < 0.3, [0.0, -0.2, 0.0], 0.0)
         off = np.linalg.norm(terms["object_from_tool"], axis=1)[:, None] < 0.25
         velocity = np.where(fixed[:, None], back * off, velocity)
         turn[fixed] = 0.0
-        return velocity, turn, ~fixed & (held | near)
+        return Plan(velocity, turn, ~fixed & (held | fetch.near))
 
-    def _fetch(
-        self, terms: dict[str, Array]
-    ) -> tuple[Array, tuple[Array, Array], NDArray[np.bool_]]:
-        """Velocity to the board, the tool's axes x and z on it, and whether cups are near it."""
+    def _fetch(self, terms: dict[str, Array]) -> Fetch:
         along, normal = terms["object_axes"][:, :3], terms["object_axes"][:, 3:]
         across = np.cross(along, normal)
         way = terms["object_from_tool"] + CUPS_M[0] * across + CUPS_M[1] * along
@@ -97,14 +133,14 @@ class BoardHolder:
         off = np.maximum((aside_m - OVER_M) / FUNNEL_M, (askew - OVER_RAD) / FUNNEL_RAD)
         target = way.copy()
         target[:, 2] += ABOVE_M * np.clip(off, 0.0, 1.0)
-        error = round_the_foot(terms["tool_position"], target, self._foot[:2], 0.6)
+        error = plan_around_foot(terms["tool_position"], target, self._foot[:2], 0.6)
         length = np.linalg.norm(error, axis=1, keepdims=True)
         most = np.where(way[:, 2:] > -0.03, PRESS_M_S, 0.5)
         velocity = error / np.maximum(length, 1e-9) * np.minimum(speed_m_s(length, 0.5), most)
-        return velocity, (along, -normal), np.linalg.norm(way, axis=1) < SUCK_M
+        near = np.linalg.norm(way, axis=1) < SUCK_M
+        return Fetch(velocity, ToolAxes(along, -normal), near)
 
-    def _bring(self, terms: dict[str, Array]) -> tuple[Array, tuple[Array, Array]]:
-        """Velocity with the board to its place, and the tool's axes x and z meanwhile."""
+    def _bring(self, terms: dict[str, Array]) -> Bring:
         board = terms["tool_position"] + terms["object_from_tool"] - self._foot
         to_place = terms["place_from_object"]
         angle = np.arctan2(board[:, 1], board[:, 0])
@@ -115,13 +151,13 @@ class BoardHolder:
         heading = (share - 0.5) * np.pi
         outward = np.stack([np.cos(heading), np.sin(heading), np.zeros(len(heading))], axis=1)
         up, c, s = np.array([0.0, 0.0, 1.0]), np.cos(tilt)[:, None], np.sin(tilt)[:, None]
-        axes = c * outward + s * up, s * outward - c * up
+        axes = ToolAxes(c * outward + s * up, s * outward - c * up)
         velocity = self._carry(board, angle, height, share)
         velocity = np.where(last[:, None], _press(terms, to_place), velocity)
-        return velocity, axes
+        return Bring(velocity, axes)
 
     def _carry(self, board: Array, angle: Array, height: Array, share: Array) -> Array:
-        """Velocity (n, 3) up and in from the stack, then round the robot."""
+        """Return the velocity (n, 3) up and inward from the stack, then around the robot."""
         radius = np.linalg.norm(board[:, :2], axis=1)
         outward = board[:, :2] / np.maximum(radius, 1e-6)[:, None]
         aside = np.stack([-outward[:, 1], outward[:, 0]], axis=1)
@@ -134,8 +170,8 @@ class BoardHolder:
 
 
 def _press(terms: dict[str, Array], to_place: Array) -> Array:
-    """Velocity (n, 3) to before the place, and against the studs when aligned there."""
-    aligned, before = _aligned(terms), to_place - [0.0, BEFORE_M, 0.0]
+    """Return the velocity (n, 3) to a point before the place, and against the studs if aligned."""
+    aligned, before = _is_aligned(terms), to_place - [0.0, BEFORE_M, 0.0]
     left = np.sign(to_place) * np.maximum(np.abs(to_place) - THERE_M, 0.0)
     error = np.where(aligned[:, None], left, before)
     length = np.linalg.norm(error, axis=1, keepdims=True)
@@ -143,8 +179,8 @@ def _press(terms: dict[str, Array], to_place: Array) -> Array:
     return error / np.maximum(length, 1e-9) * np.minimum(speed_m_s(length, CARRY_M_S), most)
 
 
-def _aligned(terms: dict[str, Array]) -> NDArray[np.bool_]:
-    """(n,) whether the board stands right before its place, or is there."""
+def _is_aligned(terms: dict[str, Array]) -> NDArray[np.bool_]:
+    """Return whether the board stands right before its place, or in it (n,)."""
     to_place, axes = terms["place_from_object"], terms["object_axes"]
     off = np.abs(to_place[:, [0, 2]]).max(1)
     askew = np.linalg.norm(np.cross(axes[:, 3:], [0.0, -1.0, 0.0]), axis=1)
@@ -154,8 +190,8 @@ def _aligned(terms: dict[str, Array]) -> NDArray[np.bool_]:
     return fine & (to_place[:, 1] < BEFORE_M + 0.05)
 
 
-def _pressing(terms: dict[str, Array]) -> NDArray[np.bool_]:
-    """(n,) whether the board is at its place: people work at it, and it must not move."""
+def _is_pressing(terms: dict[str, Array]) -> NDArray[np.bool_]:
+    """Return whether the board is at its place, where people work and it must not move (n,)."""
     return (terms["object_held"][:, 0] > 0.5) & (
         np.linalg.norm(terms["place_from_object"], axis=1) < 0.02
     )

@@ -1,6 +1,6 @@
-"""The protocol of agents, and what they know about their environment."""
+"""The protocol of agents, and their knowledge of the environment."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
@@ -18,64 +18,68 @@ if TYPE_CHECKING:
 
 
 Observation = NDArray[np.float32] | Mapping[str, NDArray[np.float32]]
-"""(..., n), or such arrays by name where goals stand apart."""
+"""An observation (..., n), or arrays by name if goals or images are separate."""
 
 
 class Agent(Protocol):
-    """A policy: all that an evaluation asks of it is `act`."""
+    """A policy; `act` is its only required method."""
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
         """Return actions (..., A) in [-1, 1] for observations (..., n).
 
-        They are of one environment or of many; `EnvInfo.split` gives an observation's terms.
+        Observations are of one environment or of many; `EnvInfo.split` gives their terms.
         """
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class EnvInfo:
-    """What an agent may know beforehand: the robot and how to read an observation."""
+    """The information that an agent gets in advance: the robot and the layout of observations."""
 
     layout: ObservationLayout
-    """Which entries of an observation belong to which term, and their scales."""
+    """Entries of an observation by term, and their scales."""
     chain: SerialChain
-    """The robot's kinematics, from its foot to its tool."""
+    """Kinematics of the robot, from its foot to its tool."""
     home_q: NDArray[np.float64]
-    """(N,) the robot's pose at rest [rad], of slides [m]."""
+    """Rest pose of the robot (N,) [rad], of slides [m]."""
     control: str
-    """What an action means: "joint", "tool" or "twist"."""
+    """Meaning of an action: "joint", "tool" or "twist"."""
     control_config: ControlConfig
-    """The velocities that actions of 1 stand for."""
+    """Velocities to which actions of 1 correspond."""
     n_actions: int
-    """Entries of an action."""
+    """Number of entries of an action."""
     task: str
-    """The task's id."""
+    """Id of the task."""
     map: Grounds
-    """Of the place: where things stand, and where people walk and work."""
+    """Map of the place: obstacles, and areas where people walk and work."""
     goal_size: int = 0
-    """Entries of a goal that stands apart from the observation; 0: there is none."""
+    """Number of entries of a goal that is separate from the observation; 0: there is none."""
     images: Mapping[str, tuple[int, int, int]] = field(default_factory=dict)
-    """Height, width and channels of the images that stand beside the observation, by name."""
+    """Height, width and channels of images beside the observation, by name."""
 
     def split(self, observation: Observation) -> dict[str, NDArray[Any]]:
-        """Return an observation's terms by name, in metres, seconds and radians.
+        """Return the terms of an observation by name, in metres, seconds and radians.
 
         Goals and images are among them.
 
         Args:
-            observation: (..., n), or such arrays by name.
+            observation: (..., n), or arrays by name.
         """
         return split(observation, self.layout)
 
 
+AgentFactory = Callable[[EnvInfo], Agent]
+"""A function that makes an agent for an environment."""
+
+
 def env_info(env: object) -> EnvInfo:
-    """Return what an agent may know of an environment beforehand.
+    """Return the information that an agent gets about an environment in advance.
 
     Args:
         env: a single or vector environment of this package, wrapped or not, or its simulation.
 
     Raises:
-        ConfigError: it is none.
+        ConfigError: it is none of these.
     """
     inner = getattr(env, "unwrapped", env)
     simulation = cast("Simulation", getattr(inner, "simulation", inner))

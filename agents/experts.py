@@ -18,16 +18,16 @@ from .scripted import Reacher, Yielding
 
 Terms = dict[str, NDArray[np.float64]]
 PLACED_M = 0.008
-"""Distance to its place within which a released piece stays there."""
+"""Distance to its place within which a released piece stays there [m]."""
 
 
-def reach_goal(terms: Terms) -> Terms:
-    """What `Reacher` reads, from goals."""
+def read_reach_goal(terms: Terms) -> Terms:
+    """Return the terms that `Reacher` needs, from goals."""
     return {"goal_from_tool": terms["desired_goal"] - terms["achieved_goal"]}
 
 
-def pick_place_goal(terms: Terms) -> Terms:
-    """What `PickPlacer` reads, from goals."""
+def read_pick_place_goal(terms: Terms) -> Terms:
+    """Return the terms that `PickPlacer` needs, from goals."""
     way = terms["desired_goal"] - terms["achieved_goal"]
     off_m = np.linalg.norm(way.reshape(*way.shape[:-1], -1, 3), axis=-1)
     placed = (off_m < PLACED_M) & (terms["object_held"] < 0.5)
@@ -35,13 +35,13 @@ def pick_place_goal(terms: Terms) -> Terms:
 
 
 class GoalReader:
-    """An expert whose goals stand apart from the observation."""
+    """An expert for tasks with goals that are separate from the observation."""
 
     def __init__(self, expert: Reacher | PickPlacer, read: Callable[[Terms], Terms]) -> None:
         self.expert, self.read = expert, read
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
-        """Actions (..., A), as the expert's."""
+        """Return actions (..., A), as the expert's."""
         terms = split(observation, self.expert.env_info.layout)
         return self.expert.act_on({**terms, **self.read(terms)})
 
@@ -52,23 +52,26 @@ EXPERTS: dict[str, Callable[[EnvInfo, Yielding | None], Agent]] = {
     "HRCDelivery-v0": Deliverer,
     "HRCDrywall-v0": BoardHolder,
     "HRCHandover-v0": Bringer,
-    "HRCReachGoal-v0": lambda of, y: GoalReader(Reacher(of, y), reach_goal),
-    "HRCPickPlaceGoal-v0": lambda of, y: GoalReader(PickPlacer(of, y), pick_place_goal),
+    "HRCReachGoal-v0": lambda info, y: GoalReader(Reacher(info, y), read_reach_goal),
+    "HRCPickPlaceGoal-v0": lambda info, y: GoalReader(PickPlacer(info, y), read_pick_place_goal),
 }
-"""By task: what solves it without learning."""
+"""Factories of scripted agents by task."""
 
 
-def expert(env_info: EnvInfo, yielding: Yielding | None = None) -> Agent:
-    """Return the scripted agent for a task, or for one that it derives from, with or without
-    yielding.
+def make_expert(env_info: EnvInfo, yielding: Yielding | None = None) -> Agent:
+    """Return the scripted agent for a task, or for the task that it derives from.
+
+    Args:
+        env_info: the environment.
+        yielding: how it slows down near people; None: it ignores them.
 
     Raises:
-        ConfigError: nobody has written one.
+        ConfigError: there is no scripted agent for the task.
     """
     task = ancestor_of(env_info.task, EXPERTS)
     if task not in EXPERTS:
         raise ConfigError(
-            f"There is no scripted agent for {env_info.task}; there is for {', '.join(EXPERTS)}. "
-            "The agent 'random' and checkpoints work with every task."
+            f"There is no scripted agent for {env_info.task}; there is one for "
+            f"{', '.join(EXPERTS)}. The agent 'random' and checkpoints work with every task."
         )
     return EXPERTS[task](env_info, yielding)

@@ -1,11 +1,11 @@
-"""A run's policy as files that execute nothing, with a card of its scores."""
+"""Export of a run's policy as files that execute no code, with a card of its scores."""
 
 import hashlib
 import json
 import shlex
 from collections.abc import Mapping
 from dataclasses import asdict, fields, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium import spaces
@@ -26,9 +26,9 @@ from .env_info import env_info
 from .features import NearAndFar
 from .network import Architecture, Network, Tensors
 from .policies import SUFFIX, Card, Worth
-from .recipes import filled
+from .recipes import fill_in
 from .requests import ExportRequest, TrainingRequest
-from .training import ONLY_OF_A_RUN, asked_of
+from .training import ONLY_OF_A_RUN, read_arguments
 
 with learner():
     import torch
@@ -37,40 +37,48 @@ with learner():
 LEFT_OUT = {*ONLY_OF_A_RUN} - {"timesteps", "engine", "workers"}
 """Arguments that a policy does not depend on."""
 ACTIVATIONS = {torch.nn.Tanh: "tanh", torch.nn.ReLU: "relu"}
+"""Names of activation functions."""
 
 
-def run(asked: ExportRequest) -> int:
-    """Write weights and card; returns the exit status.
+class ExportedNetwork(NamedTuple):
+    """The network of a policy."""
+
+    tensors: Tensors
+    architecture: Architecture
+
+
+def run(request: ExportRequest) -> int:
+    """Write weights and card; return the exit status.
 
     Raises:
-        CheckpointError: the folder holds no run, or there is such a policy already.
+        CheckpointError: the folder holds no run, or the policy exists already.
     """
-    arguments = filled(asked_of(asked.run_folder))
-    path = asked.out / arguments.task / f"{asked.name}{SUFFIX}"
+    arguments = fill_in(read_arguments(request.run_folder))
+    path = request.out / arguments.task / f"{request.name}{SUFFIX}"
     if path.exists():
-        raise CheckpointError(f"{path} is there already; give another --name, or delete it.")
+        raise CheckpointError(f"{path} exists already; give another --name, or delete it.")
     console, kwargs = Console(), arguments.keywords()
     make_ready(console, arguments.perception)
     env = HRCVecEnv(1, **arguments.batched_keywords())
     try:
-        here = env_info(env.simulation)
+        info = env_info(env.simulation)
     finally:
         env.close()
-    trained = checkpoints.load(asked.run_folder / "policy.zip", here).learner
-    n_workers = checkpoints.describe(asked.run_folder / "policy.zip").get("workers")
+    trained = checkpoints.load(request.run_folder / "policy.zip", info).learner
+    n_workers = checkpoints.describe(request.run_folder / "policy.zip").get("workers")
     engine = {} if n_workers is None else {"engine": "ray", "workers": n_workers}
     arguments = replace(arguments, timesteps=trained.num_timesteps, **engine)
-    tensors, architecture = taken(trained)
-    network = Network(tensors, architecture)
-    content = _packed(tensors)
-    shields = dict.fromkeys([arguments.shield or "none", *asked.shields])
-    record = json.loads((asked.run_folder / "run.json").read_text())
+    exported = extract_network(trained)
+    network = Network(exported.tensors, exported.architecture)
+    content = _pack(exported.tensors)
+    shields = dict.fromkeys([arguments.shield or "none", *request.shields])
+    record = json.loads((request.run_folder / "run.json").read_text())
     card = Card(
-        task=here.task, control=here.control, observation=policies.terms(here),
-        n_actions=here.n_actions, architecture=architecture, command=command(arguments),
-        seed=arguments.seed, timesteps=trained.num_timesteps, hrc_env=__version__,
-        commit=record.get("git"), sha256=hashlib.sha256(content).hexdigest(),
-        worth=tuple(_worth(network, shield, asked, kwargs, console) for shield in shields),
+        task=info.task, control=info.control, observation=policies.list_terms(info),
+        n_actions=info.n_actions, architecture=exported.architecture,
+        command=format_command(arguments), seed=arguments.seed, timesteps=trained.num_timesteps,
+        hrc_env=__version__, commit=record.get("git"), sha256=hashlib.sha256(content).hexdigest(),
+        worth=tuple(_evaluate(network, shield, request, kwargs, console) for shield in shields),
     )  # fmt: skip
     write_whole(path, content)
     write_whole(path.with_suffix(".json"), json.dumps(asdict(card), indent=1))
@@ -78,17 +86,17 @@ def run(asked: ExportRequest) -> int:
     return 0
 
 
-def taken(trained: checkpoints.Learner) -> tuple[Tensors, Architecture]:
-    """Return the networks of a learner that act.
+def extract_network(trained: checkpoints.Learner) -> ExportedNetwork:
+    """Return the network of a learner that acts.
 
     Raises:
-        CheckpointError: it sees images: the format has no convolutions.
+        CheckpointError: it uses images, and the format has no convolutions.
     """
     space = trained.observation_space
     if isinstance(space, spaces.Dict) and any(name.startswith(IMAGE) for name in space.spaces):
         raise CheckpointError(
-            "A policy that sees images cannot be exported: such files hold layers of numbers, no "
-            "convolutions. Give its policy.zip instead."
+            "A policy that uses images cannot be exported: such files hold dense layers, no "
+            "convolutions. Use its policy.zip instead."
         )
     policy: Any = trained.policy
     squashed = isinstance(trained, SAC)
@@ -103,45 +111,45 @@ def taken(trained: checkpoints.Learner) -> tuple[Tensors, Architecture]:
             tensors[f"actor.{k}.{part}"] = np.ascontiguousarray(value, np.float32)
     activation = ACTIVATIONS[policy.activation_fn]
     near = isinstance(actor.features_extractor, NearAndFar)
-    return tensors, Architecture(activation, near_and_far=near, squashed=squashed)
+    return ExportedNetwork(tensors, Architecture(activation, near_and_far=near, squashed=squashed))
 
 
-def command(arguments: TrainingRequest) -> str:
-    """The line that trains so."""
+def format_command(arguments: TrainingRequest) -> str:
+    """Return the command line of a training."""
     words = ["python", "-m", "hrc_env", "train"]
-    for each in fields(TrainingRequest):
-        value = getattr(arguments, each.name)
-        if value == each.default or each.name in LEFT_OUT:
+    for field in fields(TrainingRequest):
+        value = getattr(arguments, field.name)
+        if value == field.default or (field.name in ONLY_OF_A_RUN and field.name != "timesteps"):
             continue
         several = isinstance(value, tuple | list)
-        option = f"--{each.name.replace('_', '-')}"
+        option = f"--{field.name.replace('_', '-')}"
         words += [option, *map(str, value if several else [value])]
     return shlex.join(words)
 
 
-def _packed(tensors: Tensors) -> bytes:
+def _pack(tensors: Tensors) -> bytes:
     from safetensors.numpy import save
 
     return save(tensors)
 
 
-def _worth(
+def _evaluate(
     network: Network,
     shield: str,
-    asked: ExportRequest,
+    request: ExportRequest,
     kwargs: Mapping[str, Any],
     console: Console,
 ) -> Worth:
-    """What it is worth on the seeds of evaluations, also printed."""
-    with progress_bar(console, f"judged, shield {shield}") as say:
+    """Evaluate a policy on the seeds of evaluations, and print the scores."""
+    with progress_bar(console, f"evaluating, shield {shield}") as say:
         episodes = play_episodes(
-            lambda _: network, asked.episodes, tick=lambda share: say(share, ""),
+            lambda _: network, request.episodes, tick=lambda share: say(share, ""),
             **{**kwargs, "shield": read_word(None if shield == "none" else shield)},
         )  # fmt: skip
-    found = measure(episodes)
+    metrics = measure(episodes)
     names = ("goals_per_minute", "cost_per_episode", "contacts_per_episode")
     for name in names:
-        told = found[name]
-        words = f"  {name:24s}{told.value:.2f} ({told.low:.2f} to {told.high:.2f})"
-        console.print(words, highlight=False)
-    return Worth(shield, asked.episodes, EVALUATION_SEED, *(found[name] for name in names))
+        metric = metrics[name]
+        text = f"  {name:24s}{metric.value:.2f} ({metric.low:.2f} to {metric.high:.2f})"
+        console.print(text, highlight=False)
+    return Worth(shield, request.episodes, EVALUATION_SEED, *(metrics[name] for name in names))

@@ -1,4 +1,4 @@
-"""What policies make of an observation before their first layer: near and far at once."""
+"""Features of observations for policies: every entry at two scales."""
 
 import math
 from typing import Any
@@ -17,17 +17,20 @@ with learner():
 
 
 class NearAndFar(BaseFeaturesExtractor):
-    """Every entry x beside sign(x) log(1 + NEAR |x|): a network that sees metres, and must place to
-    millimetres, has both at its own scale. Parts of an observation are taken in their order; where
-    goals stand apart, the way from what is achieved to what is desired is one part more."""
+    """Features that hold every entry x and also sign(x) log(1 + NEAR |x|).
+
+    A network that sees metres and must place to millimetres has both at their own scale. Parts of
+    an observation are used in their order; if goals are separate, the difference between desired
+    and achieved goal is one more part.
+    """
 
     def __init__(self, observation_space: spaces.Space[Any]) -> None:
         parts = observation_space.spaces if isinstance(observation_space, spaces.Dict) else ()
         if images := [name for name in parts if name.startswith(IMAGE)]:
             raise ConfigError(
-                f"This policy sees numbers at two scales, and the observation holds {images}: "
-                "leave out observe_images, or learn by PPO without demonstrations, whose policy "
-                "has convolutions."
+                f"This policy uses numbers at two scales, and the observation contains {images}: "
+                "leave out observe_images, or train by PPO without demonstrations, which has a "
+                "policy with convolutions."
             )
         n = spaces.flatdim(observation_space)
         if isinstance(observation_space, spaces.Dict):
@@ -35,7 +38,7 @@ class NearAndFar(BaseFeaturesExtractor):
         super().__init__(observation_space, 2 * n)
 
     def forward(self, observations: Any) -> torch.Tensor:
-        """(B, 2 n) of observations (B, n)."""
+        """Return features (B, 2 n) of observations (B, n)."""
         parts = [observations]
         if isinstance(observations, dict):
             parts = [*observations.values(), observations[DESIRED] - observations[ACHIEVED]]

@@ -1,4 +1,4 @@
-"""How tasks are learnt, and settings of the learners: they need no learner to be read."""
+"""Learning recipes of tasks and settings of learners, which can be read without a learner."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -10,11 +10,11 @@ from hrc_env.core.mapping import answer_unknown_fields
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class PPOSettings:
-    """Settings of PPO that learn the built-in tasks: keywords of `stable_baselines3.PPO`.
+    """Settings of PPO for the built-in tasks: keywords of `stable_baselines3.PPO`.
 
-    They need episodes out of phase, scaled rewards (observations are scaled already), and a
-    proximity term that grows: with the whole term from the first step a learner learns to stay
-    away before it finds a goal. `train` has all three:
+    They assume episodes out of phase, scaled rewards (observations are scaled already), and a
+    proximity term that grows: with the whole term from the first step a learner learns to stay away
+    before it finds a goal. `train` provides all three:
 
         env = VecNormalize(HRCVecEnv(64, stagger=True), norm_obs=False, gamma=0.98)
         model = PPO("MlpPolicy", env, **PPOSettings().keywords())
@@ -28,19 +28,19 @@ class PPOSettings:
     n_epochs: int = 5
     """Passes over a rollout."""
     learning_rate: float = 5e-4
-    """Adam's step size."""
+    """Step size of Adam."""
     gamma: float = 0.98
-    """Discount per step; 0.98 looks about 2 s ahead."""
+    """Discount per step; 0.98 is a horizon of about 2 s."""
     gae_lambda: float = 0.95
-    """Bias against variance of the advantage."""
+    """Trade-off between bias and variance of the advantage."""
     clip_range: float = 0.2
-    """How far a policy may move in an update."""
+    """Greatest relative change of the policy in an update."""
     hidden: tuple[int, ...] = (128, 128)
     """Hidden layers of policy and value network (tanh)."""
     log_std_init: float = -0.5
     """Initial log standard deviation of actions."""
     near_and_far: bool = False
-    """Whether it sees every entry at two scales (`agents.features`), through layers of ReLU."""
+    """Whether every entry is used at two scales (`agents.features`), with ReLU layers."""
 
     def keywords(self) -> dict[str, Any]:
         """Return the keyword arguments of `stable_baselines3.PPO`; torch is imported here."""
@@ -52,7 +52,7 @@ class PPOSettings:
             "net_arch": list(values.pop("hidden")),
             "activation_fn": torch.nn.ReLU if near else torch.nn.Tanh,
             "log_std_init": values.pop("log_std_init"),
-            **_features(near),
+            **_make_features(near),
         }
         return {**values, "policy_kwargs": policy}
 
@@ -60,45 +60,48 @@ class PPOSettings:
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class SACSettings:
-    """Settings of SAC that learn the built-in tasks: keywords of `stable_baselines3.SAC`.
+    """Settings of SAC for the built-in tasks: keywords of `stable_baselines3.SAC`.
 
-    With goals apart from the observation hindsight replay (HER) comes beside them, with
-    `relabelled` as its `n_sampled_goal`.
+    If goals are separate from the observation, hindsight replay (HER) is used, with `relabelled` as
+    its `n_sampled_goal`.
     """
 
     buffer_size: int = 200_000
-    """Transitions that are kept, of all environments together."""
+    """Number of stored transitions, of all environments together."""
     batch_size: int = 256
     """Samples in a gradient step."""
     gradient_steps: int = 16
-    """After each step of all environments."""
+    """Gradient steps after each step of all environments."""
     learning_rate: float = 1e-3
-    """Adam's step size."""
+    """Step size of Adam."""
     gamma: float = 0.95
-    """Discount per step; 0.95 looks about 1 s ahead."""
+    """Discount per step; 0.95 is a horizon of about 1 s."""
     tau: float = 0.05
     """Share by which the target networks follow in a gradient step."""
     ent_coef: str = "auto_0.05"
-    """Weight of the entropy: found as it goes, from this on."""
+    """Weight of the entropy: adapted during the training, from this value on."""
     hidden: tuple[int, ...] = (128, 128)
     """Hidden layers of actor and critics (ReLU)."""
     near_and_far: bool = True
-    """Whether it sees every entry at two scales, and the way to its goal (`agents.features`):
-    without that, hindsight found no goal of reaching in 5,000 gradient steps; with it, in 800."""
+    """Whether every entry and the difference to the goal are used at two scales
+    (`agents.features`).
+
+    Without it, hindsight found no goal of reaching in 5,000 gradient steps; with it, in 800.
+    """
     relabelled: int = 4
-    """With hindsight, how many transitions are judged by goals that were achieved later in their
-    episode, for each that is judged by its own."""
+    """With hindsight, number of transitions relabelled with goals achieved later in their episode,
+    for each with its own goal."""
 
     def keywords(self) -> dict[str, Any]:
         """Return the keyword arguments of `stable_baselines3.SAC`; torch is imported here."""
         values = asdict(self)
         del values["relabelled"]
         hidden = list(values.pop("hidden"))
-        policy = {"net_arch": hidden, **_features(values.pop("near_and_far"))}
+        policy = {"net_arch": hidden, **_make_features(values.pop("near_and_far"))}
         return {**values, "policy_kwargs": policy}
 
 
-def _features(near_and_far: bool) -> dict[str, Any]:
+def _make_features(near_and_far: bool) -> dict[str, Any]:
     if not near_and_far:
         return {}
     from .features import NearAndFar  # here: it imports torch
@@ -107,10 +110,11 @@ def _features(near_and_far: bool) -> dict[str, Any]:
 
 
 IMITATOR = PPOSettings(hidden=(256, 256), near_and_far=True, learning_rate=5e-5, gamma=0.99)
-"""Of who begins with what an expert does, and keeps most of it."""
+"""Settings of PPO after cloning, which preserve most of the cloned behaviour."""
 
 IMITATION: Mapping[str, Any] = {"control": "twist", "demonstrations": 256, "timesteps": 0}
-"""Of what PPO alone does not find; picking and delivering it gained nothing after that."""
+"""Recipe of tasks that PPO alone does not learn; training after cloning did not improve picking and
+delivering."""
 RECIPES: Mapping[str, Mapping[str, Any]] = {
     "HRCReachGoal-v0": {"algorithm": "sac", "control": "tool", "timesteps": 60_000},
     "HRCPickPlace-v0": {**IMITATION, "demonstrations": 512},
@@ -119,7 +123,8 @@ RECIPES: Mapping[str, Mapping[str, Any]] = {
     "HRCDrywall-v0": IMITATION,
     "HRCDelivery-v0": {**IMITATION, "control": "joint", "demonstrations": 1024},
 }
-"""How each task is learnt by default: arguments of `python -m hrc_env train` by the task's id.
+"""Default recipe of each task: arguments of `python -m hrc_env train` by the task's id.
 
-Where they differ from PPO, control "joint", no demonstrations and 1,000,000 steps. The learners'
-own settings are `PPOSettings` and `SACSettings`."""
+Other tasks use PPO, control "joint", no demonstrations and 1,000,000 steps. The learners' own
+settings are `PPOSettings` and `SACSettings`.
+"""

@@ -1,4 +1,4 @@
-"""What scripted agents that handle things have in common: from where to go to what joints do."""
+"""Functions of scripted agents that manipulate: from targets of the tool to actions."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,14 +9,23 @@ from .env_info import EnvInfo
 
 Array = NDArray[np.float64]
 ROUND_RAD = 0.35
-"""A target farther round the robot than this is approached along a circle."""
+"""Angle around the robot beyond which a target is approached along a circle."""
 TURN_HZ = 4.0
 """Turn rate per angle [1/s]."""
 
 
-def round_the_foot(tool: Array, target: Array, foot_xy: Array, radius_m: float) -> Array:
-    """(n, 3) ways to targets from the tool, (n, 3) each: along a circle of a radius at most round
-    the robot's axis where they are far round it, else straight."""
+def plan_around_foot(tool: Array, target: Array, foot_xy: Array, radius_m: float) -> Array:
+    """Return paths to targets: along a circle around the robot if they are far around it.
+
+    Args:
+        tool: position of the tool (n, 3) [m].
+        target: targets from the tool (n, 3) [m].
+        foot_xy: horizontal position of the robot's axis (2,) [m].
+        radius_m: greatest radius of the circle [m].
+
+    Returns:
+        Paths from the tool (n, 3) [m], straight for other targets.
+    """
     here, there = tool[:, :2] - foot_xy, tool[:, :2] + target[:, :2] - foot_xy
     radius, wanted = np.linalg.norm(here, axis=1), np.linalg.norm(there, axis=1)
     cross = here[:, 0] * there[:, 1] - here[:, 1] * there[:, 0]
@@ -30,7 +39,14 @@ def round_the_foot(tool: Array, target: Array, foot_xy: Array, radius_m: float) 
 
 
 def turn_towards(tool_axes: Array, x: Array, z: Array, most_rad_s: float) -> Array:
-    """(n, 3) turn rates that bring the tool's axes x and z, (n, 6), to those wanted."""
+    """Return turn rates (n, 3) that turn the tool towards desired axes.
+
+    Args:
+        tool_axes: axes x and z of the tool (n, 6).
+        x: desired x axis (n, 3).
+        z: desired z axis (n, 3).
+        most_rad_s: fastest turn [rad/s].
+    """
     own_x, own_z = tool_axes[:, :3], tool_axes[:, 3:]
     own_y, y = np.cross(own_z, own_x), np.cross(z, x)
     pairs = ((own_x, x), (own_y, y), (own_z, z))
@@ -39,8 +55,17 @@ def turn_towards(tool_axes: Array, x: Array, z: Array, most_rad_s: float) -> Arr
     return half / np.maximum(rate, 1e-9) * np.minimum(TURN_HZ * rate, most_rad_s)
 
 
-def arm_action(env_info: EnvInfo, terms: dict[str, Array], velocity: Array, turn: Array) -> Array:
-    """(n, A - 1) the arm's part of an action for velocities and turn rates of the tool, (n, 3)."""
+def make_arm_action(
+    env_info: EnvInfo, terms: dict[str, Array], velocity: Array, turn: Array
+) -> Array:
+    """Return the arm's part of an action (n, A - 1) for a motion of the tool.
+
+    Args:
+        env_info: the environment.
+        terms: terms of the observation.
+        velocity: velocity of the tool (n, 3) [m/s].
+        turn: turn rate of the tool (n, 3) [rad/s].
+    """
     config, twist = env_info.control_config, np.concatenate([velocity, turn], axis=1)
     if env_info.control == "twist":
         scale = np.repeat([config.tool_speed_mps, config.tool_turn_rad_s], 3)

@@ -1,8 +1,9 @@
-"""The mean action of a trained policy by NumPy alone: who only acts needs no learner."""
+"""The mean action of a trained policy by NumPy alone, so that acting needs no learner."""
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,28 +15,38 @@ from hrc_env.tasks.goal import ACHIEVED, DESIRED
 from .env_info import Observation
 
 NEAR = 100.0
-"""Entries that are smaller than 1 / NEAR are spread out."""
+"""Factor of the near scale: entries below 1 / NEAR are spread out."""
 ACTIVATIONS = {"tanh": np.tanh, "relu": lambda x: np.maximum(x, 0.0)}
+"""Activation functions by name."""
 Tensors = dict[str, NDArray[np.float32]]
+"""Weights and biases by name."""
 
 
 @dataclass(frozen=True, slots=True)
 class Architecture:
-    """What a network is, beside its weights."""
+    """The structure of a network, without its weights."""
 
     activation: str
-    """"tanh" or "relu", after each layer but the last."""
+    """Activation after each layer but the last: "tanh" or "relu"."""
     near_and_far: bool
-    """Whether it sees every entry at two scales (`agents.features`)."""
+    """Whether every entry is used at two scales (`agents.features`)."""
     squashed: bool
-    """Whether actions are the tanh of the last layer's output (SAC), not cut at -1 and 1 (PPO)."""
+    """Whether actions are the tanh of the last layer's output (SAC), not clipped at -1 and 1
+    (PPO)."""
 
     def __post_init__(self) -> None:
         check_names("activation", [self.activation], ACTIVATIONS)
 
 
+class NetworkSizes(NamedTuple):
+    """Numbers of inputs and outputs of a network."""
+
+    n_inputs: int
+    n_outputs: int
+
+
 class Network:
-    """Layers one after the other; layer k is "actor.k.weight" (out, in) and "actor.k.bias" (out,).
+    """A sequence of layers; layer k is "actor.k.weight" (out, in) and "actor.k.bias" (out,).
 
     Raises:
         KeyError: a layer lacks its weight or bias.
@@ -47,35 +58,36 @@ class Network:
         self.architecture = architecture
 
     @property
-    def sizes(self) -> tuple[int, int]:
+    def sizes(self) -> NetworkSizes:
         """Numbers of its inputs and outputs."""
-        n_seen = self.layers[0][0].shape[1]
-        return n_seen // (2 if self.architecture.near_and_far else 1), len(self.layers[-1][1])
+        n_features = self.layers[0][0].shape[1]
+        n_inputs = n_features // (2 if self.architecture.near_and_far else 1)
+        return NetworkSizes(n_inputs, len(self.layers[-1][1]))
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
-        """Actions (..., A) in [-1, 1] for observations (..., n)."""
-        seen, of = flat(observation), self.architecture
-        if of.near_and_far:
-            seen = near_and_far(observation)
+        """Return actions (..., A) in [-1, 1] for observations (..., n)."""
+        x, architecture = flatten(observation), self.architecture
+        if architecture.near_and_far:
+            x = expand_near_and_far(observation)
         for weight, bias in self.layers[:-1]:
-            seen = ACTIVATIONS[of.activation](seen @ weight.T + bias)
+            x = ACTIVATIONS[architecture.activation](x @ weight.T + bias)
         weight, bias = self.layers[-1]
-        said = seen @ weight.T + bias
-        return np.tanh(said) if of.squashed else np.clip(said, -1.0, 1.0)
+        x = x @ weight.T + bias
+        return np.tanh(x) if architecture.squashed else np.clip(x, -1.0, 1.0)
 
 
-def flat(observation: Observation) -> NDArray[np.float32]:
-    """(..., n) without images; where goals stand apart, they come first."""
+def flatten(observation: Observation) -> NDArray[np.float32]:
+    """Return the numbers of an observation (..., n) without images; separate goals come first."""
     if isinstance(observation, Mapping):
         numbers = [name for name in sorted(observation) if not name.startswith(IMAGE)]
         return np.concatenate([observation[name] for name in numbers], axis=-1)
     return observation
 
 
-def near_and_far(observation: Observation) -> NDArray[np.float32]:
-    """(..., 2 n) what `agents.features.NearAndFar` makes of an observation."""
-    seen = flat(observation)
+def expand_near_and_far(observation: Observation) -> NDArray[np.float32]:
+    """Return the features (..., 2 n) of `agents.features.NearAndFar`."""
+    x = flatten(observation)
     if isinstance(observation, Mapping) and DESIRED in observation:
-        seen = np.concatenate([seen, observation[DESIRED] - observation[ACHIEVED]], axis=-1)
-    near = np.sign(seen) * np.log1p(NEAR * np.abs(seen)) / math.log1p(NEAR)
-    return np.concatenate([seen, near], axis=-1, dtype=np.float32)
+        x = np.concatenate([x, observation[DESIRED] - observation[ACHIEVED]], axis=-1)
+    near = np.sign(x) * np.log1p(NEAR * np.abs(x)) / math.log1p(NEAR)
+    return np.concatenate([x, near], axis=-1, dtype=np.float32)

@@ -1,11 +1,12 @@
-"""Picks and places without learning: what to do next follows from the observation alone.
+"""A picker without learning, which decides from the observation alone.
 
-There is no plan to remember. A piece in the fingers goes up, round the robot to above its place,
-down, and is let go; with none, the fingers go to above the first piece that is not placed, down,
-and close. Velocities of the tool are resolved to joint velocities by `hrc_env.control`.
+It needs no memory. With a piece in the fingers it moves up, around the robot to above its place,
+down, and opens; without one, the fingers move above the first piece that is not placed, down, and
+close. Velocities of the tool are resolved to joint velocities by `hrc_env.control`.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,74 +14,96 @@ from numpy.typing import NDArray
 from hrc_env.observations import split
 
 from .env_info import EnvInfo, Observation
-from .manipulating import TURN_HZ, arm_action, round_the_foot
+from .manipulating import TURN_HZ, make_arm_action, plan_around_foot
 from .scripted import Yielding, fastest_m_s, speed_m_s
 
 Array = NDArray[np.float64]
 ABOVE_M, CLEAR_M = 0.16, 0.11
-"""How high above pieces the tool travels; above this it may move sideways."""
+"""Height at which the tool travels above pieces, and least height of sideways motion [m]."""
 OVER_M, OVER_RAD, STILL_OVER_M = 0.006, 0.05, 0.015
-"""Horizontal distances to its target below which the tool goes down, and goes on down."""
+"""Horizontal errors below which the tool goes down, and below which it continues to."""
 AT_M, STILL_AT_M = 0.007, 0.014
-"""So near to a piece's middle fingers close, and stay closed; so near to its place they open."""
+"""Distances to a piece's middle below which fingers close, and stay closed [m].
+
+At these distances to its place they open.
+"""
 PIECE_M = 0.15
-"""A piece's end from the fingers."""
+"""Distance of a piece's end from the fingers [m]."""
 LYING = 0.8
-"""Cosine of a piece's tilt below which it lies, and is left."""
+"""Cosine of a piece's tilt below which it lies on its side, and is ignored."""
 ROUND_M = 0.50
-"""Round the robot the tool travels on a circle of this radius, which leaves the place in front to
-people."""
+"""Radius of the circle around the robot on which the tool travels [m].
+
+It leaves the space in front to people.
+"""
 
 
 @dataclass(frozen=True, slots=True)
-class _Seen:
-    """An observation as the policy reads it; rows are environments."""
+class _View:
+    """The parts of observations that the agent uses; rows are environments."""
 
     tool: Array
+    """Position of the tool (n, 3) [m]."""
     finger_axis: Array
+    """Axis across the fingers (n, 3)."""
     tool_axis: Array
+    """Axis of the tool (n, 3)."""
     opening_m: Array
+    """Opening of the fingers (n,) [m]."""
     to_piece: Array
+    """The first piece to place, from the tool (n, 3) [m]."""
     along: Array
-    """(n, 3) the piece's long axis."""
+    """Long axis of the piece (n, 3)."""
     to_place: Array
-    """From the piece."""
+    """Place of the piece, from the piece (n, 3) [m]."""
     held: NDArray[np.bool_]
+    """Whether the piece is held (n,)."""
     nothing: NDArray[np.bool_]
-    """Whether there is no piece left to place."""
+    """Whether no piece is left to place (n,)."""
+
+
+class _Plan(NamedTuple):
+    """The motion of the tool."""
+
+    velocity: Array
+    """Velocity (n, 3) [m/s]."""
+    turn: Array
+    """Turn rate (n, 3) [rad/s]."""
+    grip: Array
+    """Command of the fingers (n,): 1 closes, -1 opens."""
 
 
 class PickPlacer:
-    """Resolved-rate picking and placing, with or without yielding."""
+    """Picks and places by resolved rates, with or without yielding."""
 
     def __init__(self, env_info: EnvInfo, yielding: Yielding | None = None) -> None:
         self.env_info, self.yielding = env_info, yielding
         self._foot = env_info.chain.T_world_from_base[:2, 3]
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
-        """Actions (..., A): towards the next piece, or with it to its place."""
+        """Return actions (..., A) towards the next piece, or with it to its place."""
         return self.act_on(split(observation, self.env_info.layout))
 
     def act_on(self, terms: dict[str, Array]) -> NDArray[np.float32]:
-        """The same for an observation by its terms."""
+        """Return actions for an observation that is given by its terms."""
         shape = terms["tool_position"].shape[:-1]
         terms = {name: np.atleast_2d(term) for name, term in terms.items()}
-        seen = _seen(terms)
-        velocity, turn, grip = self._wanted(seen)
+        velocity, turn, grip = self._plan(_read_view(terms))
         if self.yielding is not None:
             nearest_m = terms["worker_separation"].min(axis=-1, initial=np.inf)
             share = self.yielding.share(nearest_m)[:, None]
             velocity, turn = velocity * share, turn * share
-        moves = arm_action(self.env_info, terms, velocity, turn)
+        moves = make_arm_action(self.env_info, terms, velocity, turn)
         if self.yielding is not None:
             moves *= self.yielding.blind_share(terms, fastest_m_s(velocity, turn, PIECE_M))[:, None]
         action = np.concatenate([moves, grip[:, None]], axis=1)
         return action.reshape(*shape, -1).astype(np.float32)
 
-    def _wanted(self, seen: _Seen) -> tuple[Array, Array, Array]:
-        """Velocity and turn rate of the tool (n, 3), and what the fingers do (n,)."""
+    def _plan(self, seen: _View) -> _Plan:
         held, at_place = seen.held, np.linalg.norm(seen.to_place, axis=1) < AT_M
-        yaw = np.where(held, _to_y(seen.along), _between(seen.finger_axis, seen.along))
+        yaw = np.where(
+            held, _find_turn_to_y(seen.along), _find_finger_turn(seen.finger_axis, seen.along)
+        )
         way = np.where(held[:, None], seen.to_place, seen.to_piece)
         released = ~held & (np.linalg.norm(seen.to_place, axis=1) < STILL_AT_M)
         aside_m = np.linalg.norm(way[:, :2], axis=1)
@@ -97,22 +120,19 @@ class PickPlacer:
         upright = np.cross(seen.tool_axis, [0.0, 0.0, -1.0])
         turn = TURN_HZ * (upright + yaw[:, None] * [0.0, 0.0, 1.0])
         waits = ~held & closed
-        return (
-            np.where(waits[:, None], 0.0, self._velocity(seen.tool, target)),
-            turn,
-            2.0 * closed - 1,
-        )
+        velocity = np.where(waits[:, None], 0.0, self._compute_velocity(seen.tool, target))
+        return _Plan(velocity, turn, 2.0 * closed - 1)
 
-    def _velocity(self, tool: Array, target: Array) -> Array:
-        """Velocity (n, 3) to targets from the tool."""
-        error = round_the_foot(tool, target, self._foot, ROUND_M)
+    def _compute_velocity(self, tool: Array, target: Array) -> Array:
+        """Return velocities (n, 3) to targets from the tool."""
+        error = plan_around_foot(tool, target, self._foot, ROUND_M)
         length = np.linalg.norm(error, axis=1, keepdims=True)
         most = self.env_info.control_config.tool_speed_mps
         return error / np.maximum(length, 1e-9) * speed_m_s(length, most)
 
 
-def _seen(terms: dict[str, Array]) -> _Seen:
-    """What matters now: the first piece that can be placed and is not."""
+def _read_view(terms: dict[str, Array]) -> _View:
+    """Return the parts of observations for the first piece that can be placed and is not."""
     n = len(terms["object_placed"])
     axes = terms["object_axes"].reshape(n, -1, 2, 3)
     to_place = terms["place_from_object"].reshape(n, -1, 3)
@@ -122,7 +142,7 @@ def _seen(terms: dict[str, Array]) -> _Seen:
     which = np.where(held.any(1), np.argmax(held, axis=1), np.argmin(done, axis=1))
     row = np.arange(n)
     tool_axes = terms["tool_axes"].reshape(n, 2, 3)
-    return _Seen(
+    return _View(
         tool=terms["tool_position"],
         finger_axis=tool_axes[:, 0],
         tool_axis=tool_axes[:, 1],
@@ -135,16 +155,16 @@ def _seen(terms: dict[str, Array]) -> _Seen:
     )
 
 
-def _between(finger_axis: Array, along: Array) -> Array:
-    """(n,) angles by which to turn fingers so that they close across a piece, -90 to 90 degrees."""
+def _find_finger_turn(finger_axis: Array, along: Array) -> Array:
+    """Return angles (n,) that turn fingers across a piece, -90 to 90 degrees."""
     across = np.arctan2(along[:, 1], along[:, 0]) - np.pi / 2
-    return _half_turn(across - np.arctan2(finger_axis[:, 1], finger_axis[:, 0]))
+    return _wrap_half_turn(across - np.arctan2(finger_axis[:, 1], finger_axis[:, 0]))
 
 
-def _to_y(along: Array) -> Array:
-    """(n,) angles by which to turn a piece so that it lies along y, either way round."""
-    return _half_turn(np.pi / 2 - np.arctan2(along[:, 1], along[:, 0]))
+def _find_turn_to_y(along: Array) -> Array:
+    """Return angles (n,) that turn a piece along y, in either direction."""
+    return _wrap_half_turn(np.pi / 2 - np.arctan2(along[:, 1], along[:, 0]))
 
 
-def _half_turn(angle: Array) -> Array:
+def _wrap_half_turn(angle: Array) -> Array:
     return (angle + np.pi / 2) % np.pi - np.pi / 2

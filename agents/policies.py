@@ -1,14 +1,15 @@
-"""Trained policies as files that execute nothing: weights as safetensors, and a card beside them.
+"""Trained policies as files that execute no code: weights as safetensors, and a card beside them.
 
-`hrc://HRCReach-v0/NAME` is one that comes with the package; NAME.safetensors is any other that
-`python -m hrc_env export` wrote. The card (NAME.json) says what it was made for, how, and what it
-is worth; its SHA-256 holds the weights to it.
+`hrc://HRCReach-v0/NAME` is a policy of the package; NAME.safetensors is any other that `python -m
+hrc_env export` wrote. The card (NAME.json) describes its environment, its training and its scores;
+the card's SHA-256 guards the weights.
 """
 
 import hashlib
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from hrc_env.core.errors import CheckpointError, ConfigError, unknown
 from hrc_env.core.mapping import from_mapping
@@ -21,29 +22,32 @@ from .network import Architecture, Network
 
 PREFIX, SUFFIX = "hrc://", ".safetensors"
 FOLDER = Path(__file__).parent / "pretrained"
-"""Those that come with the package, as ID/NAME.safetensors."""
+"""Folder of the package's policies, as ID/NAME.safetensors."""
 EXPORT = "python -m hrc_env export RUN --name NAME"
 
 
 @dataclass(frozen=True, slots=True)
 class TermSize:
-    """A term of the observation."""
+    """The size of a term of the observation."""
 
     name: str
+    """Name of the term."""
     entries: int
+    """Number of entries."""
     scale: float
-    """What one unit stands for."""
+    """Value to which one unit corresponds."""
 
 
 @dataclass(frozen=True, slots=True)
 class Worth:
-    """Means over episodes on fixed seeds, deterministic actions, with 95 % intervals."""
+    """Means over episodes on fixed seeds with deterministic actions, and their 95 % intervals."""
 
     shield: str
-    """Its name, or "none"."""
+    """Name of the shield, or "none"."""
     episodes: int
+    """Number of episodes."""
     seed: int
-    """Of the first episode."""
+    """Seed of the first episode."""
     goals_per_minute: Metric
     cost_per_episode: Metric
     contacts_per_episode: Metric
@@ -51,59 +55,74 @@ class Worth:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Card:
-    """What a policy was made for, how, and what it is worth."""
+    """The description of a policy: environment, training and scores."""
 
     task: str
-    """The environment's id."""
+    """Id of the environment."""
     control: str
+    """Control of the actions."""
     observation: tuple[TermSize, ...]
+    """Terms of the observation in their order."""
     n_actions: int
+    """Number of entries of an action."""
     architecture: Architecture
+    """Structure of the network."""
     command: str
-    """That trained it."""
+    """Command that trained the policy."""
     seed: int
+    """Seed of the training."""
     timesteps: int
+    """Environment steps of the training."""
     hrc_env: str
-    """Version."""
+    """Version of the package."""
     commit: str | None
+    """Commit of the repository."""
     sha256: str
-    """Of the weights' file."""
+    """Digest of the weights' file."""
     worth: tuple[Worth, ...]
-    """As judged when it was exported."""
+    """Scores at the time of the export."""
 
 
-def names() -> tuple[str, ...]:
-    """Addresses of the policies that come with the package."""
+class Policy(NamedTuple):
+    """A policy from its files."""
+
+    card: Card
+    network: Network
+
+
+def list_names() -> tuple[str, ...]:
+    """Return the addresses of the package's policies."""
     return tuple(
         f"{PREFIX}{path.parent.name}/{path.stem}" for path in sorted(FOLDER.glob(f"*/*{SUFFIX}"))
     )
 
 
-def path_of(policy: str) -> Path:
-    """The file of a policy by its address or its path.
+def find_path(policy: str) -> Path:
+    """Return the file of a policy, given by its address or its path.
 
     Raises:
-        ConfigError: no such policy comes with the package.
+        ConfigError: the package has no such policy.
     """
     if not policy.startswith(PREFIX):
         return Path(policy)
-    if policy not in names():
-        error = unknown("policy", policy, names()) if names() else "No policies come with it yet."
+    if policy not in list_names():
+        names = list_names()
+        error = unknown("policy", policy, names) if names else "The package has no policies yet."
         raise ConfigError(f"{error} Or train your own, and: {EXPORT}")
     return FOLDER / f"{policy.removeprefix(PREFIX)}{SUFFIX}"
 
 
-def read(path: Path) -> tuple[Card, Network]:
-    """A policy's card and its network.
+def read(path: Path) -> Policy:
+    """Return a policy with its card.
 
     Raises:
-        CheckpointError: no file, no card, one that is no card, weights that are not those of the
-            card, or no safetensors.
+        CheckpointError: a file is missing, the card is not a card, the weights are not those of
+            the card, or they are not safetensors.
     """
     card_path = path.with_suffix(".json")
-    for each in (path, card_path):
-        if not each.exists():
-            raise CheckpointError(f"No {each}: a policy is NAME{SUFFIX} and NAME.json; {EXPORT}")
+    for file in (path, card_path):
+        if not file.exists():
+            raise CheckpointError(f"No {file}: a policy is NAME{SUFFIX} and NAME.json; {EXPORT}")
     try:
         card = from_mapping(Card, json.loads(card_path.read_text()))
     except (ConfigError, ValueError, AttributeError) as error:
@@ -111,57 +130,58 @@ def read(path: Path) -> tuple[Card, Network]:
     content = path.read_bytes()
     if content[:1] == b"\x80" or content[:2] == b"PK":
         raise CheckpointError(
-            f"{path} is a pickled file, which could run anything, and is not read. Policies are "
-            f"safetensors: {EXPORT}"
+            f"{path} is a pickled file, which could execute anything, and is not read. Policies "
+            f"are safetensors: {EXPORT}"
         )
-    found = hashlib.sha256(content).hexdigest()
-    if found != card.sha256:
+    digest = hashlib.sha256(content).hexdigest()
+    if digest != card.sha256:
         raise CheckpointError(
-            f"{path} is damaged, or not the one of its card: its SHA-256 is {found}, the card says "
-            f"{card.sha256}. Fetch or export it again."
+            f"{path} is damaged, or does not belong to its card: its SHA-256 is {digest}, that of "
+            f"the card {card.sha256}. Fetch or export it again."
         )
-    return card, _network(path, content, card)
+    return Policy(card, _load_network(path, content, card))
 
 
 def load(path: Path, env_info: EnvInfo) -> Network:
-    """A policy that acts in an environment.
+    """Return a policy for acting in an environment.
 
     Raises:
-        CheckpointError: as of `read`; or it was made for another environment.
+        CheckpointError: it fails in `read`, or it was made for another environment.
     """
     card, network = read(path)
-    apart = differences(card, env_info)
-    if apart:
+    different = list_differences(card, env_info)
+    if different:
         raise CheckpointError(
-            f"{path} does not fit this environment: {'; '.join(apart)}. It was trained by: "
+            f"{path} does not fit this environment: {'; '.join(different)}. It was trained by: "
             f"{card.command}"
         )
     return network
 
 
-def differences(card: Card, env_info: EnvInfo) -> list[str]:
-    """What of an environment is not as the policy was made for, in words."""
-    said = [
-        f"its {what} is {of}, here it is {here}"
-        for what, of, here in (
+def list_differences(card: Card, env_info: EnvInfo) -> list[str]:
+    """Return descriptions of the differences between a policy's environment and another one."""
+    texts = [
+        f"its {name} is {theirs}, here it is {ours}"
+        for name, theirs, ours in (
             ("task", card.task, ancestor_of(env_info.task, [card.task])),
             ("control", card.control, env_info.control),
             ("number of actions", card.n_actions, env_info.n_actions),
         )
-        if of != here
+        if theirs != ours
     ]
-    seen, here = ({each.name: each for each in of} for of in (card.observation, terms(env_info)))
-    for name in [*seen, *(here.keys() - seen.keys())]:
-        if seen.get(name) != here.get(name):
-            of, to = (_words(each.get(name)) for each in (seen, here))
-            said.append(f"its observation's {name} has {of}, here {to}")
-    if not said and list(seen) != list(here):
-        said.append("its observation's terms come in another order")
-    return said
+    theirs = {term.name: term for term in card.observation}
+    ours = {term.name: term for term in list_terms(env_info)}
+    for name in [*theirs, *(ours.keys() - theirs.keys())]:
+        if theirs.get(name) != ours.get(name):
+            old, new = _describe_term(theirs.get(name)), _describe_term(ours.get(name))
+            texts.append(f"its observation's {name} has {old}, here {new}")
+    if not texts and list(theirs) != list(ours):
+        texts.append("its observation's terms have another order")
+    return texts
 
 
-def terms(env_info: EnvInfo) -> tuple[TermSize, ...]:
-    """What an observation is made of, in its order; goals that stand apart come first."""
+def list_terms(env_info: EnvInfo) -> tuple[TermSize, ...]:
+    """Return the terms of an observation in their order; separate goals come first."""
     goals = (ACHIEVED, DESIRED) if env_info.goal_size else ()
     layout = env_info.layout
     present = {name: part for name, part in layout.slices.items() if part.stop > part.start}
@@ -174,25 +194,24 @@ def terms(env_info: EnvInfo) -> tuple[TermSize, ...]:
     )
 
 
-def _words(term: TermSize | None) -> str:
+def _describe_term(term: TermSize | None) -> str:
     return "no entries" if term is None else f"{term.entries} entries of {term.scale:g}"
 
 
-def _network(path: Path, content: bytes, card: Card) -> Network:
+def _load_network(path: Path, content: bytes, card: Card) -> Network:
     from safetensors import SafetensorError
-    from safetensors.numpy import load as tensors_of
+    from safetensors.numpy import load as load_tensors
 
     try:
-        network = Network(tensors_of(content), card.architecture)
+        network = Network(load_tensors(content), card.architecture)
     except (SafetensorError, KeyError) as error:
-        raise CheckpointError(f"{path} holds no policy: {error}. {EXPORT}") from error
-    n_seen = sum(term.entries for term in card.observation)
-    n_seen += next((term.entries for term in card.observation if term.name == ACHIEVED), 0) * (
-        card.architecture.near_and_far
-    )
-    if network.sizes != (n_seen, card.n_actions):
+        raise CheckpointError(f"{path} is not a policy: {error}. {EXPORT}") from error
+    n_inputs = sum(term.entries for term in card.observation)
+    if card.architecture.near_and_far:
+        n_inputs += next((t.entries for t in card.observation if t.name == ACHIEVED), 0)
+    if network.sizes != (n_inputs, card.n_actions):
         raise CheckpointError(
-            f"{path} is a network from {network.sizes[0]} to {network.sizes[1]} numbers; its card "
-            f"says {n_seen} and {card.n_actions}."
+            f"{path} is a network from {network.sizes.n_inputs} to {network.sizes.n_outputs} "
+            f"numbers; its card describes {n_inputs} and {card.n_actions}."
         )
     return network

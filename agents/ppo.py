@@ -1,8 +1,8 @@
-"""Proximal policy optimisation by Stable-Baselines3, with settings that suit this task.
+"""Proximal policy optimization by Stable-Baselines3, with settings for these tasks.
 
-Schulman et al. 2017, arXiv:1707.06347. What mattered most: no running normalisation of observations
-(it inflates nearly constant ones such as ages), a progress term, many short rollouts at random
-phases of an episode.
+Schulman et al. 2017, arXiv:1707.06347. Most important were: no running normalization of
+observations (it inflates nearly constant ones such as ages), a progress term, and many short
+rollouts at random phases of an episode.
 """
 
 from collections.abc import Callable
@@ -27,7 +27,8 @@ def make_learner(
     tensorboard: Path | None = None,
     kind: Callable[..., PPO] = PPO,
 ) -> PPO:
-    """A fresh PPO on `env`; a running estimate scales rewards, observations stay as they are."""
+    """Return a new PPO on `env`; a running estimate scales rewards, observations stay as they
+    are."""
     normalised = VecNormalize(env, norm_obs=False, norm_reward=True, gamma=settings.gamma)
     log = None if tensorboard is None else str(tensorboard)
     network = "MultiInputPolicy" if isinstance(env.observation_space, Dict) else "MlpPolicy"

@@ -1,9 +1,9 @@
-"""PPO that keeps a limit: Stable-Baselines3's PPO, of which only the collection is another.
+"""PPO with a cost limit: Stable-Baselines3's PPO with another collection of rollouts.
 
 A multiplier weighs the advantage of the cost against that of the reward (Ray et al. 2019,
-"Benchmarking Safe Exploration in Deep Reinforcement Learning"). It follows the error by proportion
-and integral (Stooke et al. 2020, arXiv:2007.03964). Costs are those of `info["cost"]`, which are
-counted on the truth.
+"Benchmarking Safe Exploration in Deep Reinforcement Learning"). It follows the error by
+proportional and integral terms (Stooke et al. 2020, arXiv:2007.03964). Costs are those of
+`info["cost"]`, which are computed from the truth.
 """
 
 import copy
@@ -26,28 +26,32 @@ with learner():
     from stable_baselines3.common.vec_env import VecEnv
 
 CRITIC_RATE, CRITIC_PASSES, CRITIC_BATCH = 1e-3, 4, 1024
-"""How the critic of the cost learns: step size, passes over a rollout, samples a gradient step."""
+"""Step size of the cost critic, passes over a rollout, and samples in a gradient step."""
 
 
 @dataclass(slots=True)
 class Multiplier:
-    """Compute lambda = clip(integral + kp error), after each rollout.
+    """Compute lambda = clip(integral + kp error) after each rollout.
 
-    The integral changes by a share of itself, so that it finds lambdas of any size, and leaves
-    large ones as fast as it came to them. It rests while lambda is at an end that the error pushes
-    it beyond, and the error counts no more than 1: policies take hundreds of rollouts to follow.
+    The integral changes by a share of itself, so it finds lambdas of any size, and leaves large
+    ones as fast as it reached them. It rests while lambda is at a bound that the error would
+    exceed, and the error is at most 1: policies take hundreds of rollouts to follow.
     """
 
     limit: float
-    """Of the cost of an episode."""
+    """Limit of the cost of an episode."""
     kp: float = 8.0
+    """Gain of the proportional term."""
     ki: float = 0.02
+    """Gain of the integral term."""
     smoothing: float = 0.1
-    """Share by which `cost` follows that of the latest rollout."""
+    """Share by which `cost` follows the latest rollout."""
     most: float = 20.0
+    """Greatest lambda."""
     cost: float = float("nan")
-    """Of an episode, smoothed."""
+    """Smoothed cost of an episode."""
     integral: float = 0.0
+    """Integral term."""
     value: float = 0.0
     """The multiplier lambda."""
 
@@ -55,7 +59,12 @@ class Multiplier:
         check_fields(self, "be positive", "limit", "smoothing", "most")
 
     def update(self, cost: float, share: float = 1.0) -> None:
-        """A rollout cost so much an episode, while limit / share was what it was to cost."""
+        """Update lambda after a rollout.
+
+        Args:
+            cost: cost of an episode in the rollout.
+            share: the limit in force is limit / share.
+        """
         new = 1.0 if np.isnan(self.cost) else self.smoothing
         self.cost = cost if new == 1.0 else (1 - new) * self.cost + new * cost
         error = min(share * self.cost / self.limit - 1, 1.0)
@@ -67,14 +76,14 @@ class Multiplier:
 
 
 class PPOLagrangian(PPO):
-    """PPO whose advantages are (A_reward - lambda A_cost) / (1 + lambda), each normalised.
+    """PPO with the advantages (A_reward - lambda A_cost) / (1 + lambda), each normalized.
 
-    The cost has a critic of its own. Its targets are in units of the running deviation of the
-    discounted cost: raw ones, of 15 to 50, it would never catch up with.
+    The cost has its own critic. Its targets are in units of the running deviation of the discounted
+    cost, as it would not reach raw ones of 15 to 50.
 
     Args:
-        limit: of the cost of an episode.
-        episode_steps: that an episode lasts; what a rollout costs is counted by the step.
+        limit: limit of the cost of an episode.
+        episode_steps: length of an episode; the cost of a rollout is counted per step.
     """
 
     def __init__(
@@ -82,7 +91,7 @@ class PPOLagrangian(PPO):
     ) -> None:
         self.multiplier, self.episode_steps = Multiplier(limit), episode_steps
         self.share = 1.0
-        """The limit in force is limit / share: while it is wide, the task is learnt first."""
+        """The limit in force is limit / share: with a wide limit the task is learnt first."""
         self.spread, self.discounted = RunningMeanStd(), np.zeros(1)
         super().__init__(*args, **kwargs)
 
@@ -109,66 +118,68 @@ class PPOLagrangian(PPO):
         rollout_buffer: RolloutBuffer,
         n_rollout_steps: int,
     ) -> bool:
-        """As PPO does; then the multiplier and the critic learn what it cost, and the advantages
-        count it."""
+        """Collect a rollout as PPO does, update multiplier and critic, and include the cost in
+        advantages."""
         self._costs: list[Floats] = []
         self._beyond: list[Floats] = []
         if not super().collect_rollouts(env, callback, rollout_buffer, n_rollout_steps):
             return False
         costs = np.array(self._costs)
         self.multiplier.update(float(costs.mean()) * self.episode_steps, self.share)
-        judged = self._judged(costs, rollout_buffer)
-        loss = self._learn(judged)
+        cost_rollout = self._evaluate_costs(costs, rollout_buffer)
+        loss = self._learn(cost_rollout)
         value = self.multiplier.value
-        mixed = _normalised(rollout_buffer.advantages) - value * _normalised(judged.advantages)
+        mixed = _normalize(rollout_buffer.advantages)
+        mixed = mixed - value * _normalize(cost_rollout.advantages)
         rollout_buffer.advantages = (mixed / (1 + value)).astype(np.float32)
-        told = {"multiplier": value, "cost": self.multiplier.cost, "critic_loss": loss}
-        for name, number in {**told, "limit": self.multiplier.limit}.items():
+        metrics = {"multiplier": value, "cost": self.multiplier.cost, "critic_loss": loss}
+        for name, number in {**metrics, "limit": self.multiplier.limit}.items():
             self.logger.record(f"lagrangian/{name}", number)
         return True
 
     def _update_info_buffer(self, infos: list[dict[str, Any]], dones: Any = None) -> None:
-        """Called with the infos of every step: keeps the costs, and what lies beyond a time limit,
-        by the critic."""
+        """Store the costs of a step, and the critic's value beyond a time limit; called in every
+        step."""
         super()._update_info_buffer(infos, dones)
         beyond = np.zeros(len(infos))
         for k, info in enumerate(infos):
             if info.get("TimeLimit.truncated"):
-                seen = self.policy.obs_to_tensor(info["terminal_observation"])[0]
-                beyond[k] = self._values(seen).item()
+                observation = self.policy.obs_to_tensor(info["terminal_observation"])[0]
+                beyond[k] = self._predict(observation).item()
         self._costs.append(np.array([info["cost"] for info in infos]))
         self._beyond.append(beyond)
 
-    def _judged(self, costs: Floats, rollout: RolloutBuffer) -> RolloutBuffer:
-        """The rollout with costs (T, E) as its rewards: their returns and advantages."""
+    def _evaluate_costs(self, costs: Floats, rollout: RolloutBuffer) -> RolloutBuffer:
+        """Return the rollout with costs (T, E) as its rewards, with returns and advantages."""
         sums, now = [], np.broadcast_to(self.discounted, costs.shape[1:])
         for cost, begins in zip(costs, rollout.episode_starts, strict=True):
             now = now * self.gamma * (1 - begins) + cost
             sums.append(now)
         self.discounted = now
         self.spread.update(np.concatenate(sums))
-        judged = copy.copy(rollout)
+        result = copy.copy(rollout)
         scaled = costs / np.sqrt(self.spread.var + 1e-8)
-        judged.rewards = (scaled + self.gamma * np.array(self._beyond)).astype(np.float32)
-        flat = _flat(rollout.observations)
-        judged.values = self._values(flat).reshape(costs.shape).numpy()
-        judged.advantages = np.zeros_like(judged.rewards)
-        last = self._values(obs_as_tensor(self._last_obs, self.device))  # type: ignore[arg-type]
-        judged.compute_returns_and_advantage(last, self._last_episode_starts)  # type: ignore[arg-type]
-        return judged
+        result.rewards = (scaled + self.gamma * np.array(self._beyond)).astype(np.float32)
+        flat = _flatten(rollout.observations)
+        result.values = self._predict(flat).reshape(costs.shape).numpy()
+        result.advantages = np.zeros_like(result.rewards)
+        last = self._predict(obs_as_tensor(self._last_obs, self.device))  # type: ignore[arg-type]
+        result.compute_returns_and_advantage(last, self._last_episode_starts)  # type: ignore[arg-type]
+        return result
 
-    def _values(self, observations: Any) -> torch.Tensor:
+    def _predict(self, observations: Any) -> torch.Tensor:
         with torch.no_grad():
             return self.cost_critic(observations)
 
-    def _learn(self, judged: RolloutBuffer) -> float:
-        """Fit the critic to the returns; its mean loss in the last pass."""
-        seen, returns = _flat(judged.observations), torch.as_tensor(judged.returns.reshape(-1, 1))
+    def _learn(self, rollout: RolloutBuffer) -> float:
+        """Fit the critic to the returns; return its mean loss in the last pass."""
+        observations = _flatten(rollout.observations)
+        returns = torch.as_tensor(rollout.returns.reshape(-1, 1))
         losses = []
         for _ in range(CRITIC_PASSES):
             losses.clear()
             for batch in torch.randperm(len(returns)).split(CRITIC_BATCH):
-                values = self.cost_critic(_rows(seen, batch))
+                values = self.cost_critic(_select(observations, batch))
                 loss = torch.nn.functional.mse_loss(values, returns[batch])
                 self.cost_optimizer.zero_grad()
                 loss.backward()
@@ -177,18 +188,18 @@ class PPOLagrangian(PPO):
         return float(np.mean(losses))
 
 
-def _flat(observations: Any) -> Any:
-    """Of all environments one after the other, (T, E, n) as (T E, n), also by name."""
+def _flatten(observations: Any) -> Any:
+    """Return observations (T, E, n) as (T E, n), also by name."""
     if isinstance(observations, dict):
-        return {name: _flat(part) for name, part in observations.items()}
+        return {name: _flatten(part) for name, part in observations.items()}
     return torch.as_tensor(observations.reshape(-1, observations.shape[-1]))
 
 
-def _rows(observations: Any, ids: torch.Tensor) -> Any:
+def _select(observations: Any, ids: torch.Tensor) -> Any:
     if isinstance(observations, dict):
         return {name: part[ids] for name, part in observations.items()}
     return observations[ids]
 
 
-def _normalised(advantages: Floats) -> Floats:
+def _normalize(advantages: Floats) -> Floats:
     return (advantages - advantages.mean()) / (advantages.std() + 1e-8)

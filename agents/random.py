@@ -1,4 +1,4 @@
-"""Uniformly random actions: what an environment does to somebody who does not think."""
+"""An agent with uniformly random actions."""
 
 from collections.abc import Mapping
 
@@ -11,14 +11,14 @@ from .env_info import EnvInfo, Observation
 
 
 class RandomAgent:
-    """Draws every action anew from its own generator."""
+    """Draws every action from its own generator."""
 
     def __init__(self, env_info: EnvInfo, seed: int = 0) -> None:
         self.n_actions = env_info.n_actions
         self.rng = np.random.default_rng(seed)
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
-        """Actions uniform in [-1, 1]."""
+        """Return actions (..., A), uniform in [-1, 1]."""
         flat = observation[FLAT] if isinstance(observation, Mapping) else observation
         shape = (*flat.shape[:-1], self.n_actions)
         return self.rng.uniform(-1, 1, shape).astype(np.float32)

@@ -1,4 +1,4 @@
-"""How each task is learnt by default: python -m hrc_env train --task ID"""
+"""Default recipe of each task, for `python -m hrc_env train --task ID`."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from .requests import TrainingRequest
 
 @dataclass(frozen=True, kw_only=True)
 class Run(TrainingRequest):
-    """Arguments that leave nothing open: what suits most tasks."""
+    """Training arguments without open ones; defaults suit most tasks."""
 
     algorithm: str = "ppo"
     control: str = "joint"
@@ -20,15 +20,15 @@ class Run(TrainingRequest):
 
 
 LIMITED: Mapping[str, Any] = {"timesteps": 3_000_000, "proximity": 0.0}
-"""With a limit of cost, which then is all that keeps the robot away."""
+"""Recipe with a cost limit, without a proximity term."""
 
 
-def filled(arguments: TrainingRequest) -> Run:
-    """The arguments with the recipe of their task for what they leave open."""
+def fill_in(arguments: TrainingRequest) -> Run:
+    """Return the arguments, with the recipe of their task for those that are not given."""
     recipe = RECIPES.get(arguments.task, {})
     if arguments.algorithm == "ppo_lagrangian":
         recipe = {**(recipe if recipe.get("algorithm", "ppo") == "ppo" else {}), **LIMITED}
     elif arguments.algorithm not in (None, recipe.get("algorithm", "ppo")):
-        recipe = {}  # another learner begins alone
+        recipe = {}  # the recipe is for another learner
     given = {name: each for name, each in vars(arguments).items() if each is not None}
     return Run(**{**recipe, **given})

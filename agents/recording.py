@@ -1,7 +1,7 @@
-"""Episodes of an agent as a data set: of Minari (https://minari.farama.org), or a folder.
+"""Recording of an agent's episodes as a data set of Minari (https://minari.farama.org) or a folder.
 
-They are kept as they are finished, in a folder beside the data set, which is made of them in the
-end, at once.
+Finished episodes are stored in a folder beside the data set, which is made from them at the end, at
+once.
 """
 
 import contextlib
@@ -25,8 +25,15 @@ from hrc_env.core.infos import matching
 from hrc_env.core.mapping import for_json
 from hrc_env.core.progress import progress_bar
 from hrc_env.core.results import provenance, write_whole
-from hrc_env.evaluation.dataset import ABOUT, FORMAT, draft_of, name_of, read_arrays, within
-from hrc_env.evaluation.moments import Kept, Moment, grouped
+from hrc_env.evaluation.dataset import (
+    ABOUT,
+    FORMAT,
+    format_file_name,
+    get_draft_path,
+    read_arrays,
+    select_folder,
+)
+from hrc_env.evaluation.moments import Moment, MomentParts, add_folder
 from hrc_env.evaluation.rollout import Transition, rollout
 from hrc_env.geometry.cameras import projections
 from hrc_env.pipeline.ready import make_ready
@@ -37,100 +44,105 @@ from .registry import make_agent
 from .requests import RecordingRequest
 
 TOP = ("cost", "is_success")
-"""Infos that a Minari data set has outside of the groups "belief" and "truth"."""
+"""Infos that are outside of the groups "belief" and "truth" in a Minari data set."""
 ROOT = "MINARI_DATASETS_PATH"
-"""Environment variable of Minari: where data sets are."""
+"""Environment variable of Minari with the folder of data sets."""
 MOST_BYTES = 4 * 2**30
-"""Images of episodes that are played side by side, which are held in memory until they end."""
+"""Greatest size of images of episodes that are played together, which stay in memory until their
+end."""
 Episode = dict[str, Any]
-"""Arrays by name: observations, of which there is one more than of actions, and so on."""
+"""Arrays by name: observations, of which there is one more than actions, and so on."""
 
 
-def run(asked: RecordingRequest) -> int:
-    """Record, print the place, and return the exit status.
+def run(request: RecordingRequest) -> int:
+    """Record episodes, print the place of the data set, and return the exit status.
 
     Raises:
-        MissingExtraError: Minari is asked for and not installed.
-        ConfigError: the data set exists, cannot be called so, or infos or images are asked for
-            that cannot be.
+        MissingExtraError: Minari is needed and not installed.
+        ConfigError: the data set exists, its name is not valid, or requested infos or images are
+            not available.
     """
-    minari = _minari() if asked.folder is None else None
-    path = _free_folder(asked.folder) if asked.folder else _free(minari, str(asked.out))
-    about = _about(asked)
-    draft, console = draft_of(path), Console()
-    _same_as_before(asked, draft)
-    make_ready(console, asked.perception, draws=bool(asked.observe_images))
-    firsts = range(0, asked.episodes, asked.num_envs)
+    minari = _import_minari() if request.folder is None else None
+    if request.folder is None:
+        path = _find_minari_path(minari, str(request.out))
+    else:
+        path = _check_free(request.folder)
+    about = _describe(request)
+    draft, console = get_draft_path(path), Console()
+    _check_same_request(request, draft)
+    make_ready(console, request.perception, draws=bool(request.observe_images))
+    firsts = range(0, request.episodes, request.num_envs)
     with progress_bar(console, "recording") as say:
         for first in firsts:
-            n = min(asked.num_envs, asked.episodes - first)
-            files = [draft / name_of(first + b) for b in range(n)]
+            n = min(request.num_envs, request.episodes - first)
+            files = [draft / format_file_name(first + b) for b in range(n)]
             if not all(file.exists() for file in files):
-                for file, episode in zip(files, _played(asked, first, n), strict=True):
-                    _keep(file, episode)
+                for file, episode in zip(files, _play(request, first, n), strict=True):
+                    _write_episode(file, episode)
             say(1 / len(firsts), "")
-    files = [draft / name_of(k) for k in range(asked.episodes)]
-    n_steps = sum(_steps_of(file) for file in files)
+    files = [draft / format_file_name(k) for k in range(request.episodes)]
+    n_steps = sum(_count_steps(file) for file in files)
     if minari is None:
         write_whole(draft / ABOUT, json.dumps(about, indent=1))
         os.replace(draft, path)
         how = f'hrc_env.load_episodes("{path}")'
     else:
-        _write(minari, asked, path, draft, [read_arrays(file) for file in files])
+        _write_minari(minari, request, path, draft, [read_arrays(file) for file in files])
         shutil.rmtree(draft)
-        how = f'minari.load_dataset("{asked.out}")'
-    said = f"{len(files)} episodes, {n_steps:,} steps in {path}: {how}"
-    console.print(said, markup=False, highlight=False, soft_wrap=True)
+        how = f'minari.load_dataset("{request.out}")'
+    text = f"{len(files)} episodes, {n_steps:,} steps in {path}: {how}"
+    console.print(text, markup=False, highlight=False, soft_wrap=True)
     return 0
 
 
-def _steps_of(file: Path) -> int:
+def _count_steps(file: Path) -> int:
     with np.load(file) as arrays:
         return len(arrays["rewards"])
 
 
-def _free_folder(path: Path) -> Path:
-    """The place of a data set in a folder; `ConfigError` if there is anything."""
+def _check_free(path: Path) -> Path:
+    """Return the folder of a data set; raise `ConfigError` if it exists."""
     if path.exists():
         raise ConfigError(
-            f"{path} is there already, and nothing is added to it: choose another --folder, or "
+            f"{path} exists already, and nothing is added to it: choose another --folder, or "
             "delete it."
         )
     return path
 
 
-def command(asked: RecordingRequest) -> str:
-    """The line that records so."""
-    words = ["python", "-m", "hrc_env", "record", asked.task]
-    for each in fields(RecordingRequest):
-        value = getattr(asked, each.name)
-        if value == each.default or each.name == "task":
+def format_command(request: RecordingRequest) -> str:
+    """Return the command line of a recording."""
+    words = ["python", "-m", "hrc_env", "record", request.task]
+    for field in fields(RecordingRequest):
+        value = getattr(request, field.name)
+        if value == field.default or field.name == "task":
             continue
-        option = f"--{each.name.replace('_', '-')}"
+        option = f"--{field.name.replace('_', '-')}"
         several = value if isinstance(value, tuple | list) else [] if value is True else [value]
         words += [option, *map(str, several)]
     return shlex.join(words)
 
 
-def _about(asked: RecordingRequest) -> dict[str, Any]:
-    """Return the metadata of a data set: command, arguments, configuration, versions, seeds,
-    cameras.
+def _describe(request: RecordingRequest) -> dict[str, Any]:
+    """Return the metadata of a data set.
+
+    These are command, arguments, configuration, versions, seeds and cameras.
 
     Raises:
-        ConfigError: the environment, infos or images that are asked for cannot be.
+        ConfigError: the environment, or requested infos or images, are not available.
     """
-    env = HRCVectorEnv(1, **asked.keywords())
+    env = HRCVectorEnv(1, **request.keywords())
     try:
-        _kept_of(asked, env, env.reset(seed=asked.seed)[1], asked.num_envs)
+        _choose_parts(request, env, env.reset(seed=request.seed)[1], request.num_envs)
         first = env.shards.first
         cameras = first.scene.cameras
         slices = {name: [part.start, part.stop] for name, part in first.layout.slices.items()}
         return {
-            "format": FORMAT, "command": command(asked), "task": asked.task,
-            "episodes": asked.episodes,
-            "seeds": list(range(asked.seed, asked.seed + asked.episodes)),
-            "environment": for_json(asked.keywords(), "environment"),
-            "arguments": json.loads(json.dumps(asdict(asked), default=str)),
+            "format": FORMAT, "command": format_command(request), "task": request.task,
+            "episodes": request.episodes,
+            "seeds": list(range(request.seed, request.seed + request.episodes)),
+            "environment": for_json(request.keywords(), "environment"),
+            "arguments": json.loads(json.dumps(asdict(request), default=str)),
             "config": json.loads(json.dumps(asdict(env.config), default=str)),
             "ctrl_dt_s": env.config.ctrl_dt, "observation": slices,
             "cameras": [
@@ -144,7 +156,7 @@ def _about(asked: RecordingRequest) -> dict[str, Any]:
         env.close()
 
 
-def _minari() -> Any:
+def _import_minari() -> Any:
     try:
         import h5py  # noqa: F401  in which Minari writes
         import minari
@@ -156,77 +168,84 @@ def _minari() -> Any:
     return minari
 
 
-def _free(minari: Any, name: str) -> Path:
-    """Where a data set of this name will be; `ConfigError` if there is one, or cannot be."""
+def _find_minari_path(minari: Any, name: str) -> Path:
+    """Return the folder of a new data set; raise `ConfigError` if it exists or the name is bad."""
     from minari.dataset.minari_dataset import parse_dataset_id
 
     try:
         namespace, short, version = parse_dataset_id(name)
     except (ValueError, TypeError) as error:
         raise ConfigError(
-            "--out must be a name of letters, digits, - and _, perhaps behind folders, and end in "
+            "--out must be a name of letters, digits, - and _, with optional folders, and end in "
             f"a version, as hrc/pick-place/scripted-v0; got {name!r}."
         ) from error
     path = minari.storage.get_dataset_path(name)
     if path.exists():
         head = f"{namespace}/" if namespace else ""
         raise ConfigError(
-            f"There is a data set {name!r} already ({path}), and nothing is added to it. Choose "
+            f"The data set {name!r} exists already ({path}), and nothing is added to it. Choose "
             f"another name, as {head}{short}-v{version + 1}, or delete it: minari delete {name}"
         )
     return path
 
 
-def _same_as_before(asked: RecordingRequest, draft: Path) -> None:
-    """Make the draft's folder, or see that it was begun with the same arguments."""
-    record, now = draft / "asked.json", json.dumps(asdict(asked), indent=1, default=str)
-    if record.exists() and record.read_text() != now:
+def _check_same_request(request: RecordingRequest, draft: Path) -> None:
+    """Create the draft's folder, or check that it was begun with the same arguments."""
+    record, text = draft / "asked.json", json.dumps(asdict(request), indent=1, default=str)
+    if record.exists() and record.read_text() != text:
         raise ConfigError(
-            f"{draft} holds episodes that were recorded with other arguments ({record}): use these "
-            "again to go on, delete the folder, or choose another name with --out."
+            f"{draft} holds episodes that were recorded with other arguments ({record}): use the "
+            "same arguments, delete the folder, or choose another name with --out."
         )
-    write_whole(record, now)
+    write_whole(record, text)
 
 
-def _played(asked: RecordingRequest, first: int, n: int) -> list[Episode]:
-    """Episodes `first` to `first + n - 1`, side by side."""
-    env = HRCVectorEnv(n, **asked.keywords())
+def _play(request: RecordingRequest, first: int, n: int) -> list[Episode]:
+    """Return the episodes `first` to `first + n - 1`, played together."""
+    env = HRCVectorEnv(n, **request.keywords())
     try:
-        agent = make_agent(asked.agent, env_info(env.shards.first), asked.seed + first, asked.trust)
-        begun = env.reset(seed=asked.seed + first)
-        kept = _kept_of(asked, env, begun[1], n)
-        steps, moments = list[Transition](), [kept.of(env, begun[1])]
-        for step in rollout(env, _Clipped(agent), begun[0]):
+        info, seed = env_info(env.shards.first), request.seed + first
+        agent = make_agent(request.agent, info, seed, request.trust)
+        observation, infos = env.reset(seed=seed)
+        parts = _choose_parts(request, env, infos, n)
+        steps, moments = list[Transition](), [parts.read(env, infos)]
+        for step in rollout(env, _Clipped(agent), observation):
             steps.append(step)
-            moments.append(kept.of(env, step.info))
+            moments.append(parts.read(env, step.info))
         lengths = np.sum([step.is_playing for step in steps], axis=0)
-        seeds = range(asked.seed + first, asked.seed + first + n)
-        parts = [(steps[:length], moments[: length + 1]) for length in lengths]
-        return [_episode(begun[0], *parts[b], b, seed) for b, seed in enumerate(seeds)]
+        return [
+            _make_episode(observation, steps[:length], moments[: length + 1], b, seed + b)
+            for b, length in enumerate(lengths)
+        ]
     finally:
         env.close()
 
 
-def _kept_of(asked: RecordingRequest, env: HRCVectorEnv, info: Mapping[str, Any], n: int) -> Kept:
-    """Return the requested parts of each moment of `n` episodes side by side, of the infos that
-    there are; `ConfigError` for other infos, and for more images than memory holds."""
-    there = [name for name in info if not name.startswith("_")]
-    names = dict.fromkeys((*TOP, *matching(asked.infos, there)))
+def _choose_parts(
+    request: RecordingRequest, env: HRCVectorEnv, info: Mapping[str, Any], n: int
+) -> MomentParts:
+    """Return the requested parts of each moment of `n` episodes that are played together.
+
+    Raises:
+        ConfigError: an info does not exist, or there are more images than memory holds.
+    """
+    available = [name for name in info if not name.startswith("_")]
+    names = dict.fromkeys((*TOP, *matching(request.infos, available)))
     if (images := env.shards.first.images) is not None:
         n_moments = (env.max_episode_steps + 1) * n
         n_bytes = n_moments * len(images.names) * int(np.prod(images.shape))
         if n_bytes > MOST_BYTES:
             raise ConfigError(
                 f"Images of {len(images.names)} cameras, {images.shape[0]} x {images.shape[1]}, "
-                f"are {n_bytes / 2**30:.1f} GiB for {n} episodes side by side, and at most "
+                f"are {n_bytes / 2**30:.1f} GiB for {n} episodes played together, and at most "
                 f"{MOST_BYTES / 2**30:.0f} are held in memory: observe smaller images, fewer "
                 "cameras, or play fewer environments together (--num-envs)."
             )
-    return Kept(tuple(names), asked.poses, asked.keypoints)
+    return MomentParts(tuple(names), request.poses, request.keypoints)
 
 
 class _Clipped:
-    """An agent whose actions are within the action space, as data sets want them."""
+    """An agent with actions that are clipped to the action space, as data sets require."""
 
     def __init__(self, agent: Agent) -> None:
         self.agent = agent
@@ -236,12 +255,12 @@ class _Clipped:
         return np.clip(self.agent.act(observation), -1, 1)
 
 
-def _episode(
-    begun: Observation, steps: Sequence[Transition], moments: Sequence[Moment], b: int, seed: int
+def _make_episode(
+    first: Observation, steps: Sequence[Transition], moments: Sequence[Moment], b: int, seed: int
 ) -> Episode:
     """Return the episode of environment `b`."""
-    seen = [begun, *(step.observation for step in steps)]
-    parts = [each if isinstance(each, Mapping) else {"": each} for each in seen]
+    observations = [first, *(step.observation for step in steps)]
+    parts = [each if isinstance(each, Mapping) else {"": each} for each in observations]
     return {
         **{f"observations/{k}": np.stack([p[k][b] for p in parts]) for k in parts[0]},
         "actions": np.stack([step.action[b] for step in steps]),
@@ -253,28 +272,33 @@ def _episode(
     }
 
 
-def _keep(path: Path, episode: Episode) -> None:
-    """Write an episode into a file, which appears whole."""
+def _write_episode(path: Path, episode: Episode) -> None:
+    """Write an episode into a file; an interrupted write leaves no partial file."""
     rough = path.with_suffix(".rough.npz")
     np.savez_compressed(rough, **episode)
     os.replace(rough, path)
 
 
-def _write(
-    minari: Any, asked: RecordingRequest, path: Path, draft: Path, episodes: list[Episode]
+def _write_minari(
+    minari: Any, request: RecordingRequest, path: Path, draft: Path, episodes: list[Episode]
 ) -> None:
-    """Make the data set inside the draft, then move it to its place."""
-    env = gymnasium.make(asked.task, **asked.keywords())
-    with contextlib.closing(env), _root(draft / "whole") as root, warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # that there is no author, and so on
+    """Make the data set inside of the draft, then move it to its place."""
+    env = gymnasium.make(request.task, **request.keywords())
+    with (
+        contextlib.closing(env),
+        _redirect_minari(draft / "whole") as root,
+        warnings.catch_warnings(),
+    ):
+        warnings.simplefilter("ignore")  # warnings of a missing author, and so on
         shutil.rmtree(root, ignore_errors=True)
         made = minari.create_dataset_from_buffers(
-            asked.out, [_buffer(k, each) for k, each in enumerate(episodes)], env=env,
-            algorithm_name=asked.agent, description=asked.task, requirements=["hrc_env"],
+            request.out, [_make_buffer(k, each) for k, each in enumerate(episodes)], env=env,
+            algorithm_name=request.agent, description=request.task, requirements=["hrc_env"],
         )  # fmt: skip
-        about = {"hrc_env_command": command(asked), "hrc_env_versions": json.dumps(provenance())}
+        about = {"hrc_env_command": format_command(request)}
+        about["hrc_env_versions"] = json.dumps(provenance())
         made.storage.update_metadata(about)
-    name = str(asked.out)
+    name = str(request.out)
     namespace = name.rpartition("/")[0]
     if namespace and namespace not in minari.namespace.list_local_namespaces():
         minari.namespace.create_namespace(namespace)
@@ -282,8 +306,8 @@ def _write(
 
 
 @contextlib.contextmanager
-def _root(folder: Path) -> Iterator[Path]:
-    """Meanwhile Minari writes into this folder."""
+def _redirect_minari(folder: Path) -> Iterator[Path]:
+    """Let Minari write into this folder inside of the context."""
     before = os.environ.get(ROOT)
     os.environ[ROOT] = str(folder)
     try:
@@ -294,16 +318,16 @@ def _root(folder: Path) -> Iterator[Path]:
             os.environ[ROOT] = before
 
 
-def _buffer(k: int, episode: Episode) -> Any:
-    """An episode as Minari takes it; belief and other things that were kept are groups of infos."""
+def _make_buffer(k: int, episode: Episode) -> Any:
+    """Return an episode as Minari takes it; belief, truth and keypoints are groups of infos."""
     from minari.data_collector import EpisodeBuffer
 
-    seen, infos = within(episode, "observations"), dict[str, Any]()
+    seen, infos = select_folder(episode, "observations"), dict[str, Any]()
     for group in ("belief", "truth", "keypoints"):
-        infos[group] = within(episode, group)
-    infos |= {name: episode[grouped(name)] for name in TOP}
+        infos[group] = select_folder(episode, group)
+    infos |= {name: episode[add_folder(name)] for name in TOP}
     for name in TOP:
-        infos[grouped(name).partition("/")[0]].pop(name)
+        infos[add_folder(name).partition("/")[0]].pop(name)
     return EpisodeBuffer(
         id=k, seed=int(episode["seed"]), observations=seen.get("", seen),
         infos={name: value for name, value in infos.items() if len(value)},

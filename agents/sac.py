@@ -1,4 +1,4 @@
-"""Soft actor-critic by Stable-Baselines3, with hindsight where a task has goals apart.
+"""Soft actor-critic by Stable-Baselines3, with hindsight if a task has separate goals.
 
 Haarnoja et al. 2018, arXiv:1801.01290; Andrychowicz et al. 2017, arXiv:1707.01495.
 """
@@ -23,13 +23,20 @@ def make_learner(
     tensorboard: Path | None = None,
     her: bool | None = None,
 ) -> SAC:
-    """A fresh SAC on `env`; with hindsight if `her`, or if nobody says and the task has goals.
+    """Return a new SAC on `env`.
 
-    It begins to learn when every environment has an episode behind it. The reward's terms beside
-    the goal's stay as they were when a transition is judged by another goal.
+    It begins to learn when every environment has finished an episode. The reward's other terms stay
+    as they are when a transition is relabelled with another goal.
+
+    Args:
+        env: the environments.
+        settings: settings of SAC.
+        seed: seed of the learner.
+        tensorboard: folder of TensorBoard logs.
+        her: whether to use hindsight (default: if the task has goals).
 
     Raises:
-        NoGoalError: hindsight is asked for where there are no goals apart from the observation.
+        NoGoalError: hindsight is requested, and the task has no separate goals.
     """
     task = env.simulation.task
     hindsight = task.goal is not None if her is None else her
@@ -40,18 +47,18 @@ def make_learner(
         buffer = {"replay_buffer_class": HerReplayBuffer, "replay_buffer_kwargs": kept}
     return SAC(
         "MlpPolicy" if task.goal is None else "MultiInputPolicy", env, **settings.keywords(),
-        **buffer, train_freq=1, learning_starts=first_steps(env), seed=seed,
+        **buffer, train_freq=1, learning_starts=count_first_steps(env), seed=seed,
         device="cpu", tensorboard_log=None if tensorboard is None else str(tensorboard),
     )  # fmt: skip
 
 
-def first_steps(env: HRCVecEnv) -> int:
-    """In which a new buffer fills with random actions: an episode of every environment."""
+def count_first_steps(env: HRCVecEnv) -> int:
+    """Return the steps that fill a new buffer with random actions: an episode per environment."""
     return env.num_envs * (env.env.max_episode_steps + 1)
 
 
 class ResumedSAC(SAC):
-    """SAC that goes on: its empty buffer fills with its policy's actions."""
+    """SAC for resumed runs: its empty buffer is filled with actions of its policy."""
 
     def _sample_action(self, learning_starts: int, *args: Any, **kwargs: Any) -> Any:
         """Return noisy actions of the policy, from the first step on."""

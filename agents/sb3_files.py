@@ -1,10 +1,10 @@
-"""Policies of Stable-Baselines3, read from their files without running anything that files hold.
+"""Policies of Stable-Baselines3, read from their files without executing code that files contain.
 
-What `model.save` writes is a zip: `policy.pth` holds the weights, and `data` is JSON in which all
-that JSON cannot hold is a pickle, beside what of it could be written plainly. Reading a pickle runs
-whatever its author put there. The weights alone do not, and the network round them is built here:
-from the plain part where it is one of Stable-Baselines3 or of this package, otherwise from the
-pickle, which wants `trust`.
+A file of `model.save` is a zip: `policy.pth` holds the weights, and `data` is JSON, in which values
+that JSON cannot represent are pickles beside a plain description. Loading a pickle can run
+arbitrary code of its author. Weights alone do not, and the network for them is built here: from the
+plain description if its classes are of Stable-Baselines3 or of this package, otherwise from the
+pickle, which needs `trust`.
 """
 
 import base64
@@ -17,7 +17,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium import spaces
@@ -36,9 +36,9 @@ with learner():
     from stable_baselines3.common.policies import BasePolicy
     from stable_baselines3.common.vec_env import VecNormalize
 
-TRUST = "If you trust who made it: --trust, in Python trust=True."
+TRUST = "If you trust its author: --trust, in Python trust=True."
 PICKLED = ":serialized:"
-"""Key of a value that JSON cannot hold, as base64 of a pickle."""
+"""Key of a value that JSON cannot represent, as base64 of a pickle."""
 POLICIES = {
     "stable_baselines3.common.policies": (
         "ActorCriticPolicy", "ActorCriticCnnPolicy", "MultiInputActorCriticPolicy",
@@ -46,8 +46,7 @@ POLICIES = {
     "stable_baselines3.sac.policies": ("SACPolicy", "CnnPolicy", "MultiInputPolicy"),
     "stable_baselines3.td3.policies": ("TD3Policy", "CnnPolicy", "MultiInputPolicy"),
 }  # fmt: skip
-"""Policies that are built without a pickle, by module: those of PPO and A2C, of SAC, of TD3 and
-DDPG."""
+"""Policies that are built without a pickle, by module: of PPO and A2C, of SAC, of TD3 and DDPG."""
 EXTRACTORS = {
     f"{module}.{name}"
     for module, names in {
@@ -58,13 +57,13 @@ EXTRACTORS = {
     }.items()
     for name in names
 }  # fmt: skip
-"""Extractors of features that are known without a pickle."""
+"""Feature extractors that are known without a pickle."""
 ACTIVATIONS = tuple(
     f"torch.nn.modules.activation.{name}"
     for name in ("Tanh", "ReLU", "ELU", "LeakyReLU", "SiLU", "GELU", "Mish", "Sigmoid")
 )
 NOT_FOR_ACTING = ("optimizer_class", "optimizer_kwargs")
-"""Arguments of a policy that only learning needs."""
+"""Arguments of a policy that only training needs."""
 CLASS = re.compile(r"<class '([\w.]+)'>")
 BOX = re.compile(r"'([^']+)': Box\(.*?, \(([\d, ]*)\), \w+\)", re.S)
 
@@ -73,34 +72,42 @@ def load(path: Path, env_info: EnvInfo, trust: bool = False) -> "SB3Agent":
     """Return the policy of a file of Stable-Baselines3, for acting.
 
     Args:
-        path: what `model.save` has written.
-        env_info: of the environment that it acts in.
-        trust: whether pickles are read where nothing else will do: a policy, a network or
-            statistics of observations of the user's own. That runs code of whoever made the file.
+        path: a file of `model.save`.
+        env_info: the environment in which it acts.
+        trust: whether pickles may be loaded if needed, for the author's own policy, network or
+            statistics of observations; they can run arbitrary code.
 
     Raises:
-        CheckpointError: no such file, other spaces, or something that wants `trust`.
+        CheckpointError: the file does not exist, has other spaces, or needs `trust`.
     """
     data, weights = _read(path)
-    said = _shapes_said(data.get("observation_space")) or {}
-    seen, actions = spaces_of(env_info, [name for name in env_info.images if name in said])
-    _check_spaces(path, data, seen, actions, env_info)
-    if (control := _control_said(data)) is not None:
+    shapes = _parse_shapes(data.get("observation_space")) or {}
+    env_spaces = make_spaces(env_info, [name for name in env_info.images if name in shapes])
+    _check_spaces(path, data, env_spaces, env_info)
+    if (control := _parse_control(data)) is not None:
         check_control(path, control, env_info)
-    make, keywords = _architecture(path, data, trust)
+    maker = _find_maker(path, data, trust)
+    observations, actions = env_spaces
     with torch.random.fork_rng(devices=[]):  # the first weights are drawn, and replaced
-        policy = _built(path, lambda: make(seen, actions, lambda _: 0.0, **keywords), weights)
-    return SB3Agent(policy, _statistics(path, trust))
+        policy = _build(
+            path,
+            lambda: maker.make(observations, actions, lambda _: 0.0, **maker.keywords),
+            weights,
+        )
+    return SB3Agent(policy, _load_statistics(path, trust))
 
 
-def control_of(path: Path) -> str | None:
-    """Return the `control` of the environment in which the policy of a file learnt; None if the
-    file does not hold it. `CheckpointError` unless Stable-Baselines3 has written it."""
-    return _control_said(_read(path)[0])
+def read_control(path: Path) -> str | None:
+    """Return the `control` of the environment in which a policy was trained; None if unknown.
+
+    Raises:
+        CheckpointError: the file is not one of Stable-Baselines3.
+    """
+    return _parse_control(_read(path).data)
 
 
 def check_control(path: Path, control: str, env_info: EnvInfo) -> None:
-    """Raise `CheckpointError` for a policy that learnt with another `control`."""
+    """Raise `CheckpointError` for a policy that was trained with another `control`."""
     if control != env_info.control:
         raise CheckpointError(
             f"{path} acts by control={control!r}, and this environment has control="
@@ -108,27 +115,32 @@ def check_control(path: Path, control: str, env_info: EnvInfo) -> None:
         )
 
 
-def _control_said(data: Mapping[str, Any]) -> str | None:
-    """Return the attribute `control` of the space of actions (`hrc_env.env.spaces`)."""
-    said = data.get("action_space")
-    control = said.get("control") if isinstance(said, dict) else None
+def _parse_control(data: Mapping[str, Any]) -> str | None:
+    """Return the attribute `control` of the action space (`hrc_env.env.spaces`)."""
+    space = data.get("action_space")
+    control = space.get("control") if isinstance(space, dict) else None
     return control if control in CONTROLS else None
 
 
 def check_is_one(path: Path) -> None:
-    """Raise `CheckpointError` unless a file is one that Stable-Baselines3 has written."""
+    """Raise `CheckpointError` if a file is not one of Stable-Baselines3."""
     _read(path)
 
 
-def spaces_of(
-    env_info: EnvInfo, images: Sequence[str] = ()
-) -> tuple[spaces.Space[Any], spaces.Box]:
+class Spaces(NamedTuple):
+    """The spaces of an environment."""
+
+    observations: spaces.Space[Any]
+    actions: spaces.Box
+
+
+def make_spaces(env_info: EnvInfo, images: Sequence[str] = ()) -> Spaces:
     """Return the spaces of an environment's observations and actions.
 
     Args:
-        env_info: of the environment.
-        images: names of those that a policy looks at. Their channels come first, as
-            Stable-Baselines3 turns them.
+        env_info: the environment.
+        images: names of the images that a policy uses; channels come first, as in
+            Stable-Baselines3.
     """
     layout, size = env_info.layout, env_info.goal_size
     flat = spaces.Box(layout.low, layout.high, dtype=np.float32)
@@ -140,17 +152,17 @@ def spaces_of(
     if size:
         goals = spaces.Box(-np.inf, np.inf, (size,), np.float32)
         beside |= {ACHIEVED: goals, DESIRED: goals}
-    return (spaces.Dict({**beside, FLAT: flat}) if beside else flat), actions
+    return Spaces(spaces.Dict({**beside, FLAT: flat}) if beside else flat, actions)
 
 
 @dataclass(frozen=True, slots=True)
 class Statistics:
-    """Statistics by which `VecNormalize` scales observations."""
+    """Statistics with which `VecNormalize` scales observations."""
 
     wrapper: VecNormalize
 
-    def applied(self, observation: Observation) -> Any:
-        """Return an observation as the policy saw it when it learnt."""
+    def apply(self, observation: Observation) -> Any:
+        """Return an observation scaled as in the training."""
         return self.wrapper.normalize_obs(observation)  # type: ignore[arg-type]
 
 
@@ -159,23 +171,35 @@ class SB3Agent:
     """The mean action of a policy of Stable-Baselines3."""
 
     policy: BasePolicy
+    """The policy."""
     statistics: Statistics | None = None
-    """None: it sees observations as they are."""
+    """Statistics of observations; None: they are used as they are."""
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
-        """Deterministic actions (..., A), to the bit those of `model.predict`; of an observation
-        with more parts it is given those that it learnt from."""
+        """Return deterministic actions (..., A), bit for bit those of `model.predict`.
+
+        Only those parts of an observation are used that were used in the training.
+        """
         if isinstance(observation, Mapping):
             space = self.policy.observation_space
             names = space.spaces if isinstance(space, spaces.Dict) else ()
             observation = {name: observation[name] for name in names} or observation[FLAT]
         if self.statistics is not None:
-            observation = self.statistics.applied(observation)
+            observation = self.statistics.apply(observation)
         return self.policy.predict(observation, deterministic=True)[0]  # type: ignore[arg-type]
 
 
-def _read(path: Path) -> tuple[Mapping[str, Any], Mapping[str, torch.Tensor]]:
-    """Return the description and the weights of the policy in a file; neither is unpickled."""
+class PolicyFile(NamedTuple):
+    """The contents of a policy's file."""
+
+    data: Mapping[str, Any]
+    """The description."""
+    weights: Mapping[str, torch.Tensor]
+    """Weights by name."""
+
+
+def _read(path: Path) -> PolicyFile:
+    """Return the description and the weights of a file without unpickling."""
     if not path.exists():
         raise CheckpointError(f"No checkpoint at {path}. Train one: python -m hrc_env train")
     try:
@@ -183,8 +207,8 @@ def _read(path: Path) -> tuple[Mapping[str, Any], Mapping[str, torch.Tensor]]:
             data, content = json.loads(archive.read("data")), archive.read("policy.pth")
     except (zipfile.BadZipFile, KeyError, ValueError) as error:
         raise CheckpointError(
-            f"{path} is not a checkpoint of hrc_env, nor a policy that Stable-Baselines3 saved "
-            f"({error}). Expected is what python -m hrc_env train or model.save writes (.zip)."
+            f"{path} is neither a checkpoint of hrc_env nor a policy that Stable-Baselines3 saved "
+            f"({error}). Expected is a file of python -m hrc_env train or model.save (.zip)."
         ) from error
     if not isinstance(data, dict):
         raise CheckpointError(f"{path} is not a policy that Stable-Baselines3 saved.")
@@ -193,121 +217,127 @@ def _read(path: Path) -> tuple[Mapping[str, Any], Mapping[str, torch.Tensor]]:
     except (pickle.UnpicklingError, RuntimeError, EOFError, ValueError) as error:
         first = str(error).splitlines()[0]
         raise CheckpointError(
-            f"policy.pth in {path} holds no weights, or more than weights ({first}), and is not "
-            "read: Stable-Baselines3 writes tensors by name."
+            f"policy.pth in {path} contains no weights, or more than weights ({first}), and is "
+            "not read: Stable-Baselines3 writes tensors by name."
         ) from error
     if not (
         isinstance(weights, dict) and all(isinstance(w, torch.Tensor) for w in weights.values())
     ):
-        raise CheckpointError(f"policy.pth in {path} must hold tensors by name.")
-    return data, weights
+        raise CheckpointError(f"policy.pth in {path} must contain tensors by name.")
+    return PolicyFile(data, weights)
 
 
 # Spaces
 
 
 Shapes = dict[str, tuple[int, ...]]
-"""Of the parts of a space by name; "" of one without parts."""
+"""Shapes of the parts of a space by name; "" for a space without parts."""
 
 
 def _check_spaces(
-    path: Path, data: Mapping[str, Any], seen: spaces.Space[Any], actions: spaces.Box, here: EnvInfo
+    path: Path, data: Mapping[str, Any], env_spaces: Spaces, env_info: EnvInfo
 ) -> None:
-    """Raise `CheckpointError` unless a policy's spaces are those of the environment."""
+    """Raise `CheckpointError` if a policy's spaces are not those of the environment."""
     advice = (
-        f"Make the environment as it was trained in ({here.task} here, control={here.control!r}: "
-        "task, control, robot, n_workers and observe_images decide), or wrap it in an agent of "
-        "your own (MODULE:FUNCTION)."
+        f"Make the environment as in its training ({env_info.task} here, "
+        f"control={env_info.control!r}: task, control, robot, n_workers and observe_images "
+        "decide), or wrap it in your own agent (MODULE:FUNCTION)."
     )
-    for what, space in (("observation", seen), ("action", actions)):
-        said: Any = data.get(f"{what}_space")
-        kind = CLASS.search(str(said.get(":type:"))) if isinstance(said, dict) else None
+    for name, space in (("observation", env_spaces.observations), ("action", env_spaces.actions)):
+        saved: Any = data.get(f"{name}_space")
+        kind = CLASS.search(str(saved.get(":type:"))) if isinstance(saved, dict) else None
         if kind is None:
-            raise CheckpointError(f"{path} does not say for which {what}s its policy was made.")
-        expected, found = _shapes_of(space), _shapes_said(said)
+            raise CheckpointError(f"{path} does not describe the {name}s of its policy.")
+        expected, found = _list_shapes(space), _parse_shapes(saved)
         if found is None:
-            was = kind[1].rpartition(".")[2]
+            text = kind[1].rpartition(".")[2]
         elif found != expected:
-            was = _words(found)
+            text = _describe_shapes(found)
         else:
             continue
         raise CheckpointError(
-            f"{path} is for {what}s of {was}, this environment has {_words(expected)}. {advice}"
+            f"{path} is for {name}s of {text}, this environment has {_describe_shapes(expected)}. "
+            f"{advice}"
         )
     for end, bound in (("low", -1.0), ("high", 1.0)):
-        values = _numbers(data["action_space"].get(end))
+        values = _parse_numbers(data["action_space"].get(end))
         if values.size and not np.allclose(values, bound):
             raise CheckpointError(
-                f"{path} acts between other bounds: its action space has {end} "
+                f"{path} has other bounds of actions: its action space has {end} "
                 f"{data['action_space'][end]}, here it is {bound:g}. {advice}"
             )
 
 
-def _shapes_of(space: spaces.Space[Any]) -> Shapes:
+def _list_shapes(space: spaces.Space[Any]) -> Shapes:
     if isinstance(space, spaces.Dict):
         return {name: tuple(part.shape or ()) for name, part in space.items()}
     return {"": tuple(space.shape or ())}
 
 
-def _shapes_said(said: Any) -> Shapes | None:
-    """Return the shapes that a file's plain part tells of a space; None of one that is neither a
-    box nor boxes by name."""
-    if not isinstance(said, dict) or ":type:" not in said:
+def _parse_shapes(space: Any) -> Shapes | None:
+    """Return the shapes of a space from its plain description; None if it has no boxes."""
+    if not isinstance(space, dict) or ":type:" not in space:
         return None
-    if ".box.Box'" in str(said[":type:"]):
-        return {"": tuple(map(int, said.get("_shape") or ()))}
-    if ".dict.Dict'" in str(said[":type:"]):
-        found = BOX.findall(str(said.get("spaces")))
+    if ".box.Box'" in str(space[":type:"]):
+        return {"": tuple(map(int, space.get("_shape") or ()))}
+    if ".dict.Dict'" in str(space[":type:"]):
+        found = BOX.findall(str(space.get("spaces")))
         return {name: tuple(map(int, re.findall(r"\d+", shape))) for name, shape in found}
     return None
 
 
-def _numbers(text: Any) -> NDArray[np.float64]:
-    """Return the numbers that an array was printed as; none where it is no such text."""
+def _parse_numbers(text: Any) -> NDArray[np.float64]:
+    """Return the numbers of a printed array; none if there is no such text."""
     return np.array(re.findall(r"-?\d+\.?\d*(?:e[+-]?\d+)?", str(text or "")), float)
 
 
-def _words(shapes: Shapes) -> str:
-    def one(shape: tuple[int, ...]) -> str:
+def _describe_shapes(shapes: Shapes) -> str:
+    def describe(shape: tuple[int, ...]) -> str:
         return " x ".join(map(str, shape)) + " numbers" if shape else "no numbers"
 
     if set(shapes) == {""}:
-        return one(shapes[""])
-    return "; ".join(f"{name!r}: {one(shape)}" for name, shape in shapes.items()) or "no parts"
+        return describe(shapes[""])
+    parts = (f"{name!r}: {describe(shape)}" for name, shape in shapes.items())
+    return "; ".join(parts) or "no parts"
 
 
 # Architecture
 
 
-def _architecture(
-    path: Path, data: Mapping[str, Any], trust: bool
-) -> tuple[Callable[..., BasePolicy], dict[str, Any]]:
-    """Return the function that makes the policy, and its arguments beside the spaces."""
-    kind, said = data.get("policy_class"), data.get("policy_kwargs", {})
-    if not isinstance(kind, dict) or not isinstance(said, dict):
-        raise CheckpointError(f"{path} does not say which policy it holds.")
-    make, unread = _known_policy(kind), list[str]()
+class PolicyMaker(NamedTuple):
+    """A function that makes a policy, and its arguments besides the spaces."""
+
+    make: Callable[..., BasePolicy]
+    keywords: dict[str, Any]
+
+
+def _find_maker(path: Path, data: Mapping[str, Any], trust: bool) -> PolicyMaker:
+    """Return the function that makes the policy of a file, with its arguments."""
+    kind, saved = data.get("policy_class"), data.get("policy_kwargs", {})
+    if not isinstance(kind, dict) or not isinstance(saved, dict):
+        raise CheckpointError(f"{path} does not describe its policy.")
+    make, unread = _find_policy_class(kind), list[str]()
     if make is None:
         unread.append(f"its policy ({kind.get('__module__', 'unknown')})")
-    keywords, strange = _plain_keywords(said)
+    keywords, strange = _split_keywords(saved)
     unread += [f"{name} ({value})" for name, value in strange.items()]
     if unread and not trust:
         raise CheckpointError(
             f"{path} can only be read with its pickle: {', '.join(unread)} is not of "
-            f"Stable-Baselines3. A pickle runs code of whoever made the file. {TRUST}"
+            f"Stable-Baselines3. A pickle can run arbitrary code of its author. {TRUST}"
         )
     if make is None:
-        make = _unpickled(path, "policy_class", kind, type)
+        make = _unpickle(path, "policy_class", kind, type)
     if strange:
-        whole = _unpickled(path, "policy_kwargs", said, dict)
-        keywords = {name: each for name, each in whole.items() if name not in NOT_FOR_ACTING}
+        values = _unpickle(path, "policy_kwargs", saved, dict)
+        keywords = {name: value for name, value in values.items() if name not in NOT_FOR_ACTING}
     if data.get("use_sde") is True:
         keywords = {"use_sde": True, **keywords}
-    return make, keywords
+    return PolicyMaker(make, keywords)
 
 
-def _known_policy(kind: Mapping[str, Any]) -> Callable[..., BasePolicy] | None:
-    """Return a policy's class by its module and the name that its constructor is printed with."""
+def _find_policy_class(kind: Mapping[str, Any]) -> Callable[..., BasePolicy] | None:
+    """Return a policy's class, found by its module and the printed name of its constructor."""
     module = str(kind.get("__module__"))
     found = re.match(r"<function (\w+)\.__init__ ", str(kind.get("__init__")))
     if found is None or found[1] not in POLICIES.get(module, ()):
@@ -315,10 +345,19 @@ def _known_policy(kind: Mapping[str, Any]) -> Callable[..., BasePolicy] | None:
     return getattr(import_module(module), found[1])
 
 
-def _plain_keywords(said: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, str]]:
-    """Return a policy's arguments as far as they are plain, and the words of those that are not."""
-    given = {name: each for name, each in said.items() if name not in NOT_FOR_ACTING}
-    is_whole = PICKLED not in said  # then all of it is JSON
+class PolicyKeywords(NamedTuple):
+    """Arguments of a policy, split by their representation."""
+
+    plain: dict[str, Any]
+    """Arguments that are known without a pickle."""
+    strange: dict[str, str]
+    """Descriptions of the others."""
+
+
+def _split_keywords(saved: Mapping[str, Any]) -> PolicyKeywords:
+    """Return a policy's arguments, as far as they are plain, and descriptions of the others."""
+    given = {name: value for name, value in saved.items() if name not in NOT_FOR_ACTING}
+    is_whole = PICKLED not in saved  # then all of it is JSON
     plain, strange = dict[str, Any](), dict[str, str]()
     for name, value in given.items():
         if name.startswith(":"):
@@ -331,18 +370,18 @@ def _plain_keywords(said: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, 
             strange[name] = value
         else:
             plain[name] = value
-    return plain, strange
+    return PolicyKeywords(plain, strange)
 
 
-def _unpickled(path: Path, name: str, said: Mapping[str, Any], expected: type) -> Any:
+def _unpickle(path: Path, name: str, saved: Mapping[str, Any], expected: type) -> Any:
     import cloudpickle
 
     try:
-        found = cloudpickle.loads(base64.b64decode(said[PICKLED]))
-    except Exception as error:  # whatever objects of others raise
+        found = cloudpickle.loads(base64.b64decode(saved[PICKLED]))
+    except Exception as error:  # objects of others can raise anything
         raise CheckpointError(
             f"The {name} of {path} cannot be unpickled here ({type(error).__name__}: {error}). "
-            "What it is made of must be importable from here."
+            "Its classes must be importable here."
         ) from error
     if not isinstance(found, expected):
         raise CheckpointError(
@@ -351,7 +390,7 @@ def _unpickled(path: Path, name: str, said: Mapping[str, Any], expected: type) -
     return found
 
 
-def _built(
+def _build(
     path: Path, make: Callable[[], BasePolicy], weights: Mapping[str, torch.Tensor]
 ) -> BasePolicy:
     try:
@@ -369,10 +408,10 @@ def _built(
 # Observations that were scaled
 
 
-def statistics_beside(path: Path) -> Path | None:
-    """Return the file of `VecNormalize` that belongs to a policy's; None: there is none.
+def find_statistics(path: Path) -> Path | None:
+    """Return the file of `VecNormalize` that belongs to a policy's file; None if there is none.
 
-    It is called as Stable-Baselines3's `CheckpointCallback` and its Zoo call theirs:
+    Names are those of Stable-Baselines3's `CheckpointCallback` and of its Zoo:
     vecnormalize.pkl, NAME_vecnormalize.pkl, NAME_vecnormalize_1000_steps.pkl.
     """
     steps = re.sub(r"_(\d+_steps)$", r"_vecnormalize_\1", path.stem)
@@ -380,16 +419,15 @@ def statistics_beside(path: Path) -> Path | None:
     return next((file for name in names if (file := path.with_name(name)).is_file()), None)
 
 
-def _statistics(path: Path, trust: bool) -> Statistics | None:
-    file = statistics_beside(path)
+def _load_statistics(path: Path, trust: bool) -> Statistics | None:
+    file = find_statistics(path)
     if file is None:
         return None
     if not trust:
         raise CheckpointError(
-            f"Beside {path.name} lies {file}: by its statistics VecNormalize scaled what the "
-            "policy saw or earned. It is a pickle, which runs code of whoever made it when it is "
-            "read. "
-            f"{TRUST} If the policy saw observations as they are, move that file away."
+            f"{file} beside {path.name} holds the statistics with which VecNormalize scaled "
+            "observations or rewards. It is a pickle, which can run arbitrary code of its author. "
+            f"{TRUST} If observations were not scaled, move that file away."
         )
     try:
         wrapper = pickle.loads(file.read_bytes())
@@ -397,8 +435,7 @@ def _statistics(path: Path, trust: bool) -> Statistics | None:
         raise CheckpointError(f"{file} cannot be unpickled ({error}).") from error
     if not isinstance(wrapper, VecNormalize):
         raise CheckpointError(
-            f"{file} must hold the statistics of a VecNormalize, and holds "
-            f"{type(wrapper).__name__}."
+            f"{file} must hold the statistics of a VecNormalize, got {type(wrapper).__name__}."
         )
     wrapper.training = False
     return Statistics(wrapper) if wrapper.norm_obs else None

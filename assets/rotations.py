@@ -6,7 +6,7 @@ from hrc_env.core.typing import QuaternionsWxyz, Rotations
 
 
 def matrix_from_quaternion(quaternion_wxyz: QuaternionsWxyz) -> Rotations:
-    """(..., 4) unit quaternions to (..., 3, 3) matrices."""
+    """Convert unit quaternions (..., 4) to rotation matrices (..., 3, 3)."""
     w, x, y, z = np.moveaxis(quaternion_wxyz, -1, 0)
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -17,7 +17,8 @@ def matrix_from_quaternion(quaternion_wxyz: QuaternionsWxyz) -> Rotations:
 
 
 def quaternion_from_matrix(rotation: Rotations) -> QuaternionsWxyz:
-    """(..., 3, 3) matrices to (..., 4) unit quaternions with w >= 0 (Bar-Itzhack 2000)."""
+    """Convert rotation matrices (..., 3, 3) to unit quaternions (..., 4) with w >= 0 (Bar-Itzhack
+    2000)."""
     m, trace = rotation, np.trace(rotation, axis1=-2, axis2=-1)
     skew = np.swapaxes(m, -1, -2) - m
     profile = np.empty((*m.shape[:-2], 4, 4))

@@ -1,1 +1,1 @@
-"""Benchmarks: estimators, detectors, speed, motion; each writes a table and results.json."""
+"""Benchmarks of estimators, detectors, speed and motion; each writes a table and results.json."""

@@ -1,4 +1,5 @@
-"""python -m benchmarks: measure estimators, detector, speed, workers; draw workers and scenes."""
+"""The command python -m benchmarks: measure estimators, detector, speed and workers; draw
+workers."""
 
 import sys
 from collections.abc import Sequence
@@ -10,82 +11,87 @@ from typing import Annotated, Any
 import tyro
 from rich.console import Console
 
-from hrc_env.cli.checks import at_least, writable_folder
+from hrc_env.cli.checks import check_at_least, check_writable_folder
 from hrc_env.cli.engines import EngineArguments
 from hrc_env.cli.entry import import_first, run_command, show_errors
-from hrc_env.cli.estimators import estimators_named
+from hrc_env.cli.estimators import resolve_estimators
 from hrc_env.cli.show import show
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.progress import progress_bar
-from hrc_env.experiments.runner import Experiment, changed, run_experiment
+from hrc_env.experiments.runner import Experiment, override, run_experiment
 
 PROGRAM = "python -m benchmarks"
 
 
 @dataclass(frozen=True)
 class BenchArguments(EngineArguments):
-    """What every bench is asked; one that was stopped goes on where it was in the same folder. What
-    takes times is always run here, alone."""
+    """Arguments of every benchmark.
+
+    A run that was stopped continues in the same folder. Benchmarks that measure time always run in
+    this process, one part after the other.
+    """
 
     out: Path
-    """Folder for report.html, results.json, figures and the parts that are done."""
+    """Folder for report.html, results.json, figures and finished parts."""
     quick: bool = False
-    """Every number, from less: minutes, not hours."""
+    """Make every number from less data: minutes, not hours."""
 
     def show(self, experiment: Experiment[Any]) -> int:
-        """Run an experiment, show its tables."""
-        return show(partial(run_experiment, experiment, engine=self.chosen()), self.out, "bench")
+        """Run an experiment and print its tables; return the exit status."""
+        return show(
+            partial(run_experiment, experiment, engine=self.choose_engine()), self.out, "bench"
+        )
 
 
 @dataclass(frozen=True)
 class TrackingArguments(BenchArguments):
-    """Run every estimator on the same simulated sequences; tables and results.json."""
+    """Run every estimator on the same simulated sequences."""
 
     out: Path = Path("out/bench_tracking")
-    """Folder; of --real and --baselines, which are parts of their own, with that word after it."""
+    """Folder for the results; with --real and --baselines that word is added to its default."""
     seeds: int | None = None
-    """Sequences per rig and condition, instead of 70 (8 if quick)."""
+    """Number of sequences per rig and condition (default: 70, quick: 8)."""
     real: bool = False
-    """On recorded films instead, which are fetched once (51 MB): four calibrated cameras."""
+    """Use recorded films of four calibrated cameras instead, which are fetched once (51 MB)."""
     estimators: tuple[str, ...] = ()
-    """Run these only, beside particle: names (those of --import too, dlt, smoother), or
-    MODULE:FUNCTION, which makes one of (P, ctrl_dt, config)."""
+    """Estimators to run besides particle: names (those of --import too, dlt, smoother), or
+    MODULE:FUNCTION, a function of (P, ctrl_dt, config)."""
     sequences: tuple[str, ...] = ()
-    """On these only: a rig (lab, site, env), a condition (clean, occluded, hard, ...) or one of a
-    rig, as lab.hard."""
+    """Sequences to run: a rig (lab, site, env), a condition (clean, occluded, hard, ...) or one of
+    a rig, as lab.hard."""
     baselines: bool = False
-    """Other people's code instead, on the same sequences (5 per rig and condition, 1 if quick),
-    as far as it is installed."""
+    """Run other libraries instead, as far as they are installed, on the same sequences (5 per rig
+    and condition, quick: 1)."""
 
     def run(self) -> int:
-        """Run, show the tables."""
-        at_least("--seeds", self.seeds, 1)
+        """Run the benchmark and print its tables; return the exit status."""
+        check_at_least("--seeds", self.seeds, 1)
         if self.real and self.baselines:
-            raise ConfigError("--real and --baselines are two parts of the bench; choose one.")
+            raise ConfigError("--real and --baselines are two benchmarks; choose one.")
         if (self.real or self.baselines) and (self.estimators or self.sequences):
             raise ConfigError(
-                "--estimators and --sequences choose of the simulated sequences, which --real and "
-                "--baselines do not run: leave one of them out."
+                "--estimators and --sequences select simulated sequences, which --real and "
+                "--baselines do not use: leave one of them out."
             )
         if self.baselines:
             from benchmarks.tracking.baselines.bench import N_QUICK, BaselinesBench
 
             n_seeds = self.seeds or (N_QUICK if self.quick else 5)
-            return self._beside("_baselines").show(BaselinesBench(n_seeds))
+            return self._change_folder("_baselines").show(BaselinesBench(n_seeds))
         if self.real:
             from benchmarks.recorded.bench import RecordedBench
 
-            return self._beside("_real").show(RecordedBench())
+            return self._change_folder("_real").show(RecordedBench())
         from benchmarks.tracking.bench import QUICK, TrackingBench
 
         config = QUICK if self.quick else TrackingBench()
-        names = estimators_named(self.estimators)
+        names = resolve_estimators(self.estimators)
         sequences = tuple(dict.fromkeys(self.sequences))
-        config = changed(config, n_seeds=self.seeds)
-        return self.show(changed(config, estimators=names, sequences=sequences))
+        config = override(config, n_seeds=self.seeds)
+        return self.show(override(config, estimators=names, sequences=sequences))
 
-    def _beside(self, ending: str) -> BenchArguments:
-        """The same in a folder of its own, unless one was given."""
+    def _change_folder(self, ending: str) -> BenchArguments:
+        """Return arguments with another default folder."""
         is_usual = self.out == TrackingArguments.out
         out = Path(f"{self.out}{ending}") if is_usual else self.out
         return BenchArguments(out, engine=self.engine, workers=self.workers, address=self.address)
@@ -93,58 +99,60 @@ class TrackingArguments(BenchArguments):
 
 @dataclass(frozen=True)
 class SpeedArguments(BenchArguments):
-    """Steps a second, what each organ takes of a step, and resets; beside Gymnasium's Reacher. Then
-    those of every id, beside the first's.
+    """Measure steps a second, the time of each part of a step, and resets.
 
-    Everybody takes turns: nothing else should run on the machine.
+    Gymnasium's Reacher and all other ids are measured besides. All take turns, so nothing else
+    should run on the machine.
     """
 
-    stays = "it takes times, which other processes would disturb"
+    stays = "it measures time, which other processes would disturb"
     out: Path = Path("out/bench_speed")
     task: str | None = None
-    """Which environment, by its id, instead of the first; the other ids are then left out. Or
-    "every": steps a second of each id, and nothing else."""
+    """Id of the environment; the other ids are then left out. Or "every": steps a second of each
+    id, and nothing else."""
     shield: str | None = None
-    """What may change commands: qp, ssm, pfl, or one that was registered (--import)."""
+    """Shield that may change commands: qp, ssm, pfl, or a registered one (--import)."""
     rounds: int | None = None
-    """In how many rounds everybody has a turn, instead of 6 (1 if quick); medians count."""
+    """Number of rounds in which all take turns (default: 6, quick: 1); medians count."""
 
     def run(self) -> int:
-        """Run, show the tables."""
-        at_least("--rounds", self.rounds, 1)
+        """Run the benchmark and print its tables; return the exit status."""
+        check_at_least("--rounds", self.rounds, 1)
         from benchmarks.speed.bench import QUICK, SpeedBench
 
         config = QUICK if self.quick else SpeedBench()
-        return self.show(changed(config, n_rounds=self.rounds, task=self.task, shield=self.shield))
+        return self.show(override(config, n_rounds=self.rounds, task=self.task, shield=self.shield))
 
 
 @dataclass(frozen=True)
 class MotionArguments(BenchArguments):
-    """Play everything that workers can do; statistics beside those of people."""
+    """Play all motions of workers, and compare their statistics with those of people."""
 
-    stays = "it has no parts that could be played apart"
+    stays = "it has no independent parts"
     out: Path = Path("out/bench_motion")
     seeds: int | None = None
-    """How often each worker plays a scene, instead of 12 (2 if quick)."""
+    """Number of times that each worker plays a scene (default: 12, quick: 2)."""
 
     def run(self) -> int:
-        """Run, show the tables."""
-        at_least("--seeds", self.seeds, 1)
+        """Run the benchmark and print its tables; return the exit status."""
+        check_at_least("--seeds", self.seeds, 1)
         from benchmarks.motion.bench import QUICK, MotionBench
 
         config = QUICK if self.quick else MotionBench()
-        return self.show(changed(config, n_seeds=self.seeds))
+        return self.show(override(config, n_seeds=self.seeds))
 
 
 @dataclass(frozen=True)
 class PerceptionArguments(BenchArguments):
-    """Level `pixels`: steps a second and what takes them, how well workers are seen by pose,
-    distance, view angle and lens, and what every fault of a camera costs."""
+    """Measure level `pixels`: speed, accuracy, and the effects of camera faults.
+
+    Accuracy is measured by pose, distance, view angle and lens.
+    """
 
     out: Path = Path("out/bench_perception")
 
     def run(self) -> int:
-        """Run, show the tables."""
+        """Run the benchmark and print its tables; return the exit status."""
         from benchmarks.perception.bench import QUICK, PerceptionBench
 
         return self.show(QUICK if self.quick else PerceptionBench())
@@ -158,8 +166,8 @@ class Gallery:
     """Folder for the pictures (PNG) and `index.html`."""
 
     def run(self) -> int:
-        """Draw, tell where."""
-        writable_folder(self.out)
+        """Draw the pictures and print their folder; return the exit status."""
+        check_writable_folder(self.out)
         from benchmarks.gallery.gallery import GalleryConfig, run
 
         console = Console()
@@ -171,29 +179,29 @@ class Gallery:
 
 @dataclass(frozen=True)
 class Benchmarks:
-    """Measure the estimators (tracking), the detector (perception), the environment (speed) or the
-    workers (motion); draw workers, motions and scenes (gallery).
+    """Measure the estimators, the detector, the environment or the workers, or draw a gallery.
 
-    Each bench takes --quick (minutes, not hours) and --out DIR, where it writes report.html,
-    results.json and figures; `tracking --help` and so on say the rest.
+    These are tracking, perception, speed, motion and gallery. Each benchmark takes --quick
+    (minutes, not hours) and --out DIR, where it writes report.html, results.json and figures;
+    `tracking --help` and so on describe the rest.
     """
 
-    what: (
+    benchmark: (
         Annotated[TrackingArguments, tyro.conf.subcommand("tracking")]
         | Annotated[PerceptionArguments, tyro.conf.subcommand("perception")]
         | Annotated[SpeedArguments, tyro.conf.subcommand("speed")]
         | Annotated[MotionArguments, tyro.conf.subcommand("motion")]
         | Annotated[Gallery, tyro.conf.subcommand("gallery")]
     )
-    """Which one."""
+    """Benchmark to run."""
 
     def run(self) -> int:
-        """Run it."""
-        return self.what.run()
+        """Run the benchmark; return the exit status."""
+        return self.benchmark.run()
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Run a bench, of the process's words if none are given; return the exit status."""
+    """Run a benchmark with the given words, or those of the process; return the exit status."""
     given = list(sys.argv[1:] if words is None else words) or ["--help"]
     return show_errors(lambda: run_command(Benchmarks, import_first(given, PROGRAM), PROGRAM))
 

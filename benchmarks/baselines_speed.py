@@ -1,14 +1,14 @@
-"""Steps a second of other people's environments: python baselines_speed.py
+"""Speed of other environments in steps a second: python baselines_speed.py
 
-Knows nothing of hrc_env: gymnasium-robotics and robosuite want other versions of MuJoCo and NumPy,
-so this is for an environment of their own,
+It does not import hrc_env, as gymnasium-robotics and robosuite need other versions of MuJoCo and
+NumPy. It runs in a virtual environment of its own:
 
     python3.11 -m venv others
     others/bin/pip install "gymnasium-robotics==1.4.2" "robosuite==1.5.2" "mujoco==3.5.*" "numpy<2"
     others/bin/python benchmarks/baselines_speed.py
 
-and where one of them is missing it says so. Random actions, resets inside, infos read; the median
-of runs that take turns with Gymnasium's Reacher.
+Environments that are missing are reported. Actions are random, resets are included, infos are read;
+the result is the median of runs that take turns with Gymnasium's Reacher.
 """
 
 import statistics
@@ -18,18 +18,19 @@ from typing import Any
 import gymnasium
 
 RUNS, SECONDS = 5, 4.0
+"""Number of runs, and the length of a run [s]."""
 
 
-def fetch_reach() -> Any:
-    """gymnasium-robotics: a Fetch arm reaches for a point."""
+def make_fetch_reach() -> Any:
+    """Return a task of gymnasium-robotics: a Fetch arm reaches for a point."""
     import gymnasium_robotics
 
     gymnasium.register_envs(gymnasium_robotics)
     return gymnasium.make("FetchReach-v4")
 
 
-def lift() -> Any:
-    """robosuite: a Panda lifts a cube; no cameras."""
+def make_lift() -> Any:
+    """Return a task of robosuite: a Panda lifts a cube; no cameras."""
     import robosuite
     from robosuite.wrappers import GymWrapper
 
@@ -37,15 +38,16 @@ def lift() -> Any:
     return GymWrapper(robosuite.make("Lift", robots="Panda", **off))
 
 
-MADE = {
+FACTORIES = {
     "Reacher-v5": lambda: gymnasium.make("Reacher-v5"),
-    "FetchReach-v4": fetch_reach,
-    "robosuite Lift, Panda": lift,
+    "FetchReach-v4": make_fetch_reach,
+    "robosuite Lift, Panda": make_lift,
 }
+"""Functions that make the environments, by name."""
 
 
-def pace(env: Any) -> float:
-    """Steps a second."""
+def measure_pace(env: Any) -> float:
+    """Return the speed of an environment in steps a second."""
     n_steps, started_s = 0, time.perf_counter()
     env.reset()
     while time.perf_counter() - started_s < SECONDS:
@@ -59,16 +61,19 @@ def pace(env: Any) -> float:
 
 
 def main() -> None:
-    """Measure and print."""
+    """Measure all environments and print their speed."""
     envs = {}
-    for name, make in MADE.items():
+    for name, make in FACTORIES.items():
         try:
             envs[name] = make()
-        except Exception as error:  # not there, or broken by newer packages: say how
-            print(f"{name} does not work ({error!r}); the top of this file says how to install it.")
-    paces = [{name: pace(env) for name, env in envs.items()} for _ in range(RUNS)]
+        except Exception as error:  # missing, or broken by newer packages
+            print(
+                f"{name} does not work ({error!r}); the top of this file describes the "
+                "installation."
+            )
+    paces = [{name: measure_pace(env) for name, env in envs.items()} for _ in range(RUNS)]
     for name in envs:
-        values = [each[name] for each in paces]
+        values = [paced[name] for paced in paces]
         spread = f"({min(values):,.0f}-{max(values):,.0f})"
         print(f"{name}: {statistics.median(values):,.0f} env-steps/s {spread}")
 

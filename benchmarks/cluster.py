@@ -1,10 +1,10 @@
-"""What workers of RLlib are worth: python -m benchmarks.cluster [--quick] [--out DIR].
+"""Speed of training with workers of RLlib: python -m benchmarks.cluster [--quick] [--out DIR].
 
-One and two workers take turns on this machine, and Stable-Baselines3 without any: how long 64 of
-their environments take for a rollout of 64 steps, and how long PPO learns from it. From one worker
-follows a model: workers step at the same time, and one core learns from the steps of all; so n
-workers take the time of one rollout and n times the time of learning from it. It is held against
-two workers, and extended to more.
+One and two workers take turns on this machine with Stable-Baselines3 without workers. The bench
+measures the time that 64 environments of each worker take for a rollout of 64 steps, and the time
+that PPO takes to learn from it. A model follows from one worker: workers step at the same time, and
+one core learns from the steps of all; so n workers take the time of one rollout and n times the
+time of learning from it. It is compared with two workers and extrapolated to more.
 """
 
 import sys
@@ -26,17 +26,17 @@ from hrc_env.core.machine import n_cores
 from hrc_env.core.results import Metric, over
 from hrc_env.experiments.cache import PartCache, PartProgress
 from hrc_env.experiments.columns import Column
-from hrc_env.experiments.plots import label, new_figure, save
-from hrc_env.experiments.report import Metrics, Report, Table, picture
+from hrc_env.experiments.plots import label_axes, make_figure, save
+from hrc_env.experiments.report import Metrics, Report, Table, format_picture
 from hrc_env.experiments.runner import run_experiment
 
 KEYWORDS: Mapping[str, Any] = {"task": "HRCReach-v0", "perception": "keypoints"}
 NUM_ENVS = 64
 MEASURED = (1, 2)
 MODELLED = (10, 100, 1000)
-"""Workers."""
+"""Numbers of workers of the model."""
 GBIT_BYTES_S = 125e6
-"""What a network of 1 Gbit/s carries [bytes/s]."""
+"""Capacity of a network of 1 Gbit/s [bytes/s]."""
 PREFIX = "ray_hrc_env_"
 SHOWN = {
     f"{PREFIX}steps_per_s": "steps/s",
@@ -44,7 +44,7 @@ SHOWN = {
     f"{PREFIX}goals_total": "goals",
     f"{PREFIX}contacts_total": "contacts",
 }
-"""Metrics of Ray that are drawn, and their axes."""
+"""Metrics of Ray in the figure, and their axis labels."""
 Played = Mapping[str, list[float]]
 
 TABLE = Table(
@@ -82,23 +82,23 @@ TABLE = Table(
 
 @dataclass(frozen=True, slots=True)
 class ClusterBench:
-    """The bench, and how much is run."""
+    """The bench, and its extent."""
 
     name = "cluster"
     depends = ("env", "tracker", "emulator", "motion", "agents")
     n_rounds: int = 12
-    """In which one and two workers have a turn."""
+    """Number of rounds in which one and two workers take turns."""
     n_watched: int = 60
-    """Updates of two workers whose metrics are read from Ray."""
+    """Number of updates of two workers for which the metrics of Ray are read."""
 
     @property
     def seeds(self) -> Sequence[int]:
-        """Of the workers."""
+        """Seeds of the workers."""
         return (0,)
 
     @property
     def n_parts(self) -> int:
-        """Times, and what Ray shows."""
+        """Number of parts: the times, and the metrics of Ray."""
         return 2
 
     @property
@@ -108,13 +108,13 @@ class ClusterBench:
         return f"Quick run, {self.n_rounds} rounds: too few to compare." if is_short else ""
 
     def settings(self) -> dict[str, Any]:
-        """Return what its numbers depend on."""
+        """Return the settings on which its metrics depend."""
         return {**asdict(self), "environment": dict(KEYWORDS), "num_envs": NUM_ENVS}
 
     def play(self, cache: PartCache) -> Played:
-        """Return the times of every round, and what Ray's metrics showed of a run."""
-        times = cache.part("times", self._times)
-        return times | cache.part("watched", self._watched)
+        """Return the times of every round, and the metrics that Ray exported during a run."""
+        times = cache.make_part("times", self._times)
+        return times | cache.make_part("watched", self._watched)
 
     def _times(self, tick: PartProgress) -> dict[str, Any]:
         with _workers() as learners, _alone() as alone:
@@ -148,7 +148,7 @@ class ClusterBench:
         return found
 
     def metrics(self, played: Played) -> dict[str, Metric]:
-        """Return every number."""
+        """Return all metrics by name."""
         return metrics_of(played)
 
     def shown_tables(self) -> tuple[Table, ...]:
@@ -156,16 +156,19 @@ class ClusterBench:
         return (TABLE,)
 
     def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
-        """Draw what Ray showed; return the table beside it."""
+        """Draw the metrics of Ray; return the table beside them."""
         drawn = _draw(played, figures / "metrics.png")
         about = (__doc__ or "").partition("\n")[2].strip()
-        parts = [TABLE.markdown(metrics), picture(drawn, "A run of two workers, as Ray exports it")]
+        parts = [
+            TABLE.to_markdown(metrics),
+            format_picture(drawn, "A run of two workers, as Ray exports it"),
+        ]
         return Report("Workers of RLlib", about, parts, "smallest and largest rounds")
 
 
 @contextmanager
 def _workers(numbers: Sequence[int] = MEASURED) -> Iterator[dict[int, Any]]:
-    """Yield learners by their numbers of workers, which wait while others have their turn."""
+    """Yield learners by their numbers of workers, which wait during the turns of others."""
     from hrc_env.agents import ppo  # here and below: learner and Ray take seconds to import
     from hrc_env.agents.learner_settings import PPOSettings
     from hrc_env.agents.rllib.learner import RLlibPPO, RunnerSettings
@@ -191,8 +194,10 @@ def _workers(numbers: Sequence[int] = MEASURED) -> Iterator[dict[int, Any]]:
 
 @contextmanager
 def _alone() -> Iterator[Callable[[], float]]:
-    """Yield a function that lets Stable-Baselines3 learn from a rollout of as many environments as
-    a worker has, stepped by all cores, and returns its steps a second."""
+    """Yield a function that trains Stable-Baselines3 on a rollout and returns its steps a second.
+
+    It has as many environments as a worker, stepped by all cores.
+    """
     import torch
 
     from hrc_env.agents import ppo
@@ -213,8 +218,8 @@ def _alone() -> Iterator[Callable[[], float]]:
 
 
 def _turn(learner: Any) -> tuple[float, float, int, int]:
-    """Return the times of a rollout alone, and of a rollout with learning [s]; the steps of a
-    rollout of all workers, and its bytes."""
+    """Return times of a rollout alone and with learning [s], and steps and bytes of a rollout of
+    all workers."""
     group = learner.algorithm.env_runner_group
     started_s = time.monotonic()
     samples = group.foreach_env_runner(lambda runner: runner.sample(), local_env_runner=False)
@@ -227,7 +232,7 @@ def _turn(learner: Any) -> tuple[float, float, int, int]:
 
 
 def _exported() -> dict[str, float]:
-    """Return our metrics as this machine exports them, by name."""
+    """Return the metrics of this package that this machine exports, by name."""
     import ray
 
     (node,) = ray.nodes()
@@ -239,12 +244,12 @@ def _exported() -> dict[str, float]:
 
 
 def _draw(played: Played, path: Path) -> Path:
-    """Draw what Ray showed over the time of the run."""
-    figure = new_figure(9, 6)
+    """Draw the metrics of Ray over the time of the run."""
+    figure = make_figure(9, 6)
     panels = figure.subplots(2, 2, sharex=True).ravel()
     for axis, (name, words) in zip(panels, SHOWN.items(), strict=True):
         axis.plot(played["watched_s"], played[name], drawstyle="steps-post")
-        label(axis, "time [s]", words)
+        label_axes(axis, "time [s]", words)
         axis.set_ylim(bottom=0)
     save(figure, path)
     return path
@@ -264,7 +269,7 @@ def _step_s(n_steps: int = 50) -> float:
 
 
 def metrics_of(played: Played) -> dict[str, Metric]:
-    """Return every number, of the rounds' times and of the model."""
+    """Return the metrics of the rounds' times and of the model."""
     found = {name: over(played[name], "s") for name in ("step_s", "update_s.1", "update_s.2")}
     found["bytes_per_step"] = over(played["bytes_per_step"], "byte")
     times = {name: np.array(values) for name, values in played.items()}
@@ -304,15 +309,15 @@ def make_study(quick: bool = False) -> ClusterBench:
 
 
 def main() -> int:
-    """Run it as the process's words ask; return the exit status."""
+    """Run the bench with the command line's arguments; return the exit status."""
     import tyro
 
     from hrc_env.cli.entry import show_errors
-    from hrc_env.cli.options import understood
+    from hrc_env.cli.options import normalize_words
     from hrc_env.cli.show import show
 
     def run_asked() -> int:
-        words = understood(Arguments, sys.argv[1:], "python -m benchmarks.cluster")
+        words = normalize_words(Arguments, sys.argv[1:], "python -m benchmarks.cluster")
         asked = tyro.cli(
             Arguments, args=words, default=Arguments(Path("out/cluster")), description=__doc__
         )

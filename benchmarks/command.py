@@ -1,4 +1,5 @@
-"""How the studies of this folder are called: python -m benchmarks.NAME [--quick] [--out DIR]."""
+"""The command line of the studies in this folder: python -m benchmarks.NAME [--quick] [--out
+DIR]."""
 
 import sys
 from collections.abc import Callable
@@ -8,10 +9,10 @@ from pathlib import Path
 
 import tyro
 
-from hrc_env.cli.checks import at_least
+from hrc_env.cli.checks import check_at_least
 from hrc_env.cli.engines import EngineArguments
 from hrc_env.cli.entry import show_errors
-from hrc_env.cli.options import understood
+from hrc_env.cli.options import normalize_words
 from hrc_env.cli.show import show
 from hrc_env.experiments.runner import run_experiment
 from hrc_env.experiments.study import Study
@@ -19,52 +20,54 @@ from hrc_env.experiments.study import Study
 
 @dataclass(frozen=True)
 class Arguments(EngineArguments):
-    """What every experiment is asked; one that was stopped goes on in the same folder."""
+    """Arguments of every experiment; a run that was stopped continues in the same folder."""
 
     out: Path
     """Folder for results.json, a report and finished parts."""
     quick: bool = False
-    """Every number, from a few episodes."""
+    """Make every number from a few episodes."""
     overwrite: bool = False
     """Delete other results in the folder."""
 
 
 @dataclass(frozen=True)
 class StudyArguments(Arguments):
-    """What every study of whole episodes is asked besides."""
+    """Arguments of every study of whole episodes."""
 
     only: tuple[str, ...] = ()
-    """Rows by the beginnings of their names; all if not given."""
+    """Rows to run, by the beginnings of their names (default: all)."""
     threads: int | None = None
-    """Threads that the environments share; all cores by default."""
+    """Number of threads that the environments share (default: all cores)."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for numbers that cannot work."""
-        at_least("--threads", self.threads, 1)
+        check_at_least("--threads", self.threads, 1)
 
 
 def run_study(study: Study, arguments: StudyArguments) -> int:
-    """Run a study as it was asked, and show its report; return the exit status."""
+    """Run a study with the given arguments and print its report; return the exit status."""
     study = study.select(arguments.only) if arguments.only else study
-    study = replace(study.quick() if arguments.quick else study, threads=arguments.threads)
-    run = partial(run_experiment, study, overwrite=arguments.overwrite, engine=arguments.chosen())
+    study = replace(study.shorten() if arguments.quick else study, threads=arguments.threads)
+    run = partial(
+        run_experiment, study, overwrite=arguments.overwrite, engine=arguments.choose_engine()
+    )
     return show(run, arguments.out, study.name)
 
 
 def main(make: Callable[[], Study], about: str | None) -> int:
-    """Run a study as the process's words ask; return the exit status.
+    """Run a study with the arguments of the process; return the exit status.
 
     Args:
         make: makes the study.
         about: the module's docstring, for `--help`.
     """
 
-    def run_asked() -> int:
+    def run() -> int:
         study = make()
         default = StudyArguments(Path("out") / study.name)
-        words = understood(StudyArguments, sys.argv[1:], f"python -m benchmarks.{study.name}")
+        words = normalize_words(StudyArguments, sys.argv[1:], f"python -m benchmarks.{study.name}")
         return run_study(
             study, tyro.cli(StudyArguments, args=words, default=default, description=about)
         )
 
-    return show_errors(run_asked)
+    return show_errors(run)

@@ -1,4 +1,4 @@
-"""What the benches share: normalised errors, cells of tables, a way to show results."""
+"""Functions that the benchmarks share: normalized errors, cells of tables, names of metrics."""
 
 from collections.abc import Iterable
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Covariances3, Floats, Points3
-from hrc_env.experiments.report import with_interval
+from hrc_env.experiments.report import format_interval
 from hrc_env.tasks import BUILT_IN
 
 TASKS = tuple(dict.fromkeys((
@@ -15,27 +15,30 @@ TASKS = tuple(dict.fromkeys((
 )))  # fmt: skip
 """All built-in tasks in the order of tables."""
 CHI2_95_3D = 7.815
-"""95 % of a three-dimensional normal variable lies within this squared distance."""
+"""Squared Mahalanobis distance of the 95 % region of a normal variable in three dimensions."""
 
 
-def exactly(value: float, unit: str, n: int = 1) -> Metric:
-    """A number without a spread."""
+def make_exact(value: float, unit: str, n: int = 1) -> Metric:
+    """Return a metric without an interval."""
     return Metric(float(value), float(value), float(value), unit, n)
 
 
-def normalised_square(offset: Points3, cov: Covariances3) -> Floats:
-    """Squared errors (...,) of (..., 3) in units of covariances (..., 3, 3)."""
+def compute_normalized_square(offset: Points3, cov: Covariances3) -> Floats:
+    """Return squared errors (...,) of offsets (..., 3) relative to covariances (..., 3, 3)."""
     return np.einsum("...i,...ij,...j->...", offset, np.linalg.inv(cov), offset)
 
 
-def keys(metrics: Iterable[str], start: str) -> list[str]:
-    """What comes after `start` in the names that begin so."""
+def list_endings(metrics: Iterable[str], start: str) -> list[str]:
+    """Return the rest of each name that begins with `start`."""
     return [name.removeprefix(start) for name in metrics if name.startswith(start)]
 
 
-def cell(metric: Metric | None, scale: float = 1.0, digits: int = 1, interval: bool = False) -> str:
-    """A number as tables show it, with its interval if asked; nothing of what is not known."""
+def format_number(
+    metric: Metric | None, scale: float = 1.0, digits: int = 1, interval: bool = False
+) -> str:
+    """Return a metric in the format of tables, with its interval if requested; "" for None."""
     if metric is None:
         return ""
     ends = (metric.low, metric.high) if interval else (metric.value, metric.value)
-    return with_interval([scale * each for each in (metric.value, *ends)], digits)
+    low, high = (scale * end for end in ends)
+    return format_interval(scale * metric.value, low, high, digits)

@@ -1,11 +1,12 @@
-"""What the scripted agents of all tasks are worth: python -m benchmarks.experts
+"""Scores of the scripted agents in all tasks: python -m benchmarks.experts
 
-By success, time, cost and contacts on the same seeds: without workers, and beside attentive ones
-at perception levels. Episodes at `pixels` are played one by one.
+Success, time, cost and contacts on the same seeds: without workers, and beside attentive ones at
+several perception levels. Episodes at `pixels` are played one by one.
 """
 
 import sys
 from itertools import product
+from typing import NamedTuple
 
 from benchmarks.command import main
 from benchmarks.common import TASKS
@@ -15,20 +16,29 @@ from hrc_env.experiments.setups import PerceptionSetup
 from hrc_env.experiments.study import Row, Study
 from hrc_env.tasks import BUILT_IN
 
+
+class Way(NamedTuple):
+    """A way to play a task."""
+
+    agent: str
+    level: str
+    """Perception level."""
+
+
 WAYS = {
-    "alone": ("scripted", "none"),
-    "truth": ("scripted", "truth"),
-    "keypoints": ("scripted", "keypoints"),
-    "slowed": ("scripted_slowed", "keypoints"),
-    "pixels": ("scripted", "pixels"),
+    "alone": Way("scripted", "none"),
+    "truth": Way("scripted", "truth"),
+    "keypoints": Way("scripted", "keypoints"),
+    "slowed": Way("scripted_slowed", "keypoints"),
+    "pixels": Way("scripted", "pixels"),
 }
-"""Agents and perception levels, by name as in the table."""
+"""Ways by their names in the table."""
 NEEDS_WORKERS = ("HRCHandover-v0",)
-"""Tasks that nobody can do alone."""
+"""Tasks that need a worker."""
 
 
-def _row(task: str, way: str) -> Row:
-    """Return one way to do a task."""
+def _make_row(task: str, way: str) -> Row:
+    """Return the row of one way to play a task."""
     (agent, level), is_pixels = WAYS[way], way == "pixels"
     env = {"task": task, **({"n_workers": 0} if way == "alone" else {})}
     return Row(f"{task}, {way}", 5 if is_pixels else 50, agent, PerceptionSetup(level), env,
@@ -37,12 +47,12 @@ def _row(task: str, way: str) -> Row:
 
 STUDY = Study(
     name="experts",
-    title="What scripted agents are worth",
+    title="Scores of the scripted agents",
     about=(__doc__ or "").strip(),
     depends=("env", "tracker", "emulator", "detector", "motion", "agents"),
     first_seed=3_000_000,
     rows={
-        f"{task}.{way}": _row(task, way)
+        f"{task}.{way}": _make_row(task, way)
         for way, task in product(WAYS, BUILT_IN)
         if way != "alone" or task not in NEEDS_WORKERS
     },
@@ -52,7 +62,7 @@ STUDY = Study(
     tables=(
         Table(
             "experts",
-            "What scripted agents are worth",
+            "Scores of the scripted agents",
             {task: (f"`{task}`",) for task in TASKS},
             (
                 Column("{}.alone.success", "no worker [%]", scale=100),
@@ -67,7 +77,7 @@ STUDY = Study(
             ("task",),
             "Successful episodes of {n[HRCReach-v0.alone.success]} "
             "({n[HRCReach-v0.pixels.success]} at `pixels`) beside attentive workers, and alone; "
-            "cost an episode. 95 % intervals.",
+            "cost per episode. 95 % intervals.",
         ),
     ),
     n_quick=2,

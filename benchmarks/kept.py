@@ -1,8 +1,8 @@
-"""What kept policies are worth in today's environments: python -m benchmarks.kept
+"""Scores of the package's policies: python -m benchmarks.kept
 
-Policies that `python -m benchmarks.learners` and `python -m benchmarks.limited` made come with the
-package, one or more of every task. Each is judged as it learnt and under the shield `qp`, on the
-same fixed seeds.
+Policies that `python -m benchmarks.learners` and `python -m benchmarks.limited` made are part of
+the package, one or more for every task. Each is evaluated as it was trained and with the shield
+`qp`, on the same fixed seeds.
 """
 
 import sys
@@ -15,24 +15,26 @@ from hrc_env.experiments.columns import mean, per_minute, rate, share_of_tries
 from hrc_env.experiments.study import Row, Study
 
 
-def _row(address: str, shield: str | None) -> Row:
-    """Return a policy under a shield."""
-    card = policies.read(policies.path_of(address))[0]
+def _make_row(address: str, shield: str | None) -> Row:
+    """Return the row of a policy with a shield."""
+    card = policies.read(policies.find_path(address)).card
     env = {"task": card.task, "control": card.control, "shield": shield}
     return Row((f"`{address}`", f"`{shield}`" if shield else "none"), 48, address, env=env)
 
 
 def make_study() -> Study:
-    """Return the study of every policy that comes with the package."""
+    """Return the study of all policies of the package."""
     return Study(
         name="kept",
-        title="What the policies of the package are worth",
+        title="Scores of the package's policies",
         about=(__doc__ or "").strip(),
         depends=("env", "tracker", "emulator", "motion", "shield", "agents"),
         first_seed=EVALUATION_SEED,
         rows={
-            f"{address.removeprefix(policies.PREFIX)}.{shield or 'none'}": _row(address, shield)
-            for address in policies.names()
+            f"{address.removeprefix(policies.PREFIX)}.{shield or 'none'}": _make_row(
+                address, shield
+            )
+            for address in policies.list_names()
             for shield in (None, "qp")
         },
         heads=("policy", "shield"),
@@ -43,8 +45,8 @@ def make_study() -> Study:
             rate("contacts", "contacts", digits=2),
             rate("contacts_towards", "towards [in 1,000]", "towards", "1000 episodes"),
         ),
-        note="Beside attentive workers at `keypoints`, 48 episodes. Contacts an episode, and "
-        "towards the worker in 1,000. 95 % intervals: exact ones of success and contacts, else "
+        note="Beside attentive workers at `keypoints`, 48 episodes. Contacts per episode, and "
+        "towards the worker per 1,000. 95 % intervals: exact for success and contacts, else "
         "bootstraps.",
     )
 

@@ -1,8 +1,8 @@
-"""What learning makes of every task: python -m benchmarks.learners
+"""Scores of policies that are trained for every task: python -m benchmarks.learners
 
-Each id is learnt by the one command that its page names, `python -m hrc_env train --task ID`, with
-three seeds, and judged beside its scripted agent on the same fixed seeds: success, cost, contacts,
-and how long it took. Of policies the median of the seeds is shown, lowest to highest; of contacts
+Each id is trained by the command on its page, `python -m hrc_env train --task ID`, with three
+seeds, and evaluated beside its scripted agent on the same fixed seeds: success, cost, contacts, and
+time of the training. For policies the median of the seeds is shown, lowest to highest; for contacts
 the ends of their exact 95 % intervals.
 """
 
@@ -17,9 +17,9 @@ import torch
 import tyro
 
 from benchmarks.command import StudyArguments, run_study
-from benchmarks.common import TASKS, exactly
+from benchmarks.common import TASKS, make_exact
 from benchmarks.learning import Training
-from hrc_env.agents.recipes import filled
+from hrc_env.agents.recipes import fill_in
 from hrc_env.agents.requests import TrainingRequest
 from hrc_env.cli.entry import show_errors
 from hrc_env.core.errors import check_names
@@ -28,26 +28,27 @@ from hrc_env.evaluation.episodes import EVALUATION_SEED
 from hrc_env.experiments.columns import Column, mean, rate, share_of_tries
 from hrc_env.experiments.report import Metrics, Table
 from hrc_env.experiments.study import Row, Study
-from hrc_env.experiments.versions import key_of
+from hrc_env.experiments.versions import make_key
 from hrc_env.tasks import BUILT_IN
 
 DEPENDS = ("env", "tracker", "emulator", "motion", "agents")
 """Subsystems that policies and finished parts depend on."""
 MEASURED = ("success", "cost", "contacts")
+"""Metrics of the seeds that are summarized."""
 Trainings = Mapping[str, list[Training]]
-"""By task, a seed after the other."""
+"""Trainings by task, one per seed."""
 
 
 @dataclass(frozen=True)
 class LearnersArguments(StudyArguments):
-    """Learn every task; with --quick one seed, which has hardly learnt."""
+    """Train a policy for every task; with --quick one seed, with hardly any training."""
 
     out: Path = Path("out/learners")
     """Folder for results.json, the report, policies and finished parts."""
     ids: tuple[str, ...] = TASKS
-    """Which tasks."""
+    """Ids of the tasks."""
     seeds: tuple[int, ...] = (0, 1, 2)
-    """Of learning."""
+    """Seeds of the trainings."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for an unknown task."""
@@ -55,9 +56,9 @@ class LearnersArguments(StudyArguments):
         check_names("task", self.ids, BUILT_IN)
 
 
-def trainings_of(arguments: LearnersArguments) -> Trainings:
+def make_trainings(arguments: LearnersArguments) -> Trainings:
     """Return the trainings of every task."""
-    key = key_of({"quick": arguments.quick}, DEPENDS)
+    key = make_key({"quick": arguments.quick}, DEPENDS)
     more: dict[str, Any] = {} if arguments.threads is None else {"threads": arguments.threads}
     if arguments.quick:
         more |= {"timesteps": 4096, "num-envs": 8, "demonstrations": 0}
@@ -75,10 +76,10 @@ def trainings_of(arguments: LearnersArguments) -> Trainings:
 
 
 def make_study(trainings: Trainings) -> Study:
-    """Return the study of the policies that have learnt, beside scripted agents."""
+    """Return the study of the trained policies and the scripted agents."""
     rows = {}
     for task, runs in trainings.items():
-        env = filled(TrainingRequest(task=task)).keywords() | {"config": {}}  # the default reward
+        env = fill_in(TrainingRequest(task=task)).keywords() | {"config": {}}  # the default reward
         for name in ("perception", "estimator", "num_threads"):
             env.pop(name, None)
         rows[f"{task}.scripted"] = Row(task, 128, env=env)
@@ -102,57 +103,58 @@ def make_study(trainings: Trainings) -> Study:
 
 
 def summarize(metrics: Metrics, trainings: Trainings) -> dict[str, Metric]:
-    """Return what the seeds of every task came to, and how long they learnt."""
-    found = {}
+    """Return the metrics over the seeds of every task, and the time of the trainings."""
+    summary = {}
     for task, runs in trainings.items():
         seeds = [f"{task}.policy_{k}" for k, run in enumerate(runs) if run.is_finished]
         if not seeds:
             continue
         for name in MEASURED:
             values = [metrics[f"{seed}.{name}"] for seed in seeds]
-            learnt = over([each.value for each in values], "1")
+            learnt = over([value.value for value in values], "1")
             if name == "contacts":
-                low, high = min(each.low for each in values), max(each.high for each in values)
+                low, high = min(value.low for value in values), max(value.high for value in values)
                 learnt = replace(learnt, low=low, high=high)
-            found[f"{task}.learnt.{name}"] = learnt
+            summary[f"{task}.learnt.{name}"] = learnt
         minutes = [run.score["processor_s"] / 60 for run in runs if run.is_finished]
-        found[f"{task}.minutes"] = over(minutes, "min")
-        share = found[f"{task}.learnt.success"].value / metrics[f"{task}.scripted.success"].value
-        found[f"{task}.share_of_expert"] = exactly(share, "share", len(seeds))
-    return found
+        summary[f"{task}.minutes"] = over(minutes, "min")
+        learnt = summary[f"{task}.learnt.success"].value
+        share = learnt / metrics[f"{task}.scripted.success"].value
+        summary[f"{task}.share_of_expert"] = make_exact(share, "share", len(seeds))
+    return summary
 
 
-def make_usual(out: Path) -> Study:
-    """Return the study as the command makes it, with the policies that are in a folder."""
-    return make_study(trainings_of(LearnersArguments(out)))
+def make_default(out: Path) -> Study:
+    """Return the study of the command, with the policies that are in a folder."""
+    return make_study(make_trainings(LearnersArguments(out)))
 
 
 def main() -> int:
-    """Learn, judge, show."""
+    """Train and evaluate policies, and print the report; return the exit status."""
     arguments = tyro.cli(LearnersArguments, description=__doc__)
     torch.set_num_threads(1)  # two are slower in networks as small as these
-    trainings = trainings_of(arguments)
+    trainings = make_trainings(arguments)
     for runs in trainings.values():
         for training in runs:
             training.run()
     return run_study(make_study(trainings), arguments)
 
 
-TITLE = "What learners make of every task"
+TITLE = "Learnt policies in every task"
 NOTE = (
-    "Beside attentive workers at `keypoints`, {n[HRCReach-v0.scripted.success]} episodes, means an "
-    "episode. Success is the share of what was to be achieved in an episode: goals, studs, screws, "
-    "loads. Median of three seeds (lowest to highest, of contacts the ends of exact 95 % "
-    "intervals), each learnt by `python -m hrc_env train --task ID`."
+    "Beside attentive workers at `keypoints`, {n[HRCReach-v0.scripted.success]} episodes, means "
+    "per episode. Success is the share of an episode's goals, studs, screws or loads that were "
+    "achieved. Median of three seeds (lowest to highest, for contacts the ends of exact 95 % "
+    "intervals), each trained by `python -m hrc_env train --task ID`."
 )
 COLUMNS = (
     Column("{}.learnt.success", "success", 2),
-    Column("{}.scripted.success", "of the scripted agent", 2, plain=True),
+    Column("{}.scripted.success", "success, scripted", 2, plain=True),
     Column("{}.learnt.cost", "cost"),
-    Column("{}.scripted.cost", "of the scripted agent", plain=True),
+    Column("{}.scripted.cost", "cost, scripted", plain=True),
     Column("{}.learnt.contacts", "contacts", 2, counted=True),
-    Column("{}.scripted.contacts", "of the scripted agent", 2, counted=True),
-    Column("{}.minutes", "learning [core min]", 0),
+    Column("{}.scripted.contacts", "contacts, scripted", 2, counted=True),
+    Column("{}.minutes", "training [core min]", 0),
 )
 
 if __name__ == "__main__":

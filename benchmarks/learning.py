@@ -1,4 +1,5 @@
-"""Policies that studies judge: learnt by `python -m hrc_env train`, kept in the study's folder."""
+"""Policies that studies evaluate: trained by `python -m hrc_env train`, stored in the study's
+folder."""
 
 import json
 import os
@@ -15,35 +16,35 @@ class Training:
     """A run of `train`."""
 
     folder: Path
-    """The folder of this run alone, named after its options."""
+    """Folder of this run alone, named after its options."""
     options: Mapping[str, Any]
-    """Of the command, without `--`."""
+    """Options of the command, without `--`."""
 
     @property
     def policy(self) -> Path:
-        """The checkpoint, whether it is there or not."""
+        """The checkpoint, which may not exist yet."""
         return self.folder / "policy.zip"
 
     @property
     def is_finished(self) -> bool:
-        """Whether the policy has learnt and was judged."""
+        """Whether the policy was trained and evaluated."""
         return (self.folder / "score.json").exists()
 
     @property
     def score(self) -> dict[str, Any]:
-        """Return the score that `train` wrote at its end."""
+        """The score that `train` wrote at its end."""
         return json.loads((self.folder / "score.json").read_text())
 
     def run(self) -> None:
-        """Learn, or learn on, unless it is finished."""
+        """Train, or continue the training, unless it is finished."""
         if self.is_finished:
             return
         place = {"resume" if self.policy.exists() else "out": self.folder}
         given = {**place, "episodes": 1, **self.options}
-        if self.policy.exists():  # the checkpoint knows its task
+        if self.policy.exists():  # the checkpoint contains its task
             given.pop("task", None)
         words = [word for name, value in given.items() for word in (f"--{name}", str(value))]
-        print(f"Learning: {self.folder}", flush=True)
+        print(f"Training: {self.folder}", flush=True)
         path = os.pathsep.join(filter(None, sys.path))
         subprocess.run(
             [sys.executable, "-m", "hrc_env", "train", "--no-film", *words],

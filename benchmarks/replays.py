@@ -1,9 +1,9 @@
-"""How the parts of each study are asked for again, with the settings of its command.
+"""Replays of the parts of each study, with the settings of its command.
 
-A replay plays an experiment as it is, and gives it a cache (`benchmarks.verify.ReplayCache`) that
-makes the parts that were drawn and hands out an empty one for each of the others. So nothing here
-looks into a part. Whatever wants a policy that a training made takes the one that is kept in the
-study's folder, and leaves out its parts where there is none.
+A replay plays an experiment unchanged with a cache (`benchmarks.verify.ReplayCache`) that computes
+the parts that were drawn and returns an empty one for each of the others, so no code here depends
+on the content of a part. Replays that need a trained policy use the one in the study's folder, and
+leave out its parts if there is none.
 """
 
 from collections.abc import Callable, Mapping
@@ -14,85 +14,87 @@ from typing import Any
 
 from benchmarks.studies import COMMANDS
 from hrc_env.experiments.cache import PartCache
-from hrc_env.experiments.runner import Experiment, cache_of
+from hrc_env.experiments.runner import Experiment, make_cache
 
 
 @dataclass(frozen=True, slots=True)
-class Replayed:
-    """What a replay is given."""
+class ReplayInput:
+    """The input of a replay."""
 
     cache: PartCache
+    """The cache from which parts are requested."""
     out: Path
-    """The study's folder, where policies may be."""
+    """Folder of the study, which may contain policies."""
     notes: Mapping[str, Mapping[str, float]]
     """Notes of the parts that were drawn, by label."""
 
 
 @dataclass(frozen=True, slots=True)
 class Replay:
-    """How a study is replayed, and which of its parts cannot be."""
+    """The replay of a study, and the kinds of its parts."""
 
-    walk: Callable[[Replayed], None]
-    """Asks the cache for every part."""
+    walk: Callable[[ReplayInput], None]
+    """Requests every part from the cache."""
     timed: tuple[str, ...] = ()
-    """Beginnings of the labels of parts that hold times of a clock."""
+    """Beginnings of the labels of parts that contain measured times."""
     trainings: tuple[str, ...] = ()
-    """Labels of parts that are trainings; one that ends with a point stands for all that follow."""
+    """Labels of parts that are trainings; one that ends with a point stands for all that begin with
+    it."""
     learnt: tuple[str, ...] = ()
-    """Words in the labels of parts that want something that a training keeps."""
+    """Words in the labels of parts that need a file of a training."""
     row_words: int = 1
-    """How many words at the beginning of a label name its row."""
+    """Number of words at the beginning of a label that name its row."""
 
     def is_training(self, label: str) -> bool:
         """Return whether a part is a training."""
         return label in self.trainings or label.startswith(
-            tuple(each for each in self.trainings if each.endswith("."))
+            tuple(name for name in self.trainings if name.endswith("."))
         )
 
     def is_repeatable(self, label: str) -> bool:
-        """Return whether another run of a part gives the same: no training, no times."""
+        """Return whether a part is the same in every run: no training, no measured times."""
         return not (self.is_training(label) or label.startswith(self.timed))
 
     def is_learnt(self, label: str) -> bool:
-        """Return whether a part wants something that a training keeps."""
+        """Return whether a part needs a file of a training."""
         return any(word in label for word in self.learnt)
 
 
-def walk(experiment: Experiment[Any], given: Replayed) -> None:
+def walk(experiment: Experiment[Any], given: ReplayInput) -> None:
     """Play an experiment with the cache of a replay."""
-    usual = cache_of(experiment, given.cache.folder, given.cache.progress)
+    usual = make_cache(experiment, given.cache.folder, given.cache.progress)
     experiment.play(replace(given.cache, key=usual.key, n_parts=usual.n_parts))
 
 
-def walk_command(command: str, given: Replayed) -> None:
-    """Play an experiment as its command does, with the cache of a replay."""
-    walk(_made(command, given), given)
+def walk_command(command: str, given: ReplayInput) -> None:
+    """Play the experiment of a command with the cache of a replay."""
+    walk(_make_experiment(command, given), given)
 
 
-def _made(command: str, given: Replayed) -> Any:
+def _make_experiment(command: str, given: ReplayInput) -> Any:
     made = COMMANDS[command].made
     if made is None:
-        raise AssertionError(f"{command} is no experiment, and is not replayed")
+        raise AssertionError(f"{command} is not an experiment, and cannot be replayed")
     return made.make(given.out)
 
 
-def _impact(given: Replayed) -> None:
+def _replay_impact(given: ReplayInput) -> None:
     from hrc_env.experiments.impact.policies import PPO
 
-    impact = _made("impact", given)
+    impact = _make_experiment("impact", given)
     if not all((given.cache.folder / f"{PPO}.{kind}").exists() for kind in ("zip", "json")):
         impact = replace(impact, policies=tuple(name for name in impact.policies if name != PPO))
     walk(impact, given)
 
 
-def _price(command: str, given: Replayed) -> None:
+def _replay_price(command: str, given: ReplayInput) -> None:
     from hrc_env.experiments.price.experiment import replay
 
     margins_m = {label: notes["margin_m"] for label, notes in given.notes.items()}
-    replay(_made(command, given), given.cache, margins_m)
+    replay(_make_experiment(command, given), given.cache, margins_m)
 
 
-def _trueness(given: Replayed) -> None:
+def _replay_trueness(given: ReplayInput) -> None:
     from assets.emulator import holdout
     from hrc_env.config import HRCConfig
     from hrc_env.perception.emulator import EmulatorConfig
@@ -104,29 +106,29 @@ def _trueness(given: Replayed) -> None:
         holdout.judged(given.cache, config, holdout.ROUNDS, None)
 
 
-def _usual(command: str, **known: Any) -> Replay:
+def _replay_command(command: str, **known: Any) -> Replay:
     return Replay(partial(walk_command, command), **known)
 
 
 REPLAYS: dict[str, Replay] = {
-    **{name: _usual(name) for name in ("footage", "facing", "site", "lab", "shielded")},
-    "ablations": _usual("ablations"),
-    "tracking": _usual("tracking", timed=("timing.",)),
-    "perception": _usual("perception", timed=("speed.", "network.")),
-    "trueness": Replay(_trueness, learnt=("",)),
-    "baselines": _usual("baselines", learnt=(".ppo",)),
-    "experts": _usual("experts"),
-    "learners": _usual("learners", learnt=(".policy_",)),
-    "limited": _usual("limited", learnt=("",)),
-    "kept": _usual("kept", row_words=3),
-    "impact": Replay(_impact, trainings=("ppo",), learnt=("ppo",)),
-    "price": Replay(partial(_price, "price"), row_words=2),
-    "frontier": Replay(partial(_price, "frontier"), row_words=2),
+    **{name: _replay_command(name) for name in ("footage", "facing", "site", "lab", "shielded")},
+    "ablations": _replay_command("ablations"),
+    "tracking": _replay_command("tracking", timed=("timing.",)),
+    "perception": _replay_command("perception", timed=("speed.", "network.")),
+    "trueness": Replay(_replay_trueness, learnt=("",)),
+    "baselines": _replay_command("baselines", learnt=(".ppo",)),
+    "experts": _replay_command("experts"),
+    "learners": _replay_command("learners", learnt=(".policy_",)),
+    "limited": _replay_command("limited", learnt=("",)),
+    "kept": _replay_command("kept", row_words=3),
+    "impact": Replay(_replay_impact, trainings=("ppo",), learnt=("ppo",)),
+    "price": Replay(partial(_replay_price, "price"), row_words=2),
+    "frontier": Replay(partial(_replay_price, "frontier"), row_words=2),
 }
-"""By command of a study; one that is not here keeps no parts."""
+"""Replays by command; a command that is missing here keeps no parts."""
 
 
-def row_of(name: str, label: str) -> str:
+def find_row(name: str, label: str) -> str:
     """Return the row of a study's part: the first words of its label."""
     n_words = REPLAYS[name].row_words if name in REPLAYS else 1
     return ".".join(label.split(".")[:n_words])

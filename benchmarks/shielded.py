@@ -1,7 +1,7 @@
-"""What the shield keeps and what it costs: python -m benchmarks.shielded
+"""Throughput and safety with the shield: python -m benchmarks.shielded
 
-Goals, contacts and cost of the scripted reacher, which drives to its goals whoever is near, beside
-people who take no notice of it: without a shield, and under `qp` with the perception of each row.
+Goals, contacts and cost of the scripted reacher, which drives to its goals and ignores people,
+beside people who ignore it: without a shield, and with `qp` and the perception of each row.
 """
 
 import sys
@@ -16,9 +16,10 @@ from hrc_env.perception.faults.fault import ALL, FaultConfig
 from hrc_env.safety.incidents import KINDS
 
 BLIND = (FaultConfig("lost", (ALL,), None, 3.0, 6.0),)
+"""Loss of all cameras for some time."""
 
 
-def _row(
+def _make_row(
     words: str,
     n_episodes: int,
     setup: PerceptionSetup = FOUR,
@@ -26,50 +27,49 @@ def _row(
     baseline: str = "bare",
     **env: Any,
 ) -> Row:
-    """Return a row beside people who take no notice of the robot."""
+    """Return a row beside people who ignore the robot."""
     known = {"people": "unaware", "shield": shield, **env}
     return Row(words, n_episodes, "scripted", setup, known, baseline, is_shown=words != "")
 
 
 STUDY = Study(
     name="shielded",
-    title="What the shield keeps",
+    title="Throughput and safety with the shield",
     about=(__doc__ or "").strip(),
     depends=("env", "tracker", "emulator", "motion", "shield", "agents"),
     first_seed=8_000_000,
     rows={
-        "bare": _row("four cameras, no shield", 2000, shield=None),
-        "four": _row("four cameras", 2000),
-        "truth": _row("`truth`", 500, PerceptionSetup("truth")),
-        "one": _row("one camera after 1 s", 1000, PerceptionSetup(n_cameras=1)),
-        "late": _row("200 ms late, told", 1000, PerceptionSetup(latency_s=0.2)),
-        "untold": _row(
-            "200 ms late, not told", 1000, PerceptionSetup(latency_s=0.2, is_told=False)
+        "bare": _make_row("four cameras, no shield", 2000, shield=None),
+        "four": _make_row("four cameras", 2000),
+        "truth": _make_row("`truth`", 500, PerceptionSetup("truth")),
+        "one": _make_row("one camera after 1 s", 1000, PerceptionSetup(n_cameras=1)),
+        "late": _make_row("200 ms late, time-stamped", 1000, PerceptionSetup(latency_s=0.2)),
+        "untold": _make_row(
+            "200 ms late, not time-stamped", 1000, PerceptionSetup(latency_s=0.2, is_told=False)
         ),
-        "blind": _row("all cameras lost from 3 to 6 s", 500, faults=BLIND),
-        "blind_stop": _row(
+        "blind": _make_row("all cameras lost from 3 to 6 s", 500, faults=BLIND),
+        "blind_stop": _make_row(
             "the same, `unknown_speed_limit_m_s=0`",
             500,
             shield={"kind": "qp", "unknown_speed_limit_m_s": 0.0},
             faults=BLIND,
         ),
-        "nobody_bare": _row("", 250, shield=None, n_workers=0),
-        "nobody": _row("nobody there", 250, baseline="nobody_bare", n_workers=0),
+        "nobody_bare": _make_row("", 250, shield=None, n_workers=0),
+        "nobody": _make_row("no worker", 250, baseline="nobody_bare", n_workers=0),
     },
-    heads=("eyes",),
+    heads=("perception",),
     columns=(
         Column("{}.share", "episodes", 0, shows="n"),
         share_of_baseline(ACHIEVED, "throughput [%]", scale=100),
-        *(rate(f"contacts_{kind}", f"{kind} [in 1,000]", kind, "1000 episodes")
+        *(rate(f"contacts_{kind}", f"{kind} [per 1,000]", kind, "1000 episodes")
           for kind in ("towards", "standing", "fleeing")),
         mean("cost", "cost"),
         per_minute(ACHIEVED, name="goals_per_minute"),
         rate([f"contacts_{kind}" for kind in KINDS], name="all", per="1000 episodes"),
     ),
-    note="The scripted reacher beside people of one body who take no notice of it, under "
-    '`shield="qp"`: throughput, of an unshielded robot\'s on the same seeds; contacts in 1,000 '
-    "episodes of 10 s by what the robot did; cost an episode. 95 % intervals, of contacts exact "
-    "ones. ",
+    note="The scripted reacher beside people of one body who ignore it, with `shield=\"qp\"`: "
+    "throughput relative to an unshielded robot on the same seeds; contacts per 1,000 episodes of "
+    "10 s by the robot's motion; cost per episode. 95 % intervals, exact for contacts. ",
 )  # fmt: skip
 
 if __name__ == "__main__":

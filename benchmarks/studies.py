@@ -1,7 +1,7 @@
-"""The studies behind the numbers and pictures of the documentation: which command makes what.
+"""The studies behind the numbers and pictures of the documentation, and their commands.
 
-A study is what is measured at once; its commands are called one after the other, and each keeps
-its results under its own name. Properties that need no table are tests: `tests/properties/`.
+A study is measured at once; its commands are called one after the other, and each keeps its results
+under its own name. Properties that need no table are tests: `tests/properties/`.
 """
 
 from collections.abc import Collection, Mapping
@@ -16,67 +16,70 @@ from hrc_env.experiments.runner import Experiment
 from hrc_env.experiments.versions import check_subsystems
 
 EXPERIMENT, BENCH = "python -m hrc_env experiment ", "python -m benchmarks "
+"""Beginnings of commands."""
 
 
 @dataclass(frozen=True, slots=True)
-class Made:
-    """Where the experiment of a command is found, with the settings of the command."""
+class ExperimentSource:
+    """The function that makes the experiment of a command, with the command's settings."""
 
     module: str
+    """Name of the module."""
     name: str = "make_study"
-    """Of a function that makes the experiment; or "STUDY", the experiment itself."""
+    """Name of a function that makes the experiment; or "STUDY", the experiment itself."""
     options: Mapping[str, Any] = field(default_factory=dict)
     """Arguments of the function."""
-    wants_out: bool = False
-    """Whether the function takes the command's folder, where policies are that have learnt."""
+    needs_out: bool = False
+    """Whether the function takes the command's folder, which contains trained policies."""
 
     def make(self, out: Path) -> Experiment[Any]:
         """Return the experiment.
 
         Args:
-            out: the command's folder.
+            out: folder of the command.
         """
-        found: Any = getattr(import_module(self.module), self.name)
+        experiment: Any = getattr(import_module(self.module), self.name)
         if self.name == "STUDY":
-            return found
-        return found(out) if self.wants_out else found(**self.options)
+            return experiment
+        return experiment(out) if self.needs_out else experiment(**self.options)
 
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """A command, and what of the documentation it makes."""
+    """A command, and the parts of the documentation that it makes."""
 
     command: str
+    """The command line."""
     minutes: float
-    """Its budget of time on two cores."""
+    """Budget of time on two cores [min]."""
     depends: tuple[str, ...]
     """Subsystems that its numbers depend on (`behaviour.toml`)."""
     tables: tuple[str, ...] = ()
-    """Tables of the documentation: those of its experiment that it fills."""
+    """Tables of the documentation that it fills, which its experiment declares."""
     pictures: Mapping[str, str] = field(default_factory=dict)
-    """Of `docs/pictures/`, and from which file of the command's folder `figures`."""
+    """Pictures in `docs/pictures/`, with their files in the command's folder `figures`."""
     quick: str = "--quick"
-    """What makes it short; "": nothing does."""
-    goes_on: bool = True
-    """Whether it keeps what is finished when it is stopped."""
-    made: Made | None = None
-    """Its experiment; None: it is none."""
+    """Option of the quick form; "": there is none."""
+    is_resumable: bool = True
+    """Whether it keeps finished parts when it is stopped."""
+    made: ExperimentSource | None = None
+    """Its experiment; None: it has none."""
     tables_in: str = ""
-    """Module whose `TABLES` it fills, if it is no experiment."""
+    """Module with the `TABLES` that it fills, if it has no experiment."""
     is_release: bool = False
-    """Whether it is called for a release only, as it trains policies for hours."""
+    """Whether it only runs for a release, as it trains policies for hours."""
 
     def __post_init__(self) -> None:
-        """Raise `ConfigError` unless subsystems are named, and exist."""
+        """Raise `ConfigError` if no subsystem is named, or one does not exist."""
         check_subsystems(self.depends)
 
     @property
     def declared_tables(self) -> Mapping[str, Table]:
         """The tables that are declared for it, by name."""
-        found = import_module(self.tables_in).TABLES if self.tables_in else ()
+        declared = import_module(self.tables_in).TABLES if self.tables_in else ()
         if self.made is not None:
-            found = getattr(self.made.make(Path()), "shown_tables", tuple)()
-        return {each.name: each for each in found}
+            declared = getattr(self.made.make(Path()), "shown_tables", tuple)()
+        return {table.name: table for table in declared}
 
 
 KEYPOINTS = ("env", "tracker", "emulator", "motion")
@@ -84,6 +87,7 @@ KEYPOINTS = ("env", "tracker", "emulator", "motion")
 PIXELS = ("env", "tracker", "emulator", "detector", "motion")
 """Subsystems behind episodes at level `pixels` and at all others."""
 ALL = (*PIXELS, "shield", "agents")
+"""All subsystems."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,82 +95,83 @@ class Study:
     """Commands that are called one after the other."""
 
     commands: Mapping[str, Command]
-    """By name, as files and folders of results are called."""
+    """Commands by name, which is also that of their files and folders of results."""
 
     @property
     def minutes(self) -> float:
-        """The budget on two cores, without what is for a release only."""
+        """Budget on two cores [min], without commands that only run for a release."""
         return sum(each.minutes for each in self.commands.values() if not each.is_release)
 
 
-def _experiment(name: str, **options: Any) -> Made:
-    """Return an experiment of the library, with options of its command."""
-    return Made(f"hrc_env.experiments.{name}.experiment", "make_experiment", options)
+def _find_experiment(name: str, **options: Any) -> ExperimentSource:
+    """Return the source of an experiment of the library, with options of its command."""
+    module = f"hrc_env.experiments.{name}.experiment"
+    return ExperimentSource(module, "make_experiment", options)
 
 
 STUDIES: dict[str, Study] = {
     "footage": Study({
         "footage": Command(
             BENCH + "tracking --real", 1, ("tracker", "detector"), ("footage",), quick="",
-            goes_on=False,
-            made=Made("benchmarks.recorded.bench", "RecordedBench"),
+            is_resumable=False,
+            made=ExperimentSource("benchmarks.recorded.bench", "RecordedBench"),
         ),
         "pictures": Command(
             "python -m docs.make_pictures", 4, ("env", "motion", "agents"), quick="",
-            goes_on=False,
+            is_resumable=False,
         ),
     }),
     "site": Study({
         "site": Command(
             EXPERIMENT + "site", 10, PIXELS, ("site",),
             {"site_figure_3.jpg": "figure_3.png", "site_figure_4.png": "figure_4_particle.png"},
-            made=_experiment("site"),
+            made=_find_experiment("site"),
         ),
     }),
     "speed": Study({
         "speed": Command(
             BENCH + "speed", 8, KEYPOINTS, ("speed", "speed_organs"),
-            {"speed_organs.png": "organs.png"}, goes_on=False,
-            made=Made("benchmarks.speed.bench", "SpeedBench"),
+            {"speed_organs.png": "organs.png"}, is_resumable=False,
+            made=ExperimentSource("benchmarks.speed.bench", "SpeedBench"),
         ),
         "speed_tasks": Command(
-            BENCH + "speed --task every", 2, KEYPOINTS, ("speed_tasks",), goes_on=False,
-            made=Made("benchmarks.speed.bench", "SpeedBench", {"task": "every"}),
+            BENCH + "speed --task every", 2, KEYPOINTS, ("speed_tasks",), is_resumable=False,
+            made=ExperimentSource("benchmarks.speed.bench", "SpeedBench", {"task": "every"}),
         ),
         "cluster": Command(
             "python -m benchmarks.cluster", 8, (*KEYPOINTS, "agents"), ("cluster",),
-            {"ray_metrics.png": "metrics.png"}, goes_on=False,
-            made=Made("benchmarks.cluster"),
+            {"ray_metrics.png": "metrics.png"}, is_resumable=False,
+            made=ExperimentSource("benchmarks.cluster"),
         ),
     }),
     "ablations": Study({
         "ablations": Command(
             EXPERIMENT + "ablations", 7, KEYPOINTS, ("ablations",),
             {f"ablations_{each}.png": f"{each}.png" for each in ("cameras", "occlusion", "filter")},
-            made=_experiment("ablations"),
+            made=_find_experiment("ablations"),
         ),
         "facing": Command("python -m benchmarks.facing", 3, PIXELS, ("facing",),
-            made=Made("benchmarks.facing"),
+            made=ExperimentSource("benchmarks.facing"),
         ),
     }),
     "tracking": Study({
         "tracking": Command(
             BENCH + "tracking", 38, KEYPOINTS, ("tracking", "tracking_cost"),
-            made=Made("benchmarks.tracking.bench", "TrackingBench"),
+            made=ExperimentSource("benchmarks.tracking.bench", "TrackingBench"),
         ),
     }),
     "impact": Study({
         "impact": Command(
             EXPERIMENT + "impact", 20, ALL,
             ("impact", "lateness"), {"impact_tradeoff.png": "tradeoff.png"},
-            made=_experiment("impact"),
+            made=_find_experiment("impact"),
         ),
     }),
     "lab": Study({
         "lab": Command(
             EXPERIMENT + "lab --folded heavy", 12, PIXELS, ("lab",),
             {"lab_figure_6.jpg": "figure_6.png"},
-            made=_experiment("lab", folded="heavy"),
+            made=_find_experiment("lab", folded="heavy"),
         ),
     }),
     "perception": Study({
@@ -175,7 +180,7 @@ STUDIES: dict[str, Study] = {
             ("pixels_accuracy", "faults", "miscalibration", "appearance", "emulator",
              "emulator_lasting", "speed_pixels"),
             {"emulator.png": "emulator.png"},
-            made=Made("benchmarks.perception.bench", "PerceptionBench"),
+            made=ExperimentSource("benchmarks.perception.bench", "PerceptionBench"),
         ),
         "trueness": Command(
             "python -m assets.emulator.holdout", 8, PIXELS, ("trueness",), quick="--rounds 1",
@@ -185,61 +190,61 @@ STUDIES: dict[str, Study] = {
     "tasks": Study({
         "baselines": Command(
             "python -m benchmarks.baselines", 11, (*PIXELS, "agents"), ("baselines",),
-            made=Made("benchmarks.baselines", "make_usual", wants_out=True),
+            made=ExperimentSource("benchmarks.baselines", "make_default", needs_out=True),
         ),
         "experts": Command(
             "python -m benchmarks.experts", 16, (*PIXELS, "agents"), ("experts",),
-            made=Made("benchmarks.experts", "STUDY"),
+            made=ExperimentSource("benchmarks.experts", "STUDY"),
         ),
         "kept": Command(
             "python -m benchmarks.kept", 3, (*KEYPOINTS, "shield", "agents"), ("kept",),
-            made=Made("benchmarks.kept"),
+            made=ExperimentSource("benchmarks.kept"),
         ),
         "learners": Command(
             "python -m benchmarks.learners", 240, (*KEYPOINTS, "agents"), ("learners",),
             is_release=True,
-            made=Made("benchmarks.learners", "make_usual", wants_out=True),
+            made=ExperimentSource("benchmarks.learners", "make_default", needs_out=True),
         ),
         "limited": Command(
             "python -m benchmarks.limited", 50, (*KEYPOINTS, "shield", "agents"), ("limited",),
             quick="--quick --seeds 0",
             is_release=True,
-            made=Made("benchmarks.limited", "make_usual", wants_out=True),
+            made=ExperimentSource("benchmarks.limited", "make_default", needs_out=True),
         ),
     }),
     "shield_and_price": Study({
         "shielded": Command(
             "python -m benchmarks.shielded", 6, (*KEYPOINTS, "shield", "agents"), ("shielded",),
-            made=Made("benchmarks.shielded", "STUDY"),
+            made=ExperimentSource("benchmarks.shielded", "STUDY"),
         ),
         "price": Command(
             EXPERIMENT + "price --quick", 20, ALL, ("price", "worth"), {"price.png": "price.png"},
             quick="--seeds 3",
-            made=_experiment("price", quick=True),
+            made=_find_experiment("price", quick=True),
         ),
         "frontier": Command(
             EXPERIMENT + "price", 120, ALL, ("price_elsewhere",),
             quick="", is_release=True,
-            made=_experiment("price"),
+            made=_find_experiment("price"),
         ),
     }),
 }  # fmt: skip
-"""By name, the shortest first."""
+"""Studies by name, the shortest first."""
 COMMANDS: dict[str, Command] = {
     name: command for study in STUDIES.values() for name, command in study.commands.items()
 }
-"""Of all studies, by name."""
+"""Commands of all studies by name."""
 
 
-def commands_of(names: Collection[str]) -> tuple[str, ...]:
+def list_commands(names: Collection[str]) -> tuple[str, ...]:
     """Return the names of commands in order, for names of studies and of commands.
 
     Raises:
         ConfigError: a name is neither.
     """
     check_names("study", names, {**STUDIES, **COMMANDS})
-    found = [
+    groups = [
         (name,) if name in COMMANDS and name not in STUDIES else tuple(STUDIES[name].commands)
         for name in names
     ]
-    return tuple(dict.fromkeys(each for some in found for each in some))
+    return tuple(dict.fromkeys(name for group in groups for name in group))

@@ -1,15 +1,14 @@
-"""Whether recorded numbers still come out: python -m benchmarks.verify --share .02
+"""Check that recorded numbers are reproduced: python -m benchmarks.verify --share .02
 
 Replays a share of all recorded parts, drawn at random, and at least one of every row of parts
-(those whose labels begin with the same words: a scene, a task, a pair of eyes), and compares them
-with what `docs/results/parts/` holds. Of a training the evaluation of its kept policy is replayed,
-where the policy is on this machine. A part that differs makes its study stale:
-`python -m benchmarks.results --list` says so, and the next `make results` makes all of its parts
-again.
+(parts with labels that begin with the same words: a scene, a task, a perception setup), and
+compares them with `docs/results/parts/`. For a training the evaluation of its policy is replayed,
+if the policy is on this machine. A part that differs makes its study stale: `python -m
+benchmarks.results --list` reports it, and the next `make results` computes all of its parts again.
 
     python -m benchmarks.verify                      # 2 % of all parts, with the day's seed
     python -m benchmarks.verify --only site lab --share 1 --longest 60
-    python -m benchmarks.verify --strict             # fails as well where nothing is recorded
+    python -m benchmarks.verify --strict             # also fails if there are no records
 """
 
 import datetime
@@ -21,7 +20,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import tyro
@@ -29,8 +28,8 @@ from rich.console import Console
 from scipy.stats import hypergeom
 
 from benchmarks import records, results
-from benchmarks.replays import REPLAYS, Replayed, row_of
-from benchmarks.studies import COMMANDS, commands_of
+from benchmarks.replays import REPLAYS, ReplayInput, find_row
+from benchmarks.studies import COMMANDS, list_commands
 from hrc_env.core.errors import (
     ConfigError,
     DownloadError,
@@ -41,24 +40,25 @@ from hrc_env.core.results import write_whole
 from hrc_env.experiments.cache import Part, PartCache, PartProgress
 
 CONFIDENCE = 0.95
+"""Probability with which a draw finds a spoiled part."""
 LACKING = (DownloadError, MissingExtraError, RenderingError)
-"""Errors of a machine that lacks something; they say nothing of a part."""
+"""Errors of a machine that lacks something, which do not concern a part."""
 
 
 @dataclass(frozen=True)
 class Arguments:
-    """Replay some recorded parts and compare them with what is kept."""
+    """Replay some recorded parts and compare them with their records."""
 
     share: float = 0.02
-    """Share of all parts that is replayed; at least one of every row is."""
+    """Share of all parts to replay; at least one of every row is replayed."""
     only: tuple[str, ...] = ()
-    """Studies; all if not given."""
+    """Studies to check (default: all)."""
     seed: int | None = None
-    """Seed of the draw; the date as a number if not given."""
+    """Seed of the draw (default: the date as a number)."""
     longest: float = 5.0
-    """Parts that took more minutes than this are left out, and named."""
+    """Time of a part [min] above which it is left out, and listed."""
     strict: bool = False
-    """Fail as well if a study has no recorded parts, or parts that cannot be replayed here."""
+    """Also fail if a study has no recorded parts, or parts that cannot be replayed here."""
     out: Path = Path("out/verify.json")
     """File for the outcome."""
 
@@ -68,7 +68,7 @@ class Arguments:
             raise ConfigError(f"--share must be in [0, 1], got {self.share}.")
         if not self.longest > 0:
             raise ConfigError(f"--longest must be positive, got {self.longest}.")
-        commands_of(self.only)
+        list_commands(self.only)
 
 
 @dataclass(slots=True)
@@ -76,28 +76,31 @@ class Outcome:
     """The outcome of a run."""
 
     seed: int
+    """Seed of the draw."""
     share: float
+    """Requested share of parts."""
     n_parts: int = 0
     """Number of parts that could be drawn."""
     drawn: dict[str, list[str]] = field(default_factory=dict)
-    """Labels by study."""
+    """Labels of the parts that were drawn, by study."""
     spoiled: dict[str, dict[str, str]] = field(default_factory=dict)
-    """Labels by study, and in which way they differ."""
+    """Labels of parts that differ, by study, with descriptions of the differences."""
     skipped: dict[str, str] = field(default_factory=dict)
-    """Studies of which nothing could be replayed, and why."""
+    """Studies without replayed parts, with the reasons."""
     lacking: dict[str, list[str]] = field(default_factory=dict)
-    """Labels by study that were drawn and could not be replayed on this machine."""
+    """Labels of parts that were drawn but cannot be replayed on this machine, by study."""
     too_long: dict[str, list[str]] = field(default_factory=dict)
-    """Labels by study that were left out of the draw."""
+    """Labels of parts that were left out of the draw, by study."""
     finds_share: float | None = None
-    """If this share of the parts is spoiled, wherever they are, one is found in 95 of 100 runs."""
+    """Least share of spoiled parts, at any positions, of which one is found in 95 of 100 runs."""
     finds_scattered_share: float | None = None
-    """The same where spoiled parts are scattered at random over all rows."""
+    """The same share for spoiled parts that are scattered at random over all rows."""
     seconds: float = 0.0
+    """Time of the run [s]."""
 
 
-class AllReplayed(Exception):  # noqa: N818  this ends a replay, and is no error
-    """Everything that was drawn of a study has been replayed."""
+class AllReplayed(Exception):  # noqa: N818  ends a replay, is not an error
+    """Signal that all drawn parts of a study have been replayed."""
 
 
 class Unplayed(dict[str, Any]):
@@ -109,81 +112,91 @@ class Unplayed(dict[str, Any]):
 
 @dataclass(frozen=True, slots=True)
 class ReplayCache(PartCache):
-    """A cache that makes the parts that were drawn, and compares them with the recorded ones."""
+    """A cache that computes the drawn parts, and compares them with the records."""
 
     drawn: Mapping[str, records.Part]
-    """By label."""
+    """Records of the drawn parts, by label."""
     left: set[str]
-    """Labels that are still to be replayed."""
+    """Labels of parts that are still to be replayed."""
     spoiled: dict[str, str]
-    """Labels of parts that differ, and in which way."""
+    """Labels of parts that differ, with descriptions of the differences."""
     is_training: Callable[[str], bool]
-    """Whether the part of a label is a training, whose kept part is handed out."""
+    """Returns whether the part of a label is a training, which is returned from its file."""
 
-    def part(
+    def make_part(
         self,
         label: str,
         make: Callable[[PartProgress], dict[str, Any]],
         key: str | None = None,
         notes: Mapping[str, float] | None = None,
     ) -> dict[str, Any]:
-        """Make the part and compare it, if it was drawn; else return an empty one.
+        """Compute and compare a part if it was drawn; else return an empty one.
 
         Raises:
             AllReplayed: it was the last.
         """
         del notes
         if label not in self.left:
-            asked = Part(label, make, key)
-            kept = self._load(asked) if self.is_training(label) else None
+            part = Part(label, make, key)
+            kept = self._load(part) if self.is_training(label) else None
             return Unplayed() if kept is None else kept
         recorded = self.drawn[label]
         if (key or self.key) == recorded.key:
-            part, words = _make(make, recorded)
+            replayed = _replay_part(make, recorded)
         else:
-            part, words = Unplayed(), "it is made with other settings than it was recorded with"
-        if words:
-            self.spoiled[label] = words
+            difference = "its settings are not those of its record"
+            replayed = ReplayedPart(Unplayed(), difference)
+        if replayed.difference:
+            self.spoiled[label] = replayed.difference
         self.left.discard(label)
         self.progress(1.0, label)
         if not self.left:
             raise AllReplayed
-        return part
+        return replayed.part
 
-    def parts(self, parts: Sequence[Part], one_core: bool = False) -> list[dict[str, Any]]:
-        """Return what `part` does, one after the other."""
+    def make_parts(self, parts: Sequence[Part], one_core: bool = False) -> list[dict[str, Any]]:
+        """Return the parts of `make_part`, one after the other."""
         del one_core
-        return [self.part(each.label, each.make, each.key, each.notes) for each in parts]
+        return [self.make_part(part.label, part.make, part.key, part.notes) for part in parts]
 
 
-def _make(
+class ReplayedPart(NamedTuple):
+    """A part that was computed again."""
+
+    part: dict[str, Any]
+    difference: str
+    """Description of its difference from the record; "" if there is none."""
+
+
+def _replay_part(
     make: Callable[[PartProgress], dict[str, Any]], recorded: records.Part
-) -> tuple[dict[str, Any], str]:
-    """Return a part that is made again, and how it differs from the recorded one."""
+) -> ReplayedPart:
+    """Compute a part again, and compare it with its record."""
     try:
         part = json.loads(json.dumps(make(lambda share: None)))
     except LACKING:
         raise
-    except Exception as error:  # whatever it is, the part no longer comes out
-        return Unplayed(), f"it fails with {type(error).__name__}: {error}"
-    return part, records.describe_difference(recorded.summary, records.summarize(part))
+    except Exception as error:  # any error means that the part is not reproduced
+        return ReplayedPart(Unplayed(), f"it fails with {type(error).__name__}: {error}")
+    difference = records.describe_difference(recorded.summary, records.summarize(part))
+    return ReplayedPart(part, difference)
 
 
 def main(arguments: Arguments) -> int:
-    """Draw, replay, compare, report; 0 if nothing differs."""
+    """Draw, replay and compare parts, and print the outcome; return 0 if nothing differs."""
     console, began_s = Console(), time.monotonic()
     seed = arguments.seed
     if seed is None:
         seed = int(datetime.date.today().strftime("%Y%m%d"))
     outcome = Outcome(seed, arguments.share)
     known = {}
-    for name in commands_of(arguments.only) or COMMANDS:
+    for name in list_commands(arguments.only) or COMMANDS:
         known[name] = records.read(name)
-        if why := why_not(name, known[name]):
+        if why := explain_skip(name, known[name]):
             outcome.skipped[name] = why
             console.print(f"{name}: not replayed, {why}", highlight=False, soft_wrap=True)
     able = {name: record for name, record in known.items() if name not in outcome.skipped}
-    choices, outcome.too_long = candidates(able, 60 * arguments.longest)
+    choices, outcome.too_long = list_candidates(able, 60 * arguments.longest)
     outcome.n_parts = len(choices)
     rng = np.random.default_rng(seed)
     outcome.drawn, n_anywhere = draw(choices, arguments.share, rng)
@@ -195,8 +208,8 @@ def main(arguments: Arguments) -> int:
     for name, labels in outcome.drawn.items():
         replay(name, able[name], labels, outcome, console)
     n_drawn -= sum(map(len, outcome.lacking.values()))
-    outcome.finds_share = found_share(len(choices), n_anywhere)
-    outcome.finds_scattered_share = found_share(len(choices), n_drawn)
+    outcome.finds_share = compute_found_share(len(choices), n_anywhere)
+    outcome.finds_scattered_share = compute_found_share(len(choices), n_drawn)
     outcome.seconds = round(time.monotonic() - began_s, 1)
     write_whole(arguments.out, json.dumps(asdict(outcome), indent=1))
     for sentence in describe(outcome):
@@ -205,22 +218,28 @@ def main(arguments: Arguments) -> int:
     return int(bool(outcome.spoiled) or (arguments.strict and is_incomplete))
 
 
-def why_not(name: str, record: records.Record) -> str:
-    """Return why nothing of a study can be replayed; "" if something can."""
+def explain_skip(name: str, record: records.Record) -> str:
+    """Return the reason why no part of a study can be replayed; "" if one can."""
     if name not in REPLAYS:
-        return "it keeps no parts; only a whole run of it verifies its numbers"
-    if why := results.why_stale(name):
+        return "it keeps no parts; only a whole run verifies its numbers"
+    if why := results.explain_stale(name):
         return f"it is stale already: {why}"
     if not record.parts:
-        return "no parts of it are recorded; the next `make results` records them"
+        return "it has no recorded parts; the next `make results` records them"
     return ""
 
 
-def candidates(
-    able: Mapping[str, records.Record], longest_s: float
-) -> tuple[dict[tuple[str, str], float], dict[str, list[str]]]:
-    """Return how long parts take that can be drawn [s], by study and label; and those that take
-    too long."""
+class Candidates(NamedTuple):
+    """The parts of studies, by whether they can be drawn."""
+
+    choices: dict[tuple[str, str], float]
+    """Times of parts that can be drawn, by study and label [s]."""
+    too_long: dict[str, list[str]]
+    """Labels of parts that take too long, by study."""
+
+
+def list_candidates(able: Mapping[str, records.Record], longest_s: float) -> Candidates:
+    """Return the parts that can be drawn, and those that take too long."""
     choices, too_long = dict[tuple[str, str], float](), dict[str, list[str]]()
     for name, record in able.items():
         for label, part in record.parts.items():
@@ -229,45 +248,49 @@ def candidates(
                     too_long.setdefault(name, []).append(label)
                 else:
                     choices[name, label] = part.seconds
-    return choices, too_long
+    return Candidates(choices, too_long)
 
 
-def draw(
-    choices: Mapping[tuple[str, str], float], share: float, rng: np.random.Generator
-) -> tuple[dict[str, list[str]], int]:
+class Draw(NamedTuple):
+    """The parts that were drawn."""
+
+    drawn: dict[str, list[str]]
+    """Labels by study."""
+    n_anywhere: int
+    """Number of parts that were drawn with equal probability."""
+
+
+def draw(choices: Mapping[tuple[str, str], float], share: float, rng: np.random.Generator) -> Draw:
     """Draw a share of all parts, then one of every row that has none.
 
     Args:
-        choices: how long each part takes [s], by study and label. The first draw takes all alike;
-            the second takes a part the more often the sooner it is replayed.
-        share: of all parts.
-        rng: draws.
-
-    Returns:
-        Labels by study, and how many were drawn from all parts alike.
+        choices: times of the parts [s], by study and label. The first draw has equal probabilities;
+            the second prefers parts that are replayed quickly.
+        share: share of all parts.
+        rng: random generator.
     """
     n_anywhere = math.ceil(share * len(choices))
     parts = list(choices)
     picked = {parts[k] for k in rng.permutation(len(parts))[:n_anywhere].tolist()}
     rows: dict[tuple[str, str], list[tuple[str, str]]] = {}
     for name, label in choices:
-        rows.setdefault((name, row_of(name, label)), []).append((name, label))
+        rows.setdefault((name, find_row(name, label)), []).append((name, label))
     for row in rows.values():
         if picked.isdisjoint(row):
-            weights = np.array([1 / (1 + choices[each]) for each in row])
+            weights = np.array([1 / (1 + choices[part]) for part in row])
             picked.add(row[int(rng.choice(len(row), p=weights / weights.sum()))])
     drawn: dict[str, list[str]] = {}
     for name, label in choices:
         if (name, label) in picked:
             drawn.setdefault(name, []).append(label)
-    return drawn, n_anywhere
+    return Draw(drawn, n_anywhere)
 
 
 def replay(
     name: str, record: records.Record, labels: Sequence[str], outcome: Outcome, console: Console
 ) -> None:
-    """Replay parts of a study; note in its record those that differ."""
-    how, out = REPLAYS[name], results.OUT / name
+    """Replay parts of a study, and mark those that differ in its record."""
+    study, out = REPLAYS[name], results.OUT / name
     drawn = {label: record.parts[label] for label in labels}
 
     def say(share: float, label: str) -> None:
@@ -275,16 +298,17 @@ def replay(
         words = cache.spoiled.get(label, "the same")
         console.print(f"{name} {label}: {words}", highlight=False, soft_wrap=True)
 
-    cache = ReplayCache(out / "parts", "", 1, say, drawn, set(labels), {}, how.is_training)
+    cache = ReplayCache(out / "parts", "", 1, say, drawn, set(labels), {}, study.is_training)
     try:
         with suppress(AllReplayed):
-            how.walk(Replayed(cache, out, {label: part.notes for label, part in drawn.items()}))
+            notes = {label: part.notes for label, part in drawn.items()}
+            study.walk(ReplayInput(cache, out, notes))
     except LACKING as error:
         console.print(f"{name}: {error}", highlight=False, soft_wrap=True)
         outcome.lacking[name] = sorted(cache.left)
     else:
         for label in sorted(cache.left):
-            if how.is_learnt(label):
+            if study.is_learnt(label):
                 outcome.lacking.setdefault(name, []).append(label)
             else:
                 cache.spoiled[label] = "the study no longer makes it"
@@ -293,11 +317,12 @@ def replay(
         records.save(name, replace(record, spoiled={**record.spoiled, **cache.spoiled}))
 
 
-def found_share(n_parts: int, n_drawn: int) -> float | None:
+def compute_found_share(n_parts: int, n_drawn: int) -> float | None:
     """Return the least share of spoiled parts of which a draw finds one with 95 %.
 
-    Of `n_parts` parts `n_drawn` are drawn, all alike and each once, so that the number of spoiled
-    parts among them is hypergeometric. None: no share is found so surely.
+    `n_drawn` of `n_parts` parts are drawn with equal probability and without repetition, so the
+    number of spoiled parts among them is hypergeometric. None: no share is found with that
+    probability.
     """
     for n_spoiled in range(1, n_parts + 1):
         if 1 - hypergeom.pmf(0, n_parts, n_spoiled, n_drawn) >= CONFIDENCE:
@@ -306,25 +331,25 @@ def found_share(n_parts: int, n_drawn: int) -> float | None:
 
 
 def describe(outcome: Outcome) -> list[str]:
-    """Return lines about an outcome."""
+    """Return lines that describe an outcome."""
     lines = []
     for name, labels in outcome.lacking.items():
         lines.append(f"{name}: {', '.join(labels)} not replayed, as this machine lacks something "
-                    "(a policy that was learnt, a download, or what draws images).")  # fmt: skip
+                    "(a trained policy, a download, or OpenGL).")  # fmt: skip
     for name, labels in outcome.too_long.items():
         lines.append(f"{name}: {', '.join(labels)} left out, as they take longer than --longest.")
     for name, spoiled in outcome.spoiled.items():
         lines.append(f"{name} is stale: {len(spoiled)} of its parts differ. "
-                    "`python -m benchmarks.results` makes it again.")  # fmt: skip
+                    "`python -m benchmarks.results` computes them again.")  # fmt: skip
     n_drawn = sum(map(len, outcome.drawn.values()))
     n_spoiled = sum(map(len, outcome.spoiled.values()))
     lines.append(f"{n_drawn} parts were drawn, and {n_spoiled} differ, in {outcome.seconds:.0f} s.")
     if outcome.finds_share is not None and outcome.finds_scattered_share is not None:
         lines.append(
             "Such a draw finds a spoiled part with 95 % if at least "
-            f"{100 * outcome.finds_share:.1f} % of the parts are spoiled, wherever they are; "
+            f"{100 * outcome.finds_share:.1f} % of the parts are spoiled, at any positions; "
             f"{100 * outcome.finds_scattered_share:.1f} % suffice if they are scattered at random; "
-            "and always if all parts of a row are."
+            "it always does if all parts of a row are spoiled."
         )
     return lines
 

@@ -3,8 +3,16 @@
 from collections.abc import Mapping
 
 from docs.tables import RESULTS
-from hrc_env.experiments.leaderboard import CONDITIONS, MAIN, PER, SEED, VERSION, Entry, read_entry
-from hrc_env.experiments.report import format_metric, table
+from hrc_env.experiments.leaderboard import (
+    CONDITIONS,
+    ENTRY_METRICS,
+    MAIN,
+    SEED,
+    VERSION,
+    Entry,
+    read_entry,
+)
+from hrc_env.experiments.report import format_metric, format_table
 from hrc_env.tasks import BUILT_IN
 
 HEAD = f"""\
@@ -54,7 +62,8 @@ def _section(task: str, everybody: Mapping[str, Entry]) -> str:
         (name if k == 0 else "", CONDITIONS[MAIN[k]].shield or "none",
          str(scores[f"{key}.goals_per_minute"].n),
          *(format_metric(scores[f"{key}.{what}"], digits=2 if what == "success" else 1)
-           for what in PER))
+           for what in ENTRY_METRICS))
         for name, scores in here for k, key in enumerate(keys)
     ]  # fmt: skip
-    return f"## {task}\n\n{table(('policy', 'shield', 'episodes', *PER.values()), rows)}\n"
+    heads = ("policy", "shield", "episodes", *ENTRY_METRICS.values())
+    return f"## {task}\n\n{format_table(heads, rows)}\n"

@@ -29,7 +29,7 @@ from PIL import Image
 
 from benchmarks.gallery.still import views
 from hrc_env.agents.env_info import env_info
-from hrc_env.agents.experts import expert
+from hrc_env.agents.experts import make_expert
 from hrc_env.core.batching import copied
 from hrc_env.core.records import Roi
 from hrc_env.env import HRCEnv
@@ -170,7 +170,7 @@ def episodes(ids: Sequence[str] = tuple(BUILT_IN)) -> None:
         inner = env.unwrapped
         assert isinstance(inner, HRCEnv)
         observation, _ = env.reset(seed=SEED_FILM)
-        agent, frames, over, n = expert(env_info(inner.simulation)), [], False, 0
+        agent, frames, over, n = make_expert(env_info(inner.simulation)), [], False, 0
         while not over and n < MOST_STEPS:
             if n % STEPS_A_FRAME == 0:
                 frames.append(np.asarray(env.render()))

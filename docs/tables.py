@@ -98,13 +98,13 @@ def filled(page: str) -> str:
 
 def _block(found: re.Match[str]) -> str:
     first, result = found[0].split("\n", 1)[0], read(found["name"])
-    table = result.table.markdown(result.metrics, intervals=not found["plain"])
+    table = result.table.to_markdown(result.metrics, intervals=not found["plain"])
     return f"{first}\n{table}\n<!-- end of results -->"
 
 
 def _number(found: re.Match[str]) -> str:
     result = read(found["name"])
-    said = result.table.number(found["which"], result.metrics)
+    said = result.table.format_number(found["which"], result.metrics)
     return f"{found[0].split('>', 1)[0]}>{said}<!-- end -->"
 
 
@@ -142,5 +142,5 @@ def asked(name: str) -> set[str]:
     command, table = declared(name)
     whole = RESULTS / "whole" / f"{command}.json"
     if not whole.exists():
-        return table.asked()
-    return table.asked() & json.loads(whole.read_text())["metrics"].keys()
+        return table.list_metrics()
+    return table.list_metrics() & json.loads(whole.read_text())["metrics"].keys()

@@ -39,7 +39,7 @@ class Arguments:
     n_steps: int = 64
     """Steps of each environment between updates."""
     perception: str = "keypoints"
-    """keypoints (camera emulator), truth or none."""
+    """Perception level: keypoints (camera emulator), truth or none."""
     seed: int = 0
     """Seed of environments and learner."""
     n_epochs: int = 5
@@ -109,7 +109,7 @@ class ReturnScale:
 
 
 class Rollout:
-    """What T steps of B environments gave; row t is the step from observation t."""
+    """Transitions of T steps of B environments; row t is the step from observation t."""
 
     def __init__(self, n_steps: int, num_envs: int, n_observed: int, n_actions: int) -> None:
         shape = (n_steps, num_envs)
@@ -121,10 +121,10 @@ class Rollout:
         )
 
     def advantages(self, last_value: Tensor, gamma: float, gae_lambda: float) -> Tensor:
-        """(T, B) generalised advantage estimates; those of reset steps mean nothing.
+        """Return generalised advantage estimates (T, B); those of reset steps are to be ignored.
 
-        Row t + 1 begins with what step t led to, which is the *final* observation where an
-        episode ended: so V(t + 1) bootstraps a truncated episode, and a terminated one not.
+        Row t + 1 begins with the observation after step t, which is the *final* observation where
+        an episode ended: so V(t + 1) bootstraps a truncated episode, but not a terminated one.
         """
         advantage = torch.zeros_like(self.reward)
         next_value, carried = last_value, torch.zeros_like(last_value)
@@ -137,7 +137,7 @@ class Rollout:
 
 
 class Collector:
-    """Steps the environments with a policy and counts what came of it."""
+    """Steps the environments with a policy and counts the goals."""
 
     def __init__(self, envs: gymnasium.vector.VectorEnv, arguments: Arguments) -> None:
         self.envs = envs
@@ -151,7 +151,7 @@ class Collector:
         """Goals reached and missed in episodes that ended lately."""
 
     def fill(self, rollout: Rollout, policy: Policy) -> Tensor:
-        """Make a rollout; returns the value (B,) of where it leads."""
+        """Fill a rollout, and return the value (B,) of the observations after it."""
         for t in range(len(rollout.reward)):
             observation = torch.from_numpy(self.observation)
             with torch.no_grad():

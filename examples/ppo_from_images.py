@@ -33,7 +33,7 @@ from torch import Tensor, nn
 from hrc_env import CameraConfig, HRCVecEnv
 
 MIDDLE_M = np.array((-0.1, 0.0, 1.1))
-"""Of the places where goals are, in the world [m]."""
+"""Middle of the goals' positions, in the world frame [m]."""
 CAMERAS = tuple(
     CameraConfig(name, eye_world, tuple(MIDDLE_M), 42.0, width_px=720, height_px=720)
     for name, eye_world in (("front", (1.5, -0.5, 1.5)), ("side", (-0.1, -2.0, 1.7)))
@@ -41,11 +41,11 @@ CAMERAS = tuple(
 """Near enough that a goal's radius is several pixels."""
 GOALS = {"azimuth_rad": (-0.7, 0.7), "height_m": (0.85, 1.35), "radius_m": 0.08}
 GOAL_SCALE = 2.0
-"""Goals are given in half metres."""
+"""Unit in which goals are observed: half a metre."""
 GAMMA = 0.95
 POINTS = "steps, minutes, goals a minute"
 RECENT = 64
-"""Episodes of which the curve shows the mean."""
+"""Number of episodes whose mean the curve shows."""
 
 
 @dataclass(frozen=True)
@@ -53,15 +53,16 @@ class Arguments:
     """Learn to reach from images."""
 
     sees: Literal["pixels", "belief"] = "pixels"
-    """What the policy is given."""
+    """Input of the policy."""
     pretrain: int = 16_000
-    """Images from which the convolutions first learn where the tool is; 0: they do not."""
+    """Images from which the convolutions first learn the position of the tool; 0: no such
+    training."""
     timesteps: int = 120_000
     """Environment steps of PPO."""
     out: Path = Path("runs/images")
     """Folder for the curve and the policy."""
     beside: tuple[Path, ...] = ()
-    """Folders of other runs, whose curves are drawn, too."""
+    """Folders of other runs, whose curves are added to the plot."""
     size: int = 64
     """Sides of the images [px]; SB3's convolutions need 36 or more."""
     num_envs: int = 32
@@ -71,17 +72,17 @@ class Arguments:
 
 
 class Seen(VecEnvWrapper):
-    """Hides the belief: both images as channels of one, and the place of the goal."""
+    """Replaces the belief by both images as channels of one, and the position of the goal."""
 
     def __init__(self, venv: HRCVecEnv, size: int) -> None:
         image = Box(0, 255, (size, size, 3 * len(CAMERAS)), np.uint8)
         goal = Box(-np.inf, np.inf, (3,), np.float32)
         super().__init__(venv, observation_space=Dict({"image": image, "goal": goal}))
         self.tool: Any = None
-        """(num_envs, 3) where the tools are by the encoders, from `MIDDLE_M` [m]."""
+        """Tool positions by the encoders relative to `MIDDLE_M`, (num_envs, 3) [m]."""
 
     def seen(self, observation: Any) -> dict[str, Any]:
-        """Return what the policy is given, of observations (B, ...) or of one."""
+        """Return the policy's input from observations (B, ...) or from one."""
         terms = self.venv.env_method("split_observation", observation, indices=[0])[0]
         self.tool = terms["tool_position"] - MIDDLE_M
         goal = (GOAL_SCALE * (self.tool + terms["goal_from_tool"])).astype(np.float32)
@@ -93,7 +94,7 @@ class Seen(VecEnvWrapper):
         return self.seen(self.venv.reset())
 
     def step_wait(self) -> Any:
-        """Step them; the last observations of episodes stand in infos."""
+        """Step all environments; the last observations of episodes are in infos."""
         observation, reward, done, infos = self.venv.step_wait()
         for info in infos:
             if "terminal_observation" in info:
@@ -102,7 +103,8 @@ class Seen(VecEnvWrapper):
 
 
 class Locating(BaseFeaturesExtractor):
-    """Where the tool is by the images, beside the goal; learnt beforehand and then kept."""
+    """Position of the tool estimated from the images, beside the goal; trained beforehand and then
+    frozen."""
 
     def __init__(self, observation_space: Dict) -> None:
         super().__init__(observation_space, features_dim=6)
@@ -110,19 +112,20 @@ class Locating(BaseFeaturesExtractor):
         self.place = nn.Linear(256, 3)
 
     def locate(self, image: Tensor) -> Tensor:
-        """(B, 3) the tool from `MIDDLE_M` [m], of images (B, C, H, W) in [0, 1]."""
+        """Estimate the tool's position relative to `MIDDLE_M`, (B, 3) [m], from images (B, C, H, W)
+        in [0, 1]."""
         return self.place(self.convolutions(image))
 
     def forward(self, observations: dict[str, Tensor]) -> Tensor:
-        """(B, 6) tool and goal from `MIDDLE_M`, in quarters of a metre."""
+        """Return tool and goal relative to `MIDDLE_M`, (B, 6), in quarters of a metre."""
         with torch.no_grad():
             tool = self.locate(observations["image"])
         return torch.cat([4 * tool, 4 / GOAL_SCALE * observations["goal"]], dim=1)
 
 
 def pretrain(locating: Locating, env: Seen, n_images: int, n_epochs: int = 12) -> float:
-    """Teach where the tool is while it wanders about its goals; return the error of new images, a
-    mean [m]."""
+    """Train the position of the tool while it wanders about its goals; return the mean error on new
+    images [m]."""
     rng, images, places, seen = np.random.default_rng(0), [], [], env.reset()
     for _ in range(-(-n_images // env.num_envs)):
         images.append(seen["image"].transpose(0, 3, 1, 2))
@@ -151,7 +154,7 @@ def pretrain(locating: Locating, env: Seen, n_images: int, n_epochs: int = 12) -
 
 
 class Curve(BaseCallback):
-    """Goals that are reached while it learns, as numbers and as a picture."""
+    """Goals reached during training, as numbers and as a plot."""
 
     def __init__(self, arguments: Arguments) -> None:
         super().__init__()
@@ -162,7 +165,7 @@ class Curve(BaseCallback):
 
     @property
     def minutes(self) -> float:
-        """Since the beginning."""
+        """Time since the start [min]."""
         return (time.monotonic() - self.started_s) / 60
 
     def _on_step(self) -> bool:
@@ -199,7 +202,7 @@ def draw(runs: list[Path], path: Path) -> None:
 
 
 def make_env(arguments: Arguments) -> Any:
-    """Return environments without people: reaching comes first."""
+    """Return environments without people, because reaching is learned first."""
     looks = arguments.sees == "pixels"
     venv = HRCVecEnv(
         arguments.num_envs, task="HRCReach-v0", perception="none", n_workers=0, control="tool",
@@ -224,7 +227,7 @@ def make_learner(arguments: Arguments, env: Any) -> PPO:
 
 
 def main(arguments: Arguments) -> None:
-    """Learn, drawing the curve as it goes."""
+    """Train the policy, and draw the curve during training."""
     torch.set_num_threads(1)
     env = make_env(arguments)
     learner, curve = make_learner(arguments, env), Curve(arguments)

@@ -33,39 +33,41 @@ from hrc_env import evaluate, make_agent  # noqa: E402  registers the ids, too
 
 @dataclass(frozen=True)
 class Arguments:
-    """Learn HRCReach-v0 with a limit by FSRL, and judge it beside another agent."""
+    """Train HRCReach-v0 with a cost limit by FSRL, and evaluate it beside another agent."""
 
     timesteps: int = 1_000_000
     """Environment steps in all."""
     cost_limit: float = 30.0
-    """Of an episode."""
+    """Cost limit of an episode."""
     num_envs: int = 4
-    """Environments, one after the other; each plays an episode between updates."""
+    """Number of environments, stepped one after the other; each plays an episode between
+    updates."""
     perception: str = "keypoints"
-    """What the robot sees with."""
+    """Perception level of the robot."""
     seed: int = 0
-    """Of the learner."""
+    """Seed of the learner."""
     episodes: int = 128
-    """Of the evaluation."""
+    """Number of episodes of the evaluation."""
     beside: str = "scripted"
-    """Whom to judge on the same seeds: a name, or the policy.zip of a run with the same limit."""
+    """Agent to evaluate on the same seeds: a name, or the policy.zip of a run with the same
+    limit."""
 
 
 class Judged:
-    """The mean action of FSRL's policy."""
+    """Mean action of FSRL's policy."""
 
     def __init__(self, actor: Any) -> None:
         self.actor = actor
 
     def act(self, observation: np.ndarray) -> np.ndarray:
-        """Actions in [-1, 1], as its `action_bound_method="clip"` has them."""
+        """Return actions in [-1, 1], as its `action_bound_method="clip"` has them."""
         with torch.no_grad():
             (mean, _), _ = self.actor(observation)
         return np.clip(mean.numpy(), -1.0, 1.0)
 
 
 def main(arguments: Arguments) -> None:
-    """Learn, judge, show."""
+    """Train, evaluate and print."""
     torch.set_num_threads(1)
     quiet = {"perception": arguments.perception, "config": {"reward": {"proximity": 0.0}}}
     make = partial(gymnasium.make, "HRCReach-v0", **quiet)

@@ -1,9 +1,9 @@
 """PPO by TorchRL over the vector environment: python examples/ppo_torchrl.py
 
 TorchRL (arXiv:2306.00577) is no dependency of hrc_env: pip install -c constraints.txt ".[torchrl]".
-Its collector resets environments itself, those whose episode is over by a mask, so the vector
+Its collector resets the environments with a mask of the finished episodes, so the vector
 environment is made with `autoreset_mode="Disabled"`: no step is lost to a reset, and the last
-observation of an episode is what the step returned.
+observation of an episode is the one that the step returned.
 """
 
 import time
@@ -38,13 +38,13 @@ class Arguments:
     n_steps: int = 64
     """Steps of each environment between updates."""
     perception: str = "keypoints"
-    """keypoints (camera emulator), truth or none."""
+    """Perception level: keypoints (camera emulator), truth or none."""
     seed: int = 0
     """Seed of environments and learner."""
 
 
 def make_env(arguments: Arguments) -> TransformedEnv:
-    """The vector environment as TorchRL sees it, with small rewards and sums over episodes."""
+    """Return the vector environment for TorchRL, with scaled rewards and sums over episodes."""
     envs = gymnasium.make_vec(
         "HRCReach-v0",
         num_envs=arguments.num_envs,

@@ -46,11 +46,11 @@ if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
     from hrc_env.evaluation.episodes import evaluate_episodes as evaluate_episodes
     from hrc_env.evaluation.intervals import Comparison as Comparison
     from hrc_env.evaluation.intervals import compare_means as compare_means
+    from hrc_env.evaluation.intervals import compare_paired as compare_paired
     from hrc_env.evaluation.intervals import compare_rates as compare_rates
-    from hrc_env.evaluation.intervals import mean_over as mean_over
-    from hrc_env.evaluation.intervals import paired as paired
-    from hrc_env.evaluation.intervals import rate_of as rate_of
-    from hrc_env.evaluation.intervals import share_of as share_of
+    from hrc_env.evaluation.intervals import estimate_mean as estimate_mean
+    from hrc_env.evaluation.intervals import estimate_rate as estimate_rate
+    from hrc_env.evaluation.intervals import estimate_share as estimate_share
     from hrc_env.evaluation.rollout import Transition as Transition
     from hrc_env.evaluation.rollout import rollout as rollout
     from hrc_env.experiments import columns as columns
@@ -220,15 +220,15 @@ PUBLIC = {
     "Score": "hrc_env.evaluation.episodes",
     "Transition": "hrc_env.evaluation.rollout",
     "compare_means": "hrc_env.evaluation.intervals",
+    "compare_paired": "hrc_env.evaluation.intervals",
     "compare_rates": "hrc_env.evaluation.intervals",
+    "estimate_mean": "hrc_env.evaluation.intervals",
+    "estimate_rate": "hrc_env.evaluation.intervals",
+    "estimate_share": "hrc_env.evaluation.intervals",
     "evaluate": "hrc_env.evaluation.episodes",
     "evaluate_episodes": "hrc_env.evaluation.episodes",
     "load_episodes": "hrc_env.evaluation.dataset",
-    "mean_over": "hrc_env.evaluation.intervals",
-    "paired": "hrc_env.evaluation.intervals",
-    "rate_of": "hrc_env.evaluation.intervals",
     "rollout": "hrc_env.evaluation.rollout",
-    "share_of": "hrc_env.evaluation.intervals",
     # experiments
     "PerceptionSetup": "hrc_env.experiments.setups",
     "Row": "hrc_env.experiments.study",

@@ -18,8 +18,7 @@ PROGRAM = "python -m hrc_env"
 COMMANDS: dict[str, tuple[str, str, str]] = {
     "setup": (
         "hrc_env.cli.setup", "Setup",
-        "Fetch the pose network's weights (once, checked), compile the kernels for this machine, "
-        "and see that headless OpenGL works.",
+        "Fetch the weights of the pose network, compile the kernels and check headless OpenGL.",
     ),
     "demo": (
         "hrc_env.cli.play", "Demo",
@@ -27,20 +26,20 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     ),
     "check": (
         "hrc_env.cli.check", "Check",
-        "Versions, machine, OpenGL, kernels, weights, one step: each line ok, or what to do.",
+        "Check versions, machine, OpenGL, kernels, weights and one step of an environment.",
     ),
     "list": (
         "hrc_env.cli.listing", "List",
-        "Environments, perception levels, estimators, scenes, cameras, shields and agents by name.",
+        "List environments, perception levels, estimators, scenes, cameras, shields and agents by"
+        " name.",
     ),
     "play": (
         "hrc_env.cli.play", "Play",
-        "Play episodes of an environment with an agent; say how they went.",
+        "Play episodes of an environment with an agent and print their scores.",
     ),
     "evaluate": (
         "hrc_env.cli.evaluate", "Evaluate",
-        "Score an agent over whole episodes with fixed seeds: goals, contacts, cost, on one "
-        "machine or on a cluster.",
+        "Score an agent over whole episodes with fixed seeds: goals, contacts and cost.",
     ),
     "train": (
         "hrc_env.cli.train", "Train",
@@ -48,26 +47,23 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     ),
     "export": (
         "hrc_env.cli.export", "Export",
-        "Make of a run's policy a file that executes nothing, and a card of what it is worth.",
+        "Write a run's policy as a file that executes no code, and a model card with its scores.",
     ),
     "record": (
         "hrc_env.cli.record", "Record",
-        "Record an agent's episodes as a data set: of Minari, or a folder.",
+        "Record an agent's episodes as a data set of Minari or a folder.",
     ),
     "experiment": (
         "hrc_env.cli.experiment", "Experiment",
-        "The paper's two experiments (site, lab), what perception is worth in safety (impact), "
-        "what sight costs at one rate of contacts (price), ablations of rigs and estimators "
-        "(ablations).",
+        "Run an experiment of the paper or of this package.",
     ),
     "benchmark": (
         "hrc_env.cli.benchmark", "Benchmark",
-        "Judge a policy on fixed seeds: beside unaware, hurried and attentive people, with four "
-        "cameras, late ones, one, and the truth, without and with a shield.",
+        "Score a policy on fixed seeds in the setups of the benchmark.",
     ),
     "import-motion": (
         "hrc_env.cli.import_motion", "ImportMotion",
-        "Bring your own motion capture: a BVH, ASF/AMC or npz recording becomes a clip.",
+        "Import motion capture: a BVH, ASF/AMC or npz recording becomes a clip.",
     ),
 }  # fmt: skip
 """Each command: its module, its class, and the class's first sentence."""

@@ -19,7 +19,7 @@ from hrc_env.core.errors import ConfigError, check_shape, learner, whole
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.env import ENDLESS
 from hrc_env.env_config import check_keywords
-from hrc_env.evaluation.sums import EpisodeSums, value_of_step
+from hrc_env.evaluation.sums import EpisodeSums, read_step_value
 from hrc_env.reset_options import named_options
 from hrc_env.rewards import RewardConfig
 from hrc_env.simulation import Simulation
@@ -173,7 +173,7 @@ class HRCVecEnv(VecEnv):
         for term in self.simulation.task.reward_terms if self.simulation.task.goal else ():
             if term.name != TERM:
                 name = f"reward/{term.name}"
-                columns[name] = value_of_step(fresh, name, self.num_envs)
+                columns[name] = read_step_value(fresh, name, self.num_envs)
         columns |= {name: fresh[name] for name in self.info_names if name not in columns}
         values = zip(*(column.tolist() for column in columns.values()), strict=True)
         return [dict(zip(columns, row, strict=True)) for row in values]

@@ -458,7 +458,7 @@ def test_an_unknown_robot_is_refused_with_those_that_there_are():
 
 def test_a_study_is_played_and_reported(tmp_path):
     study = runpy.run_path(str(EXAMPLES / "study.py"))["STUDY"]
-    short = dataclasses.replace(study, n_quick=2).quick()
+    short = dataclasses.replace(study, n_quick=2).shorten()
     found = hrc_env.run_experiment(short, tmp_path / "out")
     assert found["bare.share"].value == 1.0
     assert found["qp.contacts_towards"].n == 2

@@ -62,7 +62,7 @@ def test_every_table_is_shown_with_where_it_comes_from():
 def test_the_baselines_are_in_the_readme_and_in_learning():
     for page in (README, ROOT / "docs" / "learning.md"):
         text = page.read_text()
-        assert "| `pixels` | PPO with it |" in text
+        assert "| `pixels` | PPO with the safety term |" in text
         assert tables.filled(text.replace("| `random` |", "| `other` |")) == text
 
 
@@ -101,9 +101,9 @@ def test_a_table_finds_a_number_for_every_column(name):
 
 
 def test_a_table_shows_the_numbers_of_the_last_run():
-    result, whole = tables.read("shielded"), results.whole("shielded")
+    result, whole = tables.read("shielded"), results.read_results("shielded")
     four = whole["metrics"]["four.share"]
-    line = next(each for each in result.table.markdown(result.metrics).splitlines()
+    line = next(each for each in result.table.to_markdown(result.metrics).splitlines()
                 if each.startswith("| four cameras |"))  # fmt: skip
     assert f"| four cameras | {four['n']:,} | {100 * four['value']:.1f} (" in line
     assert " - " not in line
@@ -133,7 +133,7 @@ def test_counts_stand_with_their_intervals():
             if "contact" in column.heading or "[in 1,000]" in column.heading:
                 assert column.counted, (name, column)
                 one = replace(result.table, columns=[column], numbers={}, note="")
-                text = one.markdown(result.metrics, intervals=False)
+                text = one.to_markdown(result.metrics, intervals=False)
                 cells = [line.split("|")[-2] for line in text.splitlines()[4:]]
                 assert cells, (name, column)
                 assert all(INTERVAL.search(each) for each in cells if each != " - "), (name, column)
@@ -324,6 +324,6 @@ def test_numbers_that_look_measured_are_found():
 def test_a_number_of_a_sentence_is_filled_in():
     page = "<!-- number: speed_organs.reset_one -->99<!-- end --> ms a reset"
     result = tables.read("speed_organs")
-    said = result.table.number("reset_one", result.metrics)
+    said = result.table.format_number("reset_one", result.metrics)
     assert said == f"{result.metrics['reset_ms.1_of_1'].value:.1f}"
     assert tables.filled(page) == page.replace("99", said)

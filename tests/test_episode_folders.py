@@ -146,7 +146,7 @@ def test_drawn_rigs_differ_between_environments_of_a_batch():
 
 
 def test_what_is_finished_when_it_is_killed_is_not_played_again(tmp_path, monkeypatch):
-    once, plays = recording._played, []
+    once, plays = recording._play, []
 
     def counted(asked, first, n):
         plays.append(first)
@@ -154,11 +154,11 @@ def test_what_is_finished_when_it_is_killed_is_not_played_again(tmp_path, monkey
             raise KeyboardInterrupt
         return once(asked, first, n)
 
-    monkeypatch.setattr(recording, "_played", counted)
+    monkeypatch.setattr(recording, "_play", counted)
     words = ["--perception", "truth"]
     assert record(tmp_path / "set", *words).returncode == 130
     assert not (tmp_path / "set").exists()
-    with pytest.raises(hrc_env.ConfigError, match="the same command goes on"):
+    with pytest.raises(hrc_env.ConfigError, match="the same command continues"):
         hrc_env.load_episodes(tmp_path / "set")
     assert record(tmp_path / "set", *words).returncode == 0
     assert plays == [0, 2, 2]
@@ -175,7 +175,7 @@ BAD = {
         ["--num-envs", "9", "--observe-images", "1024", "1024"], "at most 4 are held in memory"),
     "keypoints without cameras": (
         ["--keypoints", "--perception", "truth"], "--perception truth has none"),
-    "two places": (["--out", "hrc/reach-v0"], "Say where the data set goes"),
+    "two places": (["--out", "hrc/reach-v0"], "A data set needs one place"),
 }  # fmt: skip
 
 
@@ -190,8 +190,8 @@ def test_what_cannot_be_recorded_is_refused_before_an_episode(name, tmp_path):
 
 def test_a_place_is_needed_and_must_be_free(tmp_path):
     done = hrc("record", "HRCReach-v0")
-    assert "Say where the data set goes" in said(done)
-    assert "is there already" in said(record(tmp_path))
+    assert "A data set needs one place" in said(done)
+    assert "exists already" in said(record(tmp_path))
 
 
 def test_what_is_no_data_set_is_refused_in_words(tmp_path):
@@ -199,7 +199,7 @@ def test_what_is_no_data_set_is_refused_in_words(tmp_path):
         (None, "is no folder of recorded episodes"),
         ("{", "cannot be read"),
         ("{}", "cannot be read: KeyError"),
-        (json.dumps({"format": 9, "hrc_env": "9.0"}), "is of form 9"),
+        (json.dumps({"format": 9, "hrc_env": "9.0"}), "has format 9"),
     ):
         if content is not None:
             (tmp_path / "dataset.json").write_text(content)

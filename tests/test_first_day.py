@@ -13,7 +13,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 import hrc_env
 from hrc_env.__main__ import main
 from hrc_env.agents import acting, callbacks, checkpoints
-from hrc_env.agents.registry import control_of
+from hrc_env.agents.registry import find_control
 from hrc_env.core.errors import CheckpointError
 from hrc_env.experiments import leaderboard, report
 from hrc_env.experiments.impact import experiment
@@ -97,7 +97,7 @@ def test_paired_gives_the_difference_of_a_statistic_of_one_row():
         np.array([0.5, 1.0, 3.0, 7.0, 8.0, 2.0]),
     )
     both = np.array([*ours, *theirs])
-    found = hrc_env.paired("mean", lambda w: w @ both / w.sum(-1), len(ours), "m")
+    found = hrc_env.compare_paired("mean", lambda w: w @ both / w.sum(-1), len(ours), "m")
     compared = hrc_env.compare_means(ours, theirs, "m")
     assert found["difference.mean"] == compared.difference
     assert found["p.mean"].value == compared.p
@@ -107,7 +107,7 @@ def test_actions_of_another_control_are_told_from_those_of_this_one(tmp_path):
     model = PPO("MlpPolicy", hrc_env.HRCVecEnv(2, perception="none", control="twist"), n_steps=8)
     model.save(tmp_path / "plain.zip")
     name = str(tmp_path / "plain.zip")
-    assert control_of(name) == "twist"
+    assert find_control(name) == "twist"
     joint = hrc_env.env_info(hrc_env.HRCVectorEnv(1, perception="none"))
     with pytest.raises(CheckpointError, match=r"acts by control='twist'.*--control twist"):
         hrc_env.make_agent(name, joint)
@@ -160,7 +160,7 @@ def test_a_ramp_of_ones_own_lets_the_proximity_term_grow():
     model = PPO("MlpPolicy", VecNormalize(env, norm_obs=False), n_steps=8, batch_size=16)
     model.learn(64, callback=[hrc_env.ProximityRamp(32), Watch()])
     assert weights == [0.0, 1.5, 3.0, 3.0]
-    with pytest.raises(hrc_env.ConfigError, match="wants an HRCVecEnv, got DummyVecEnv"):
+    with pytest.raises(hrc_env.ConfigError, match="needs an HRCVecEnv, got DummyVecEnv"):
         PPO("MlpPolicy", "CartPole-v1", n_steps=8, batch_size=8).learn(
             8, callback=hrc_env.ProximityRamp()
         )
@@ -221,7 +221,7 @@ def test_episodes_of_an_evaluation_can_be_compared():
 @pytest.mark.parametrize("exposure", [[1, 2, 3], [[1.0, 2.0]], []])
 def test_rates_are_of_the_same_seeds(exposure):
     with pytest.raises(hrc_env.ConfigError, match=r"same seeds|must have shape"):
-        hrc_env.rate_of([1, 1], exposure)
+        hrc_env.estimate_rate([1, 1], exposure)
     with pytest.raises(hrc_env.ConfigError, match=r"same seeds|must have shape"):
         hrc_env.compare_rates([1, 1], [1, 0], 2.0, exposure)
 
@@ -237,8 +237,8 @@ def test_margins_of_equal_contacts_can_be_set():
 
 
 def test_intervals_below_zero_can_be_read():
-    assert report.with_interval([-0.15, -0.193, -0.144], 3) == "-0.150 (-0.193 to -0.144)"
-    assert report.with_interval([0.15, 0.1, 0.2], 1) == "0.1 (0.1 to 0.2)"
+    assert report.format_interval(-0.15, -0.193, -0.144, 3) == "-0.150 (-0.193 to -0.144)"
+    assert report.format_interval(0.15, 0.1, 0.2, 1) == "0.1 (0.1 to 0.2)"
 
 
 @pytest.mark.parametrize("name", ["", " "])

@@ -7,9 +7,9 @@ import pytest
 from stable_baselines3 import PPO
 
 from hrc_env.agents.checkpoints import TrainedAgent
-from hrc_env.agents.export import taken
+from hrc_env.agents.export import extract_network
 from hrc_env.agents.features import NearAndFar
-from hrc_env.agents.network import flat
+from hrc_env.agents.network import flatten
 from hrc_env.core.errors import CheckpointError, ConfigError
 from hrc_env.sb3 import HRCVecEnv
 
@@ -42,7 +42,7 @@ def test_a_policy_acts_where_there_are_more_images_than_it_has_learnt_from(train
 
 def test_a_policy_that_sees_images_is_not_exported():
     with closing(make(ONE)) as env, pytest.raises(CheckpointError, match="no convolutions"):
-        taken(learner(env))
+        extract_network(learner(env))
 
 
 def test_features_at_two_scales_are_of_numbers():
@@ -53,4 +53,4 @@ def test_features_at_two_scales_are_of_numbers():
 def test_a_network_of_numbers_leaves_images_out():
     with closing(make(ONE)) as env:
         observation = env.reset()
-        np.testing.assert_array_equal(flat(observation), observation["observation"])
+        np.testing.assert_array_equal(flatten(observation), observation["observation"])

@@ -15,7 +15,7 @@ from hrc_env.agents import checkpoints, cloning, sac
 from hrc_env.agents.cloning import CloningSettings, clone
 from hrc_env.agents.env_info import env_info
 from hrc_env.agents.features import NearAndFar
-from hrc_env.agents.recipes import Run, filled
+from hrc_env.agents.recipes import Run, fill_in
 from hrc_env.agents.registry import make_agent
 from hrc_env.agents.requests import TrainingRequest
 from hrc_env.core.errors import CheckpointError, NoGoalError
@@ -163,18 +163,18 @@ def test_who_only_imitates_can_learn_on_later(tmp_path, monkeypatch):
 
 
 def test_every_task_is_learnt_as_suits_it_unless_somebody_says_otherwise():
-    by_task = {task: filled(TrainingRequest(task=task)) for task in BUILT_IN}
+    by_task = {task: fill_in(TrainingRequest(task=task)) for task in BUILT_IN}
     assert {task: run.algorithm for task, run in by_task.items() if run.algorithm != "ppo"} == {
         REACH: "sac"
     }
     assert [task for task, run in by_task.items() if not run.demonstrations] == [
         "HRCReach-v0", REACH,
     ]  # fmt: skip
-    run = filled(TrainingRequest(task="HRCPickPlace-v0", demonstrations=7, control="joint"))
+    run = fill_in(TrainingRequest(task="HRCPickPlace-v0", demonstrations=7, control="joint"))
     assert (run.demonstrations, run.control, run.algorithm) == (7, "joint", "ppo")
-    run = filled(TrainingRequest(task="HRCPickPlace-v0", algorithm="sac"))
+    run = fill_in(TrainingRequest(task="HRCPickPlace-v0", algorithm="sac"))
     assert (run.demonstrations, run.control) == (0, "joint")
-    assert filled(TrainingRequest(task="Mine-v0")) == Run(task="Mine-v0")
+    assert fill_in(TrainingRequest(task="Mine-v0")) == Run(task="Mine-v0")
 
 
 def test_cloning_brings_actions_near_the_experts():

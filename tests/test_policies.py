@@ -19,9 +19,9 @@ from test_extras import WITHOUT
 from hrc_env.__main__ import main
 from hrc_env.agents import checkpoints, policies, ppo, sac
 from hrc_env.agents.env_info import env_info
-from hrc_env.agents.export import command, taken
+from hrc_env.agents.export import extract_network, format_command
 from hrc_env.agents.network import Architecture, Network
-from hrc_env.agents.recipes import filled
+from hrc_env.agents.recipes import fill_in
 from hrc_env.agents.registry import make_agent
 from hrc_env.agents.requests import TrainingRequest
 from hrc_env.core.errors import CheckpointError, ConfigError
@@ -120,9 +120,9 @@ def test_the_command_of_a_card_asks_for_the_same():
         n_workers=("1", "2"), cost_limit=30.0, algorithm="ppo_lagrangian", film=False,
         config=("reward.effort=0.1", "tracker.lost_after_s=1"),
     )  # fmt: skip
-    said = command(asked)
+    said = format_command(asked)
     assert asked_by(said) == replace(asked, film=True)
-    assert command(TrainingRequest()) == "python -m hrc_env train"
+    assert format_command(TrainingRequest()) == "python -m hrc_env train"
 
 
 @pytest.mark.parametrize("task", ["HRCReach-v0", "HRCReachGoal-v0"])
@@ -137,7 +137,7 @@ def test_networks_of_every_kind_act_as_their_learners(task, kind):
     for layer in learner.policy.parameters():
         layer.data *= 4
     observation = env.reset()
-    network = Network(*taken(learner))
+    network = Network(*extract_network(learner))
     expected = learner.predict(observation, deterministic=True)[0]
     np.testing.assert_allclose(network.act(observation), expected, atol=2e-5)
     assert np.abs(expected).max() > 0.05
@@ -152,7 +152,7 @@ def test_a_policy_needs_no_learner(exported, process):
 
 def test_an_address_is_a_file_of_the_package(exported, tmp_path, monkeypatch):
     monkeypatch.setattr(policies, "FOLDER", exported.parent.parent)
-    assert policies.names() == ("hrc://HRCReach-v0/tiny",)
+    assert policies.list_names() == ("hrc://HRCReach-v0/tiny",)
     assert isinstance(make_agent("hrc://HRCReach-v0/tiny", here()), Network)
     with pytest.raises(ConfigError, match="Did you mean 'hrc://HRCReach-v0/tiny'"):
         make_agent("hrc://HRCReach-v0/tony", here())
@@ -185,11 +185,13 @@ def test_a_policy_for_another_environment_is_refused_in_words(exported, kwargs, 
 
 def test_another_order_or_scale_of_terms_is_refused(exported):
     card, info = policies.read(exported)[0], here()
-    assert policies.differences(card, info) == []
+    assert policies.list_differences(card, info) == []
     turned = replace(card, observation=card.observation[::-1])
-    assert policies.differences(turned, info) == ["its observation's terms come in another order"]
+    assert policies.list_differences(turned, info) == [
+        "its observation's terms come in another order"
+    ]
     finer = replace(card.observation[0], scale=0.5), *card.observation[1:]
-    (said,) = policies.differences(replace(card, observation=finer), info)
+    (said,) = policies.list_differences(replace(card, observation=finer), info)
     assert "6 entries of 0.5, here 6 entries of 1" in said
 
 
@@ -242,7 +244,7 @@ def test_an_activation_that_nobody_knows_is_refused():
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (["RUN", "--name", "Tiny"], "of small letters, digits and _"),
+        (["RUN", "--name", "Tiny"], "takes small letters, digits and _"),
         (["RUN", "--name", "tiny"], "is there already; give another --name"),
         (["nowhere", "--name", "tiny"], "holds no run"),
         (["RUN", "--name", "tiny", "--episodes", "0"], "--episodes must be 1 or more"),
@@ -256,15 +258,15 @@ def test_what_cannot_be_exported_is_refused_in_words(words, says, run, exported,
 
 
 def test_policies_of_the_package_are_whole_and_small():
-    for address in policies.names():
-        path = policies.path_of(address)
+    for address in policies.list_names():
+        path = policies.find_path(address)
         card, _ = policies.read(path)
         assert card.task == path.parent.name
         assert path.stat().st_size < 1.5e6
         assert card.worth
-        kwargs = filled(asked_by(card.command)).keywords()
+        kwargs = fill_in(asked_by(card.command)).keywords()
         del kwargs["num_threads"]
-        assert policies.differences(card, here(**kwargs)) == []
+        assert policies.list_differences(card, here(**kwargs)) == []
 
 
 def test_who_plays_a_policy_need_not_say_what_its_actions_are(capsys):

@@ -74,7 +74,7 @@ def test_what_was_played_loads_back(task, words, root, capsys):
 
 def test_what_is_finished_when_it_is_killed_is_not_played_again(root, monkeypatch):
     """Killed in the second pair of episodes, and then while the data set is written."""
-    once, plays = recording._played, []
+    once, plays = recording._play, []
 
     def counted(asked, first, n):
         plays.append(first)
@@ -82,7 +82,7 @@ def test_what_is_finished_when_it_is_killed_is_not_played_again(root, monkeypatc
             raise KeyboardInterrupt
         return once(asked, first, n)
 
-    monkeypatch.setattr(recording, "_played", counted)
+    monkeypatch.setattr(recording, "_play", counted)
     assert killed(lambda: record("HRCReachGoal-v0"))
     with monkeypatch.context() as patched:
         patched.setattr(minari, "create_dataset_from_buffers", interrupted)
@@ -111,7 +111,7 @@ def test_a_data_set_that_there_is_stays_as_it_is(root, capsys):
     before = {path: path.stat().st_mtime_ns for path in root.rglob("*")}
     assert record("HRCReachGoal-v0") == 2
     said = " ".join(capsys.readouterr().err.split())
-    assert f"There is a data set '{NAME}' already" in said
+    assert f"The data set '{NAME}' exists already" in said
     assert "hrc/reach/scripted-v1" in said
     assert {path: path.stat().st_mtime_ns for path in root.rglob("*")} == before
 

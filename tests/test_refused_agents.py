@@ -15,11 +15,11 @@ from hrc_env import __version__
 from hrc_env.agents import acting, policies
 from hrc_env.agents.callbacks import Ramp
 from hrc_env.agents.env_info import EnvInfo, env_info
-from hrc_env.agents.experts import expert
-from hrc_env.agents.recording import _same_as_before
-from hrc_env.agents.registry import control_of, make_agent
+from hrc_env.agents.experts import make_expert
+from hrc_env.agents.recording import _check_same_request
+from hrc_env.agents.registry import find_control, make_agent
 from hrc_env.agents.requests import RecordingRequest, TrainingRequest
-from hrc_env.agents.training import as_before, asked_of
+from hrc_env.agents.training import read_arguments, restore_arguments
 from hrc_env.core.errors import CheckpointError, ConfigError
 from hrc_env.env import HRCEnv
 from hrc_env.evaluation.episodes import evaluate
@@ -27,7 +27,7 @@ from hrc_env.tasks.goal import ACHIEVED
 
 MAJOR, MINOR, *_ = __version__.split(".")
 NEXT = int(MINOR) + 1
-KEPT = next(name for name in policies.names() if name.startswith("hrc://HRCReach-v0/"))
+KEPT = next(name for name in policies.list_names() if name.startswith("hrc://HRCReach-v0/"))
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +39,7 @@ def here() -> EnvInfo:
 @pytest.fixture
 def own(tmp_path: Path) -> Path:
     """A copy of a policy that comes with the package."""
-    path = policies.path_of(KEPT)
+    path = policies.find_path(KEPT)
     for each in (path, path.with_suffix(".json")):
         shutil.copy(each, tmp_path)
     return tmp_path / path.name
@@ -54,7 +54,7 @@ def made(meta: dict[str, object] | None, path: Path) -> Path:
     return path
 
 
-def meta_of(**changes: object) -> dict[str, object]:
+def read_meta(**changes: object) -> dict[str, object]:
     """Return what a checkpoint for 7 entries and 3 actions says of itself."""
     sizes = {"observation_size": 7, "action_size": 3}
     return {"hrc_env": __version__, "num_timesteps": 512, **sizes} | changes
@@ -75,7 +75,7 @@ def meta_of(**changes: object) -> dict[str, object]:
     ],
 )
 def test_a_checkpoint_fits_what_it_was_made_for(changes, size, said):
-    meta = meta_of(**changes)
+    meta = read_meta(**changes)
     if not said:
         acting.check_fits(Path("it.zip"), meta, size, 3)
         return
@@ -84,7 +84,7 @@ def test_a_checkpoint_fits_what_it_was_made_for(changes, size, said):
 
 
 def test_what_is_no_checkpoint_says_so(tmp_path):
-    assert acting.describe(made(meta_of(), tmp_path / "good.zip")) == meta_of()
+    assert acting.describe(made(read_meta(), tmp_path / "good.zip")) == read_meta()
     with pytest.raises(CheckpointError, match=r"none\.zip\. Train one"):
         acting.describe(tmp_path / "none.zip")
     (tmp_path / "junk.zip").write_text("junk")
@@ -95,20 +95,20 @@ def test_what_is_no_checkpoint_says_so(tmp_path):
 
 def test_a_run_goes_on_where_there_is_more_to_learn(tmp_path):
     with pytest.raises(CheckpointError, match=r"holds no run: .*run\.json is missing"):
-        asked_of(tmp_path)
+        read_arguments(tmp_path)
     (tmp_path / "run.json").write_text(json.dumps({"arguments": {"timesteps": 512, "seed": 3}}))
-    assert (asked_of(tmp_path).timesteps, asked_of(tmp_path).seed) == (512, 3)
-    made(meta_of(), tmp_path / "policy.zip")
-    assert as_before(TrainingRequest(timesteps=513), tmp_path).timesteps == 513
+    assert (read_arguments(tmp_path).timesteps, read_arguments(tmp_path).seed) == (512, 3)
+    made(read_meta(), tmp_path / "policy.zip")
+    assert restore_arguments(TrainingRequest(timesteps=513), tmp_path).timesteps == 513
     for wanted in (512, 1, None):
-        with pytest.raises(CheckpointError, match="has learnt 512 steps already"):
-            as_before(TrainingRequest(timesteps=wanted), tmp_path)
-    made(meta_of(num_timesteps=511), tmp_path / "policy.zip")
-    assert as_before(TrainingRequest(), tmp_path).timesteps == 512
+        with pytest.raises(CheckpointError, match="was trained for 512 steps already"):
+            restore_arguments(TrainingRequest(timesteps=wanted), tmp_path)
+    made(read_meta(num_timesteps=511), tmp_path / "policy.zip")
+    assert restore_arguments(TrainingRequest(), tmp_path).timesteps == 512
     (tmp_path / "run.json").write_text(json.dumps({"arguments": {"timesteps": None}}))
-    made(meta_of(num_timesteps=0), tmp_path / "policy.zip")
+    made(read_meta(num_timesteps=0), tmp_path / "policy.zip")
     with pytest.raises(CheckpointError, match="has learnt 0 steps already"):
-        as_before(TrainingRequest(), tmp_path)
+        restore_arguments(TrainingRequest(), tmp_path)
 
 
 def test_a_ramp_takes_no_time_at_the_least():
@@ -119,16 +119,16 @@ def test_a_ramp_takes_no_time_at_the_least():
 
 def test_a_record_goes_on_with_the_same_arguments_only(tmp_path):
     asked = RecordingRequest(out="own-v0")
-    _same_as_before(asked, tmp_path)
-    _same_as_before(asked, tmp_path)
+    _check_same_request(asked, tmp_path)
+    _check_same_request(asked, tmp_path)
     with pytest.raises(ConfigError, match="were recorded with other arguments"):
-        _same_as_before(replace(asked, seed=asked.seed + 1), tmp_path)
+        _check_same_request(replace(asked, seed=asked.seed + 1), tmp_path)
 
 
 def test_an_expert_is_one_of_those_that_are_written(here):
-    assert callable(expert(here).act)
+    assert callable(make_expert(here).act)
     with pytest.raises(ConfigError, match="no scripted agent for HRCTend-v0"):
-        expert(replace(here, task="HRCTend-v0"))
+        make_expert(replace(here, task="HRCTend-v0"))
 
 
 @pytest.fixture
@@ -177,7 +177,7 @@ def test_an_agent_without_a_name_is_refused(here, name):
 def test_a_folder_is_no_agent_and_that_of_a_run_says_what_is_meant(here, tmp_path):
     with pytest.raises(ConfigError, match=r"is a folder\. Valid: 'random'"):
         make_agent(str(tmp_path), here)
-    made(meta_of(), tmp_path / "policy.zip")
+    made(read_meta(), tmp_path / "policy.zip")
     with pytest.raises(ConfigError, match=r"is a folder\. Did you mean '.*policy\.zip'\?"):
         make_agent(str(tmp_path), here)
 
@@ -206,7 +206,7 @@ def test_a_module_in_the_working_folder_is_found(here, tmp_path, monkeypatch):
 def test_an_evaluation_takes_names_and_refuses_those_that_there_are_not(agent, said):
     with pytest.raises(ConfigError, match=said):
         evaluate(agent, 1, perception="none")
-    with pytest.raises(ConfigError, match="evaluate wants a function"):
+    with pytest.raises(ConfigError, match="evaluate takes a function"):
         evaluate(None, 1)
     with pytest.raises(ConfigError, match="n_episodes must be a whole number"):
         evaluate("random", 0)
@@ -221,16 +221,16 @@ def test_a_file_that_is_not_there_is_refused(here, tmp_path, name):
 
 def test_a_file_of_another_ending_is_read_as_a_checkpoint(here, tmp_path):
     (tmp_path / "policy").write_text("junk")
-    with pytest.raises(CheckpointError, match="is not a checkpoint"):
+    with pytest.raises(CheckpointError, match="neither a checkpoint"):
         make_agent(str(tmp_path / "policy"), here)
 
 
 def test_what_actions_are_is_said_by_files_only(tmp_path):
-    assert control_of("random") is None
-    assert control_of(KEPT) == policies.read(policies.path_of(KEPT))[0].control
-    told = made(meta_of(environment={"control": "tool"}), tmp_path / "own.zip")
-    assert control_of(str(told)) == "tool"
-    assert control_of(str(made(meta_of(), tmp_path / "own.zip"))) is None
+    assert find_control("random") is None
+    assert find_control(KEPT) == policies.read(policies.find_path(KEPT))[0].control
+    told = made(read_meta(environment={"control": "tool"}), tmp_path / "own.zip")
+    assert find_control(str(told)) == "tool"
+    assert find_control(str(made(read_meta(), tmp_path / "own.zip"))) is None
 
 
 def spoilt(path: Path, content: bytes | None = None, **changes: object) -> Path:
@@ -243,10 +243,10 @@ def spoilt(path: Path, content: bytes | None = None, **changes: object) -> Path:
     return path
 
 
-@pytest.mark.parametrize("name", policies.names())
+@pytest.mark.parametrize("name", policies.list_names())
 def test_the_packages_policies_are_taken(name):
     """Of tasks with goals apart from the observation, too: their networks see more than it."""
-    card, network = policies.read(policies.path_of(name))
+    card, network = policies.read(policies.find_path(name))
     n_seen = sum(term.entries for term in card.observation)
     near_and_far = card.architecture.near_and_far
     goal = next((term.entries for term in card.observation if term.name == ACHIEVED), 0)
@@ -263,11 +263,11 @@ def test_a_copy_of_a_policy_is_taken(own):
     [
         (b"\x80junk", {}, "is a pickled file"),
         (b"PKjunk", {}, "is a pickled file"),
-        (b"P", {}, "holds no policy"),
-        (b"QKjunk", {}, "holds no policy"),
-        (b"", {}, "holds no policy"),
-        (None, {"sha256": "0" * 64}, "is damaged, or not the one of its card"),
-        (None, {"n_actions": 99}, "its card says"),
+        (b"P", {}, "is not a policy"),
+        (b"QKjunk", {}, "is not a policy"),
+        (b"", {}, "is not a policy"),
+        (None, {"sha256": "0" * 64}, "is damaged, or does not belong to its card"),
+        (None, {"n_actions": 99}, "its card describes"),
         (None, {"n_actions": "six"}, "is no card of a policy"),
         (None, {"more": 1}, "is no card of a policy"),
     ],
@@ -283,7 +283,7 @@ def test_a_card_of_more_or_fewer_entries_is_refused(own):
     for by in (1, -1):
         other = [*terms[:-1], terms[-1] | {"entries": terms[-1]["entries"] + by}]
         spoilt(own, observation=other)
-        with pytest.raises(CheckpointError, match="its card says"):
+        with pytest.raises(CheckpointError, match="its card describes"):
             policies.read(own)
 
 
@@ -310,7 +310,7 @@ def test_a_card_that_is_no_mapping_is_none(own):
     ],
 )
 def test_a_policy_acts_where_it_was_made_for(here, changes, said):
-    path = policies.path_of(KEPT)
+    path = policies.find_path(KEPT)
     assert callable(policies.load(path, here).act)
     with pytest.raises(CheckpointError, match=f"does not fit this environment: {said}"):
         policies.load(path, replace(here, **changes))

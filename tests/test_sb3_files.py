@@ -150,7 +150,7 @@ def test_the_trap_of_these_tests_works(tmp_path):
 def test_a_network_of_ones_own_wants_trust(tmp_path):
     path, mark = saved(tmp_path, features_extractor_class=Own), tmp_path / "mark"
     with pytest.raises(
-        CheckpointError, match=r"features_extractor_class .*Own.*runs code.*--trust"
+        CheckpointError, match=r"features_extractor_class .*Own.*run arbitrary code.*--trust"
     ):
         make_agent(str(path), here())
     model = PPO.load(path, device="cpu")
@@ -224,10 +224,10 @@ def nameless(data):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (narrow, r"other bounds: its action space has low \[-2"),
+        (narrow, r"other bounds of actions: its action space has low \[-2"),
         (wide, "for actions of 7 numbers, this environment has 6 numbers"),
-        (unsaid, "does not say for which observations"),
-        (nameless, "does not say which policy"),
+        (unsaid, "does not describe the observations"),
+        (nameless, "does not describe its policy"),
     ],
 )
 def test_a_file_in_which_one_thing_is_wrong_is_refused(change, said, tmp_path):
@@ -268,7 +268,9 @@ def test_statistics_beside_a_policy_want_trust(name, tmp_path):
     wrapper = VecNormalize(DummyVecEnv([lambda: Boxed()]), norm_obs=True)
     wrapper.obs_rms.mean[:] = 0.25
     wrapper.save(str(tmp_path / name))
-    with pytest.raises(CheckpointError, match=rf"{name}.*pickle, which runs code.*--trust.*move"):
+    with pytest.raises(
+        CheckpointError, match=rf"{name}.*pickle, which can run arbitrary code.*--trust.*move"
+    ):
         make_agent(str(path), here())
     agent, seen = make_agent(str(path), here(), trust=True), env().observation_space.sample()
     expected = PPO.load(path).predict(wrapper.normalize_obs(seen), deterministic=True)[0]

@@ -5,14 +5,14 @@ import json
 import numpy as np
 import pytest
 
-from hrc_env.evaluation.episodes import contradiction, summarize
+from hrc_env.evaluation.episodes import describe_contradiction, summarize
 
 pytest.importorskip("torch")
 from matplotlib.figure import Figure
 
 from hrc_env.__main__ import main
 from hrc_env.agents.callbacks import plot_curve
-from hrc_env.agents.training import weight_reached
+from hrc_env.agents.training import describe_weight
 
 
 def episode(reached: float, missed: float, success: float) -> dict[str, float]:
@@ -30,17 +30,17 @@ def test_a_task_that_never_succeeded_is_told():
     """Which was reported as a success of 1."""
     never = summarize([episode(3, 0, 0), episode(2, 0, 0)])
     assert (never.success_rate, never.is_success) == (1.0, 0.0)
-    assert "100% of the attempts were achieved" in contradiction(never)
-    assert contradiction(summarize([episode(3, 0, 0), episode(2, 0, 1)])) == ""
-    assert contradiction(summarize([episode(0, 4, 0)])) == ""
+    assert "100% of the attempts were achieved" in describe_contradiction(never)
+    assert describe_contradiction(summarize([episode(3, 0, 0), episode(2, 0, 1)])) == ""
+    assert describe_contradiction(summarize([episode(0, 4, 0)])) == ""
 
 
 def test_a_curve_says_the_weight_that_was_reached():
-    assert weight_reached([{"proximity": 0.5}], 2.0) == (
-        "proximity weight 0.5 of 2: the ramp was not over"
+    assert describe_weight([{"proximity": 0.5}], 2.0) == (
+        "proximity weight 0.5 of 2: the ramp was not finished"
     )
-    assert weight_reached([{"proximity": 2.0}], 2.0) == "proximity weight 2"
-    assert weight_reached([], 2.0) == "proximity weight 2"
+    assert describe_weight([{"proximity": 2.0}], 2.0) == "proximity weight 2"
+    assert describe_weight([], 2.0) == "proximity weight 2"
 
 
 def test_a_curve_shows_successes_beside_attempts(tmp_path, monkeypatch):

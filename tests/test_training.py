@@ -19,7 +19,7 @@ from hrc_env.agents.callbacks import Interrupt, Ramp, TrainingMonitor, plot_curv
 from hrc_env.agents.env_info import env_info
 from hrc_env.agents.registry import make_agent
 from hrc_env.agents.requests import TrainingRequest
-from hrc_env.agents.training import as_before
+from hrc_env.agents.training import restore_arguments
 from hrc_env.core.errors import CheckpointError, ConfigError
 from hrc_env.env import HRCEnv
 from hrc_env.evaluation.episodes import evaluate, play_episodes, play_one_by_one
@@ -210,7 +210,7 @@ def test_a_run_of_an_older_version_resumes_with_defaults_for_what_it_lacks(run, 
     del record["arguments"]["scene"]
     record["arguments"]["n_workers"] = [1, 2]
     (old / "run.json").write_text(json.dumps(record))
-    again = as_before(TrainingRequest(scene="site", timesteps=10_000, resume=old), old)
+    again = restore_arguments(TrainingRequest(scene="site", timesteps=10_000, resume=old), old)
     assert (again.scene, again.n_workers, again.perception) == (None, ("1", "2"), "truth")
     assert (again.timesteps, again.resume) == (10_000, old)
 

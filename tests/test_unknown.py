@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hrc_env.agents.env_info import env_info
-from hrc_env.agents.experts import EXPERTS, expert
+from hrc_env.agents.experts import EXPERTS, make_expert
 from hrc_env.agents.scripted import Yielding
 from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCEnv
@@ -108,8 +108,8 @@ def test_several_environments_know_what_single_ones_do_and_states_keep_it():
 @pytest.mark.parametrize("most_m_s", [0.25, 0.0])
 def test_every_expert_is_slow_while_somebody_is_unknown_and_free_in_an_empty_room(task, most_m_s):
     env = HRCEnv(task=task, perception="none", n_workers=1)
-    careful = expert(env_info(env.simulation), Yielding(unknown_m_s=most_m_s))
-    bold = expert(env_info(env.simulation))
+    careful = make_expert(env_info(env.simulation), Yielding(unknown_m_s=most_m_s))
+    bold = make_expert(env_info(env.simulation))
     observation, _ = env.reset(seed=2)
     slow, fast = careful.act(observation), bold.act(observation)
     assert np.abs(slow[:3]).max() <= max(0.8 * np.abs(fast[:3]).max(), 0.02)

@@ -1,4 +1,4 @@
-"""RLlib's PPO round the network of Stable-Baselines3."""
+"""RLlib's PPO with the network of Stable-Baselines3."""
 
 import logging
 import math
@@ -30,27 +30,27 @@ from .runner_env import RunnerEnv, make_envs, reported_errors
 ENVIRONMENT = "hrc_env"
 """Name of our environments in RLlib."""
 _LOGGER = logging.getLogger("ray.rllib")
-"""Of workers that fail; its lines would come between those of the progress."""
+"""RLlib's log of failing workers; its lines would interrupt those of the progress."""
 SEEDS_OF_RUN = 100_000
 """Numbers of runners that a run may have, between the seeds of runs."""
 
 
 @dataclass(frozen=True, slots=True)
 class RunnerSettings:
-    """The processes that step environments."""
+    """Settings of the processes that step environments."""
 
     keywords: Mapping[str, Any]
-    """Of the environment, as of `gymnasium.make`, with the task."""
+    """Keywords of the environment, as of `gymnasium.make`, with the task."""
     n: int
-    """How many."""
+    """Number of runners."""
     num_envs: int
-    """Environments of each."""
+    """Number of environments of each runner."""
     seed: int
-    """Of environments and of exploration."""
+    """Seed of environments and of exploration."""
     share: float
-    """Of a core that each counts as, where there are fewer cores."""
+    """Share of a core that each runner counts as, if there are fewer cores than runners."""
     registrations: Registrations
-    """Registrations of this process, which they take."""
+    """Registrations of this process, which the runners take over."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,11 +60,11 @@ class Sampled:
     n_steps: int
     """Environment steps."""
     episodes: list[dict[str, float]]
-    """Statistics of those that ended."""
+    """Statistics of the episodes that ended."""
     n_runners: int
-    """Runners that live."""
+    """Number of living runners."""
     n_restarts: int
-    """Runners that died and were started anew, so far."""
+    """Number of runners that died and were restarted, so far."""
     seconds: float
     """Time of sampling and learning."""
 
@@ -81,9 +81,9 @@ class RLlibPPO:
     """Runners that step environments, and a learner on this machine.
 
     Args:
-        policy: its network is learnt on; it keeps what it knows until `pull`.
-        settings: of PPO; a rollout has `n_steps` of every environment of every runner.
-        runners: who step environments.
+        policy: policy whose network is trained; it does not change until `pull`.
+        settings: settings of PPO; a rollout has `n_steps` of every environment of every runner.
+        runners: settings of the processes that step environments.
     """
 
     def __init__(self, policy: PPO, settings: PPOSettings, runners: RunnerSettings) -> None:
@@ -158,7 +158,8 @@ class RLlibPPO:
             raise
 
     def push(self) -> None:
-        """Give learner and runners the policy's network, Adam's moments and scale of rewards."""
+        """Copy the policy's network, Adam's moments and the scale of rewards to learner and
+        runners."""
         known = self.policy.policy
         weights, moments = known.state_dict(), known.optimizer.state_dict()
 
@@ -176,7 +177,7 @@ class RLlibPPO:
         self._each(lambda envs: envs.take_rewards_state(scale))
 
     def pull(self) -> None:
-        """Give the policy the learnt network, Adam's moments and scale of rewards."""
+        """Copy the learned network, Adam's moments and the scale of rewards to the policy."""
 
         def give(learner: Any) -> Any:
             module = learner.module[DEFAULT_MODULE_ID].policy
@@ -202,10 +203,10 @@ class RLlibPPO:
         )
 
     def update(self, proximity: float) -> Sampled:
-        """Step all environments `n_steps` times and learn from that.
+        """Step all environments `n_steps` times and update the policy with the data.
 
         Args:
-            proximity: weight of the term of that name.
+            proximity: weight of the reward's proximity term.
         """
         self._each(lambda envs: envs.weigh_proximity(proximity))
         began_s = time.monotonic()
@@ -238,7 +239,7 @@ class RLlibPPO:
 
 
 def make_runner_env(context: Mapping[str, Any]) -> RunnerEnv:
-    """Return the environments of a runner; RLlib adds how many."""
+    """Return the environments of a runner; RLlib adds their number."""
     cluster.one_core()
     torch.set_num_threads(1)
     errors = context["errors"]
@@ -261,13 +262,12 @@ def envs_of(runner: EnvRunner) -> RunnerEnv:
 
 
 class GoOn(RLlibCallback):
-    """Gives runners that were started anew the scale and the weight of rewards of one that
-    lives."""
+    """Passes the scale of rewards and the proximity weight of a living runner to restarted ones."""
 
     def on_env_runners_recreated(
         self, *, env_runner_group: Any, env_runner_indices: list[int], **kwargs: Any
     ) -> None:
-        """Do so before they step."""
+        """Update restarted runners before they step."""
         living = set(env_runner_group.healthy_env_runner_ids()) - set(env_runner_indices)
         if not living:
             return
@@ -297,7 +297,7 @@ class WorkerErrors:
 
 
 class LastError(logging.Handler):
-    """Keeps the last error of a log."""
+    """Stores the last error of a log."""
 
     def __init__(self) -> None:
         super().__init__(logging.ERROR)

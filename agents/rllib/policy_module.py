@@ -1,4 +1,4 @@
-"""The network of Stable-Baselines3's PPO as a module of RLlib: a policy of one is one of both."""
+"""Network of Stable-Baselines3's PPO as a module of RLlib, whose policies are interchangeable."""
 
 from typing import Any
 
@@ -20,7 +20,7 @@ class PolicyModule(TorchRLModule, ValueFunctionAPI):
     policy: ActorCriticPolicy
 
     def setup(self) -> None:
-        """Make the network."""
+        """Create the network."""
         is_dict = isinstance(self.observation_space, Dict)
         kind = MultiInputActorCriticPolicy if is_dict else ActorCriticPolicy
         self.policy = kind(

@@ -1,4 +1,4 @@
-"""The environments of one of RLlib's runners: in all phases of an episode, rewards scaled."""
+"""Environments of one of RLlib's runners, in all phases of an episode, with scaled rewards."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
@@ -26,9 +26,9 @@ def make_envs(num_envs: int, keywords: Mapping[str, Any]) -> VectorEnv[Any, Any,
     """Return environments that step together, on one thread.
 
     Args:
-        num_envs: how many.
+        num_envs: number of environments.
         keywords: as of `gymnasium.make`, with the task. At level `pixels`, which has no batched
-            form, they are stepped one after the other.
+            form, the environments are stepped one after the other.
     """
     known = {name: value for name, value in keywords.items() if name != "num_threads"}
     if known.get("perception") != "pixels":
@@ -61,11 +61,11 @@ class RunnerEnv(VectorWrapper[Any, Any, Any, Any, Any]):
     """Environments with scaled rewards and without infos, which keep finished episodes.
 
     A running estimate of the discounted return's variance scales rewards, as `VecNormalize` of
-    Stable-Baselines3 does. First episodes end early at random times, so that a short rollout sees
-    all phases of an episode, where `env` is an `HRCVectorEnv`.
+    Stable-Baselines3 does. First episodes end early at random times, so that a short rollout covers
+    all phases of an episode, if `env` is an `HRCVectorEnv`.
 
     Args:
-        env: starts environments anew in the step after an episode's end.
+        env: environments that restart in the step after an episode's end.
         gamma: discount per step.
         report: receives the error of a reset or a step in words, before it is raised.
     """
@@ -79,7 +79,7 @@ class RunnerEnv(VectorWrapper[Any, Any, Any, Any, Any]):
         super().__init__(env)
         self.gamma, self._report = gamma, report
         self.scale = RunningMeanStd()
-        """Of discounted returns so far."""
+        """Running statistics of discounted returns."""
         self.proximity: float | None = None
         """The weight that was set last; None: the configuration's."""
         self.finished: list[dict[str, float]] = []
@@ -90,7 +90,7 @@ class RunnerEnv(VectorWrapper[Any, Any, Any, Any, Any]):
 
     @property
     def simulation(self) -> Simulation:
-        """Of the environments; of several, the first."""
+        """Simulation of the environments; of several, the first."""
         if isinstance(self.env, HRCVectorEnv):
             return self.env.simulation
         return self.env.get_attr("simulation")[0]  # type: ignore[attr-defined]  # SyncVectorEnv
@@ -99,7 +99,7 @@ class RunnerEnv(VectorWrapper[Any, Any, Any, Any, Any]):
         """Start all episodes.
 
         Args:
-            seed: of the runner, with which its environments count up: k has seed * num_envs + k.
+            seed: seed of the runner; environment k has seed * num_envs + k.
             options: none.
         """
         first_seed = None if seed is None else seed * self.num_envs
@@ -134,7 +134,7 @@ class RunnerEnv(VectorWrapper[Any, Any, Any, Any, Any]):
         return taken
 
     def weigh_proximity(self, weight: float) -> None:
-        """Set the weight of closeness to the estimated body from the next step on."""
+        """Set the weight of the proximity to the estimated body from the next step on."""
         self.proximity = weight
         weights = replace(self.simulation.config.reward, proximity=weight)
         if isinstance(self.env, HRCVectorEnv):
@@ -147,7 +147,7 @@ class RunnerEnv(VectorWrapper[Any, Any, Any, Any, Any]):
         return self.scale, self.proximity
 
     def take_rewards_state(self, scale: RunningMeanStd, proximity: float | None = None) -> None:
-        """Go on with the scale of rewards, and the weight if it was set, of another runner."""
+        """Continue with the scale of rewards, and the weight if it was set, of another runner."""
         self.scale = scale
         if proximity is not None:
             self.weigh_proximity(proximity)

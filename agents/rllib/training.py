@@ -1,4 +1,4 @@
-"""A training run by RLlib: as by Stable-Baselines3, with workers on the machines of a cluster."""
+"""Training by RLlib: as by Stable-Baselines3, with workers on the machines of a cluster."""
 
 from collections.abc import Iterator
 from contextlib import closing
@@ -19,7 +19,7 @@ from .runner_env import try_environment
 from .watch import Watch
 
 WITHOUT_STEPS = 5
-"""Updates that may come without a step, of workers that die, before it is given up."""
+"""Number of successive updates without a step, because workers died, after which training stops."""
 
 
 def learn(
@@ -30,20 +30,20 @@ def learn(
     interrupt: Interrupt,
     console: Console,
 ) -> None:
-    """Learn on from the policy of a run, up to its steps or an interrupt.
+    """Continue the training of a policy up to its number of steps or an interrupt.
 
     Args:
         run: task, budget and workers.
-        settings: of PPO; of every worker's environments a rollout has `n_steps`.
-        whole: weight of the proximity term when the ramp is over.
-        log: of a PPO of Stable-Baselines3, which has the network, Adam's moments and the scale of
-            rewards, and is saved.
-        interrupt: asked before every update.
+        settings: settings of PPO; a rollout has `n_steps` of every worker's environments.
+        whole: weight of the proximity term after the ramp.
+        log: log of a PPO of Stable-Baselines3, which has the network, Adam's moments and the scale
+            of rewards, and is saved.
+        interrupt: checked before every update.
         console: shows notes on the cluster.
 
     Raises:
         ConfigError: no such cluster, or a machine that cannot work.
-        HRCError: workers die again and again.
+        HRCError: workers die repeatedly.
     """
     learner, folder = log.learner, log.folder / "tensorboard"
     learner.set_logger(configure_logger(0, str(folder), run.algorithm, run.resume is None))
@@ -70,8 +70,10 @@ def learn(
 def _updates(
     rllib: RLlibPPO, run: Run, log: TrainingLog, interrupt: Interrupt, whole: float
 ) -> Iterator[tuple[float, Sampled]]:
-    """Update the policy until all steps are done; yield the share of the proximity term that was
-    in force, and what was learnt from."""
+    """Update the policy until all steps are done.
+
+    Yields the share of the proximity term and the data of each update.
+    """
     learner, ramp, without, n_restarts = log.learner, Ramp(run.ramp), 0, 0
     while learner.num_timesteps < run.timesteps and not interrupt.asked:
         share = ramp.at(learner.num_timesteps)

@@ -6,10 +6,10 @@ from .learner import Sampled
 
 
 class Watch:
-    """Ray's metrics of a run, which machines export as `ray_hrc_env_...`.
+    """Metrics of a run in Ray, which machines export as `ray_hrc_env_...`.
 
     Args:
-        task: the environment's id, which they are tagged with.
+        task: the environment's id, which tags the metrics.
     """
 
     def __init__(self, task: str) -> None:
@@ -28,7 +28,7 @@ class Watch:
             each.set_default_tags({"task": task})
 
     def show(self, sampled: Sampled) -> None:
-        """Take what an update has learnt from."""
+        """Set the metrics from the data of an update."""
         facts = sampled.facts()
         for name, gauge in self._rates.items():
             gauge.set(facts[name])

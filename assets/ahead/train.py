@@ -1,11 +1,11 @@
 """Train the network of `hrc_env/tracking/forecast.py`:  python assets/ahead/train.py
 
-Writes assets/ahead/ahead.npz; about five minutes on one core, torch needed. What it sees are the
-environment's own workers as the estimator `kalman` sees them through the emulator, with and
-without failing cameras, and as they are. Half of the samples are changed so that the network
-does not take this one worker for the world: played faster or slower, another size, turning as
-they go, gathering speed, walking on where the worker would have stopped. Left and right are
-exchanged in half of them.
+Writes assets/ahead/ahead.npz; about five minutes on one core, torch needed. The inputs are the
+environment's own workers as the estimator `kalman` tracks them through the emulator, with and
+without failing cameras, and their ground truth. Half of the samples are augmented so that the
+network generalizes beyond this one worker: faster or slower, of another size, turning while
+walking, accelerating, walking on where the worker would have stopped. Left and right are exchanged
+in half of them.
 """
 
 import argparse
@@ -16,8 +16,8 @@ import numpy as np
 import torch
 from torch import nn
 
-from benchmarks.tracking.tracks import Tracks, follow_env
 from benchmarks.tracking.rigs import DT_S
+from benchmarks.tracking.tracks import Tracks, follow_env
 from hrc_env.core.skeleton import MIRROR, N_JOINTS, TORSO
 from hrc_env.tracking.forecast import N_INPUTS, describe
 from hrc_env.tracking.oracle import ORACLE_STD_M
@@ -25,7 +25,7 @@ from hrc_env.tracking.oracle import ORACLE_STD_M
 OUT = Path(__file__).parent / "ahead.npz"
 HORIZONS_S = (0.1, 0.2, 0.4, 0.6, 0.8, 1.0)
 SCALE_M = np.array([0.05, 0.1, 0.2, 0.3, 0.4, 0.5], np.float32)
-"""What the network counts displacements in, at each horizon."""
+"""Unit of the network's displacements at each horizon [m]."""
 WARM_UP, N_FRAMES = 25, 300
 N_AHEAD = 39
 """Frames of the future that a sample needs: 1 s at 1.5 times the pace, and a frame for rates."""
@@ -37,22 +37,23 @@ SETS = (  # seeds, lively, failing
     (range(103_000, 103_096), True, True),
 )
 GIVEN_SHARE = 0.15
-"""Share of the samples in which the worker is seen as they are."""
+"""Share of the samples with the true state of the worker."""
 CHANGED_SHARE, GO_ON_SHARE = 0.6, 0.75
 PACE, SIZE = (0.67, 1.5), (0.9, 1.1)
 TURN_RAD_S, TURN_RAD_S2, PUSH_M_S2 = 1.2, 2.0, 0.7
-"""Standard deviations of a change's turning, of its gathering, and of a walker's acceleration."""
+"""Standard deviations of the turning rate, of its growth, and of a walker's acceleration, in
+augmented samples."""
 FLIP = np.array([1.0, -1.0, 1.0])
 
 
 @dataclass(frozen=True)
 class Samples:
-    """N moments of one worker, and the frames that they look into."""
+    """N moments of one worker, and the frames of their future."""
 
     path: np.ndarray
     """(M, J, 3) true joints, sequences one after the other."""
     start: np.ndarray
-    """(N,) a moment's row of `path`."""
+    """Row of `path` of each moment, (N,)."""
     seen: tuple[np.ndarray, np.ndarray, np.ndarray]
     """Means (N, J, 3), velocities (N, J, 3), covariances (N, J, 3, 3) as estimated."""
     speed: np.ndarray
@@ -60,7 +61,7 @@ class Samples:
 
 
 def gather(sets: list[Tracks]) -> Samples:
-    """All moments at which somebody is tracked and whose future is known."""
+    """Collect all moments with a tracked worker and a known future."""
     paths, speeds, starts, seen, begin = [], [], [], [], 0
     for tracks in sets:
         n_frames, n = tracks.truth.shape[:2]
@@ -152,7 +153,8 @@ def batch(samples: Samples, n: int, rng: np.random.Generator) -> list[torch.Tens
 
 
 def loss_of(answer: torch.Tensor, moved, variance, axes) -> torch.Tensor:
-    """Negative log-likelihood of what is known now plus what cannot be, and squared error."""
+    """Return the negative log-likelihood of the displacement beyond constant velocity, and the
+    squared error."""
     n_moved = len(HORIZONS_S) * N_JOINTS * 3
     error = moved - answer[:, :n_moved].reshape(moved.shape)
     log_std = answer[:, n_moved:].reshape(moved.shape[:3]).clamp(-6, 4)

@@ -1,1 +1,2 @@
-"""The emulator beside the pixels: clips, the network's detections, the fit, the proof."""
+"""Calibration of the keypoint emulator: clips, detections of the pose network, fit and
+validation."""

@@ -1,4 +1,4 @@
-"""Clips: one motion of one worker somewhere in a scene, with the arm somewhere near home."""
+"""Clips: one motion of one worker at a place in a scene, with the arm near its home posture."""
 
 import zlib
 from collections.abc import Sequence
@@ -19,13 +19,13 @@ from hrc_env.scene.build import SCENES, Scene, SceneConfig, build
 from hrc_env.worker.body import Body, load_body, worker_names
 
 DT_S = 0.04
-"""Between the frames of a clip [s]: the environment's control step."""
+"""Time between the frames of a clip [s]: the environment's control step."""
 N_FRAMES = 60
-"""Frames of a clip."""
+"""Number of frames of a clip."""
 WARM_UP = 10
-"""The first of these are for finding the worker and do not count."""
+"""Number of first frames in which the tracker finds the worker; they are not evaluated."""
 TRIES = 300
-"""Places and moments that are tried; the one with the most room is taken."""
+"""Number of places and moments that are tried; the one with the most room is taken."""
 
 NEAR_M = 5.0
 """Greatest distance of places from the middle of the working area [m]: the tracker does not follow
@@ -47,72 +47,73 @@ FAMILIES: dict[str, tuple[str, ...]] = {
     ),
     "fold": ("squat", "kneel", "lunge", "hammer on the floor"),
 }  # fmt: skip
-"""The scenes of the repertoire by family: what folds the body is hardest to see."""
+"""Scenes of the repertoire by family; motions that fold the body are the hardest to see."""
 TIMES = {"fold": 4}
-"""Families, and the factor by which they are played more often: folded bodies differ most from one
-another."""
+"""Number of times that motions of a family are played for each of the others (default 1): folded
+bodies differ most from one another."""
 
 
 Moved: TypeAlias = tuple[float, float]
-"""A rig whose cameras hang elsewhere: this share of the way along the walls to the next one, and so
-much lower [m]."""
+"""Displacement of a camera rig: the share of the way along the walls to the next camera, and the
+distance that the cameras are lowered [m]."""
 AS_BUILT: Moved = (0.0, 0.0)
 FIT_RIGS: tuple[Moved, ...] = (AS_BUILT, (0.5, 0.2), (0.75, 0.6))
-"""Of the fit's clips, in turns: errors depend on from where one looks."""
+"""Rigs of the fit's clips, in turn, because errors depend on the viewpoint."""
 UNSEEN_RIG: Moved = (0.25, 0.4)
 UNSEEN_SEEDS = 1003
-"""Of clips that no fit has seen: rig, and how much higher their seeds are (which also pairs motions
-and bodies otherwise)."""
+"""Rig of the clips that no fit has used, and the offset of their seeds (which also changes the
+pairs of motion and body)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Clip:
-    """What is played where."""
+    """Specification of a clip: motion, body, place and cameras."""
 
     scene: str
-    """A key of `SCENES`."""
+    """Key of `SCENES`."""
     motion: str
-    """A key of `REPERTOIRE`, or of `RECORDINGS`."""
+    """Key of `REPERTOIRE` or of `RECORDINGS`."""
     body: str
-    """A baked worker."""
+    """Name of a baked worker."""
     seed: int
-    """Of the motion's details, the place and the arm."""
+    """Seed of the motion's details, the place and the arm."""
     rig: Moved = AS_BUILT
-    """Where the cameras hang."""
+    """Displacement of the cameras."""
     draw: int = 0
-    """Number of the errors' draw, where they are drawn."""
+    """Number of the draw of the emulator's errors, in clips that the emulator plays."""
 
 
 @dataclass(frozen=True, slots=True)
 class Staged:
-    """A clip, frame by frame."""
+    """A clip frame by frame."""
 
     q: JointAngles
-    """(N,) the arm, which stands still [rad]."""
+    """Joint angles of the arm, which does not move, (N,) [rad]."""
     body: Body
-    """The worker's."""
+    """Body of the worker."""
     motion: WorkerMotion
-    """(T, 1, ...)."""
+    """Motion of the worker, (T, 1, ...)."""
 
 
 def family_of(motion: str) -> str:
-    """The family of a scene of the repertoire, or "recorded"."""
+    """Return the family of a scene of the repertoire, or "recorded"."""
     families = (family for family, motions in FAMILIES.items() if motion in motions)
     return next(families, "recorded")
 
 
 def fit_clips(rounds: int, seed: int) -> list[Clip]:
-    """Those that the emulator is fitted to (`clips_of`)."""
+    """Return the clips that the emulator is fitted to (`clips_of`)."""
     return clips_of(rounds, seed, FIT_RIGS)
 
 
 def unseen_clips(rounds: int, seed: int) -> list[Clip]:
-    """As many others: other seeds and pairs of motion and body, cameras elsewhere."""
+    """Return as many clips again with other seeds, other pairs of motion and body, and displaced
+    cameras."""
     return clips_of(rounds, seed + UNSEEN_SEEDS, (UNSEEN_RIG,))
 
 
 def recorded_clips(role: Role, rounds: int, seed: int, rigs: Sequence[Moved]) -> list[Clip]:
-    """Recordings of people that serve for this, in both scenes (`clips_of`)."""
+    """Return the clips of recordings of people with a role, in both scenes (`clips_of`)."""
     names = [name for name, of in RECORDINGS.items() if of == role]
     return clips_of(rounds, seed, rigs, motions=names)
 
@@ -125,7 +126,8 @@ def clips_of(
     motions: Sequence[str] = tuple(REPERTOIRE),
     scenes: Sequence[str] = tuple(SCENES),
 ) -> list[Clip]:
-    """Every motion, `rounds` times in each scene, or (0 rounds) in one; bodies and rigs in turn."""
+    """Return every motion, `rounds` times in each scene, or (0 rounds) in one; bodies and rigs in
+    turn."""
     clips = []
     for k, motion in enumerate(motions):
         for round_ in range(max(rounds, 1) * TIMES.get(family_of(motion), 1)):
@@ -139,13 +141,13 @@ def clips_of(
 
 
 def scene_of(clip: Clip) -> Scene:
-    """The compiled scene of a clip."""
+    """Return the compiled scene of a clip."""
     rig = () if clip.rig == AS_BUILT else moved(SCENES[clip.scene].cameras, clip.rig)
     return build(SceneConfig(cameras=rig), clip.scene, 1, clip.body)
 
 
 def moved(rig: tuple[CameraConfig, ...], how: Moved) -> tuple[CameraConfig, ...]:
-    """The same cameras elsewhere."""
+    """Return the cameras of a rig after a displacement."""
     along, lower_m = how
     eyes = [camera.eye_world for camera in rig]
     following = eyes[1:] + eyes[:1]
@@ -160,13 +162,13 @@ def moved(rig: tuple[CameraConfig, ...], how: Moved) -> tuple[CameraConfig, ...]
 
 
 def number_of(clip: Clip) -> int:
-    """A number of its own, however often it is drawn."""
+    """Return a clip's number, which its draw of the errors does not change."""
     words = f"{clip.seed} {clip.scene} {clip.motion} {clip.body} {clip.rig}"
     return zlib.crc32(words.encode())
 
 
 def stage(clip: Clip, scene: Scene) -> Staged:
-    """The worker at a place with room, at a moment of the motion that the seed chooses."""
+    """Place the worker where there is room, at a moment of the motion that the seed chooses."""
     rng = np.random.default_rng(number_of(clip))
     seed, body = int(rng.integers(2**31)), load_body(clip.body)
     path = _played(clip.motion, body, seed).position_world[:, 0, 0, :2]
@@ -182,7 +184,8 @@ def stage(clip: Clip, scene: Scene) -> Staged:
 def _played(
     name: str, body: Body, seed: int, xy_m: tuple[float, float] = (0.0, 0.0), yaw_rad: float = 0.0
 ) -> WorkerMotion:
-    """A whole scene of the repertoire, or a recording (T, 1, ...), begun at a place."""
+    """Return a complete scene of the repertoire, or a recording, (T, 1, ...), that begins at a
+    place."""
     if name not in REPERTOIRE:
         return perform_clip(recording(name), body, DT_S, xy_m, yaw_rad, N_FRAMES * DT_S)
     me = make_worker(body, xy_m, yaw_rad, right=seed % 5 > 0)
@@ -191,7 +194,7 @@ def _played(
 
 
 def _joined(films: list[Film]) -> WorkerMotion:
-    """One film after the other."""
+    """Return several films as one motion, in their order."""
     motions = [film.motion for film in films]
     helds = [motion.held for motion in motions if motion.held is not None]
     return WorkerMotion(
@@ -210,7 +213,8 @@ def _joined(films: list[Film]) -> WorkerMotion:
 def _place(
     path: Floats, scene: Scene, rng: np.random.Generator
 ) -> tuple[tuple[float, float], float, int]:
-    """Where to begin so that these frames of a path (T, 2) [m] have room: place, yaw, frame."""
+    """Return the start of a path (T, 2) [m] at which these frames have room: position, yaw,
+    frame."""
     plan, grounds = make_floorplan(scene.grounds), scene.grounds
     last = max(len(path) - N_FRAMES, 0)
     middle_of_work = HRCConfig().tracker.prior_mean_world[:2]

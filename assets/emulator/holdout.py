@@ -1,13 +1,13 @@
-"""Trueness: errors of people, motions and a place that nothing was fitted on.
+"""Validation on people, motions and a place that no part was fitted to.
 
-    python -m assets.emulator.holdout --out out/trueness
+python -m assets.emulator.holdout --out out/trueness
 
-Fitted to what is detected of rendered workers are: where the joints of a body are
-(assets/workers/calibrate_joints.py), and the calibration: offsets, deviations that the tracker is
-told, and all that the emulator draws. Here the calibration is fitted anew to six bodies, all
-motions but one of each family, and one scene. Pixels and emulator are then compared on the rest;
-the joints of the other bodies lie where those of the six do on average (`bodies.not_looked_at`).
-Clips and fit are kept in the folder, so that a run that was stopped goes on.
+Two parts are fitted to detections of rendered workers: the positions of the joints of a body
+(assets/workers/calibrate_joints.py), and the calibration, which comprises offsets, the deviations
+reported to the tracker, and all that the emulator draws. Here the calibration is fitted anew to six
+bodies, all motions but one of each family, and one scene. Pixels and emulator are then compared on
+the rest; the joints of the other bodies have the mean offsets of the six (`bodies.not_looked_at`).
+Clips and fit are kept in the folder, so that an interrupted run can continue.
 """
 
 import hashlib
@@ -43,12 +43,12 @@ from hrc_env.core.results import Metric, write_results
 from hrc_env.experiments.cache import PartCache, PartProgress
 from hrc_env.experiments.columns import Column
 from hrc_env.experiments.report import Table
-from hrc_env.experiments.versions import key_of
+from hrc_env.experiments.versions import make_key
 from hrc_env.perception.emulator import EmulatorConfig
 from hrc_env.worker.body import Body, load_body, worker_names
 
 N_HELD = 2
-"""Bodies that are held out: the last."""
+"""Number of held-out bodies: the last ones."""
 FITTED_BODIES, HELD_BODIES = worker_names()[:-N_HELD], worker_names()[-N_HELD:]
 HELD_MOTIONS = tuple(motions[1] for motions in FAMILIES.values())
 FITTED_MOTIONS = tuple(m for motions in FAMILIES.values() for m in motions if m not in HELD_MOTIONS)
@@ -58,21 +58,21 @@ FITTED_SCENE, HELD_SCENE = "lab", "site"
 ROUNDS = 3
 """Default number of rounds of clips."""
 TRUTHS = {"joint": "joints_world", "landmark": "landmarks_world"}
-"""What errors are taken from: where BlazePose means a joint to be, or anatomical landmarks."""
+"""Reference of the errors: the joints as BlazePose defines them, or the anatomical landmarks."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """Clips by what of them was held out."""
+    """Clips by the parts of them that were held out."""
 
     rounds: int
-    """How often each motion is played, so that there are some 30 clips or more."""
+    """Number of times that each motion is played, for about 30 clips or more."""
     bodies: tuple[str, ...] = FITTED_BODIES
     motions: tuple[str, ...] = FITTED_MOTIONS
     scene: str = FITTED_SCENE
 
     def clips(self, most: int) -> list[Clip]:
-        """Greatest number of rounds seen by cameras that hang elsewhere."""
+        """Return clips with displaced cameras, of at most `most` rounds."""
         where = (self.bodies, self.motions, (self.scene,))
         return clips_of(min(self.rounds, most), UNSEEN_SEEDS, (UNSEEN_RIG,), *where)
 
@@ -91,7 +91,7 @@ WORDS = {
     "scene": "the site",
     "everything": "all three",
 }
-"""Samples in words."""
+"""Descriptions of the samples."""
 
 
 TABLES = (
@@ -117,15 +117,15 @@ TABLES = (
         "joint to be. Intervals are 95 % bootstraps over clips.",
     ),
 )
-"""Of the documentation."""
+"""Tables of the documentation."""
 
 
 def main(out: Path = Path("out/trueness"), rounds: int = ROUNDS) -> None:
-    """Fit to a part, compare on the rest; writes results.json.
+    """Fit to a part, compare on the rest and write results.json.
 
     Args:
         out: folder of clips, calibration and results.
-        rounds: how often each motion is played for the fit, and at most for the rest.
+        rounds: number of times that each motion is played for the fit, and at most for the rest.
     """
     console = Console()
     with progress_bar(console, "trueness") as say:
@@ -141,17 +141,17 @@ def main(out: Path = Path("out/trueness"), rounds: int = ROUNDS) -> None:
 def judged(
     parts: PartCache, config: HRCConfig, rounds: int, store: Path | None
 ) -> dict[str, Metric]:
-    """Return the numbers of all samples, each from the cache or anew.
+    """Return the metrics of all samples, from the cache or computed anew.
 
     Args:
-        parts: where they are kept.
-        config: with the calibration that is judged.
-        rounds: how often each motion is played, at most.
+        parts: cache of the samples' metrics.
+        config: settings with the calibration that is validated.
+        rounds: greatest number of times that each motion is played.
         store: folder of rendered clips; None: they are rendered anew.
     """
     metrics = dict[str, Metric]()
     digest = hashlib.sha256(Path(config.emulator.calibration).read_bytes()).hexdigest()
-    key = key_of({"calibration": digest, "rounds": rounds}, DEPENDS)
+    key = make_key({"calibration": digest, "rounds": rounds}, DEPENDS)
     for name, sample in SAMPLES.items():
 
         def make(tick: PartProgress, sample: Sample = sample) -> dict[str, Any]:
@@ -159,23 +159,24 @@ def judged(
             seen = compared(clips, lambda share, _: tick(share), config, store, joints_of)
             return {each: asdict(metric) for each, metric in metrics_of(seen)}
 
-        part = parts.part(name, make, key)
+        part = parts.make_part(name, make, key)
         metrics |= {f"{name}.{each}": Metric(**values) for each, values in part.items()}
     return metrics
 
 
 def calibration_of(out: Path, rounds: int) -> Path:
-    """Return the path of the calibration that is fitted to what is not held out."""
-    return out / f"keypoints-{key_of({'rounds': rounds}, DEPENDS)}.json"
+    """Return the path of the calibration that is fitted to the clips that are not held out."""
+    return out / f"keypoints-{make_key({'rounds': rounds}, DEPENDS)}.json"
 
 
 def joints_of(name: str) -> Body:
-    """A body; of those that are held out without what was detected of it."""
+    """Return a body; a held-out one without the offsets that were fitted to its detections."""
     return not_looked_at(name, FITTED_BODIES) if name in HELD_BODIES else load_body(name)
 
 
 def fitted(out: Path, rounds: int, say: Say) -> HRCConfig:
-    """Settings with a calibration that is fitted to what is not held out, made if need be."""
+    """Return settings with a calibration fitted to the clips that are not held out, made if
+    necessary."""
     path, config = calibration_of(out, rounds), HRCConfig()
     where = (FITTED_BODIES, FITTED_MOTIONS, (FITTED_SCENE,))
     clips, pixels = clips_of(rounds, 0, FIT_RIGS, *where), []
@@ -190,8 +191,8 @@ def fitted(out: Path, rounds: int, say: Say) -> HRCConfig:
 
 
 def metrics_of(seen: Compared) -> Iterator[tuple[str, Metric]]:
-    """Medians, 95th percentiles [mm] and coverage of pixels by group, from both truths, and how far
-    the emulator is from them."""
+    """Return medians, 95th percentiles [mm] and coverage of pixels by group, for both references,
+    and the differences of the emulator from them."""
     for word, truth in TRUTHS.items():
         each = [in_space([watched], truth) for watched in seen.pixels]
         for group in seen.outcomes:

@@ -1,8 +1,8 @@
-"""The last touch of a calibration: play the same clips with the emulator, and close what is open.
+"""Correction of a calibration: play the same clips with the emulator and remove the differences.
 
-The fit takes one table after the other, and what is drawn from all of them together is not quite
-what was measured: sizes, whole bodies that are seen badly, and the error in space are compared
-with those of the pixels, and corrected by what they are off.
+The fit estimates one table after the other, and errors drawn from all of them together do not
+reproduce the measured ones exactly. Sizes, factors of whole bodies and the error in space are
+compared with those of the pixels and corrected by their differences.
 """
 
 from collections.abc import Callable, Iterator
@@ -33,40 +33,42 @@ from hrc_env.perception.calibration import LONGEST_TAIL, Calibration
 from hrc_env.perception.emulator import EmulatorConfig
 
 IN_THE_IMAGE, IN_SPACE = 3, 7
-"""Rounds: first errors in the image are matched, then those in space; in one more their scale."""
+"""Numbers of rounds: the errors in the image are matched first, then those in space; one more round
+corrects their scale."""
 STEP = (0.75, 1.3)
-"""No number changes by more than such a factor in a round."""
+"""Greatest decrease and increase of a number in a round, as factors."""
 DRAWS = 3
-"""How often the emulator plays every clip in a round."""
+"""Number of times that the emulator plays every clip in a round."""
 DAMPED = 0.7
-"""Power of the factors in space: what the emulator draws by chance is not to be fitted."""
+"""Power of the factors in space, so that random errors of the emulator are not fitted."""
 THROUGH_THE_TRACKER = 1.5
-"""Power of the factors of tails, chosen by trial: with `DAMPED` they were short at the end."""
+"""Power of the factors of tails, chosen by trial: with `DAMPED` they were too short at the end."""
 OFTEN = 2000
-"""Least number of joints of a posture for an estimate of it: some three clips."""
+"""Least number of joints of a posture for an estimate: some three clips."""
 USUAL = 2.366
-"""Median of the square of three normal variables: so much a longer tail adds to the median."""
+"""Median of the square of three normal variables, by which a longer tail increases the median."""
 TAKEN_BACK = 0.5
-"""How much of what a longer tail adds to the median is taken off at once, before it is measured."""
+"""Share of a longer tail's effect on the median that is compensated at once, before it is
+measured."""
 TOLD_LAGS = (2, 5, 12)
-"""Those of `LAGS` by which the duration of errors is estimated [frames]."""
+"""Lags of `LAGS` by which the duration of errors is estimated [frames]."""
 LONG_LAGS = (25, 35)
-"""Those by which the lasting share of errors is estimated [frames]."""
+"""Lags of `LAGS` by which the lasting share of errors is estimated [frames]."""
 Say = Callable[[float, str], None]
-"""Called with the growth of the finished share, and with the current work."""
+"""Callback with the increase of the completed share, and with the current work."""
 
 
 def matched(
     draft: Calibration, clips: list[Clip], pixels: list[Watched], path: Path, say: Say
 ) -> Calibration:
-    """A draft, corrected so that the emulator does to these clips what the pixels did.
+    """Correct a draft so that the emulator reproduces the errors of the pixels on these clips.
 
     Args:
-        draft: what the fit gave.
-        clips: K of them.
-        pixels: (K) what was seen of them.
-        path: a file that may be written while this runs.
-        say: hears of the progress: shares that sum to 1.
+        draft: result of the fit.
+        clips: K clips.
+        pixels: (K) their detections in rendered images.
+        path: temporary file of the drafts.
+        say: callback of the progress; its shares sum to 1.
     """
     wanted, n_rounds = samples_of(pixels), IN_THE_IMAGE + IN_SPACE + 1
     for k in range(n_rounds):
@@ -84,7 +86,7 @@ def matched(
 
 
 def _emulated(clips: list[Clip], path: Path, tick: Callable[[], None]) -> list[Watched]:
-    """Every clip `DRAWS` times."""
+    """Play every clip `DRAWS` times with the emulator."""
     config = replace(HRCConfig(), emulator=EmulatorConfig(calibration=str(path)))
     seen = []
     for draw in range(DRAWS):
@@ -95,8 +97,10 @@ def _emulated(clips: list[Clip], path: Path, tick: Callable[[], None]) -> list[W
 
 
 def _as_in_the_image(draft: Calibration, wanted: Samples, drawn: Samples) -> Calibration:
-    """Sizes by cell and how they spread, how badly whole bodies are seen, and how long errors last,
-    moved by what they are off."""
+    """Correct the errors in the image.
+
+    These are sizes by cell and their spread, factors of whole bodies, and the duration of errors.
+    """
     cells, others = Cells(wanted), Cells(drawn)
     body = draft.body * _limited(body_spread(cells) / body_spread(others))[:, None]
     (middle, wide), (middle_drawn, wide_drawn) = _lengths(cells), _lengths(others)
@@ -112,13 +116,13 @@ def _as_in_the_image(draft: Calibration, wanted: Samples, drawn: Samples) -> Cal
 
 
 def _moved(shares: Floats, more: float) -> Floats:
-    """Shares (K, 3) of what stays and what lasts for a while, of which so much more stays."""
+    """Increase the constant share of shares (K, 3) of constant and lasting errors."""
     more_each = np.clip(more, -shares[:, 0], shares[:, 1])
     return shares + np.stack([more_each, -more_each, np.zeros(N_K)], -1)
 
 
 def _correlation(samples: Samples, lags: tuple[int, ...]) -> Floats:
-    """(P, n) correlation of errors with those so many frames later, by posture, .01 to .99."""
+    """Return the correlation of errors at these lags by posture, (P, n), between .01 and .99."""
     class_ = class_of(samples.posture)[..., None, None, None]
     small = np.linalg.norm(samples.error, axis=-1, keepdims=True) < SHARP
     found = []
@@ -131,8 +135,11 @@ def _correlation(samples: Samples, lags: tuple[int, ...]) -> Floats:
 
 
 def _lengths(cells: Cells) -> tuple[Floats, Floats]:
-    """(P, S, K) each: median length of the errors, and the logarithm of what their 95th percentile
-    is over it; 1 where there are hardly any."""
+    """Return the median length of the errors and the logarithm of the 95th percentile over it, each
+    (P, S, K).
+
+    The values are 1 where there are hardly any errors.
+    """
     length = np.linalg.norm(cells.mirrored, axis=-1)
     middle, wide = np.ones((N_P, N_S, N_K)), np.ones((N_P, N_S, N_K))
     for cell in np.ndindex(*middle.shape):
@@ -144,7 +151,7 @@ def _lengths(cells: Cells) -> tuple[Floats, Floats]:
 
 
 def _trust(cells: Cells) -> Floats:
-    """(P, S, K) how far a cell has enough samples to speak for itself."""
+    """Return the weight of each cell by its number of samples, (P, S, K)."""
     count = np.zeros((N_P, N_S, N_K))
     for cell in np.ndindex(*count.shape):
         count[cell] = cells.pick(*cell).sum()
@@ -156,8 +163,11 @@ def _limited(factor: Floats | float, trust: Floats | float = 1.0) -> Floats:
 
 
 def _as_in_space(draft: Calibration, pixels: list[Watched], emulated: list[Watched]) -> Calibration:
-    """All errors scaled by what the tracker's median error is off, posture by posture; tails of
-    what cameras share by what is then left of its 95th percentile's."""
+    """Correct the errors in space.
+
+    All errors are scaled by the ratio of the tracker's median errors, posture by posture; the tails
+    of the error that cameras share by the ratio that remains of its 95th percentile.
+    """
     size, wander, tail = draft.size.copy(), draft.wander_m.copy(), draft.tail.copy()
     for posture, middle, most in _off(pixels, emulated):
         factor = _limited(middle**DAMPED)
@@ -171,7 +181,7 @@ def _as_in_space(draft: Calibration, pixels: list[Watched], emulated: list[Watch
 
 
 def _scaled(draft: Calibration, pixels: list[Watched], emulated: list[Watched]) -> Calibration:
-    """All errors scaled by what the growing tails have left of the medians' difference."""
+    """Scale all errors by the ratio of the medians that remains after the growth of the tails."""
     size, wander = draft.size.copy(), draft.wander_m.copy()
     for posture, middle, _ in _off(pixels, emulated):
         size[posture] *= middle
@@ -180,8 +190,8 @@ def _scaled(draft: Calibration, pixels: list[Watched], emulated: list[Watched]) 
 
 
 def _off(pixels: list[Watched], emulated: list[Watched]) -> Iterator[tuple[int, float, float]]:
-    """For each posture of which there is enough: it, and factors by which median and 95th
-    percentile of the tracker's errors would have to grow."""
+    """Yield each posture of enough samples with the factors of the tracker's median and 95th
+    percentile."""
     for posture in range(N_P):
         wanted, drawn = _errors_in(pixels, posture), _errors_in(emulated, posture)
         if min(wanted.size, drawn.size) >= OFTEN:
@@ -190,7 +200,7 @@ def _off(pixels: list[Watched], emulated: list[Watched]) -> Iterator[tuple[int, 
 
 
 def _errors_in(watched: list[Watched], posture: int) -> Floats:
-    """(N,) errors of the tracked joints while the body was of a posture [m]."""
+    """Return errors of the tracked joints while the body was of a posture, (N,) [m]."""
     errors = [np.zeros(0)]
     for each in watched:
         mine = each.tracked & (class_of(postures_of(each)) == posture)

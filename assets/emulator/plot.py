@@ -1,4 +1,4 @@
-"""One picture of pixels beside emulator."""
+"""Figure that compares pixels and emulator."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,7 +17,7 @@ LAGS = (1, 2, 4, 7, 12, 18, 25, 35)
 
 
 def plot_comparison(path: Path, seen: Compared) -> None:
-    """Sizes of errors in the image, how long they last, errors in space: both levels in each."""
+    """Plot sizes of errors in the image, their duration, and errors in space for both levels."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -76,7 +76,8 @@ def _bars(axis: Any, seen: Compared) -> None:
 
 
 def _lengths(watched: Sequence[Watched], sight: int) -> Floats:
-    """Lengths of the errors of joints that are seen so, of the window's side."""
+    """Return lengths of the errors of joints of a kind of sight, as a share of the window's
+    side."""
     parts = []
     for each in watched:
         length = errors_in_image(each)

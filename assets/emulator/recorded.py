@@ -15,15 +15,15 @@ from hrc_env.motion.clip import Clip, scale_clip
 from hrc_env.worker.body import Body
 
 RECORDINGS: dict[str, Role] = {each.name: each.role for each in (*CLIPS, *STYLES)}
-"""What each recording may serve for, by its name: to fit, or to validate."""
+"""Role of each recording by its name: to fit, or to validate."""
 
 
 MADE = tuple(style.name for style in STYLES)
-"""Those that are of nobody."""
+"""Names of synthetic recordings."""
 
 
 def recording(name: str) -> Clip:
-    """A recording by its name; what people's are not there is downloaded."""
+    """Return a recording by its name; missing recordings of people are downloaded."""
     return (_made if name in MADE else _of_people)(RECORDINGS[name])[name]
 
 
@@ -40,9 +40,10 @@ def _made(role: Role) -> dict[str, Clip]:
 def perform_clip(
     clip: Clip, body: Body, dt_s: float, xy_m: tuple[float, float], yaw_rad: float, least_s: float
 ) -> WorkerMotion:
-    """A recording (T, 1, ...) as a body plays it, begun at a place; without angular velocities.
+    """Return a recording (T, 1, ...) as played by a body that begins at a place, without angular
+    velocities.
 
-    One that is shorter than `least_s` goes forth and back, nowhere faster than it was recorded.
+    One that is shorter than `least_s` is played forwards and backwards, never faster than recorded.
     """
     bones = measure_body(body)
     q = _placed(scale_clip(clip, bones.lengths), xy_m, yaw_rad)
@@ -56,7 +57,7 @@ def perform_clip(
 
 
 def _moments(lasts_s: float, least_s: float, dt_s: float) -> Floats:
-    """(T,) moments of a recording, one a frame [s]."""
+    """Return times of a recording, one for each frame, (T,) [s]."""
     if lasts_s >= least_s:
         return np.arange(0.0, lasts_s, dt_s)
     time_s = np.arange(0.0, least_s, dt_s)
@@ -64,7 +65,7 @@ def _moments(lasts_s: float, least_s: float, dt_s: float) -> Floats:
 
 
 def _placed(controls: Floats, xy_m: tuple[float, float], yaw_rad: float) -> Floats:
-    """Control vectors (T, N_CONTROLS) of a clip, begun at a place."""
+    """Return control vectors of a clip that begins at a place, (T, N_CONTROLS)."""
     out, cos, sin = controls.copy(), np.cos(yaw_rad), np.sin(yaw_rad)
     turn = np.array([[cos, sin], [-sin, cos]])
     for at in (c.ROOT_X, c.ANKLE, c.ANKLE + 6):

@@ -1,4 +1,4 @@
-"""The whole of `python -m assets.emulator.calibrate`: render, fit, write, compare."""
+"""Complete run of `python -m assets.emulator.calibrate`: render, fit, write, compare."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -22,19 +22,19 @@ from hrc_env.perception.emulator import EmulatorConfig
 from hrc_env.worker.body import worker_names
 
 Say = Callable[[float, str], None]
-"""Called with the growth of the finished share, and with the current work."""
+"""Callback with the increase of the completed share, and with the current work."""
 
 
 @dataclass(frozen=True, slots=True)
 class CalibrationRun:
-    """How much is rendered."""
+    """Extent of a calibration."""
 
     rounds: int = 4
-    """How often each motion is played in each scene; 0: once, in one of the scenes."""
+    """Number of times that each motion is played in each scene; 0: once, in one of the scenes."""
     seed: int = 0
-    """Of the clips."""
+    """Seed of the clips."""
     recordings: bool = False
-    """Whether recordings of people, which are downloaded, are fitted to as well."""
+    """True to fit also to recordings of people, which are downloaded."""
 
     def __post_init__(self) -> None:
         if self.rounds < 0 or self.seed < 0:
@@ -42,12 +42,12 @@ class CalibrationRun:
 
 
 def calibrate(run: CalibrationRun, out: Path, say: Say) -> Calibration:
-    """Render, fit, write the file; rendered clips stay in a folder beside it.
+    """Render, fit and write the file; rendered clips stay in a folder beside it.
 
     Args:
-        run: how much.
+        run: extent of the calibration.
         out: the calibration file.
-        say: hears of the progress: shares that sum to 1.
+        say: callback of the progress; its shares sum to 1.
     """
     clips, pixels = fit_clips(run.rounds, run.seed), []
     n_known = len(clips)
@@ -64,12 +64,13 @@ def calibrate(run: CalibrationRun, out: Path, say: Say) -> Calibration:
 
 
 def part_of(say: Say, part: float) -> Say:
-    """What a part of the whole tells its progress."""
+    """Return a callback that reports the progress of a part of the whole."""
     return lambda share, label: say(part * share, label)
 
 
 def compare(run: CalibrationRun, out: Path, say: Say) -> Compared:
-    """Pixels beside the emulator with this file, on clips that the fit has not seen; a plot."""
+    """Compare pixels and emulator with this file on clips that the fit has not used, with a
+    plot."""
     config = replace(HRCConfig(), emulator=EmulatorConfig(calibration=str(out)))
     clips = unseen_clips(run.rounds, run.seed)
     seen = compared(clips, say, config, folder_of(out))
@@ -78,7 +79,7 @@ def compare(run: CalibrationRun, out: Path, say: Say) -> Compared:
 
 
 def folder_of(out: Path) -> Path:
-    """Where the rendered clips are kept."""
+    """Return the folder of the rendered clips."""
     return out.with_name(f"{out.stem}_clips")
 
 

@@ -1,4 +1,4 @@
-"""Errors of detections in the terms in which the emulator draws them."""
+"""Errors of detections in the coordinates in which the emulator draws them."""
 
 import inspect
 from collections.abc import Sequence
@@ -27,45 +27,51 @@ from hrc_env.perception.sightlines import (
 LEFT_OF_PAIR = np.flatnonzero(np.arange(len(MIRROR)) < MIRROR)
 """Left joints of the seven pairs."""
 APART = 0.05
-"""Pairs that look nearer to each other than this share of the side cannot tell left from right."""
+"""Least distance of a pair in the image at which left and right can be distinguished, as a share of
+the window's side."""
 BETTER = 0.6
-"""A pair is exchanged where the other way round it is off by less than this share."""
+"""A pair is exchanged if its error with exchanged sides is below this share of its error as it
+is."""
 AGREED = 0.06
-"""Errors of at most this share of the side say where in space a joint is meant; where the body is
-folded, three times as large ones."""
+"""Greatest error at which cameras agree on a joint's offset in space, as a share of the window's
+side; three times as large where the body is folded."""
 
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """L clips of T frames in C cameras; x to the right in the window, y down, of side."""
+    """Samples of L clips of T frames in C cameras.
+
+    Image coordinates are x to the right in the window and y down, as shares of its side.
+    """
 
     error: Floats
-    """(L, T, C, J, 2) with exchanged sides put right; NaN: not found."""
+    """Errors after correction of exchanged sides, (L, T, C, J, 2); NaN: not detected."""
     confidence: Floats
-    """(L, T, C, J)."""
+    """Confidences, (L, T, C, J)."""
     sight: Ints
-    """(L, T, C, J)."""
+    """Lines of sight, (L, T, C, J)."""
     view: Floats
-    """(L, T, C) [rad]."""
+    """Directions of view, (L, T, C) [rad]."""
     posture: Floats
-    """(L, T, P) how far the body counts as each of `POSTURES`."""
+    """Degree of membership of the body in each of `POSTURES`, (L, T, P)."""
     speed_m_s: Floats
-    """(L, T) mean over the joints."""
+    """Mean speed of the joints, (L, T)."""
     missed: Bools
-    """(L, T, C)."""
+    """True where the worker was not detected, (L, T, C)."""
     exchanged: Bools
-    """(L, T, C, 2) left and right of all joints, of the legs alone."""
+    """True where left and right of all joints, or of the legs alone, are exchanged, (L, T, C,
+    2)."""
     shown: Floats
-    """(L, T, C, J, 2, 3) how an offset in space (ahead, to the joint's own side, up) appears
-    [1/m]."""
+    """Image of an offset in space (ahead, to the joint's own side, up) [1/m], (L, T, C, J, 2,
+    3)."""
     offset_m: Floats
-    """(L, T, J, 3) offset in space on which three cameras or more agree; NaN: fewer."""
+    """Offset in space on which at least three cameras agree, (L, T, J, 3); NaN: fewer."""
     counts: Bools
-    """(L, T) whether the worker was tracked, so that the windows were in place."""
+    """True while the worker was tracked, so that the windows were in place, (L, T)."""
 
 
 def samples_of(clips: Sequence[Watched]) -> Samples:
-    """The samples of clips of one length and number of cameras, without their beginning."""
+    """Return the samples of clips of one length and number of cameras, without their warm-up."""
     parts = [_samples(clip) for clip in clips]
     return Samples(*(np.stack([getattr(part, f.name) for part in parts]) for f in fields(Samples)))
 
@@ -90,7 +96,7 @@ def _samples(clip: Watched) -> Samples:
 
 
 def postures_of(clip: Watched) -> Floats:
-    """(T, P) how far the body counts as each of `POSTURES`."""
+    """Return the degree of membership of the body in each of `POSTURES`, (T, P)."""
     look_of = clip.look_of[:, 0]
     columns = look_of[:, [FOLDING, KNEELING, HANDLING, STEPPING]].T
     shares = inspect.unwrap(weigh)(*columns)  # of arrays, not compiled
@@ -98,7 +104,7 @@ def postures_of(clip: Watched) -> Floats:
 
 
 def _in_window(vectors: Floats, look_of: Floats) -> Floats:
-    """Image vectors (T, C, J, 2, ...) turned into the window, of its side."""
+    """Rotate image vectors (T, C, J, 2, ...) into the window and divide them by its side."""
     lead = (..., None) + (None,) * (vectors.ndim - 4)
     cos, sin = np.cos(look_of[..., TURN])[lead], np.sin(look_of[..., TURN])[lead]
     x, y, side = vectors[:, :, :, 0], vectors[:, :, :, 1], look_of[..., SIDE][lead]
@@ -106,7 +112,8 @@ def _in_window(vectors: Floats, look_of: Floats) -> Floats:
 
 
 def exchanged_sides(px: Floats, true_px: Floats, side: Floats) -> Bools:
-    """(T, C, 2) whether left and right of the whole body, and of the legs alone, are exchanged."""
+    """Return where left and right of the whole body, and of the legs alone, are exchanged, (T, C,
+    2)."""
     here = np.linalg.norm(px - true_px, axis=-1)
     other = np.linalg.norm(px[..., MIRROR, :] - true_px, axis=-1)
     apart = np.linalg.norm(true_px - true_px[..., MIRROR, :], axis=-1)
@@ -120,7 +127,8 @@ def exchanged_sides(px: Floats, true_px: Floats, side: Floats) -> Bools:
 
 
 def _shown(clip: Watched, late: slice, look_of: Floats) -> Floats:
-    """(T, C, J, 2, 3) see `Samples`; pinhole cameras."""
+    """Return the images of offsets in space, (T, C, J, 2, 3), as in `Samples`, for pinhole
+    cameras."""
     P, joints = clip.P, clip.joints_world[late]
     slope = P[None, :, None, :2, :3] - clip.true_px[late][..., None] * P[None, :, None, 2:, :3]
     slope = slope / clip.depth_m[late][..., None, None]
@@ -135,7 +143,8 @@ def _shown(clip: Watched, late: slice, look_of: Floats) -> Floats:
 
 
 def _agreed(error: Floats, shown: Floats, sight: Ints, fold: Floats) -> Floats:
-    """(T, J, 3) least squares over the cameras that are not far off; NaN: fewer than three."""
+    """Return the least-squares offset over the cameras without outliers, (T, J, 3); NaN: fewer than
+    three."""
     most = AGREED * np.where(fold > 0.5, 3.0, 1.0)[:, None, None]
     good = (sight == SEEN) & (np.linalg.norm(np.nan_to_num(error, nan=9.0), axis=-1) < most)
     rows, e = shown * good[..., None, None], np.where(good[..., None], error, 0.0)

@@ -1,4 +1,4 @@
-"""Clips that were rendered stay on disk, so that whoever is stopped goes on where he was."""
+"""Cache of rendered clips on disk, from which an interrupted run continues."""
 
 import hashlib
 import json
@@ -10,11 +10,11 @@ from assets.emulator.clips import Clip
 from assets.emulator.watch import BodyOf, Watched, load, save, watch
 from hrc_env.config import HRCConfig
 from hrc_env.core.typing import Floats
-from hrc_env.experiments.versions import key_of
+from hrc_env.experiments.versions import make_key
 from hrc_env.worker.body import load_body
 
 DEPENDS = ("env", "tracker", "emulator", "detector", "motion")
-"""Subsystems that decide what is seen of clips."""
+"""Subsystems that decide the detections of clips."""
 
 
 def kept(
@@ -24,10 +24,11 @@ def kept(
     folder: Path | None,
     body_of: BodyOf = load_body,
 ) -> Iterator[Watched]:
-    """What a level saw of clips, from the folder where it is there, else played and put there.
+    """Yield the detections of clips at a level, from the folder if present, else played and saved
+    there.
 
-    What other versions or settings saw does not count, nor what was seen when the tracker was told
-    other deviations or offsets of joints, or that these are elsewhere in a body (`watch`).
+    Clips of other versions or settings do not count. Neither do clips with other reported
+    deviations, other offsets of joints or other joint positions in a body (`watch`).
     """
     if folder is None:
         yield from watch(level, clips, config, body_of)
@@ -35,7 +36,7 @@ def kept(
     known = config.emulator.make_calibration()
     told = _digest(known.sigma, known.offset_m, known.wander_m, known.between_m)
     settings = {"level": level, "detector": asdict(config.detector), "told": told}
-    key = key_of(settings, DEPENDS)
+    key = make_key(settings, DEPENDS)
     joints = {clip.body: _digest(body_of(clip.body).joint_offset) for clip in clips}
     paths = [folder / f"{_name(clip, key + joints[clip.body])}.npz" for clip in clips]
     todo = [clip for clip, path in zip(clips, paths, strict=True) if not path.exists()]

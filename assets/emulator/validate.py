@@ -1,7 +1,7 @@
-"""Whether the emulator predicts the pixels: the same clips, seen by both, tracked by the default.
+"""Validation of the emulator against the pixels: the same clips, both levels, the default tracker.
 
-The clips are none of the fit's: other seeds, other pairs of motion and body, and cameras that hang
-elsewhere. What counts is the 3D error after tracking, by family of motions.
+The clips are none of the fit's: other seeds, other pairs of motion and body, and displaced cameras.
+The criterion is the 3D error after tracking, by family of motions.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -21,60 +21,60 @@ from hrc_env.perception.sightlines import SEEN, SIDE
 from hrc_env.worker.body import load_body
 
 CHI2_95_3D = 7.815
-"""95 % of a three-dimensional normal variable lies within this squared distance."""
+"""95th percentile of the squared length of three standard normal variables."""
 GROUPS = {name: (name,) for name in FAMILIES}
 GROUPS |= {"upright": tuple(name for name in FAMILIES if name != "fold"), "all": tuple(FAMILIES)}
-"""Families of motions of which there are numbers, each alone and some together."""
+"""Families of motions of which there are metrics, each alone and some together."""
 HALF_SEEN = 8
-"""Least number of joints of 15."""
+"""Least number of joints of 15 in sight of which the body counts as half seen."""
 DRAWS = 4
-"""How often the emulator plays a clip."""
+"""Number of times that the emulator plays a clip."""
 RESAMPLES = 200
-"""Draws of clips for an interval."""
+"""Number of resamples of clips for an interval."""
 Say = Callable[[float, str], None]
-"""Called with the growth of the finished share, and with the current work."""
+"""Callback with the increase of the completed share, and with the current work."""
 InSpace = tuple[Floats, Bools]
-"""(N,) errors of joints [m], and whether they are within the reported region."""
+"""Errors of joints, (N,) [m], and whether they are within the reported region."""
 
 
 @dataclass(frozen=True, slots=True)
 class StepResult:
-    """What a level of perception made of clips."""
+    """Accuracy of a level of perception on clips."""
 
     median_m: float
-    """Of the joints' errors while tracked [m]."""
+    """Median of the joints' errors while tracked [m]."""
     p95_m: float
-    """Their 95th percentile [m]."""
+    """95th percentile of these errors [m]."""
     coverage: float
-    """Share of them within the reported 95 % region."""
+    """Share of joints within the reported 95 % region."""
     lost: float
-    """Share of frames in which nobody was tracked."""
+    """Share of frames without a tracked worker."""
     px_median: float
-    """Median error in an image, a share of the window's side."""
+    """Median error in an image, as a share of the window's side."""
     px_p95: float
-    """Its 95th percentile."""
+    """95th percentile of the error in an image, as a share of the window's side."""
     lasting: float
-    """Correlation of these errors (without gross ones) with those 0.48 s later."""
+    """Correlation of these errors (without outliers) with those 0.48 s later."""
     missed: float
-    """Share of looks at a body half of which is in sight that found nobody."""
+    """Share of images with at least half of the body in sight and no detection."""
     exchanged: float
-    """Share of looks that exchanged left and right of the body or of the legs."""
+    """Share of images with left and right of the body or of the legs exchanged."""
     n: int
-    """Joints."""
+    """Number of joints."""
 
 
 @dataclass(frozen=True, slots=True)
 class Compared:
-    """The same clips as both levels saw them."""
+    """The same clips at both levels."""
 
     clips: Sequence[Clip]
-    """K of them."""
+    """The K clips."""
     pixels: Sequence[Watched]
-    """(K,)."""
+    """Clips in rendered images, (K,)."""
     emulated: Sequence[Sequence[Watched]]
-    """(K, `DRAWS`)."""
+    """Clips with the emulator, (K, `DRAWS`)."""
     outcomes: dict[str, tuple[StepResult, StepResult]]
-    """Of pixels and emulator, by the names of `GROUPS`."""
+    """Results of pixels and emulator, by the names of `GROUPS`."""
 
 
 def error_ratios(
@@ -85,16 +85,17 @@ def error_ratios(
     store: Path | None = None,
     picture: Path | None = None,
 ) -> dict[str, Metric]:
-    """`ratios_of` clips that no fit has seen.
+    """Return `ratios_of` clips that no fit has used.
 
     Args:
-        rounds: how often each motion is rendered in each scene: 82 clips a round; 0: once, in
-            one of them.
-        seed: of the clips.
-        say: hears of the progress: shares that sum to 1.
-        config: settings; its `emulator` is judged.
-        store: a folder in which what was rendered stays, and is taken from; None: nothing stays.
-        picture: where a plot of both is drawn (PNG); None: nowhere.
+        rounds: number of times that each motion is rendered in each scene: 82 clips a round; 0:
+            once, in one of them.
+        seed: seed of the clips.
+        say: callback of the progress; its shares sum to 1.
+        config: settings; their `emulator` is validated.
+        store: folder of rendered clips, which are read from it and saved there; None: none are
+            saved.
+        picture: file of a plot of both levels (PNG); None: no plot.
     """
     seen = compared(unseen_clips(rounds, seed), say, config or HRCConfig(), store)
     if picture is not None:
@@ -105,13 +106,14 @@ def error_ratios(
 
 
 def ratios_of(seen: Compared) -> dict[str, Metric]:
-    """Error of the emulator over that of the pixels, by family of motions.
+    """Return the error of the emulator over that of the pixels, by family of motions.
 
     Returns:
         `emulator_error_ratio.<family>` for medians, `.<family>.p95`, and
-        `emulator_coverage_difference.<family>`; their 95 % intervals draw clips anew. What they are
-        made of, and what lasts: `emulator_<what>.<family>.<pixels|keypoints>`, which are median_m,
-        p95_m, coverage95, lasting, exchanged; and `emulator_clips.<family>`.
+            `emulator_coverage_difference.<family>`; their 95 % intervals resample the clips. Their
+            terms and the durations are `emulator_<metric>.<family>.<pixels|keypoints>` with the
+            metrics median_m, p95_m, coverage95, lasting and exchanged; the numbers of clips are
+            `emulator_clips.<family>`.
     """
     pixels = [in_space([each]) for each in seen.pixels]
     emulated = [in_space(each) for each in seen.emulated]
@@ -135,7 +137,7 @@ def _exactly(value: float, unit: str, n: int) -> Metric:
 
 
 def apart(family: str, pixels: Sequence[InSpace], emulated: Sequence[InSpace]) -> dict[str, Metric]:
-    """How far both levels are apart on K clips of a family."""
+    """Return the differences of both levels on K clips of a family."""
 
     def off(ks: Ints) -> list[float]:
         (a, a_inside), (b, b_inside) = (_of(ks, level) for level in (pixels, emulated))
@@ -150,7 +152,8 @@ def apart(family: str, pixels: Sequence[InSpace], emulated: Sequence[InSpace]) -
 def over_clips(
     numbers: Callable[[Ints], list[float]], n_clips: int, units: Sequence[str], n: int
 ) -> list[Metric]:
-    """Numbers of clips (K,), with 95 % intervals that draw the clips anew; `n` observations."""
+    """Return metrics of clips (K,) with 95 % intervals that resample the clips; `n` is that of
+    observations."""
     draws = np.random.default_rng(0)
     again = [numbers(draws.integers(0, n_clips, n_clips)) for _ in range(RESAMPLES)]
     lows, highs = np.percentile(again, [2.5, 97.5], axis=0).tolist()
@@ -159,7 +162,7 @@ def over_clips(
 
 
 def accuracy(each: Sequence[InSpace]) -> list[Metric]:
-    """Median and 95th percentile [mm] of errors, and coverage, of clips."""
+    """Return median and 95th percentile [mm] of the errors, and the coverage, of clips."""
 
     def numbers(ks: Ints) -> list[float]:
         errors, inside = zip(*(each[k] for k in ks.tolist()), strict=True)
@@ -171,7 +174,7 @@ def accuracy(each: Sequence[InSpace]) -> list[Metric]:
 
 
 def _of(ks: Ints, level: Sequence[InSpace]) -> InSpace:
-    """Some clips of a level, together."""
+    """Concatenate some clips of a level."""
     errors, inside = zip(*(level[k] for k in ks.tolist()), strict=True)
     return np.concatenate(errors), np.concatenate(inside)
 
@@ -183,7 +186,7 @@ def compared(
     store: Path | None,
     body_of: BodyOf = load_body,
 ) -> Compared:
-    """What pixels and emulator make of clips; see `error_ratios`, `watch`."""
+    """Compare pixels and emulator on clips; see `error_ratios` and `watch`."""
     pixels: list[Watched] = []
     for clip, watched in zip(clips, kept("pixels", clips, config, store, body_of), strict=True):
         pixels.append(watched)
@@ -201,7 +204,7 @@ def compared(
 def by_family(
     clips: Sequence[Clip], pixels: Sequence[list[Watched]], emulated: Sequence[list[Watched]]
 ) -> dict[str, tuple[StepResult, StepResult]]:
-    """Outcomes of both levels for each of `GROUPS` that occurs."""
+    """Return results of both levels for each of `GROUPS` that occurs."""
     result = {}
     for family in GROUPS:
         mine = of_family(clips, family)
@@ -212,12 +215,12 @@ def by_family(
 
 
 def of_family(clips: Sequence[Clip], group: str) -> list[int]:
-    """Which of the clips are of one of `GROUPS`."""
+    """Return the indices of the clips of one of `GROUPS`."""
     return [k for k, clip in enumerate(clips) if family_of(clip.motion) in GROUPS[group]]
 
 
 def outcome(watched: Sequence[Watched]) -> StepResult:
-    """Numbers of some clips."""
+    """Compute the accuracy on some clips."""
     error, inside = in_space(watched)
     px = np.concatenate([errors_in_image(each).ravel() for each in watched])
     px = px[np.isfinite(px)]
@@ -234,8 +237,10 @@ def outcome(watched: Sequence[Watched]) -> StepResult:
 
 
 def in_space(watched: Sequence[Watched], truth: str = "joints_world") -> InSpace:
-    """Errors of the tracked joints [m], and whether the reported region held them; the truth is
-    one of `Watched`'s."""
+    """Return errors of the tracked joints [m], and whether they are within the reported region.
+
+    The truth is one of the fields of `Watched`.
+    """
     errors, inside = [], []
     for each in watched:
         tracked = np.flatnonzero(each.tracked[WARM_UP:]) + WARM_UP
@@ -249,13 +254,13 @@ def in_space(watched: Sequence[Watched], truth: str = "joints_world") -> InSpace
 
 
 def errors_in_image(watched: Watched) -> Floats:
-    """(T, C, J) errors of the detections, of the window's side."""
+    """Return errors of the detections, (T, C, J), as a share of the window's side."""
     away = np.linalg.norm(watched.px - watched.true_px, axis=-1)[WARM_UP:]
     return away / watched.look_of[WARM_UP:, :, :1]
 
 
 def lasting(watched: Sequence[Watched], lag: int = 12, sharp: float = 0.06) -> float:
-    """Correlation about zero of errors below `sharp` with those `lag` frames later."""
+    """Return the correlation about zero of errors below `sharp` with those `lag` frames later."""
     product, square = 0.0, 1e-12
     for each in watched:
         error = (each.px - each.true_px)[WARM_UP:] / each.look_of[WARM_UP:, :, None, :1]
@@ -268,7 +273,7 @@ def lasting(watched: Sequence[Watched], lag: int = 12, sharp: float = 0.06) -> f
 
 
 def exchanging(watched: Sequence[Watched]) -> float:
-    """Share of looks while somebody was tracked that exchanged left and right."""
+    """Return the share of images with left and right exchanged, while the worker was tracked."""
     exchanged, looks = 0, 0
     for each in watched:
         px, side = each.px[WARM_UP:], each.look_of[WARM_UP:, :, SIDE]
@@ -279,8 +284,8 @@ def exchanging(watched: Sequence[Watched]) -> float:
     return exchanged / max(looks, 1)
 
 
-def table_of(seen: dict[str, tuple[StepResult, StepResult]]) -> Iterator[tuple[str, ...]]:
-    """Rows of text: family, then each number as "pixels / emulator"."""
+def format_metrics(seen: dict[str, tuple[StepResult, StepResult]]) -> Iterator[tuple[str, ...]]:
+    """Yield rows of text: the family, then each number as "pixels / emulator"."""
     for family, (a, b) in seen.items():
         yield (
             family,

@@ -1,4 +1,4 @@
-"""What is seen of clips: by the pose network in rendered pictures, or by its emulator."""
+"""Detections in clips: of the pose network in rendered images, or of its emulator."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, fields, replace
@@ -23,63 +23,65 @@ from hrc_env.scene.build import Scene
 from hrc_env.worker.body import Body, load_body, worker_truth
 
 INTRODUCED, INTRODUCED_PX = 3, 10.0
-"""So many frames of true joints the tracker is given first, as known to so many pixels [px]."""
+"""Number of frames of true joints that initialize the tracker, and their standard deviation
+[px]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Watched:
-    """A clip of T frames as C cameras and the tracker had it."""
+    """Detections and track of a clip of T frames and C cameras."""
 
     px: Points2
-    """(T, C, J, 2) what was detected; NaN: nothing."""
+    """Detections, (T, C, J, 2) [px]; NaN: none."""
     confidence: Floats
-    """(T, C, J)."""
+    """Confidences, (T, C, J)."""
     sigma_px: Floats
-    """(T, C, J)."""
+    """Standard deviations, (T, C, J)."""
     window: Floats
-    """(T, C, 4) centre x and y, side [px], turn [rad]; NaN: did not look, or emulated."""
+    """Windows, (T, C, 4): centre x and y, side [px], rotation [rad]; NaN: no window, or
+    emulated."""
     true_px: Points2
-    """(T, C, J, 2) where the joints are, in pixels of the image."""
+    """True joint positions in the image, (T, C, J, 2)."""
     depth_m: Floats
-    """(T, C, J)."""
+    """Depths, (T, C, J)."""
     sight: Ints
-    """(T, C, J) as `perception.emulator.lines_of_sight`."""
+    """Lines of sight as `perception.emulator.lines_of_sight`, (T, C, J)."""
     look_of: Floats
-    """(T, C, `sightlines.N_LOOK`) the same."""
+    """Directions of view as `perception.emulator.lines_of_sight`, (T, C, `sightlines.N_LOOK`)."""
     joints_world: Points3
-    """(T, J, 3) [m]."""
+    """True joint positions, (T, J, 3) [m]."""
     mean_world: Points3
-    """(T, J, 3) the estimate [m]."""
+    """Estimated joint positions, (T, J, 3) [m]."""
     cov_world: Covariances3
-    """(T, J, 3, 3) [m^2]."""
+    """Covariances of the estimate, (T, J, 3, 3) [m^2]."""
     tracked: Bools
-    """(T,)."""
+    """True while the worker is tracked, (T,)."""
     landmarks_world: Points3
-    """(T, J, 3) the anatomical landmarks of the joints [m]."""
+    """Anatomical landmarks of the joints, (T, J, 3) [m]."""
     P: Floats
-    """(C, 3, 4) the cameras."""
+    """Projection matrices of the cameras, (C, 3, 4)."""
     tracker_mean_world: Points3
-    """(T, J, 3) the tracker's estimate of the network's joints [m]."""
+    """Tracker's estimate of the network's joints, (T, J, 3) [m]."""
     tracker_cov_world: Covariances3
-    """(T, J, 3, 3) [m^2]."""
+    """Covariances of the tracker's estimate, (T, J, 3, 3) [m^2]."""
     tracker_velocity_world: Floats
-    """(T, J, 3) [m/s]."""
+    """Velocities of the tracker's estimate, (T, J, 3) [m/s]."""
 
 
 BodyOf = Callable[[str], Body]
-"""A body by its name."""
+"""Function that returns a body by its name."""
 
 
 def watch(
     level: str, clips: Iterable[Clip], config: HRCConfig, body_of: BodyOf = load_body
 ) -> Iterator[Watched]:
-    """Play clips before the pipeline of a perception level; those of one scene together.
+    """Yield clips as observed by the pipeline of a perception level; those of one scene together.
 
     Args:
         level: "pixels" or "keypoints".
-        clips: in an order in which those of one scene follow each other.
+        clips: in an order in which those of one scene are adjacent.
         config: settings.
-        body_of: where the joints of a body by name are.
+        body_of: function that returns a body, and so its joint positions, by its name.
     """
     pipeline, known = None, None
     try:
@@ -135,7 +137,7 @@ def _watched(
 
 
 def _introduce(pipeline: PoseTracking, joints_world: Points3, P: Floats, rngs: Generators) -> None:
-    """Let the tracker know the worker: how a search finds people is no matter of the clip."""
+    """Initialize the tracker with the worker, because a search for people is not part of a clip."""
     px, _ = project(P, joints_world)
     sigma_px = np.full(px.shape[:-1], INTRODUCED_PX)
     for _ in range(INTRODUCED):
@@ -154,7 +156,7 @@ def _windows(windows: list[list[Roi | None]], n_cameras: int) -> Floats:
 
 
 def save(path: Path, watched: Watched) -> None:
-    """Write what was seen of a clip, whole or not at all."""
+    """Write the detections of a clip, completely or not at all."""
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_suffix(".draft.npz")
     np.savez(draft, **{f.name: getattr(watched, f.name) for f in fields(watched)})
@@ -162,6 +164,6 @@ def save(path: Path, watched: Watched) -> None:
 
 
 def load(path: Path) -> Watched:
-    """What `save` wrote."""
+    """Read a file of `save`."""
     with np.load(path) as stored:
         return Watched(*(stored[f.name] for f in fields(Watched)))

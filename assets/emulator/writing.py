@@ -1,4 +1,4 @@
-"""Writes what was fitted as a calibration file."""
+"""Writer of calibration files."""
 
 import dataclasses
 import json
@@ -10,12 +10,12 @@ from hrc_env.perception.calibration import FORMAT, VERSION, Calibration
 
 
 def write_calibration(path: Path | str, calibration: Calibration, made: dict[str, Any]) -> None:
-    """Write a calibration, whole or not at all.
+    """Write a calibration, completely or not at all.
 
     Args:
-        path: of the file.
+        path: path of the file.
         calibration: the numbers, which are rounded to four digits.
-        made: command, seed, commit and whatever else one wants to know of its making.
+        made: command, seed, commit and further information on its origin.
     """
     path = Path(path)
     lines = [

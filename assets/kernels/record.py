@@ -1,9 +1,9 @@
 """Write hrc_env/core/kernels/signatures.json: python -m assets.kernels.record.
 
-Plays every perception level, single and batched, and notes which kernels Python called with which
-types. What was not on disk is compiled meanwhile, and how long that took is noted, too; with an
-empty folder as NUMBA_CACHE_DIR that is everything. To be run when a test says that a level compiles
-something that is not recorded.
+Plays every perception level, single and batched, and records the kernels that Python called and
+their types. Kernels that are not cached are compiled meanwhile, and the compile time is recorded,
+too; with an empty folder as NUMBA_CACHE_DIR these are all. Run it when a test reports that a level
+compiles a kernel that is not recorded.
 """
 
 import subprocess
@@ -22,28 +22,29 @@ from hrc_env.core.kernels import DISPATCHER, KERNELS, ahead, signatures
 from hrc_env.core.kernels.signatures import Signature
 
 LEVELS = {"truth": 250, "keypoints": 250, "none": 250, "pixels": 40}
-"""Steps of each level that are played."""
+"""Number of steps of each level."""
 VARIANTS: dict[str, dict[str, Any]] = {
     "": {},
     " and more": {"scene": "site", "n_workers": 2, "shield": "qp"},
     " and ssm": {"shield": "ssm"},
 }
-"""What else is played; what only this calls is compiled by `setup`, not by the first `make`."""
+"""Further configurations that are played; kernels that only these call are compiled by `setup`, not
+by the first `make`."""
 NUM_ENVS = 8
 
 
 class Stopwatch(event.Listener):
-    """Processor time that it takes to compile each kernel for Python, callees included."""
+    """Processor time for the compilation of each kernel for Python, callees included."""
 
     def __init__(self) -> None:
         self.seconds: dict[tuple[str, str], float] = {}
 
     def on_start(self, event: event.Event) -> None:
-        """Remember when."""
+        """Store the start time."""
         event.data["dispatcher"]._started_s = time.process_time()
 
     def on_end(self, event: event.Event) -> None:
-        """Note how long it took."""
+        """Store the elapsed time."""
         kernel = event.data["dispatcher"]
         if isinstance(kernel, DISPATCHER):
             name = f"{kernel.py_func.__module__}:{kernel.py_func.__qualname__}"
@@ -52,7 +53,7 @@ class Stopwatch(event.Listener):
 
 
 def main() -> None:
-    """Each level in a process of its own."""
+    """Record each level in a process of its own."""
     before = {each.kernel: each.seconds for each in signatures.recorded()}
     signatures.write([])
     for level in LEVELS:
@@ -94,14 +95,14 @@ def record(level: str) -> None:
 
 
 def called() -> Iterator[tuple[str, tuple[Any, ...]]]:
-    """Which kernels Python has called, with which types."""
+    """Yield the kernels that Python has called, and their types."""
     for name, kernel in KERNELS.items():
         for types in kernel.overloads:
             yield name, types
 
 
 def play(level: str, variant: dict[str, Any]) -> None:
-    """An episode of one environment, and where there are such of several at once."""
+    """Play an episode of one environment, and of a vector of them if there is one."""
     env = gymnasium.make("HRCReach-v0", perception=level, **variant)
     agent = make_agent("scripted_slowed", env_info(env.unwrapped.simulation))
     observation, _ = env.reset(seed=0)

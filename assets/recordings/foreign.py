@@ -1,7 +1,7 @@
 """Recordings in formats of their own, as joints (T, 15, 3) for the importer's npz file.
 
-Joints are the centres that bones turn about. No format has a nose; where the head's rotation is
-given it turns with the head, else it looks straight ahead of the chest.
+Joints are the centres of rotation of the bones. No format has a nose; it turns with the head if the
+head's rotation is given, otherwise it points straight ahead of the chest.
 """
 
 import json
@@ -17,12 +17,13 @@ from hrc_env.geometry.rotations import about_axis
 from hrc_env.mocap.record import compose_tree
 
 _NOSE_M, _TOE_M = (0.11, 0.0, 0.175), (0.13, 0.0, -0.03)
-"""From a physics humanoid's neck and ankles, forward and up, to its nose and foot tips [m]: the
-front of its head's sphere and of its feet's boxes."""
+"""Offsets from a physics humanoid's neck and ankles, forward and up, to its nose and foot tips [m]:
+the front of its head's sphere and of its feet's boxes."""
 _CLIMB_HZ, _CLIMB_NOSE_M = 120.0, (0.11, 0.05)
-"""Rate of the climbing recordings; from the head's joint to the nose, ahead and up [m]."""
+"""Rate of the climbing recordings, and the offset from the head's joint to the nose, ahead and up
+[m]."""
 _CLIMB = (6, 25, 7, 26, 8, 27, 43, 47, 44, 48, 45, 49, 46, 50)
-"""Rows of all joints but the nose among the 53 of a climbing recording; foot tips: toe bases."""
+"""Rows of all joints but the nose among the 53 of a climbing recording; foot tips are toe bases."""
 _BODIES = {
     "shoulder": "upper_arm", "elbow": "lower_arm", "wrist": "hand",
     "hip": "thigh", "knee": "shin", "ankle": "foot", "foot": "foot",
@@ -53,12 +54,13 @@ their columns; knees and elbows are hinges about z, the rest are quaternions, ti
 
 
 def joints_in(path: Path) -> tuple[Points3, float]:
-    """Joints (T, 15, 3) and frames a second of a recording that the importer does not read."""
+    """Read joints (T, 15, 3) and frame rate of a recording in a format that the importer does not
+    read."""
     return READERS[path.suffix](path)
 
 
 def _climb(path: Path) -> tuple[Points3, float]:
-    """An array of positions (T, 53, 3)."""
+    """Read an array of positions (T, 53, 3)."""
     points = np.load(path, allow_pickle=False).astype(float)
     joints = points[:, (4, *_CLIMB)].copy()
     up = points[:, 4] - points[:, 3]
@@ -70,7 +72,7 @@ def _climb(path: Path) -> tuple[Points3, float]:
 
 
 def _bodies(path: Path) -> tuple[Points3, float]:
-    """Positions and rotations of a humanoid's bodies, by name."""
+    """Read positions and rotations of a humanoid's bodies, by name."""
     with np.load(path, allow_pickle=False) as file:
         names = [str(name) for name in file["body_names"]]
         place, turn = file["body_positions"].astype(float), file["body_rotations"].astype(float)
@@ -85,7 +87,7 @@ def _bodies(path: Path) -> tuple[Points3, float]:
 
 
 def _quaternions(path: Path) -> tuple[Points3, float]:
-    """Rows of a time step, the root's place, and rotations in the parent's frame."""
+    """Read rows of a time step, the root's position, and rotations in the parent's frame."""
     rows = np.array(json.loads(path.read_text())["Frames"])
     offset = np.repeat(np.array([way for _, _, way in _TREE])[None], len(rows), axis=0)
     offset[:, 0] = rows[:, 1:4]
@@ -96,7 +98,7 @@ def _quaternions(path: Path) -> tuple[Points3, float]:
 
 
 def _rotations(columns: Floats) -> Floats:
-    """(T, nodes, 3, 3) of the tree's nodes, tips unturned."""
+    """Return rotations of the tree's nodes, (T, nodes, 3, 3), tips not rotated."""
     out, at = np.tile(np.eye(3), (len(columns), len(_TREE), 1, 1)), 0
     for node, (name, _, _) in enumerate(_TREE):
         if at == columns.shape[1]:

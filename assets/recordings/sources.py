@@ -1,4 +1,4 @@
-"""Packages of public registries that carry recordings of people in motion under a free licence."""
+"""Packages of public registries with recordings of people in motion under a free licence."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -12,14 +12,14 @@ _MIMIC = "pybullet_data/data/motions/{0}.txt"
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A package, whose its recordings are, and what they may serve for."""
+    """A package, the people in its recordings, and the role of these."""
 
     archive: Archive
     role: Literal["fitted", "validated"]
     licence: str
-    """Of the package, which says nothing else of its recordings."""
+    """Licence of the package, which has no separate one for its recordings."""
     people: str
-    """Who is recorded, as far as is said or seen in the bones' lengths."""
+    """Recorded people, as far as documented or visible in the bones' lengths."""
 
 
 SOURCES: dict[str, Source] = {
@@ -97,4 +97,4 @@ SOURCES: dict[str, Source] = {
         "(X. B. Peng et al.); 24 to 60 Hz",
     ),
 }  # fmt: skip
-"""By a short name. Roles are of packages, so that no recording is in both."""
+"""Packages by a short name. Roles belong to packages, so that no recording has both."""

@@ -1,6 +1,6 @@
-"""Recordings that nobody made: the repertoire's motions by people of other proportions and styles.
+"""Synthetic recordings: the repertoire's motions by people of other proportions and styles.
 
-Each is written as a BVH or Acclaim file, as the importer finds other people's.
+Each is written as a BVH or Acclaim file, for the importer to read like any other.
 """
 
 import tempfile
@@ -24,29 +24,29 @@ from hrc_env.worker.body import PARENT, SEGMENT, SEGMENTS, Body, load_body
 
 FPS, LONGEST_S = 50.0, 8.0
 LEGS, ARMS = ("thigh", "shank", "foot", "toes"), ("forearm", "hand")
-"""Segments whose distance from their parent grows with the legs and with the arms."""
+"""Segments whose distance from their parent scales with the legs and with the arms."""
 
 
 @dataclass(frozen=True, slots=True)
 class Style:
-    """Somebody who does something in a way of their own."""
+    """A person with proportions and a style of their own."""
 
     name: str
     motion: str
-    """A key of `REPERTOIRE`."""
+    """Key of `REPERTOIRE`."""
     role: Literal["fitted", "validated"]
     body: str
-    """A baked worker."""
+    """Name of a baked worker."""
     legs: float = 1.0
     arms: float = 1.0
     trunk: float = 1.0
-    """Lengths as shares of that body's."""
+    """Lengths as shares of those of that body."""
     stoop_rad: float = 0.0
-    """How much further forward the trunk is bent."""
+    """Additional forward inclination of the trunk."""
     apart_rad: float = 0.0
-    """How much further the upper arms are away from the trunk."""
+    """Additional angle of the upper arms from the trunk."""
     pace: float = 1.0
-    """How much faster."""
+    """Factor on the speed of the motion."""
 
 
 STYLES: tuple[Style, ...] = (
@@ -63,14 +63,14 @@ STYLES: tuple[Style, ...] = (
     Style("made-broad", "turn", "validated", "worker_8", trunk=1.08, apart_rad=0.55),
     Style("made-short", "lunge", "validated", "worker_5", legs=0.88, arms=0.92, pace=0.9),
 )
-"""Eight to fit on and four, of other motions, to validate on."""
+"""Eight styles to fit on and four, of other motions, to validate on."""
 
 
 def made_of(
     role: Literal["fitted", "validated"] | None = None, body: Body | None = None
 ) -> Iterator[tuple[Style, Clip, RetargetError]]:
-    """Each clip of a role (None: both), made for a body (None: worker_1) as `clips_of` makes those
-    of recordings."""
+    """Yield each clip of a role (None: both), made for a body (None: worker_1), as `clips_of`
+    does."""
     for number, style in enumerate(STYLES):
         if role in (None, style.role):
             with tempfile.TemporaryDirectory() as scratch:
@@ -81,7 +81,7 @@ def made_of(
 
 
 def write(style: Style, folder: Path, number: int) -> Path:
-    """The file of a style; formats, units, axes and orders of angles vary with the number."""
+    """Write the file of a style; formats, units, axes and orders of angles vary with the number."""
     body = load_body(style.body)
     films = perform(
         REPERTOIRE[style.motion], make_worker(body), np.random.default_rng(number), 1 / FPS
@@ -104,8 +104,10 @@ def write(style: Style, folder: Path, number: int) -> Path:
 def restyled(
     position: Points3, rotation: Rotations, body: Body, style: Style
 ) -> tuple[Points3, Rotations, Body]:
-    """Segments' origins (T, 22, 3), turns (T, 22, 3, 3) and the body of somebody of this style who
-    does what a body does; feet that stand go on standing."""
+    """Apply a style to a body's motion; supporting feet remain on the floor.
+
+    Returns the segments' origins (T, 22, 3) and rotations (T, 22, 3, 3), and the body.
+    """
     offset = body.rest_position - body.rest_position[np.maximum(PARENT, 0)]
     offset = offset * _lengths(style)[:, None]
     local = np.swapaxes(rotation[:, np.maximum(PARENT, 0)], -1, -2) @ rotation
@@ -123,7 +125,7 @@ def restyled(
 
 
 def _lengths(style: Style) -> Floats:
-    """(22,) share of each segment's distance from its parent."""
+    """Return the share of each segment's distance from its parent, (22,)."""
     parts: Sequence[str] = [name.removeprefix("left_").removeprefix("right_") for name in SEGMENTS]
     return np.array(
         [style.legs if part in LEGS else style.arms if part in ARMS else style.trunk
@@ -132,7 +134,7 @@ def _lengths(style: Style) -> Floats:
 
 
 def _summed(offset: Points3, root: Floats) -> Points3:
-    """(22, 3) origins at rest."""
+    """Return origins at rest, (22, 3)."""
     rest = offset.copy()
     rest[0] = root
     for segment, above in enumerate(PARENT):

@@ -1,4 +1,4 @@
-"""Segments of a body over time as BVH and Acclaim files, with as many of their traps as wished."""
+"""Motions of a body as BVH and Acclaim files, with selectable peculiarities of these formats."""
 
 import itertools
 from collections.abc import Callable, Sequence
@@ -13,7 +13,7 @@ from hrc_env.worker.body import PARENT, SEGMENT, SEGMENTS, Body, load_body
 
 AXES = "xyz"
 Y_UP = about_axis("x", -np.pi / 2)
-"""From z up to y up."""
+"""Rotation from z up to y up."""
 CMU = {
     "pelvis": "Hips", "abdomen": "LowerBack", "torso": "Spine", "chest": "Spine1",
     "neck": "Neck", "head": "Head", "clavicle": "Shoulder", "upper_arm": "Arm",
@@ -25,7 +25,7 @@ BODY = load_body()
 
 
 def angles_of(rotation: Rotations, order: str) -> Floats:
-    """(T, 3) angles [rad] about moving axes in an order such as "zyx": R = Rz Ry Rx."""
+    """Return angles about moving axes, (T, 3) [rad], in an order such as "zyx": R = Rz Ry Rx."""
     i, j, k = (AXES.index(axis) for axis in order)
     sign = 1.0 if (i, j, k) in ((0, 1, 2), (1, 2, 0), (2, 0, 1)) else -1.0
     r = rotation
@@ -40,7 +40,7 @@ def angles_of(rotation: Rotations, order: str) -> Floats:
 
 
 def cmu_name(segment: str, prefix: str = "") -> str:
-    """What the CMU database's BVH files, and Mixamo with a prefix, call a segment."""
+    """Return a segment's name in the CMU database's BVH files, or with a prefix in Mixamo's."""
     side, _, part = segment.partition("_")
     if side in ("left", "right"):
         return prefix + side.title() + CMU[part]
@@ -52,7 +52,7 @@ def write_bvh(
     axes: Rotations | None = None, orders: Sequence[str] = ("ZYX",), rest_first: bool = False,
     name: Callable[[str], str] = cmu_name, body: Body = BODY,
 ) -> Path:  # fmt: skip
-    """A BVH file of segments over time; `orders` are taken in turn, one a joint."""
+    """Write a BVH file of segments over time; `orders` are taken in turn, one for each joint."""
     axes = np.eye(3) if axes is None else axes
     offset = (body.rest_position - body.rest_position[np.maximum(PARENT, 0)]) @ axes.T / unit_m
     offset[0] = 0.0
@@ -94,7 +94,8 @@ def write_bvh(
 def write_acclaim(
     folder: Path, position: Points3, rotation: Rotations, body: Body = BODY, name: str = "walk"
 ) -> Path:
-    """Write walk.asf and walk.amc as of the CMU database: y up, 0.45 lengths an inch; the .amc."""
+    """Write walk.asf and walk.amc as in the CMU database (y up, 0.45 lengths an inch); return the
+    .amc."""
     bones = _bones(body)
     unit_m = 0.0254 / 0.45
     asf = [":version 1.10", ":name WALK", ":units", "  mass 1.0", "  length 0.45", "  angle deg"]
@@ -129,7 +130,7 @@ def write_acclaim(
 
 
 def _bones(body: Body) -> list[tuple[str, str, int, Floats]]:
-    """(name, parent, segment that it turns with, way from its start to its end) of each bone."""
+    """Return name, parent, segment, and vector from start to end of each bone."""
     rest = body.rest_position
 
     def way(first: str, second: str) -> Floats:
@@ -161,7 +162,7 @@ def _bones(body: Body) -> list[tuple[str, str, int, Floats]]:
 
 
 def _tip(s: int, body: Body) -> Floats:
-    """(3,) end of a segment that carries no other [m]."""
+    """Return the end of a segment that carries no other, (3,) [m]."""
     if SEGMENTS[s].endswith("toes"):
         marks = make_marks(body, landmarks=True)
         return marks.offset[13 if SEGMENTS[s].startswith("left") else 14]
@@ -169,7 +170,7 @@ def _tip(s: int, body: Body) -> Floats:
 
 
 def _fixed_axes(angles: Floats) -> Rotations:
-    """(3, 3) turns about fixed x, then y, then z."""
+    """Return rotations about fixed x, then y, then z, (3, 3)."""
     x, y, z = (about_axis(axis, angle) for axis, angle in zip(AXES, angles, strict=True))
     return z @ y @ x
 

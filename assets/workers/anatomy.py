@@ -21,7 +21,7 @@ ORIGIN_BONE = {
     "forearm": "lowerarm01", "hand": "wrist", "thigh": "upperleg01", "shank": "lowerleg01",
     "foot": "foot", "toes": "toe2-1",
 }  # fmt: skip
-"""MakeHuman bone whose head is the segment's origin."""
+"""Segment by the MakeHuman bone that begins at the segment's origin."""
 
 BONE_PREFIXES = (
     ("root", "pelvis"), ("pelvis", "pelvis"), ("spine05", "abdomen"), ("spine04", "abdomen"),
@@ -57,7 +57,7 @@ class Person:
 
 
 def raw_arrays(phenotype: dict[str, float], stature_m: float) -> dict[str, np.ndarray]:
-    """Ask `anny` for the body with this stature (`height` is found by bisection)."""
+    """Compute `anny`'s body of this stature (its `height` is found by bisection)."""
     import anny
     import torch
 

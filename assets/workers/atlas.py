@@ -85,11 +85,11 @@ def smooth_seam(
     uv_of: Callable[[np.ndarray, np.ndarray], np.ndarray],
     sink_m: float = 0.004,
 ) -> tuple[Surface, np.ndarray]:
-    """Cut as `split` does, with hidden flaps that make the light run smoothly over the seam.
+    """Cut as `split` does, with hidden flaps that make the shading continuous across the seam.
 
-    A renderer makes normals from the faces round a vertex; at a seam each side lacks the
-    other's. So each side also gets the other's faces along the seam, their far corners sunk
-    under the surface where nobody sees them.
+    A renderer computes normals from the faces around a vertex; at a seam each side lacks the
+    other's. So each side also gets the other's faces along the seam, with their far corners sunk
+    under the surface where they are hidden.
     """
     on_side = [np.unique(surface.faces[side_of_face == side]) for side in (0, 1)]
     seam = np.intersect1d(*on_side)
@@ -129,7 +129,7 @@ class Painting:
         self.image[:] = colour
 
     def lay(self, colour: tuple[float, ...] | np.ndarray, cover: np.ndarray) -> None:
-        """Lay a colour over the image where `cover` (H, W) in [0, 1] says."""
+        """Lay a colour over the image with opacity `cover` (H, W) in [0, 1]."""
         share = np.clip(np.asarray(cover, float), 0.0, 1.0)[..., None]
         self.image = self.image * (1 - share) + np.asarray(colour, float) * share
 

@@ -36,7 +36,8 @@ def residual_m(points: np.ndarray, ends: np.ndarray, radius_m: float) -> np.ndar
 def _fit(
     points: np.ndarray, start: np.ndarray, ends_of: Callable, outside: float = OUTSIDE_WEIGHT
 ) -> np.ndarray:
-    """Parameters (the last one the radius) whose capsule's surface lies closest to points."""
+    """Return parameters (the last one the radius) of the capsule with the surface closest to
+    points."""
     hold = HOLD * np.sqrt(len(points))
 
     def residuals(values: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ from surfaces import Surface, decimated, grid_faces, head_surface, normals, smoo
 CAP_M = {"short": 0.013, "bun": 0.010, "ponytail": 0.010}
 """How far the hair stands off the scalp, by style; a judgement, as is everything here."""
 UNDER_HAT_M = 0.006
-"""The same under a hat, whose shell is 17 mm away."""
+"""Distance of the hair from the scalp under a hat, which is 17 mm away."""
 ROOT_M = -0.0015
 """At the hairline the cap dips under the skin, so that no edge shows."""
 N_VERTICES = 320

@@ -215,7 +215,8 @@ class _Outfit:
         ]
 
     def shade(self, recipe: Recipe) -> np.ndarray:
-        """Creases, folds, the shadow on the trousers of what hangs over them."""
+        """Return the shade of creases, folds, and the shadow of the upper clothes on the
+        trousers."""
         dark = 1 - np.clip(self.fine / 0.016, -0.06, 0.10) - np.clip(self.broad / 0.08, -0.07, 0.07)
         fine, broad = folds(dark.shape, 1, (5.0, 9.0)), folds(dark.shape, 2, (18.0,))
         dark *= 1 + recipe.creases * 0.035 * fine + recipe.creases * 0.03 * broad

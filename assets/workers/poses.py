@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from hrc_env.worker.body import N_SEGMENTS, PARENT, SEGMENT, Body
-from hrc_env.geometry.rotations import about_axis
 from assets.rotations import quaternion_from_matrix
 from hrc_env.core.records import WorkerMotion
+from hrc_env.geometry.rotations import about_axis
+from hrc_env.worker.body import N_SEGMENTS, PARENT, SEGMENT, Body
 
 HANGING, ALONG, STRAIGHT = (5, 10), (18, 6), (2, 4, 4)
 POSES: dict[str, dict] = {
@@ -31,8 +31,8 @@ POSES: dict[str, dict] = {
     "stoop": {"lean": 45, "left": ((45, 8), (60, 5)), "right": ((45, 8), (60, 5)),
               "legs": ((20, 6, 20), (20, 6, 20))},
 }  # fmt: skip
-"""Angles in degrees. lean: trunk forward; arms: (upper arm, forearm), each (forward, outward) from hanging down;
-legs: left and right (forward, outward, knee flexion). All in degrees."""
+"""Angles in degrees. lean: trunk forward; arms: (upper arm, forearm), each (forward, outward) from
+hanging down; legs: left and right (forward, outward, knee flexion). All in degrees."""
 
 
 def rest_motion(body: Body) -> WorkerMotion:
@@ -71,7 +71,7 @@ def posed(
 
 
 def _arm(turn: np.ndarray, rest: np.ndarray, side: str, angles: tuple, shift: np.ndarray) -> None:
-    """Turn an arm's segments so that they point where the angles say."""
+    """Turn an arm's segments into the directions of the angles."""
     s = {part: SEGMENT[f"{side}_{part}"] for part in ("clavicle", "upper_arm", "forearm", "hand")}
     sign = 1 if side == "left" else -1
     chest = turn[SEGMENT["chest"]]

@@ -1,4 +1,4 @@
-"""The workers by name: what each of them is baked from. All of it is made up (a judgement)."""
+"""Recipes of the workers by name. All values are judgements."""
 
 from dataclasses import dataclass, field, replace
 
@@ -22,7 +22,7 @@ class Recipe:
     """1 is an idealised figure."""
     colours: Colours
     over: str = "vest"
-    """What is worn over the shirt: vest, bib (bib and brace overalls) or nothing."""
+    """Garment over the shirt: vest, bib (bib and brace overalls) or nothing."""
     hat: bool = True
     hair: str = "none"
     """Hair with a shape of its own: short, bun, ponytail; none is painted on the skin only."""

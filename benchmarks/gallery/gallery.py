@@ -1,4 +1,4 @@
-"""All pictures and the page: every body, every motion, every scene."""
+"""The pictures and the page of the gallery."""
 
 import html
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import imageio.v2 as imageio
 
-from benchmarks.gallery.motions import strip
+from benchmarks.gallery.motions import draw_strip
 from benchmarks.gallery.still import CASTS, portrait, views
 from hrc_env.core.errors import check_names
 from hrc_env.core.typing import Image
@@ -18,7 +18,7 @@ from hrc_env.motion.repertoire import SCENES
 from hrc_env.worker.body import load_body, worker_names
 
 VIEWS = 5
-"""Pictures of a scene."""
+"""Number of pictures of a scene."""
 
 
 STYLE = """
@@ -37,12 +37,12 @@ class Exhibit(NamedTuple):
     title: str
     caption: str
     is_wide: bool
-    """Whether it takes a row of its own."""
+    """Whether it has its own row."""
 
 
 @dataclass(frozen=True, slots=True)
 class GalleryConfig:
-    """What is drawn."""
+    """The contents of the gallery."""
 
     bodies: tuple[str, ...] = worker_names()
     motions: tuple[str, ...] = tuple(SCENES)
@@ -55,7 +55,7 @@ class GalleryConfig:
 
 
 def run(config: GalleryConfig, out: Path, say: Progress) -> list[Exhibit]:
-    """Draw everything into a folder, with an `index.html`; returns what the page shows."""
+    """Draw all pictures into a folder with an `index.html`; return the exhibits of the page."""
     out.mkdir(parents=True, exist_ok=True)
     share = 1.0 / max(len(config.bodies) + len(config.motions) + VIEWS * len(config.scenes), 1)
     shown: list[Exhibit] = []
@@ -78,13 +78,13 @@ def run(config: GalleryConfig, out: Path, say: Progress) -> list[Exhibit]:
     bodies = config.bodies or worker_names()
     for k, body in enumerate(bodies):  # strips of one worker are drawn one after another
         for name in config.motions[k :: len(bodies)]:
-            hang(strip(name, body), "Motions", name, f"by {body.replace('_', ' ')}", True)
+            hang(draw_strip(name, body), "Motions", name, f"by {body.replace('_', ' ')}", True)
     write_page(shown, out, "python -m benchmarks gallery")
     return shown
 
 
 def write_page(exhibits: Sequence[Exhibit], out: Path, command: str) -> None:
-    """Write `index.html` into a folder that has the pictures; those of a section come together."""
+    """Write `index.html` into a folder of pictures; exhibits of a section are shown together."""
     sections = groupby(exhibits, lambda exhibit: exhibit.section)
     body = "".join(
         f'<h2>{html.escape(name)}</h2><div class="grid">{"".join(map(_figure, some))}</div>\n'

@@ -1,11 +1,11 @@
-"""Film strips: a scene of the repertoire in a few frames, followed by a camera."""
+"""Film strips: a scene of the repertoire in a few frames, with a camera that follows the worker."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.gallery.still import camera_at
+from benchmarks.gallery.still import make_camera
 from hrc_env.core.batching import one
 from hrc_env.core.typing import Image
 from hrc_env.motion.repertoire import SCENES, make_worker, perform
@@ -15,31 +15,31 @@ from hrc_env.scene.render import PictureRenderer
 from hrc_env.worker.body import SEGMENT, load_body
 
 FRAMES, FRAME_PX = 6, (300, 420)
-"""How many frames a strip has, width and height of each [px]."""
+"""Number of frames of a strip, width and height of each [px]."""
 DT_S = 0.05
 HFOV_DEG, TARGET_M = 38.0, 0.92
-"""The camera's field of view, and how high it looks."""
+"""Field of view of the camera [deg], and the height that it looks at [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """Where a scene is played on the site and from where one looks on."""
+    """The place of a scene on the site, and the position of its camera."""
 
     xy_m: tuple[float, float]
-    """Where the worker stands at first [m]."""
+    """Position of the worker at the start [m]."""
     yaw_rad: float
-    """Which way they look [rad]."""
+    """Heading of the worker [rad]."""
     aside_rad: float
-    """Where the camera is, from where the worker looks [rad]."""
+    """Direction of the camera, relative to the worker's heading [rad]."""
     away_m: float
-    """How far it is from the worker [m]."""
+    """Distance of the camera from the worker [m]."""
 
 
 OPEN = Stage((1.6, -1.5), 0.0, -1.05, 3.1)
 LONG = Stage((-4.4, -2.2), 0.0, -0.85, 2.9)
-"""For those who go far."""
+"""Stage of motions that cover a long path."""
 LADEN = Stage((-4.4, -2.2), 0.0, -0.85, 4.0)
-"""For those who go with something large."""
+"""Stage of motions with a large load."""
 AT_TABLE, AT_STUDS = ("table", -1.05, 2.7), ("north_studs_1", -2.0, 3.0)
 STAGED: dict[str, tuple[str, float, float]] = {
     "hammer lightly": AT_TABLE,
@@ -51,23 +51,23 @@ STAGED: dict[str, tuple[str, float, float]] = {
     "drill overhead": ("lintel", -2.0, 3.0),
     "climb": ("hop_up", -1.3, 2.8),
 }
-"""Scenes that belong to a workplace of the site: its name, where the camera is, how far."""
+"""Scenes at a workplace of the site: its name, direction and distance of the camera."""
 
 
-def strip(name: str, body_name: str, seed: int = 0) -> Image:
-    """A scene of the repertoire played by a worker, (420, about 1800, 3)."""
+def draw_strip(name: str, body_name: str, seed: int = 0) -> Image:
+    """Return a scene of the repertoire as a film strip, an image (420, about 1800, 3)."""
     scene = build(name="site", n_workers=1, bodies=body_name)
-    stage = stage_of(name)
+    stage = make_stage(name)
     me = make_worker(load_body(body_name), stage.xy_m, stage.yaw_rad)
     films = perform(SCENES[name], me, np.random.default_rng(seed), DT_S)
     renderer = PictureRenderer(scene, *FRAME_PX)
     frames, turn = [], stage.yaw_rad + stage.aside_rad
     lengths = [len(film.time_s) for film in films]
-    for k, row in moments(lengths):
+    for k, row in spread_frames(lengths):
         motion = one(films[k].motion, row)
         root = motion.position_world[0, SEGMENT["pelvis"]]
         target = np.array([*root[:2], TARGET_M])
-        camera = camera_at(target, turn, stage.away_m, HFOV_DEG, FRAME_PX)
+        camera = make_camera(target, turn, stage.away_m, HFOV_DEG, FRAME_PX)
         frame = np.array(renderer.picture(scene.home_q, motion, camera), np.uint8)
         overlay.label(frame, f"{DT_S * (sum(lengths[:k]) + row):.1f} s", (8, 8), 14)
         frames.append(frame)
@@ -75,8 +75,8 @@ def strip(name: str, body_name: str, seed: int = 0) -> Image:
     return overlay.tile(frames, FRAMES)
 
 
-def stage_of(name: str) -> Stage:
-    """Where a scene is played."""
+def make_stage(name: str) -> Stage:
+    """Return the stage of a scene."""
     if name in STAGED:
         where, aside_rad, away_m = STAGED[name]
         place = next(p for p in build(name="site").grounds.places if p.name == where)
@@ -86,8 +86,8 @@ def stage_of(name: str) -> Stage:
     return LONG if name.startswith(("walk", "stumble", "run", "fall")) else OPEN
 
 
-def moments(lengths: Sequence[int]) -> list[tuple[int, int]]:
-    """Evenly spread over films of so many rows: which film, which of its rows."""
+def spread_frames(lengths: Sequence[int]) -> list[tuple[int, int]]:
+    """Return evenly spread frames of films of given lengths, as pairs of film and row."""
     rows = [(film, row) for film, length in enumerate(lengths) for row in range(length)]
     shares = (np.arange(FRAMES) + 0.5) / FRAMES
     return [rows[int(share * len(rows))] for share in shares]

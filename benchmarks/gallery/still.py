@@ -1,4 +1,4 @@
-"""Still pictures: portraits of the workers, and the scenes with people at work in them."""
+"""Still pictures: portraits of the workers, and scenes with people at work."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -16,10 +16,10 @@ from hrc_env.worker.body import load_body
 from hrc_env.world import Workplace
 
 EYE_M = 1.45
-"""How high above the floor the cameras that look at somebody are [m]."""
+"""Height of the cameras of portraits above the floor [m]."""
 PORTRAIT_PX = (600, 900)
 SITTING = (0.75, -0.6, -0.2)
-"""Where workers stand for their portrait, and which way they look: x, y [m], yaw [rad]."""
+"""Position x, y [m] and heading [rad] of workers in their portraits."""
 PLACE_PX = (1600, 900)
 CASTS: dict[str, tuple[tuple[str, str, float], ...]] = {
     "lab": (("robot_4", "lunge", 0.3), ("open_studs", "drill", 0.5)),
@@ -28,28 +28,30 @@ CASTS: dict[str, tuple[tuple[str, str, float], ...]] = {
         ("slab_floor_1", "kneel", 0.5), ("carts", "wheelbarrow", 0.35),
     ),
 }  # fmt: skip
-"""Who stands in the pictures of a scene: workplace, scene of the repertoire, share of it."""
+"""People in the pictures of a scene: workplace, scene of the repertoire, share of it."""
 OVERVIEW = {"lab": "room", "site": "overview"}
-"""The view for people that shows most of a scene."""
+"""Name of the view that shows most of a scene."""
 
 
-def camera_at(
+def make_camera(
     target_world: Points3, turn_rad: float, away_m: float, hfov_deg: float, size_px: tuple[int, int]
 ) -> PinholeCamera:
-    """A camera that looks at a point (3,) [m] from a direction (from world +x) and level distance;
-    its horizontal field of view, width and height."""
+    """Return a camera that looks at a point (3,) [m] from a direction and a horizontal distance.
+
+    The direction is measured from world +x; the camera's field of view, width and height are given.
+    """
     x, y, _ = target_world
     eye = np.array([x + away_m * np.cos(turn_rad), y + away_m * np.sin(turn_rad), EYE_M])
     return pinhole("follower", eye, np.asarray(target_world, float), hfov_deg, *size_px)
 
 
 def portrait(body_name: str, seed: int = 1) -> Image:
-    """A worker on the laboratory's floor, from before and a little aside."""
+    """Return a picture of a worker on the laboratory's floor, from the front and slightly aside."""
     scene = build(n_workers=1, bodies=body_name)
     x, y, yaw = SITTING
     me = make_worker(load_body(body_name), (x, y), yaw)
     film = perform(REPERTOIRE["stand"], me, np.random.default_rng(seed), 0.1)[0]
-    camera = camera_at(np.array([x, y, 1.0]), yaw + 0.4, 2.1, 40.5, PORTRAIT_PX)
+    camera = make_camera(np.array([x, y, 1.0]), yaw + 0.4, 2.1, 40.5, PORTRAIT_PX)
     renderer = PictureRenderer(scene, *PORTRAIT_PX)
     picture = np.array(renderer.picture(scene.home_q, one(film.motion, 10), camera), np.uint8)
     renderer.close()
@@ -57,10 +59,11 @@ def portrait(body_name: str, seed: int = 1) -> Image:
 
 
 def views(scene_name: str, body_name: str) -> dict[str, Image]:
-    """A scene with people at work: one view for people, then what each camera sees."""
+    """Return pictures of a scene with people at work: one overview, then the view of each
+    camera."""
     cast = CASTS[scene_name]
     scene = build(name=scene_name, n_workers=len(cast), bodies=body_name)
-    motion = _together([_at_work(scene, body_name, *role) for role in cast])
+    motion = _stack_workers([_move_at_work(scene, body_name, *role) for role in cast])
     renderer = PictureRenderer(scene, *PLACE_PX)
     names = (OVERVIEW[scene_name], *(camera.name for camera in scene.cameras))
     found = {
@@ -70,10 +73,10 @@ def views(scene_name: str, body_name: str) -> dict[str, Image]:
     return found
 
 
-def _at_work(
+def _move_at_work(
     scene: Scene, body_name: str, place_name: str, doing: str, share: float
 ) -> WorkerMotion:
-    """One worker, arrays (1, ...), at a share of what they do at a place."""
+    """Return the motion of one worker (1, ...) at a share of an activity at a place."""
     place: Workplace = next(p for p in scene.grounds.places if p.name == place_name)
     me = make_worker(load_body(body_name), place.xy_m, place.yaw_rad)
     films = perform(REPERTOIRE[doing], me, np.random.default_rng(2), 0.05)
@@ -81,8 +84,8 @@ def _at_work(
     return one(rows, int(share * len(rows.position_world)))
 
 
-def _together(workers: list[WorkerMotion]) -> WorkerMotion:
-    """Several workers, each with arrays (1, ...), as one record (W, ...)."""
+def _stack_workers(workers: list[WorkerMotion]) -> WorkerMotion:
+    """Return several workers, each with arrays (1, ...), as one record (W, ...)."""
 
     def joined(records: Sequence[Any], *names: str) -> list[Any]:
         return [np.concatenate([getattr(each, name) for each in records]) for name in names]

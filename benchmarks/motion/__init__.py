@@ -1,1 +1,1 @@
-"""How like people's the workers' activities are: statistics beside what was measured of people."""
+"""Similarity of the workers' activities to those of people, by statistics."""

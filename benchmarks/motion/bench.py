@@ -1,4 +1,4 @@
-"""The motion bench: every scene of the repertoire, played by several workers, and measured."""
+"""The motion benchmark: every scene of the repertoire, played by several workers, and measured."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
@@ -8,45 +8,45 @@ from typing import Any
 import numpy as np
 
 from benchmarks.motion.report import report
-from benchmarks.motion.statistics import gait_of, statistics_of
+from benchmarks.motion.statistics import compute_gait, compute_statistics
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric, over
 from hrc_env.experiments.cache import PartCache
-from hrc_env.experiments.report import Metrics, Report, quick_words
-from hrc_env.experiments.runner import at_least_one, is_as_short
+from hrc_env.experiments.report import Metrics, Report, describe_quick_run
+from hrc_env.experiments.runner import check_at_least_one, is_as_short
 from hrc_env.motion import state as st
 from hrc_env.motion.repertoire import SCENES, Film, make_worker, perform
 from hrc_env.worker.body import Body, load_body, worker_names
 
 DT_S = 0.01
-"""Between the frames of a film [s]: fast enough for accelerations."""
+"""Time between frames of a film, short enough for accelerations [s]."""
 
 
 @dataclass(frozen=True, slots=True)
 class MotionBench:
-    """The experiment, and how much is played."""
+    """The experiment, and the amount of data that is played."""
 
     name = "bench motion"
     depends = ("motion",)
     n_parts = 1
     n_seeds: int = 12
-    """How often each worker plays a scene; right-handed and left-handed in turn."""
+    """Number of times that each worker plays a scene, right-handed and left-handed in turn."""
     bodies: tuple[str, ...] = worker_names()
-    """Whose bodies."""
+    """Names of the bodies."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for numbers that cannot work."""
-        at_least_one(self, "n_seeds")
+        check_at_least_one(self, "n_seeds")
         if not self.bodies:
             raise ConfigError(f"bodies must name some of {worker_names()}.")
 
     @property
     def seeds(self) -> list[int]:
-        """One a film of each worker."""
+        """Seeds, one per film of each worker."""
         return list(range(self.n_seeds))
 
     def settings(self) -> dict[str, Any]:
-        """Return what all numbers depend on."""
+        """Return the settings that all numbers depend on."""
         return {"bench": asdict(self)}
 
     def play(self, cache: PartCache) -> dict[str, Metric]:
@@ -58,31 +58,32 @@ class MotionBench:
         return metrics
 
     def metrics(self, played: dict[str, Metric]) -> dict[str, Metric]:
-        """Return every number."""
+        """Return all metrics by name."""
         return played
 
     def report(self, played: dict[str, Metric], metrics: Metrics, figures: Path) -> Report:
-        """Return the tables."""
+        """Return the report."""
         seconds = [each.value for name, each in metrics.items() if name.endswith(".seconds")]
         lasting = min(seconds), max(seconds)
-        short = quick_words(self.n_seeds, lasting) if is_as_short(self, QUICK) else ""
+        short = describe_quick_run(self.n_seeds, lasting) if is_as_short(self, QUICK) else ""
         return replace(report(metrics), quick=short)
 
 
 QUICK = MotionBench(n_seeds=2, bodies=("worker_1",))
-"""Every number, from little."""
+"""The quick form: every number, from little data."""
 
 
 def _measure(scene: str, config: MotionBench) -> dict[str, Metric]:
-    """A scene's statistics: the median over its films, the smallest and the largest body's."""
+    """Return a scene's statistics: the median over its films, the smallest and the largest
+    body's."""
     by_body: list[dict[str, float]] = []
     for name in config.bodies:
         body = load_body(name)
         films = [film for seed in range(config.n_seeds) for film in _play(scene, seed, body)]
-        numbers = statistics_of(films, body)
+        numbers = compute_statistics(films, body)
         numbers["seconds"] = sum(film.time_s[-1] for film in films) / config.n_seeds
         if films[0].activity == st.WALK:
-            gaits = [gait_of(film) for film in films]
+            gaits = [compute_gait(film) for film in films]
             numbers |= {key: float(np.median([g[key] for g in gaits])) for key in gaits[0]}
         by_body.append(numbers)
     n = config.n_seeds * len(config.bodies)
@@ -93,13 +94,13 @@ def _measure(scene: str, config: MotionBench) -> dict[str, Metric]:
 
 
 def _play(scene: str, seed: int, body: Body) -> Sequence[Film]:
-    """A scene's films."""
+    """Return the films of a scene."""
     me = make_worker(body, right=seed % 2 == 0)
     return perform(SCENES[scene], me, np.random.default_rng([17, seed]), DT_S)
 
 
 def _unit(key: str) -> str:
-    """Of a statistic, from its name."""
+    """Return the unit of a statistic, from its name."""
     for ending, unit in (
         ("_m_s2", "m/s^2"), ("_m_s", "m/s"), ("_m", "m"), ("_deg", "deg"), ("seconds", "s"),
         ("_per_min", "1/min"),

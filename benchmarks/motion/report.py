@@ -1,9 +1,9 @@
-"""The motion bench as people read it."""
+"""The report of the motion benchmark."""
 
-from benchmarks.motion.targets import ANY, Target, targets_of
+from benchmarks.motion.targets import ANY, Target, list_targets
 from hrc_env.core.results import Metric
 from hrc_env.experiments.columns import Column
-from hrc_env.experiments.report import Metrics, Report, format_metric, table, table_of
+from hrc_env.experiments.report import Metrics, Report, format_metric, format_metrics, format_table
 
 COLUMNS = (
     Column("{}.seconds", "s"),
@@ -17,37 +17,38 @@ COLUMNS = (
     Column("{}.grip_missed_share", "grips missed", 3),
     Column("{}.inside_itself_share", "in itself", 3),
 )
-"""Of the table of everything."""
+"""Columns of the table of all scenes."""
 
 
 def report(metrics: Metrics) -> Report:
-    """What is to be read."""
+    """Return the report."""
     scenes = [name.rsplit(".", 1)[0] for name in metrics if name.endswith(".seconds")]
     lead = (
         "Medians over bodies, smallest and largest in brackets; the first table has the targets of "
         "single scenes, the second what all scenes have (speeds in m/s)."
     )
-    asked = (f"`{each.statistic}` <= {each.high:g} ({each.source})" for each in targets_of(ANY))
+    asked = (f"`{each.statistic}` <= {each.high:g} ({each.source})" for each in list_targets(ANY))
     return Report("Motion bench", lead, (
         "## Beside what is known of people", _targets(scenes, metrics),
-        "## Every scene", table_of("scene", {each: each for each in scenes}, COLUMNS, metrics),
+        "## Every scene",
+        format_metrics("scene", {each: each for each in scenes}, COLUMNS, metrics),
         f"Everywhere: {'; '.join(asked)}.",
     ), "the smallest and the largest body's")  # fmt: skip
 
 
 def inside(target: Target, metric: Metric) -> bool:
-    """Whether the median body is in the band."""
+    """Return whether the median body is in the band."""
     return target.low <= metric.value <= target.high
 
 
 def _targets(scenes: list[str], metrics: Metrics) -> str:
     lines = []
     for scene in scenes:
-        for target in targets_of(scene):
+        for target in list_targets(scene):
             metric = metrics[f"{scene}.{target.statistic}"]
             if target.scene != ANY or not inside(target, metric):
                 verdict = "" if inside(target, metric) else "**outside**"
                 band = f"{target.low:.3g}-{target.high:.3g}"
                 measured = format_metric(metric, 1, 3)
                 lines.append([scene, target.statistic, measured, band, verdict, target.source])
-    return table(["scene", "statistic", "measured", "target", "", "source"], lines)
+    return format_table(["scene", "statistic", "measured", "target", "", "source"], lines)

@@ -1,4 +1,5 @@
-"""Numbers of films: speeds, accelerations, slipping feet, missing hands, bodies in themselves."""
+"""Statistics of films: speeds, accelerations, slipping feet, missed targets of hands,
+self-contact."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -17,17 +18,18 @@ WRISTS = [SEGMENT[f"{side}_hand"] for side in SIDES]
 ANKLES = [SEGMENT[f"{side}_foot"] for side in SIDES]
 HEAD = [SEGMENT["head"]]
 MISSED_M = 0.01
-"""A hand further than this from what it holds has missed it."""
+"""Distance from its target beyond which a hand has missed it [m]."""
 LOADED_M = 0.001
-"""A foot whose ball is no higher than this above its ground bears weight."""
+"""Height of the ball of a foot above its ground below which the foot bears weight [m]."""
 STEADY_SHARE = 0.97
-"""Of the top speed: from there on a walk is steady."""
+"""Share of the top speed from which a walk is steady."""
 DEEP_M = 0.05
-"""Capsules this deep in each other count: they are rounder than limbs, clothes and flesh give."""
+"""Depth from which capsules count as intersecting [m]: they are rounder than limbs, and flesh
+yields."""
 
 
-def statistics_of(films: Sequence[Film], body: Body) -> dict[str, float]:
-    """Statistics of films of one scene, all frames of all of them pooled."""
+def compute_statistics(films: Sequence[Film], body: Body) -> dict[str, float]:
+    """Return the statistics of all frames of the films of one scene."""
     numbers: dict[str, float] = {}
     for name, which in (("wrist", WRISTS), ("ankle", ANKLES), ("head", HEAD)):
         speeds = np.concatenate([_speeds(film, which) for film in films])
@@ -39,10 +41,12 @@ def statistics_of(films: Sequence[Film], body: Body) -> dict[str, float]:
         numbers[f"{name}_p999_m_s2"] = float(np.percentile(rates, 99.9))
     pelvis = np.concatenate([film.motion.position_world[:, 0, 0, 2] for film in films])
     numbers["pelvis_low_m"] = float(pelvis.min())
-    numbers["slip_p95_m_s"] = _percentile(np.concatenate([slips(film) for film in films]), 95)
-    missed = np.concatenate([misses(film) for film in films])
+    numbers["slip_p95_m_s"] = _percentile(
+        np.concatenate([compute_slips(film) for film in films]), 95
+    )
+    missed = np.concatenate([compute_misses(film) for film in films])
     numbers["grip_missed_share"] = float((missed > MISSED_M).mean()) if missed.size else 0.0
-    inside = np.concatenate([depths(film, body) > DEEP_M for film in films])
+    inside = np.concatenate([compute_depths(film, body) > DEEP_M for film in films])
     numbers["inside_itself_share"] = float(inside.mean())
     return numbers
 
@@ -52,19 +56,19 @@ def _percentile(values: Floats, share: float) -> float:
 
 
 def _speeds(film: Film, which: list[int]) -> Floats:
-    """(T, n) of segments' origins [m/s]."""
+    """Return the speeds (T, n) of the origins of segments [m/s]."""
     return np.linalg.norm(film.motion.velocity_world[:, 0, which], axis=-1)
 
 
 def _accelerations(film: Film, which: list[int]) -> Floats:
-    """Of segments' origins, all of them [m/s^2]."""
+    """Return the accelerations of the origins of segments, of all frames [m/s^2]."""
     velocity = film.motion.velocity_world[:, 0, which]
     change = np.diff(velocity, axis=0) / np.diff(film.time_s)[:, None, None]
     return np.linalg.norm(change, axis=-1).ravel()
 
 
-def slips(film: Film) -> Floats:
-    """Speeds over the floor of balls of feet that bear weight [m/s]."""
+def compute_slips(film: Film) -> Floats:
+    """Return the speeds over the floor of the balls of feet that bear weight [m/s]."""
     grounds = np.unique(np.round([0.0, *film.worker.footprints[:, 4]], 4))
     found = []
     for side in SIDES:
@@ -77,8 +81,9 @@ def slips(film: Film) -> Floats:
     return np.concatenate(found)
 
 
-def grips(film: Film) -> Floats:
-    """(T, 2, 3) where the hands grip: beyond the wrist along the forearm [m]."""
+def compute_grips(film: Film) -> Floats:
+    """Return the positions (T, 2, 3) of the hands' grips, beyond the wrist along the forearm
+    [m]."""
     place = film.motion.position_world[:, 0]
     both = []
     for side in SIDES:
@@ -88,19 +93,21 @@ def grips(film: Film) -> Floats:
     return np.stack(both, 1)
 
 
-def wholly_there(film: Film) -> Bools:
-    """(T, 2) when a hand is to be at its target."""
+def find_arrivals(film: Film) -> Bools:
+    """Return when each hand should be at its target (T, 2)."""
     return film.controls[:, c.HAND_SHARE : c.HAND_SHARE + 2] > 1.0 - 1e-9
 
 
-def misses(film: Film) -> Floats:
-    """How far hands are from what they hold or work on, of all frames in which they do [m]."""
+def compute_misses(film: Film) -> Floats:
+    """Return the distances of hands from their targets, in all frames in which they have one
+    [m]."""
     wished = film.controls[:, c.HAND_TARGET : c.HAND_TARGET + 6].reshape(-1, 2, 3)
-    return np.linalg.norm(grips(film) - wished, axis=-1)[wholly_there(film)]
+    return np.linalg.norm(compute_grips(film) - wished, axis=-1)[find_arrivals(film)]
 
 
-def depths(film: Film, body: Body) -> Floats:
-    """(T,) how deep limbs are in what they should not be in [m]; negative: how far away."""
+def compute_depths(film: Film, body: Body) -> Floats:
+    """Return the greatest depth (T,) to which limbs intersect other parts [m]; negative: the
+    clearance."""
     truth = worker_truth(body, film.motion)
     capsules, radius = truth.capsules_world[:, 0], truth.capsule_radius_m[0, 0]
     deepest = np.full(len(film.time_s), -np.inf)
@@ -116,7 +123,7 @@ def depths(film: Film, body: Body) -> Floats:
 
 
 def _pairs(body: Body) -> list[tuple[int, int]]:
-    """Capsules that should stay out of each other."""
+    """Return the pairs of capsules that should not intersect."""
     at = {name: index for index, name in enumerate(body.capsule_names)}
     trunk = ("pelvis", "abdomen", "torso", "chest", "head")
     named = [(f"{side}_hand", part) for side in SIDES for part in trunk]
@@ -127,8 +134,8 @@ def _pairs(body: Body) -> list[tuple[int, int]]:
     return [(at[a], at[b]) for a, b in named if a in at and b in at]
 
 
-def gait_of(film: Film) -> dict[str, float]:
-    """Cadence, step length and width, bob and knee flexion of a straight walk."""
+def compute_gait(film: Film) -> dict[str, float]:
+    """Return cadence, step length and width, bob and knee flexion of a straight walk."""
     place, rate = film.motion.position_world[:, 0], film.motion.velocity_world[:, 0]
     ahead = place[-1, 0, :2] - place[0, 0, :2]
     ahead /= np.linalg.norm(ahead)
@@ -153,13 +160,13 @@ def gait_of(film: Film) -> dict[str, float]:
 
 
 def _smooth(speed: Floats) -> Floats:
-    """Mean over about half a second of a film at 100 Hz."""
+    """Return the mean speed over about half a second of a film at 100 Hz."""
     window = np.ones(51) / 51
     return np.convolve(np.pad(speed, 25, "edge"), window, "valid")
 
 
 def knee_flexion_deg(place: Floats, side: str) -> Floats:
-    """(T,) from segments' origins (T, 22, 3); 0 is straight."""
+    """Return knee flexion (T,) from the origins of segments (T, 22, 3) [deg]; 0 is straight."""
     hip, knee, ankle = (place[:, SEGMENT[f"{side}_{n}"]] for n in ("thigh", "shank", "foot"))
     thigh, shank = knee - hip, ankle - knee
     cosine = (thigh * shank).sum(-1) / np.linalg.norm(thigh, axis=-1)

@@ -1,4 +1,4 @@
-"""What is known of people's motion, and where from: the bands that activities should be in."""
+"""Bands of statistics of people's motion, with their sources, for activities."""
 
 from dataclasses import dataclass
 
@@ -7,9 +7,9 @@ CMU_WORK = "CMU motion capture, trials of manual work"
 CMU_ALL = "CMU motion capture, 99.9th percentile of real clips"
 JUDGEMENT = "judgement"
 WALKS_M_S = (0.8, 1.1, 1.3, 1.4, 1.8)
-"""Speeds of the walks."""
+"""Speeds of the walks [m/s]."""
 ANY = "*"
-"""Of every scene."""
+"""Name that stands for every scene."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,8 +24,8 @@ class Target:
 
 
 def _walk(speed: float) -> list[Target]:
-    """Of a walk at a speed [m/s]: within 10 % of the fits."""
-    name = walk_name(speed)
+    """Return the bands of a walk at a speed [m/s]: within 10 % of the fits."""
+    name = format_walk(speed)
     cadence, length = 96.2 * speed**0.468, 0.345 + 0.286 * speed
     return [
         Target(name, "cadence_per_min", 0.9 * cadence, 1.1 * cadence, CMU),
@@ -37,16 +37,16 @@ def _walk(speed: float) -> list[Target]:
 
 
 def _limbs(speed: float, wrist: float, ankle: float) -> list[Target]:
-    """Of wrists and ankles in a walk: within 10 % of their 95th percentiles [m/s]."""
-    name = walk_name(speed)
+    """Return the bands of wrists and ankles in a walk: 10 % around their 95th percentiles [m/s]."""
+    name = format_walk(speed)
     return [
         Target(name, "wrist_p95_m_s", 0.9 * wrist, 1.1 * wrist, CMU),
         Target(name, "ankle_p95_m_s", 0.9 * ankle, 1.1 * ankle, CMU),
     ]
 
 
-def walk_name(speed_m_s: float) -> str:
-    """The scene of a walk."""
+def format_walk(speed_m_s: float) -> str:
+    """Return the name of the scene of a walk."""
     return f"walk {speed_m_s:.1f} m/s"
 
 
@@ -73,6 +73,6 @@ TARGETS: tuple[Target, ...] = (
 )
 
 
-def targets_of(scene: str) -> list[Target]:
-    """Those of a scene."""
+def list_targets(scene: str) -> list[Target]:
+    """Return the bands of a scene."""
     return [target for target in TARGETS if target.scene in (scene, ANY)]

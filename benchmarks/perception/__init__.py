@@ -1,1 +1,1 @@
-"""How fast the eyes are, how well they see, and what faults cost them."""
+"""Speed and accuracy of perception from pixels, and the effects of faults."""

@@ -1,7 +1,7 @@
-"""The perception bench: how fast detection is, how well workers are seen, and what goes wrong.
+"""The perception benchmark: speed of detection, accuracy, and effects of faults.
 
-Each part is written to DIR/parts as soon as it is done, so that a bench that was stopped goes on
-where it was; parts made at other versions or settings are made anew. Times are taken last.
+Each part is written to DIR/parts as soon as it is complete, so a run that was stopped continues
+there; parts of other versions or settings are computed again. Times are measured last.
 """
 
 import zlib
@@ -17,16 +17,16 @@ from assets.emulator.validate import error_ratios
 from benchmarks.perception import episodes, speed
 from benchmarks.perception.crops import Looker, instants
 from benchmarks.perception.declaration import TABLES
-from benchmarks.perception.metrics import EMULATED, NO_FAULT, PIXELS, metrics_of
+from benchmarks.perception.metrics import EMULATED, NO_FAULT, PIXELS, compute_metrics
 from benchmarks.perception.report import report
-from benchmarks.perception.views import PLAIN, View, in_turns
+from benchmarks.perception.views import PLAIN, View, list_activities
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric
 from hrc_env.engines.local import Serial
 from hrc_env.experiments.cache import Part, PartCache, PartProgress
-from hrc_env.experiments.report import Metrics, Report, Table, quick_words
+from hrc_env.experiments.report import Metrics, Report, Table, describe_quick_run
 from hrc_env.experiments.rigs import DT_S
-from hrc_env.experiments.runner import at_least_one, is_as_short
+from hrc_env.experiments.runner import check_at_least_one, is_as_short
 from hrc_env.perception import vino
 from hrc_env.perception.faults.fault import IMAGE, KINDS, FaultConfig
 from hrc_env.scene.build import SCENES, Scene, SceneConfig, build
@@ -35,52 +35,56 @@ from hrc_env.scene.rigs import RIGS
 from hrc_env.worker.body import worker_names
 
 LENSES = {"pinhole": "lab", "fisheye": "lab_gopro"}
-"""Rigs that hang in the same places, by the rows that their crops make."""
+"""Rigs with cameras in the same places, by the rows of their crops."""
 FIRST_SEED = 500
-"""Of episodes, and of resets after which the worker is looked for; the others count up."""
+"""First seed of episodes, and of crops."""
 BLOCK = 5
-"""Episodes of a part: so many are lost at most when the bench is stopped."""
+"""Number of episodes in a part, which bounds the loss when a run is stopped."""
 
 Parts = dict[str, dict[str, Any]]
-"""By label."""
+"""Finished parts by label."""
 
 
 @dataclass(frozen=True, slots=True)
 class PerceptionBench:
-    """The experiment, and how much is measured."""
+    """The experiment, and the amount of data that is measured."""
 
     name = "bench perception"
     depends = ("env", "tracker", "emulator", "detector", "motion")
     episodes: tuple[tuple[str, int], ...] = (("lab", 15), ("site", 8))
-    """Episodes at `pixels`, scene by scene; faults are compared with the lab's first ones."""
+    """Number of episodes at `pixels` by scene; faults are compared with the first ones of the
+    lab."""
     n_steps: int = 250
-    """Steps of each."""
+    """Steps of these episodes."""
     n_faults: int = 4
-    """Episodes of every fault at `pixels`; the four cameras have it in turns."""
+    """Number of episodes of every fault at `pixels`; the four cameras have it in turns."""
     fault_steps: int = 150
-    """Steps of each."""
+    """Steps of these episodes."""
     n_emulated: int = 20
-    """Episodes of every fault at `keypoints`, of `n_steps` each."""
+    """Number of episodes of every fault at `keypoints`, of `n_steps` each."""
     kinds: tuple[str, ...] = tuple(KINDS)
-    """Which faults."""
+    """Names of the faults."""
     bodies: tuple[str, ...] = worker_names()
-    """Whose crops are looked at."""
+    """Names of the bodies on crops."""
     n_instants: int = 15
-    """Moments of each body in each scene, and of each lens; four crops each."""
+    """Number of moments of each body in each scene, and of each lens; four crops each."""
     emulator_rounds: int | None = 2
-    """How often each motion is rendered in each scene to hold the emulator against pixels; 0: once,
-    in one of them; None: not at all."""
+    """Number of times that each motion is rendered in each scene to compare the emulator with
+    pixels.
+
+    0: once, in one scene; None: not at all.
+    """
     cameras: tuple[int, ...] = (1, 2, 4)
-    """Numbers of cameras whose speed is taken."""
+    """Numbers of cameras at which speed is measured."""
     workers: tuple[int, ...] = (1, 2)
-    """Numbers of workers likewise."""
+    """Numbers of workers at which speed is measured."""
     speed_steps: int = 200
-    """Steps by which it is."""
+    """Number of steps in a measurement of speed."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for numbers that cannot work."""
         counts = ("n_steps", "n_faults", "fault_steps", "n_emulated", "n_instants", "speed_steps")
-        at_least_one(self, *counts)
+        check_at_least_one(self, *counts)
         if self.n_faults > dict(self.episodes).get("lab", 0) or self.fault_steps > self.n_steps:
             raise ConfigError(
                 "Faults are compared with the lab's first episodes: n_faults must not exceed their "
@@ -91,47 +95,47 @@ class PerceptionBench:
 
     @property
     def seeds(self) -> list[int]:
-        """One an episode."""
+        """Seeds, one per episode."""
         return [FIRST_SEED + k for k in range(max(n for _, n in self.episodes))]
 
     @property
     def n_parts(self) -> int:
-        """Tasks."""
-        return len(list(tasks_of(self)))
+        """Number of parts."""
+        return len(list(make_tasks(self)))
 
     @property
     def quick_note(self) -> str:
         """The warning on tables and figures of a short run; "" if it is long enough."""
         is_short = is_as_short(self, QUICK)
-        return quick_words(self.n_emulated, self.n_steps * DT_S) if is_short else ""
+        return describe_quick_run(self.n_emulated, self.n_steps * DT_S) if is_short else ""
 
     def settings(self) -> dict[str, Any]:
-        """Return what all numbers depend on."""
+        """Return the settings that all numbers depend on."""
         return {"bench": asdict(self)}
 
     def play(self, cache: PartCache) -> Parts:
         """Return all parts by their labels."""
-        tasks = list(tasks_of(self, cache.folder.parent / "figures"))
+        tasks = list(make_tasks(self, cache.folder.parent / "figures"))
         cache = replace(cache, n_parts=sum(task.cost for task in tasks))
         away = [task for task in tasks if not task.is_here]
-        parts = cache.parts([task.part for task in away], one_core=True)
+        parts = cache.make_parts([task.part for task in away], one_core=True)
         played = {task.label: part for task, part in zip(away, parts, strict=True)}
         here = replace(cache, engine=Serial())
         for task in tasks:
             if task.is_here:
-                (played[task.label],) = here.parts([task.part])
+                (played[task.label],) = here.make_parts([task.part])
         return played
 
     def metrics(self, played: Parts) -> dict[str, Metric]:
-        """Return every number."""
-        return metrics_of(played, self.n_faults, self.fault_steps)
+        """Return all metrics by name."""
+        return compute_metrics(played, self.n_faults, self.fault_steps)
 
     def shown_tables(self) -> tuple[Table, ...]:
         """Return the tables of the documentation."""
         return TABLES
 
     def report(self, played: Parts, metrics: Metrics, figures: Path) -> Report:
-        """Return the tables."""
+        """Return the report."""
         return report(self, played, metrics, figures)
 
 
@@ -140,18 +144,18 @@ QUICK = PerceptionBench(
     n_emulated=8, bodies=("worker_1", "worker_2"), n_instants=10, emulator_rounds=0,
     speed_steps=30,
 )  # fmt: skip
-"""Every number, from little."""
+"""The quick form: every number, from little data."""
 
 
 class Task(NamedTuple):
-    """One part of the bench."""
+    """One part of the benchmark."""
 
     label: str
     cost: float
-    """How long it takes beside the others, roughly [s]."""
+    """Approximate time that it takes relative to others [s]."""
     make: Callable[[PartProgress], dict[str, Any]]
     is_here: bool = False
-    """Whether it is made in this process, alone: it takes times, or draws."""
+    """Whether it runs in this process, alone: it measures time, or draws."""
 
     @property
     def part(self) -> Part:
@@ -159,8 +163,8 @@ class Task(NamedTuple):
         return Part(self.label, self.make, weight=self.cost)
 
 
-def tasks_of(config: PerceptionBench, figures: Path | None = None) -> Iterator[Task]:
-    """All parts, times last; the emulator's plot is drawn into a folder."""
+def make_tasks(config: PerceptionBench, figures: Path | None = None) -> Iterator[Task]:
+    """Yield all parts, time measurements last; the plot of the emulator is drawn into a folder."""
     yield from _crops(config)
     yield from _episodes(config)
     yield from _faults(config)
@@ -171,7 +175,8 @@ def tasks_of(config: PerceptionBench, figures: Path | None = None) -> Iterator[T
 
 
 def _speeds(config: PerceptionBench) -> Iterator[Task]:
-    """The lab in all sizes; its largest rig once more on the site and on the other runtime."""
+    """Yield speeds of the lab in all sizes, and its largest rig on the site and on the other
+    runtime."""
     most, fewest = max(config.cameras), min(config.workers)
     runtimes = (speed.LITERT, speed.OPENVINO) if vino.is_installed() else (speed.LITERT,)
     settings = [
@@ -198,7 +203,7 @@ def _episodes(config: PerceptionBench) -> Iterator[Task]:
 
 
 def _faults(config: PerceptionBench) -> Iterator[Task]:
-    """Every fault at the levels that know it; at `keypoints` also the same without."""
+    """Yield every fault at the levels that have it, and for `keypoints` the same without faults."""
     for kind in config.kinds:
         make = partial(_play_fault, kind, config.n_faults, config.fault_steps, PIXELS)
         slow = 3.0 if kind == "motion_blur" else 1.2
@@ -217,7 +222,7 @@ def _play(seeds: list[int], n_steps: int, tick: PartProgress, **arguments: Any) 
 
 
 def _play_fault(kind: str, n: int, n_steps: int, level: str, tick: PartProgress) -> dict[str, Any]:
-    """Episodes in which the cameras have a fault in turns."""
+    """Return episodes in which the cameras have a fault in turns."""
     played: list[dict[str, Any]] = [{}] * n
     n_cameras = len(SCENES["lab"].cameras)
     for c in range(min(n_cameras, n)):
@@ -232,7 +237,7 @@ def _play_fault(kind: str, n: int, n_steps: int, level: str, tick: PartProgress)
 
 
 def _crops(config: PerceptionBench) -> Iterator[Task]:
-    """Crops of every body in every scene; of one body through every lens, in every appearance."""
+    """Yield crops of every body in every scene, and of one body with every lens and appearance."""
     n, first = config.n_instants, config.bodies[0]
     cost = 3 + 0.12 * n
     for name, _ in config.episodes:
@@ -248,12 +253,12 @@ def _crops(config: PerceptionBench) -> Iterator[Task]:
 
 
 def _look(variant: str, make: Callable[[], Scene], n: int, tick: PartProgress) -> dict[str, Any]:
-    """n moments; every activity has its turn."""
+    """Return n moments, in which every activity has its turn."""
     scene, views = make(), list[View]()
     rng = np.random.default_rng(zlib.crc32(f"{scene.name} {scene.bodies[0]}".encode()))
     appearance = APPEARANCES.get(variant.removeprefix("appearance "), AS_BUILT)
     looker = Looker(scene)
-    for k, now in enumerate(instants(scene, n, rng, in_turns())):
+    for k, now in enumerate(instants(scene, n, rng, list_activities())):
         if appearance != AS_BUILT:
             looker.randomize(draw_look(appearance, 1, np.random.default_rng([FIRST_SEED, k])))
         looked = looker.detect(now)

@@ -1,8 +1,8 @@
-"""Crops of workers at their work, looked at as if for the first time.
+"""Crops of workers at their work, detected without a former track.
 
-A worker moves as the motion generator has it and is drawn with the arm somewhere near home. Each
-camera gives a crop round the true joints, cut as the pipeline cuts it. What counts are crops with
-every joint in the image and no room or robot before one ("in view").
+A worker moves by the motion generator and is rendered with the arm near its home pose. Each camera
+gives a crop around the true joints, cut as in the pipeline. Only crops count with every joint in
+the image and neither room nor robot in front of one ("in view").
 """
 
 from collections.abc import Iterator, Sequence
@@ -35,38 +35,40 @@ from hrc_env.worker.body import load_body, worker_truth
 
 STEP_S = 0.04
 PAUSE_STEPS = (20, 80)
-"""Between two looks pass 0.8 to 3.2 s: another moment of the work, or other work."""
+"""Steps between two moments, 0.8 to 3.2 s, so that they show different work."""
 PATIENCE = 200
-"""Moments that may pass without a wanted activity before that is given up."""
+"""Number of moments without a wanted activity after which the search for it is given up."""
 
 
 class Instant(NamedTuple):
-    """A moment of a worker's day."""
+    """A moment of a worker's work."""
 
     activity: str
     q: JointAngles
-    """(N,) the arm [rad]."""
+    """Joint angles of the arm (N,) [rad]."""
     motion: WorkerMotion
-    """(1, 1, S, ...)."""
+    """Motion of the worker (1, 1, S, ...)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Looked:
-    """What the cameras made of one instant; arrays (C,)."""
+    """Detections of the cameras at one moment; arrays (C,)."""
 
     in_view: Bools
-    """All joints in the image, nothing of room or robot before them."""
+    """Whether all joints are in the image, with neither room nor robot in front of them."""
     error: Floats
     """Mean distance of the joints from the truth as a share of the stature; NaN: missed."""
     distance_m: Floats
-    """From the camera to the middle of the body [m]."""
+    """Distance from the camera to the middle of the body [m]."""
     angle_deg: Floats
-    """Between where the worker faces and the direction to the camera, seen from above: 0 from
-    the front, 180 from behind."""
+    """Angle between the body's heading and the direction to the camera, from above [deg].
+
+    It is 0 from the front and 180 from behind.
+    """
 
 
 class Looker:
-    """PoseDetector and a renderer for the crops of one scene."""
+    """A detector and a renderer for the crops of one scene."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.body = scene, load_body(scene.bodies[0])
@@ -75,11 +77,11 @@ class Looker:
         self.detector = PoseDetector(scene.cameras)
 
     def randomize(self, look: Look) -> None:
-        """Let everything look so from the next look on."""
+        """Set the appearance of the scene from the next moment on."""
         self.renderer.randomize(look)
 
     def detect(self, now: Instant) -> Looked:
-        """Look at an instant with every camera."""
+        """Detect the worker at a moment with every camera."""
         scene = self.scene
         joints = worker_truth(self.body, now.motion).joints_world[0]
         px, depth_m = (values[0] for values in project(projections(scene.cameras), joints))
@@ -105,7 +107,7 @@ class Looker:
         self.renderer.close()
 
     def _found(self, now: Instant, true_px: Points2, depth_m: Floats) -> Points2:
-        """(C, J, 2) pinhole pixels; NaN where nobody was found."""
+        """Return the detections (C, J, 2) in pinhole pixels; NaN for a worker that is not found."""
         cameras = self.scene.cameras
         views = zip(true_px, depth_m, cameras, strict=True)
         windows = [window_from_joints(*view) for view in views]
@@ -120,8 +122,11 @@ class Looker:
 def instants(
     scene: Scene, n: int, rng: np.random.Generator, wanted: Sequence[str]
 ) -> Iterator[Instant]:
-    """n moments of a worker's day in a scene, of whose first body they are: of the activities that
-    are wanted, in turns, where one comes within some minutes, else as they come."""
+    """Yield n moments of a worker's work in a scene.
+
+    Wanted activities are shown in turns if one occurs within some minutes, else activities as they
+    occur. The worker has the scene's first body.
+    """
     body = load_body(scene.bodies[0])
     state = generator.make_state(1, 1, body, HRCConfig().motion, scene.grounds)
     streams = [np.random.default_rng(rng.integers(2**63))]
@@ -139,7 +144,7 @@ def instants(
 
 
 def view_angle_deg(joints_world: Points3, eyes_world: Points3) -> Floats:
-    """(C,) see `Looked.angle_deg`, of one worker's joints (J, 3) from eyes (C, 3)."""
+    """Return view angles (C,) as in `Looked.angle_deg`, for joints (J, 3) and cameras (C, 3)."""
     left = joints_world[[JOINT["left_shoulder"], JOINT["left_hip"]]].mean(0)
     right = joints_world[[JOINT["right_shoulder"], JOINT["right_hip"]]].mean(0)
     across = (left - right)[:2]

@@ -1,4 +1,4 @@
-"""The perception bench as it is declared: rows, columns and tables."""
+"""The declaration of the perception benchmark: rows, columns and tables."""
 
 from dataclasses import replace
 
@@ -8,23 +8,23 @@ from hrc_env.perception.faults.fault import KINDS
 from hrc_env.scene.domain_randomization import APPEARANCES
 
 LEVELS = {"pixels": "", "keypoints": "keypoints."}
-"""Perception levels, and what begins the names of their metrics."""
+"""Perception levels, with the prefixes of their metrics."""
 FAULTS = {
     "none": ("no fault",), **{kind: (f"`{kind}`",) for kind in KINDS},
 }  # fmt: skip
 POSTURES = {each: (each,) for each in ("stand", "walk", "carry", "work", "fold", "all")}
 SHOWN = ("none", "wrong_rotation", "wrong_translation", "wrong_focal", "knocked", "noise",
          "exposure")  # fmt: skip
-"""Faults by which the documentation shows how cameras are named as miscalibrated."""
+"""Faults for which the documentation shows the reports of miscalibrated cameras."""
 
 
 def belief(start: str = "", words: str = "", key: str = "{}") -> dict[str, Column]:
     """Return columns of the error of estimates and of their reported deviations.
 
     Args:
-        start: of the names of metrics.
-        words: before the headings.
-        key: the row's, in the names of metrics.
+        start: prefix of the metrics.
+        words: prefix of the headings.
+        key: key of the row in the names of metrics.
     """
     return {
         "median": Column(f"{start}error_m.{key}.median", f"{words}median [mm]", 1, 1000),
@@ -35,8 +35,8 @@ def belief(start: str = "", words: str = "", key: str = "{}") -> dict[str, Colum
     }
 
 
-def of_fault(level: str) -> dict[str, Column]:
-    """Return columns of a level's faults."""
+def make_fault_columns(level: str) -> dict[str, Column]:
+    """Return the columns of a level's faults."""
     start, words = LEVELS[level], f"`{level}`: "
     return {
         "ratio": Column(f"{start}error_ratio.{{}}", f"{words}ratio", 2),
@@ -45,8 +45,8 @@ def of_fault(level: str) -> dict[str, Column]:
     }
 
 
-def of_names(level: str) -> tuple[Column, ...]:
-    """Return columns of how a level's cameras are named as miscalibrated."""
+def make_name_columns(level: str) -> tuple[Column, ...]:
+    """Return the columns of a level's reports of miscalibrated cameras."""
     key, words = f"{LEVELS[level]}miscalibrated.{{}}.", f"`{level}`: "
     return (
         Column(f"{key}named", f"{words}named", shows="count"),
@@ -55,7 +55,7 @@ def of_names(level: str) -> tuple[Column, ...]:
     )
 
 
-PIXELS, EMULATED = of_fault("pixels"), of_fault("keypoints")
+PIXELS, EMULATED = make_fault_columns("pixels"), make_fault_columns("keypoints")
 DETECTED = Column("detected.{}", "detected [%]", 1, 100)
 ERROR_SHARE = Column("error_share.{}.median", "median error [% of stature]", 1, 100)
 ACCURACY = Table(
@@ -88,7 +88,7 @@ NAMED = Table(
     "miscalibration",
     "Miscalibrated cameras",
     {kind: FAULTS[kind] for kind in SHOWN},
-    (*of_names("pixels"), *of_names("keypoints")),
+    (*make_name_columns("pixels"), *make_name_columns("keypoints")),
     ("fault of one camera",),
     "Episodes in which the camera was named, after how long, and the share of steps in which "
     "another one was; lab, arm at rest, 6 s an episode at `pixels`, 10 s at `keypoints`. Other "
@@ -154,4 +154,4 @@ SPEED = Table(
     "anything.",
 )
 TABLES = (SPEED, ACCURACY, COST, NAMED, APPEARANCE, EMULATOR, LASTING)
-"""Of the documentation."""
+"""Tables of the documentation."""

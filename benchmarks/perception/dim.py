@@ -1,8 +1,8 @@
-"""The pose network on dark and dull pictures: python -m benchmarks.perception.dim
+"""Accuracy of the pose network on dark and dull pictures: python -m benchmarks.perception.dim
 
-The same moments are drawn in usual light and with each of `PICTURES`, and every camera sees the
-worker as if for the first time. The deviations of `hrc_env.perception.exposure` were fitted to this
-table.
+The same moments are rendered in normal light and with each of `PICTURES`, and every camera detects
+the worker without a former track. The deviations of `hrc_env.perception.exposure` were fitted to
+this table.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,7 +13,7 @@ import numpy as np
 import tyro
 
 from benchmarks.perception.crops import Instant, instants
-from benchmarks.perception.views import in_turns
+from benchmarks.perception.views import list_activities
 from hrc_env.core.batching import one
 from hrc_env.core.records import Roi
 from hrc_env.core.typing import Floats, Image
@@ -30,18 +30,18 @@ from hrc_env.scene.render import CropRenderer
 from hrc_env.worker.body import load_body, worker_truth
 
 GROSS = 8.0
-"""Errors count as at most this number of deviations, so that single gross ones do not decide."""
+"""Greatest error that counts, in deviations, so that single gross errors do not dominate."""
 
 
 class Picture(NamedTuple):
-    """A way to corrupt pictures."""
+    """A kind of degraded picture."""
 
     light: float = 1.0
-    """As of `AppearanceConfig`."""
+    """Light, as in `AppearanceConfig`."""
     darkness: float = 1.0
     """Amount of the fault."""
     contrast: float = 1.0
-    """Distance from a middle grey is multiplied by it."""
+    """Factor on the difference from middle grey."""
 
 
 PICTURES: dict[str, Picture] = {
@@ -57,7 +57,7 @@ class Arguments:
     """Settings of the measurement."""
 
     moments: int = 40
-    """Of each body in each scene."""
+    """Number of moments of each body in each scene."""
     bodies: tuple[str, ...] = ("worker_1", "worker_3")
     scenes: tuple[str, ...] = ("lab", "site")
     seed: int = 1
@@ -71,7 +71,7 @@ class _Seen(NamedTuple):
 
 
 class _Spoilt:
-    """An image source with spoilt pictures."""
+    """An image source with degraded pictures."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.renderer = scene, CropRenderer(scene)
@@ -79,7 +79,7 @@ class _Spoilt:
         self.picture, self.count = Picture(), 0
 
     def crop(self, camera_index: int, window: Roi) -> Image:
-        """The window of a camera's image."""
+        """Return the window of a camera's image."""
         image, kind = self.source.crop(camera_index, window), self.picture
         self.count += 1
         if kind.contrast < 1.0:
@@ -90,7 +90,7 @@ class _Spoilt:
         return image
 
     def show(self, now: Instant, picture: Picture, seed: Sequence[int]) -> None:
-        """Draw a moment from now on, with a picture's light and faults."""
+        """Show a moment from now on, with a picture's light and faults."""
         light = AppearanceConfig(light=(picture.light, picture.light))
         self.picture = picture
         self.renderer.randomize(draw_look(light, 1, np.random.default_rng(seed)))
@@ -103,7 +103,7 @@ def look(name: str, body: str, asked: Arguments) -> dict[str, list[_Seen]]:
     spoilt, detector = _Spoilt(scene), PoseDetector(scene.cameras)
     seen: dict[str, list[_Seen]] = {kind: [] for kind in PICTURES}
     rng = np.random.default_rng(asked.seed)
-    for k, now in enumerate(instants(scene, asked.moments, rng, in_turns())):
+    for k, now in enumerate(instants(scene, asked.moments, rng, list_activities())):
         joints = worker_truth(load_body(body), now.motion).joints_world[0]
         px, depth_m = (values[0] for values in project(projections(scene.cameras), joints))
         views = zip(px, depth_m, scene.cameras, strict=True)
@@ -115,21 +115,32 @@ def look(name: str, body: str, asked: Arguments) -> dict[str, list[_Seen]]:
             spoilt.show(now, picture, [asked.seed, k])
             detector.forget(0)
             found = detector.detect(spoilt, windows)
-            seen[kind] += _compared(found, windows, true_px)
+            seen[kind] += _compare(found, windows, true_px)
     detector.close()
     spoilt.renderer.close()
     return seen
 
 
-def _compared(found: Detection, windows: Views, true_px: Floats) -> list[_Seen]:
+def _compare(found: Detection, windows: Views, true_px: Floats) -> list[_Seen]:
     off = np.linalg.norm(found.px - true_px, axis=-1)
     return [_Seen(off[c], found.sigma_px[c]) for c, w in enumerate(windows) if w is not None]
 
 
-def row_of(usual: Sequence[_Seen], dim: Sequence[_Seen]) -> tuple[int, int, float, float]:
-    """Return the number of crops that showed the worker in usual light, and in this picture too; of
-    the latter the median error, and the root mean square of error over deviation, both as factors
-    on those in usual light."""
+class Row(NamedTuple):
+    """Comparison of a degraded picture with normal light."""
+
+    n_known: int
+    """Number of crops with a detection in normal light."""
+    n_both: int
+    """Number of these crops with a detection in this picture too."""
+    error: float
+    """Median error in the latter crops, as a factor on that in normal light."""
+    spread: float
+    """Root mean square of error over deviation, as a factor on that in normal light."""
+
+
+def make_row(usual: Sequence[_Seen], dim: Sequence[_Seen]) -> Row:
+    """Compare a degraded picture with normal light."""
     known = [pair for pair in zip(usual, dim, strict=True) if np.isfinite(pair[0].error_px).all()]
     both = [pair for pair in known if np.isfinite(pair[1].error_px).all()]
 
@@ -140,7 +151,7 @@ def row_of(usual: Sequence[_Seen], dim: Sequence[_Seen]) -> tuple[int, int, floa
         share = np.array([pair[which].error_px / pair[which].sigma_px for pair in both])
         return float(np.sqrt(np.mean(np.minimum(share, GROSS) ** 2)))
 
-    return len(known), len(both), median(1) / median(0), spread(1) / spread(0)
+    return Row(len(known), len(both), median(1) / median(0), spread(1) / spread(0))
 
 
 def main(asked: Arguments, say: Callable[[str], None] = print) -> None:
@@ -150,8 +161,8 @@ def main(asked: Arguments, say: Callable[[str], None] = print) -> None:
         seen = {kind: [view for part in parts for view in part[kind]] for kind in PICTURES}
         say(f"\n| {name} | found | of | error | error / deviation |\n|---|---:|---:|---:|---:|")
         for kind in PICTURES:
-            known, both, error, spread = row_of(seen["usual"], seen[kind])
-            say(f"| {kind} | {both} | {known} | {error:.2f} | {spread:.2f} |")
+            row = make_row(seen["usual"], seen[kind])
+            say(f"| {kind} | {row.n_both} | {row.n_known} | {row.error:.2f} | {row.spread:.2f} |")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
-"""Episodes of the environment: where the belief was, where the worker was, step by step.
+"""Episodes of the environment: estimated and true joints, step by step.
 
-The arm rests, so that the worker of a seed moves in the same way whatever the cameras do: faults
-and levels are compared on the very same motion.
+The arm rests, so the worker of a seed moves identically with all cameras: faults and levels are
+compared on the same motion.
 """
 
 from collections.abc import Callable, Sequence
@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.common import CHI2_95_3D, normalised_square
+from benchmarks.common import CHI2_95_3D, compute_normalized_square
 from benchmarks.perception.views import family_index
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Floats, Ints
@@ -22,35 +22,37 @@ from hrc_env.worker.body import worker_truth
 
 @dataclass(frozen=True, slots=True)
 class Episode:
-    """One episode of T steps, one worker; the reset's look is not in it."""
+    """One episode of T steps with one worker, without the reset."""
 
     error_m: Floats
-    """(T, J) of the estimate; NaN where the worker was not tracked."""
+    """Errors of the estimate (T, J) [m]; NaN if the worker was not tracked."""
     std_m: Floats
-    """(T, J) root of the trace of what was reported; NaN likewise."""
+    """Root of the trace of the reported covariance (T, J) [m]; NaN if the worker was not
+    tracked."""
     inside95: Ints
-    """(T,) joints within the reported 95 % region."""
+    """Number of joints within the reported 95 % region (T,)."""
     off_px: Floats
-    """(T, C) mean distance of a camera's keypoints from the true joints; NaN: nothing found."""
+    """Mean distance of a camera's keypoints from the true joints (T, C) [px]; NaN: no detection."""
     family: Ints
-    """(T,) what the worker did, an index of `views.FAMILIES`."""
+    """Activity of the worker (T,), an index in `views.FAMILIES`."""
     named: Bools
-    """(T, C) whether a camera was named in info as miscalibrated."""
+    """Whether a camera was reported as miscalibrated (T, C)."""
 
     def to_json(self) -> dict[str, Any]:
-        """Lists of numbers, lengths to a tenth of a millimetre; NaN where unknown."""
+        """Return lists of numbers for JSON, lengths to a tenth of a millimetre; NaN for missing
+        values."""
         arrays = {each.name: np.asarray(getattr(self, each.name), float) for each in fields(self)}
         return {name: np.round(values, 4).tolist() for name, values in arrays.items()}
 
 
-def episode_of(content: dict[str, Any]) -> Episode:
-    """What `Episode.to_json` gave."""
+def read_episode(content: dict[str, Any]) -> Episode:
+    """Return an episode from the content of `Episode.to_json`."""
     arrays = {name: np.array(values, float) for name, values in content.items()}
     return Episode(**{**arrays, "named": arrays["named"] > 0})
 
 
-def some_steps(episode: Episode, steps: Bools | slice) -> Episode:
-    """An episode's steps that are asked for."""
+def select_steps(episode: Episode, steps: Bools | slice) -> Episode:
+    """Return some steps of an episode."""
     names = [each.name for each in fields(Episode)]
     return Episode(*(getattr(episode, name)[steps] for name in names))
 
@@ -58,7 +60,8 @@ def some_steps(episode: Episode, steps: Bools | slice) -> Episode:
 def play(
     seeds: Sequence[int], n_steps: int, tick: Callable[[float], None], **arguments: Any
 ) -> list[Episode]:
-    """An episode a seed of an environment, made with these arguments, whose arm rests."""
+    """Return one episode per seed of an environment with the given arguments, with a resting
+    arm."""
     env = HRCEnv(n_workers=1, **arguments)
     try:
         episodes = []
@@ -83,18 +86,18 @@ def _episode(env: HRCEnv, seed: int, n_steps: int) -> Episode:
         truth = worker_truth(simulation.bodies, generator.current(simulation.motion))
         joints, estimate = truth.joints_world[0, 0], simulation.estimate
         family[t] = family_index(int(generator.activity(simulation.motion)[0, 0]))
-        off_px[t] = _off_px(env, joints)
+        off_px[t] = _measure_error_px(env, joints)
         named[t] = simulation.pipeline.suspected_cameras(np.array([0]))[0]
         if estimate.tracked[0, 0]:
             offset, cov = estimate.mean_world[0, 0] - joints, estimate.cov_world[0, 0]
             error[t] = np.linalg.norm(offset, axis=-1)
             std[t] = np.sqrt(np.trace(cov, axis1=-2, axis2=-1))
-            inside[t] = np.count_nonzero(normalised_square(offset, cov) < CHI2_95_3D)
+            inside[t] = np.count_nonzero(compute_normalized_square(offset, cov) < CHI2_95_3D)
     return Episode(error, std, inside, off_px, family, named)
 
 
-def _off_px(env: HRCEnv, joints_world: Floats) -> Floats:
-    """(C,) how far the keypoints of this step are from the truth; NaN: none."""
+def _measure_error_px(env: HRCEnv, joints_world: Floats) -> Floats:
+    """Return the distance of this step's keypoints from the truth (C,) [px]; NaN: no detection."""
     keypoints, _ = env.simulation.pipeline.last_detections(0)
     cameras = env.simulation.scene.cameras
     if keypoints is None:

@@ -1,37 +1,42 @@
-"""The numbers that come of what the perception bench played."""
+"""Metrics of the parts of the perception benchmark."""
 
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from benchmarks.common import exactly
+from benchmarks.common import make_exact
 from benchmarks.perception.crops import STEP_S
-from benchmarks.perception.episodes import Episode, episode_of, some_steps
+from benchmarks.perception.episodes import Episode, read_episode, select_steps
 from benchmarks.perception.speed import ROUNDS
-from benchmarks.perception.views import FAMILIES, ROWS, View, rows_of
+from benchmarks.perception.views import FAMILIES, ROWS, View, group_rows
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.evaluation.intervals import (
     bootstrap,
-    quantile_over,
-    ratio_over,
-    rmse_over,
-    share_of,
+    estimate_quantile,
+    estimate_ratio,
+    estimate_rmse,
+    estimate_share,
 )
 
 PIXELS, EMULATED, NO_FAULT = "pixels", "keypoints", "none"
 N_DRAWS = 200
 Metrics = dict[str, Metric]
 Found = Mapping[str, dict[str, Any]]
-"""Finished parts by their labels: see `bench.tasks_of`."""
+"""Finished parts by label, as of `bench.tasks_of`."""
 
 
-def metrics_of(found: Found, n_faults: int, fault_steps: int) -> Metrics:
-    """Every number by its name; faults are compared with so many of the lab's first episodes, cut
-    to so many steps."""
+def compute_metrics(found: Found, n_faults: int, fault_steps: int) -> Metrics:
+    """Return all metrics by name.
+
+    Args:
+        found: finished parts.
+        n_faults: number of the lab's first episodes with which faults are compared.
+        fault_steps: number of steps to which these are cut.
+    """
     played = {
-        label: [episode_of(each) for each in part["episodes"]]
+        label: [read_episode(each) for each in part["episodes"]]
         for label, part in found.items()
         if "episodes" in part
     }
@@ -43,7 +48,7 @@ def metrics_of(found: Found, n_faults: int, fault_steps: int) -> Metrics:
             loops.setdefault(first, []).extend(episodes)
         else:
             faults[first, second] = episodes
-    base = [some_steps(each, slice(fault_steps)) for each in loops["lab"][:n_faults]]
+    base = [select_steps(each, slice(fault_steps)) for each in loops["lab"][:n_faults]]
     faults[PIXELS, NO_FAULT] = base
     views = [View(**view) for part in found.values() for view in part.get("views", ())]
     metrics = {**_speed(found), **_loops(loops), **_faults(faults), **_views(views)}
@@ -56,12 +61,12 @@ def _speed(found: Found) -> Metrics:
     for label, part in found.items():
         kind, _, key = label.partition(".")
         if kind == "network":
-            metrics[f"network_ms.{key}"] = exactly(part["ms"], "ms", ROUNDS)
+            metrics[f"network_ms.{key}"] = make_exact(part["ms"], "ms", ROUNDS)
         elif kind == "speed":
-            metrics[f"steps_per_s.{key}"] = exactly(part["steps_per_s"], "1/s", part["n"])
-            metrics[f"step_ms.{key}"] = exactly(1e3 / part["steps_per_s"], "ms", part["n"])
+            metrics[f"steps_per_s.{key}"] = make_exact(part["steps_per_s"], "1/s", part["n"])
+            metrics[f"step_ms.{key}"] = make_exact(1e3 / part["steps_per_s"], "ms", part["n"])
             for stage, ms in part["stages"].items():
-                metrics[f"stage_ms.{stage}.{key}"] = exactly(ms, "ms", part["n"])
+                metrics[f"stage_ms.{stage}.{key}"] = make_exact(ms, "ms", part["n"])
     return metrics
 
 
@@ -71,7 +76,7 @@ def _loops(loops: dict[str, list[Episode]]) -> Metrics:
         metrics |= _belief(scene, episodes)
     everything = [episode for episodes in loops.values() for episode in episodes]
     for k, family in enumerate(FAMILIES):
-        those = [some_steps(episode, episode.family == k) for episode in everything]
+        those = [select_steps(episode, episode.family == k) for episode in everything]
         those = [episode for episode in those if len(episode.family)]
         if those:
             metrics |= _belief(f"pose.{family}", those)
@@ -79,24 +84,27 @@ def _loops(loops: dict[str, list[Episode]]) -> Metrics:
 
 
 def _belief(name: str, episodes: list[Episode]) -> Metrics:
-    """Error, coverage, reported deviation and lost steps of some episodes."""
-    errors = [_known(episode.error_m) for episode in episodes]
+    """Return error, coverage, reported deviation and lost steps of episodes."""
+    errors = [_select_tracked(episode.error_m) for episode in episodes]
     squared = [float((each**2).sum()) for each in errors]
-    reported = [float((_known(episode.std_m) ** 2).sum()) for episode in episodes]
+    reported = [float((_select_tracked(episode.std_m) ** 2).sum()) for episode in episodes]
     inside = [float(episode.inside95.sum()) for episode in episodes]
     lost = [float(np.isnan(episode.error_m[:, 0]).sum()) for episode in episodes]
     steps = [float(len(episode.family)) for episode in episodes]
     return {
-        f"error_m.{name}.median": quantile_over(errors, 0.5, "m"),
-        f"error_m.{name}.p95": quantile_over(errors, 0.95, "m"),
-        f"coverage95.{name}": ratio_over(inside, [float(len(each)) for each in errors], "share"),
-        f"std_over_error.{name}": rmse_over(reported, squared, "ratio"),
-        f"lost_steps.{name}": ratio_over(lost, steps, "share"),
+        f"error_m.{name}.median": estimate_quantile(errors, 0.5, "m"),
+        f"error_m.{name}.p95": estimate_quantile(errors, 0.95, "m"),
+        f"coverage95.{name}": estimate_ratio(
+            inside, [float(len(each)) for each in errors], "share"
+        ),
+        f"std_over_error.{name}": estimate_rmse(reported, squared, "ratio"),
+        f"lost_steps.{name}": estimate_ratio(lost, steps, "share"),
     }
 
 
 def _faults(faults: dict[tuple[str, str], list[Episode]]) -> Metrics:
-    """Beside the same seeds without; the cameras have the fault in turns, episode by episode."""
+    """Return metrics of faults relative to the same seeds without; cameras have the fault in
+    turns."""
     metrics: Metrics = {}
     for (level, kind), episodes in faults.items():
         start = "" if level == PIXELS else f"{level}."
@@ -107,15 +115,16 @@ def _faults(faults: dict[tuple[str, str], list[Episode]]) -> Metrics:
             own = [-1] * len(episodes)
         else:
             found[f"error_ratio.{kind}"] = _ratio(episodes, base)
-            found[f"detected.fault.{kind}"] = _detected(episodes, own)
-        found |= _named(f"miscalibrated.{kind}", episodes, own)
+            found[f"detected.fault.{kind}"] = _rate_detections(episodes, own)
+        found |= _rate_reports(f"miscalibrated.{kind}", episodes, own)
         metrics |= {start + name: metric for name, metric in found.items()}
     return metrics
 
 
 def _ratio(episodes: list[Episode], base: list[Episode]) -> Metric:
-    """Median error over that of the same seeds without the fault; seeds are drawn anew."""
-    above, below = ([_known(each.error_m) for each in some] for some in (episodes, base))
+    """Return the median error over that of the same seeds without the fault, by bootstrap over
+    seeds."""
+    above, below = ([_select_tracked(each.error_m) for each in some] for some in (episodes, base))
 
     def ratio(weights: Ints) -> Floats:
         drawn = [np.repeat(np.arange(len(each)), each) for each in weights]
@@ -129,15 +138,15 @@ def _median(values: list[Floats], which: Ints) -> float:
     return float(np.median(together)) if together.size else np.nan
 
 
-def _detected(episodes: list[Episode], cameras: list[int]) -> Metric:
-    """The share of steps in which the camera with the fault reported anybody."""
+def _rate_detections(episodes: list[Episode], cameras: list[int]) -> Metric:
+    """Return the share of steps in which the camera with the fault detected the worker."""
     pairs = zip(episodes, cameras, strict=True)
     seen = [float(np.isfinite(each.off_px[:, c]).sum()) for each, c in pairs]
-    return ratio_over(seen, [float(len(each.off_px)) for each in episodes], "share")
+    return estimate_ratio(seen, [float(len(each.off_px)) for each in episodes], "share")
 
 
-def _named(start: str, episodes: list[Episode], own: list[int]) -> Metrics:
-    """How often, and how soon, the camera with the fault is named as miscalibrated, and others."""
+def _rate_reports(start: str, episodes: list[Episode], own: list[int]) -> Metrics:
+    """Return the share and the delay of reports of the camera with the fault, and of others."""
     cameras = [np.arange(each.named.shape[1]) for each in episodes]
     mine = [each.named[:, c == k].any(1) for each, c, k in zip(episodes, cameras, own, strict=True)]
     wrong = [
@@ -146,24 +155,26 @@ def _named(start: str, episodes: list[Episode], own: list[int]) -> Metrics:
     first = [float(np.argmax(each)) * STEP_S for each in mine if each.any()]
     steps = [float(len(each.family)) for each in episodes]
     return {
-        f"{start}.named": share_of([bool(each.any()) for each in mine]),
-        f"{start}.after_s": quantile_over([[each] for each in first], 0.5, "s"),
-        f"{start}.others": ratio_over([float(each.sum()) for each in wrong], steps, "share"),
+        f"{start}.named": estimate_share([bool(each.any()) for each in mine]),
+        f"{start}.after_s": estimate_quantile([[each] for each in first], 0.5, "s"),
+        f"{start}.others": estimate_ratio([float(each.sum()) for each in wrong], steps, "share"),
     }
 
 
 def _views(every: list[View]) -> Metrics:
     metrics: Metrics = {}
     for kind in ROWS:
-        for row, views in rows_of(every, kind).items():
-            metrics[f"detected.{kind}.{row}"] = share_of([view.error is not None for view in views])
+        for row, views in group_rows(every, kind).items():
+            metrics[f"detected.{kind}.{row}"] = estimate_share(
+                [view.error is not None for view in views]
+            )
             errors = [[view.error] for view in views if view.error is not None]
             for name, q in (("median", 0.5), ("p95", 0.95)):
                 key = f"error_share.{kind}.{row}.{name}"
-                metrics[key] = quantile_over(errors, q, "share of stature")
+                metrics[key] = estimate_quantile(errors, q, "share of stature")
     return metrics
 
 
-def _known(values: np.ndarray) -> np.ndarray:
-    """Those of single joints, while the worker was tracked."""
+def _select_tracked(values: np.ndarray) -> np.ndarray:
+    """Return the values of single joints while the worker was tracked."""
     return values[np.isfinite(values)]

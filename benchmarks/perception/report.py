@@ -1,10 +1,10 @@
-"""The perception bench as people read it."""
+"""The report of the perception benchmark."""
 
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from benchmarks.common import keys
+from benchmarks.common import list_endings
 from benchmarks.perception.declaration import (
     ACCURACY,
     DETECTED,
@@ -16,12 +16,12 @@ from benchmarks.perception.declaration import (
     NAMED,
     SPEED,
     belief,
-    of_fault,
+    make_fault_columns,
 )
 from benchmarks.perception.speed import REST, STAGES
 from benchmarks.perception.views import ROWS
 from hrc_env.experiments.columns import Column
-from hrc_env.experiments.report import Metrics, Report, table_of
+from hrc_env.experiments.report import Metrics, Report, format_metrics
 
 _LEAD = """\
 Intervals of shares are exact. Level `pixels` unless it says otherwise; every camera looks in every
@@ -46,43 +46,48 @@ emulator's calibration has not seen, by family of motions (`assets.emulator`).""
 
 
 def report(config: Any, found: Any, metrics: Metrics, figures: Path) -> Report:
-    """Return the tables.
+    """Return the report.
 
     Args:
-        config: of the bench.
+        config: settings of the benchmark.
         found: its parts.
-        metrics: of the bench.
-        figures: folder.
+        metrics: metrics by name.
+        figures: folder of figures.
     """
     del config, found, figures
     kinds = {kind: words for kind, (words,) in FAULTS.items()}
     views = {
         f"{kind}.{row}": f"{kind}: {row.replace('_', ' ')}"
         for kind in ROWS
-        for row in keys(metrics, f"detected.{kind}.")
+        for row in list_endings(metrics, f"detected.{kind}.")
     }
-    paces = {name: name for name in keys(metrics, "steps_per_s.")}
-    names = keys(metrics, "lost_steps.")
+    paces = {name: name for name in list_endings(metrics, "steps_per_s.")}
+    names = list_endings(metrics, "lost_steps.")
     estimates = {name: name.replace(".", ": ") for name in names if not name.startswith("fault.")}
-    faults = [each for level in LEVELS for name, each in of_fault(level).items() if name != "lost"]
+    faults = [
+        each
+        for level in LEVELS
+        for name, each in make_fault_columns(level).items()
+        if name != "lost"
+    ]
     stages = [Column(f"stage_ms.{each}.{{}}", f"{each} [ms]") for each in (*STAGES, REST)]
     less = Column("emulator_coverage_difference.{}", "coverage less pixels'", 3, signed=True)
     parts = (
-        "## Speed", SPEED.markdown(metrics),
-        table_of("cameras.workers", paces, [Column("steps_per_s.{}", "steps [1/s]"), *stages],
+        "## Speed", SPEED.to_markdown(metrics),
+        format_metrics("cameras.workers", paces, [Column("steps_per_s.{}", "steps [1/s]"), *stages],
                  metrics),
         _ABOUT_SPEED,
-        "## Error of the estimate", ACCURACY.markdown(metrics),
-        table_of("", estimates, [*belief().values()], metrics), _ABOUT_ERRORS,
+        "## Error of the estimate", ACCURACY.to_markdown(metrics),
+        format_metrics("", estimates, [*belief().values()], metrics), _ABOUT_ERRORS,
         "## Faults of one of four cameras, lab",
-        table_of("", kinds, faults, metrics), _ABOUT_FAULTS,
-        "## Cameras named as miscalibrated", replace(NAMED, rows=FAULTS).markdown(metrics),
-        "## Single crops", table_of("", views, [
+        format_metrics("", kinds, faults, metrics), _ABOUT_FAULTS,
+        "## Cameras named as miscalibrated", replace(NAMED, rows=FAULTS).to_markdown(metrics),
+        "## Single crops", format_metrics("", views, [
             DETECTED, ERROR_SHARE, Column("error_share.{}.p95", "95 % [% of stature]", 1, 100),
         ], metrics), _ABOUT_CROPS,
         "## The emulator beside the pixels",
-        replace(EMULATOR, columns=(*EMULATOR.columns, less)).markdown(metrics),
-        LASTING.markdown(metrics), _ABOUT_THE_EMULATOR,
+        replace(EMULATOR, columns=(*EMULATOR.columns, less)).to_markdown(metrics),
+        LASTING.to_markdown(metrics), _ABOUT_THE_EMULATOR,
     )  # fmt: skip
     spread = "95 % intervals over episodes, crops or clips"
     return Report("Perception bench", _LEAD, [*filter(None, parts)], spread)

@@ -1,4 +1,4 @@
-"""Steps a second at level `pixels`, every camera in every step, and what takes the time."""
+"""Steps a second at level `pixels` with every camera in every step, and the time of the stages."""
 
 import time
 import warnings
@@ -25,18 +25,21 @@ STAGES: Mapping[str, Sequence[Place]] = {
     "physics": ((Physics, "step"),),
     "motion": ((generator, "advance"), (generator, "watch")),
 }
-"""Time of the thread that steps: `detect` is what is left of looking when drawing is taken out,
-most of it the network's, or waiting for it; `track` has association in it."""
+"""Stages, as times of the stepping thread.
+
+`detect` is the time of detection without rendering, most of it the network's or waiting for it;
+`track` includes association.
+"""
 REST = "rest"
 WARM_UP = 10
-"""Steps before the clock runs."""
+"""Number of steps before the measurement."""
 ROUNDS = 60
-"""Of four crops, to time the network alone."""
+"""Number of runs with four crops that time the network alone."""
 LITERT, OPENVINO = "litert", "openvino"
 
 
 class Setting(NamedTuple):
-    """What is timed."""
+    """The setting of a time measurement."""
 
     cameras: int
     workers: int
@@ -45,14 +48,14 @@ class Setting(NamedTuple):
 
     @property
     def name(self) -> str:
-        """As in the names of metrics: numbers, then what is not usual."""
+        """Name in metrics: numbers, then deviations from the default."""
         usual = {"lab", LITERT}
         special = (each for each in (self.scene, self.runtime) if each not in usual)
         return ".".join([str(self.cameras), str(self.workers), *special])
 
 
 def network_ms(runtime: str, tick: Callable[[float], None]) -> dict[str, float]:
-    """The median time in which two threads get the landmarks of four crops: no loop is faster."""
+    """Return the median time in which two threads process four crops, a lower bound of any loop."""
     landmarkers = [load_landmarker(runtime=runtime) for _ in range(2)]
     crop = np.random.default_rng(0).random((LANDMARK_SIDE, LANDMARK_SIDE, 3), np.float32)
     seconds = []
@@ -71,8 +74,11 @@ def network_ms(runtime: str, tick: Callable[[float], None]) -> dict[str, float]:
 def measure(
     setting: Setting, n_steps: int, seed: int, tick: Callable[[float], None]
 ) -> dict[str, Any]:
-    """Random actions for "n" steps, then as many with the stopwatch round the stages: "steps_per_s"
-    of the median step, and of "stages" milliseconds a step."""
+    """Return the speed of random actions, and the times of the stages.
+
+    After "n" steps as many run with the stopwatch around the stages: "steps_per_s" of the median
+    step, and in "stages" milliseconds per step.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # that one camera is few is known
         env = HRCEnv(
@@ -103,7 +109,7 @@ def measure(
 
 
 def _step(env: HRCEnv, actions: np.random.Generator, n_steps: int) -> list[float]:
-    """Seconds of each step."""
+    """Return the seconds of each step."""
     seconds = []
     for _ in range(n_steps):
         action = actions.uniform(-1, 1, env.simulation.n_actions).astype(np.float32)

@@ -1,4 +1,4 @@
-"""Crops as rows of a table: by what the worker does, how far away, from which side."""
+"""Crops as rows of a table: by activity, distance and view angle."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -13,23 +13,25 @@ FAMILIES: dict[str, tuple[str, ...]] = {
     "raise": ("drill overhead", "climb"),
     "fold": ("lift", "pick up", "set down", "squat", "kneel", "fall"),
 }
-"""Motion families and the activities in them; every activity is in one. A judgement: `fold` are
-those in which trunk or knees are bent far, where the network is weak."""
+"""Motion families with their activities; every activity is in one.
+
+A judgement: in `fold` trunk or knees are bent far, where the network is weak.
+"""
 FAMILY_OF: dict[str, str] = {
     activity: family for family, activities in FAMILIES.items() for activity in activities
 }
 DISTANCES_M = (0, 3, 4, 6, 9, 13)
-"""Lower bounds of the rows by distance; the last one is open."""
+"""Lower bounds of the rows by distance [m]; the last one is open."""
 ANGLES_DEG = (0, 45, 90, 135)
-"""Lower bounds of the rows by view angle; each is 45 degrees wide."""
+"""Lower bounds of the rows by view angle [deg]; each is 45 degrees wide."""
 
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """One crop in which the whole worker was in view, and what came of it."""
+    """One crop with the whole worker in view, and the result of its detection."""
 
     variant: str
-    """Under which conditions it was taken, `PLAIN` or "<kind> <row>"."""
+    """Conditions of the crop, `PLAIN` or "<kind> <row>"."""
     scene: str
     body: str
     activity: str
@@ -48,15 +50,15 @@ ROWS: Mapping[str, Callable[[View], str]] = {
     "lens": lambda view: view.variant.removeprefix("lens "),
     "appearance": lambda view: view.variant.removeprefix("appearance "),
 }
-"""By what crops are told apart, and the row that each is in."""
+"""Kinds of rows, each a function from a crop to its row."""
 COMPARED = ("lens", "appearance")
-"""Kinds that compare variants "<kind> <row>" of the same moments; the others have `PLAIN` ones."""
+"""Kinds that compare variants "<kind> <row>" of the same moments; the others use `PLAIN` ones."""
 PLAIN = "plain"
-"""The variant of the scenes as they are."""
+"""Variant of the scenes without changes."""
 
 
-def rows_of(views: list[View], kind: str) -> dict[str, list[View]]:
-    """The views of a kind of row by row, in a sensible order."""
+def group_rows(views: list[View], kind: str) -> dict[str, list[View]]:
+    """Return the crops of a kind by row, in the order of the table."""
     name = ROWS[kind]
     compared = kind in COMPARED
     chosen = [v for v in views if v.variant.startswith(f"{kind} " if compared else PLAIN)]
@@ -64,15 +66,15 @@ def rows_of(views: list[View], kind: str) -> dict[str, list[View]]:
     return {row: [view for view in chosen if name(view) == row] for row in found}
 
 
-def in_turns() -> tuple[str, ...]:
-    """Every activity that a worker does on their own account, the families in turns."""
+def list_activities() -> tuple[str, ...]:
+    """Return every activity that a worker does on its own, with the families in turns."""
     kinds = [[each for each in names if each != "clip"] for names in FAMILIES.values()]
     longest = max(map(len, kinds))
     return tuple(names[k] for k in range(longest) for names in kinds if k < len(names))
 
 
 def family_index(activity: int) -> int:
-    """The family of an activity: an index of `FAMILIES`."""
+    """Return the family of an activity, an index in `FAMILIES`."""
     return list(FAMILIES).index(FAMILY_OF[activity_names[activity]])
 
 
@@ -85,6 +87,6 @@ def _band(value: float, bounds: tuple[float, ...], unit: str) -> str:
 
 
 def _order(row: str) -> tuple[float, str]:
-    """Bands by their numbers, names by the alphabet."""
+    """Return the sort key of a row: bands by their numbers, names alphabetically."""
     number = row.split("_", 1)[0]
     return (float(number) if number.replace(".", "").isdigit() else -1.0, row)

@@ -1,1 +1,1 @@
-"""The estimators on real films, where there is no ground truth."""
+"""Estimators on recorded films, for which there is no ground truth."""

@@ -1,4 +1,4 @@
-"""The tracking bench on recorded films: every estimator on the same detections."""
+"""The tracking benchmark on recorded films: every estimator on the same detections."""
 
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.recorded.calibration import read_calibration, tracker_config
-from benchmarks.recorded.detections import FOLLOWER, Detections, detections_of
+from benchmarks.recorded.detections import FOLLOWER, Detections, make_detections
 from benchmarks.recorded.fetch import POSE2SIM, fetch_recording
 from benchmarks.recorded.films import Films
 from benchmarks.recorded.metrics import (
@@ -15,8 +15,8 @@ from benchmarks.recorded.metrics import (
     bone_std,
     follow,
     foretell,
-    foretold_metrics,
     jerk,
+    summarize_foretold,
 )
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats
@@ -27,7 +27,7 @@ from hrc_env.geometry.cameras import projections
 from hrc_env.tracking.config import TrackerConfig
 
 _DETECTING = 0.5
-"""Its share of the work."""
+"""Share of the progress for detection."""
 _LEAD = """\
 Leave-one-camera-out reprojection [px]; `renamed`: where it fits better, the held-out detector is
 taken to have exchanged left and right. Coverage: share of held-out detections within the 95 %
@@ -65,20 +65,20 @@ class RecordedBench:
     n_parts = 1
 
     def settings(self) -> dict[str, Any]:
-        """Return what all numbers depend on."""
+        """Return the settings that all numbers depend on."""
         return {"recording": POSE2SIM.requirement, "follower": FOLLOWER}
 
     def play(self, cache: PartCache) -> dict[str, Metric]:
-        """Fetch, detect, estimate; detections that are there already are not made again.
+        """Fetch and detect, then run all estimators; existing detections are used.
 
         Raises:
-            DownloadError: the recording is not there and cannot be fetched.
-            WeightsError: the pose network's weights are not there.
+            DownloadError: the recording is missing and cannot be fetched.
+            WeightsError: the weights of the pose network are missing.
         """
         recording = fetch_recording(lambda sentence: cache.progress(0.0, sentence))
         with closing(Films(recording.films)) as films:
             cameras = read_calibration(recording.calibration, films.sizes_px)
-            detections = detections_of(films, cameras, replace(cache, n_parts=1 / _DETECTING))
+            detections = make_detections(films, cameras, replace(cache, n_parts=1 / _DETECTING))
         pinholes = [replace(camera, lens=None) for camera in cameras]
         P, tracker = projections(tuple(pinholes)), tracker_config(pinholes)
         metrics: dict[str, Metric] = {}
@@ -88,7 +88,7 @@ class RecordedBench:
         return dict(sorted(metrics.items()))
 
     def metrics(self, played: dict[str, Metric]) -> dict[str, Metric]:
-        """Return every number."""
+        """Return all metrics by name."""
         return played
 
     def shown_tables(self) -> tuple[Table, ...]:
@@ -96,16 +96,16 @@ class RecordedBench:
         return (FOOTAGE,)
 
     def report(self, played: dict[str, Metric], metrics: Metrics, figures: Path) -> Report:
-        """Return the table."""
+        """Return the report."""
         return report(metrics)
 
 
 def _of_estimator(
     name: str, P: Floats, config: TrackerConfig, detections: Detections
 ) -> dict[str, Metric]:
-    """Everything about one estimator."""
+    """Return the metrics of one estimator."""
     metrics = {}
-    for kind, metric in foretold_metrics(foretell(name, P, config, detections)).items():
+    for kind, metric in summarize_foretold(foretell(name, P, config, detections)).items():
         measure, *part = kind.split(".")
         label = f"reprojection_{measure}" if part else measure
         metrics[".".join([f"real_{label}", name, *part])] = metric
@@ -116,7 +116,7 @@ def _of_estimator(
 
 
 def report(metrics: Metrics) -> Report:
-    """Return the table, a row for each estimator."""
-    parts = [FOOTAGE.markdown(metrics)]
+    """Return the report, with one row per estimator."""
+    parts = [FOOTAGE.to_markdown(metrics)]
     spread = "95 % intervals over blocks of frames, those of bones and jerk with least and largest"
     return Report("Tracking on recorded films", _LEAD, parts, spread)

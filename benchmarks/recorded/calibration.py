@@ -1,4 +1,4 @@
-"""The calibration of a recording: Qualisys' XML to pinhole cameras with a lens.
+"""The calibration of a recording: from Qualisys' XML to pinhole cameras with a lens.
 
 Frames: the file's world is right-handed, +Z up, in millimetres, and becomes `world` in metres.
 Its matrix has the camera's axes in its rows (+X right, +Y up, -Z forward), so that OpenCV's
@@ -23,13 +23,13 @@ _HALF_TURN_ABOUT_X = np.diag([1.0, -1.0, -1.0])
 
 
 def read_calibration(path: Path, sizes_px: list[tuple[int, int]]) -> list[PinholeCamera]:
-    """The cameras of a Qualisys calibration file, whose films have these widths and heights."""
+    """Return the cameras of a Qualisys calibration file, for films of these widths and heights."""
     found = ElementTree.parse(path).getroot().iter("camera")
     return [_camera(camera, size) for camera, size in zip(found, sizes_px, strict=True)]
 
 
-def meeting_point(cameras: list[PinholeCamera]) -> Points3:
-    """(3,) the point that is nearest to all optical axes, which are not parallel [m]."""
+def find_meeting_point(cameras: list[PinholeCamera]) -> Points3:
+    """Return the point (3,) that is closest to all optical axes, which are not parallel [m]."""
     normal, rhs = np.zeros((3, 3)), np.zeros(3)
     for camera in cameras:
         along = camera.T_world_from_cam[:3, 2]
@@ -40,9 +40,12 @@ def meeting_point(cameras: list[PinholeCamera]) -> Points3:
 
 
 def tracker_config(cameras: list[PinholeCamera]) -> ParticleConfig:
-    """Where a rig expects somebody: where it looks, give or take half its mean distance; where the
-    floor is, the file does not say."""
-    point = meeting_point(cameras)
+    """Return tracker settings for a rig: a prior around the point it looks at, without a floor.
+
+    The standard deviation of the prior is half the mean distance; the file has no height of the
+    floor.
+    """
+    point = find_meeting_point(cameras)
     distances_m = [float(np.linalg.norm(camera.eye_world - point)) for camera in cameras]
     x, y, z = (float(value) for value in point)
     return ParticleConfig(

@@ -1,4 +1,4 @@
-"""What the pose network sees in a recording: made once, kept, given to every estimator."""
+"""Detections of the pose network in a recording: made once, stored, and used by every estimator."""
 
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -17,50 +17,50 @@ from hrc_env.perception.windows import window_from_joints
 from hrc_env.tracking.estimators import make_estimator
 
 FOLLOWER = "kalman"
-"""The estimator whose prediction says where to look: a rival of the default one, so that nobody
-can say that the default was given windows of its own."""
+"""Estimator that predicts the crop windows, another one than the default, which gets no
+advantage."""
 SURE = 0.5
-"""Detections of less confidence do not count."""
+"""Confidence below which detections do not count."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Detections:
-    """One person in T frames of C cameras."""
+    """Detections of one person in T frames of C cameras."""
 
     px: Points2
-    """(T, C, J, 2) [px] of the pinhole cameras, NaN where not found."""
+    """Pixels of the pinhole cameras (T, C, J, 2), NaN without a detection."""
     confidence: Floats
-    """(T, C, J) in [0, 1]."""
+    """Confidence (T, C, J) in [0, 1]."""
     sigma_px: Floats
-    """(T, C, J) as the detector says [px]."""
+    """Standard deviation of the detector (T, C, J) [px]."""
     dt_s: float
-    """Time from one frame to the next [s]."""
+    """Time between frames [s]."""
 
     def keypoints(self, t: int, cameras: list[int]) -> Keypoints:
-        """The record of frame `t` for some of the cameras."""
+        """Return the record of frame `t` for some of the cameras."""
         px, confidence, sigma = (
             array[t, cameras][None, :, None] for array in (self.px, self.confidence, self.sigma_px)
         )
         return Keypoints(px, confidence, sigma)
 
 
-def detections_of(films: Films, cameras: list[PinholeCamera], parts: PartCache) -> Detections:
-    """The detections of all films: the part that is there, or new ones."""
+def make_detections(films: Films, cameras: list[PinholeCamera], parts: PartCache) -> Detections:
+    """Return the detections of all films, from the cache or computed."""
 
     def make(tick: PartProgress) -> dict[str, Any]:
         found = asdict(_detect(films, cameras, tick))
         return {name: np.asarray(value).tolist() for name, value in found.items()}
 
-    made = parts.part("detections", make)
+    made = parts.make_part("detections", make)
     px, confidence, sigma_px = (np.array(made[name]) for name in ("px", "confidence", "sigma_px"))
     return Detections(px, confidence, sigma_px, made["dt_s"])
 
 
 def _detect(films: Films, cameras: list[PinholeCamera], tick: PartProgress) -> Detections:
-    """Look at every frame where the person is predicted to be; search while nobody is followed.
+    """Detect the person in every frame near the predicted position; search without a track.
 
-    A follower with all cameras chooses the windows, so that somebody who stands by is not
-    looked at: hips where the lines of sight of most cameras meet win the search.
+    A follower with all cameras chooses the windows, so a bystander is not detected: hips at which
+    the lines of sight of most cameras meet win the search.
     """
     pinholes = [replace(camera, lens=None) for camera in cameras]
     dt_s = 1 / films.frames_per_s
@@ -88,7 +88,7 @@ def _detect(films: Films, cameras: list[PinholeCamera], tick: PartProgress) -> D
 
 
 def _windows(predicted: PoseEstimate, cameras: list[PinholeCamera]) -> list[Roi | None]:
-    """A window a camera round the predicted joints; none at all, a search, without a track."""
+    """Return a window per camera around the predicted joints; none without a track."""
     if not predicted.tracked[0, 0]:
         return [None] * len(cameras)
     px, depth_m = project(projections(tuple(cameras)), predicted.mean_world[:, 0])

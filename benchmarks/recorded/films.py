@@ -1,4 +1,4 @@
-"""Recorded films as a source of pictures: one frame of every camera at a time."""
+"""Recorded films as an image source: one frame of every camera at a time."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,12 +13,12 @@ from hrc_env.perception.blazepose import crop_window
 
 
 class Films:
-    """Films of a rig, read side by side; an `ImageSource` of the frames that are open."""
+    """Films of a rig that are read together; an `ImageSource` of the current frames."""
 
     def __init__(self, paths: Sequence[Path]) -> None:
-        """Open the films; raises `ConfigError` for a file that is none."""
+        """Open the films; raises `ConfigError` for a file that is not a film."""
         self.frames: list[Image] = []
-        """The open frame of each camera, (H, W, 3) RGB; none before `advance`."""
+        """Current frame of each camera, (H, W, 3) RGB; none before `advance`."""
         self._films = [cv2.VideoCapture(str(path)) for path in paths]
         for path, film in zip(paths, self._films, strict=True):
             if not film.isOpened():
@@ -26,7 +26,7 @@ class Films:
 
     @property
     def frames_per_s(self) -> float:
-        """Frame rate, the first film's [Hz]."""
+        """Frame rate of the first film [Hz]."""
         return float(self._films[0].get(cv2.CAP_PROP_FPS))
 
     @property
@@ -39,11 +39,11 @@ class Films:
 
     @property
     def n_frames(self) -> int:
-        """How many frames all films have, as their headers say."""
+        """Number of frames that all films have, by their headers."""
         return min(int(film.get(cv2.CAP_PROP_FRAME_COUNT)) for film in self._films)
 
     def advance(self) -> bool:
-        """Open the next frames; False where a film ends."""
+        """Read the next frames; return False at the end of a film."""
         read = [film.read() for film in self._films]
         if not all(ok for ok, _ in read):
             return False
@@ -53,7 +53,7 @@ class Films:
         return True
 
     def crop(self, camera_index: int, window: Roi) -> Image:
-        """The window of a camera's open frame, upright, (256, 256, 3) RGB."""
+        """Return the window of a camera's current frame, upright, (256, 256, 3) RGB."""
         return crop_window(self.frames[camera_index], window)
 
     def close(self) -> None:

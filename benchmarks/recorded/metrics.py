@@ -1,6 +1,7 @@
-"""How good an estimator is where nobody knows the truth: recorded films.
+"""Quality of an estimator without ground truth, on recorded films.
 
-A camera is held out and must be foretold; bones must not change; motion must be smooth.
+Detections of a held-out camera are predicted; bone lengths should be constant; motion should be
+smooth.
 """
 
 from dataclasses import dataclass, fields
@@ -12,32 +13,32 @@ from hrc_env.core.records import PoseEstimate
 from hrc_env.core.results import Metric
 from hrc_env.core.skeleton import BONES, MIRROR
 from hrc_env.core.typing import Bools, Covariances3, Floats, Points3
-from hrc_env.evaluation.intervals import quantile_over, ratio_over
+from hrc_env.evaluation.intervals import estimate_quantile, estimate_ratio
 from hrc_env.geometry.cameras import project
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import ESTIMATORS, make_estimator
 from hrc_env.tracking.smoother import smooth
 
 SMOOTHER = "smoother"
-"""Offline: it sees the whole recording at once."""
+"""Name of the smoother, which is offline: it uses the whole recording."""
 NAMES = [*ESTIMATORS, SMOOTHER]
-"""Who runs on a recording."""
+"""Names of the estimators that run on a recording."""
 CHI2_95_2D = 5.991
-"""95 % of a two-dimensional normal variable lies within this squared distance."""
+"""Squared Mahalanobis distance of the 95 % region of a normal variable in two dimensions."""
 _BLOCK = 10
-"""Neighbouring frames are alike: intervals come from drawing blocks of this many."""
+"""Number of frames in a block of the bootstrap, as neighbouring frames are alike."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
-    """What an estimator believed after each of T frames."""
+    """Estimates after each of T frames."""
 
     mean_world: Points3
-    """(T, J, 3) [m]."""
+    """Joint positions (T, J, 3) [m]."""
     cov_world: Covariances3
-    """(T, J, 3, 3) [m^2]."""
+    """Covariances of joint positions (T, J, 3, 3) [m^2]."""
     tracked: Bools
-    """(T,)."""
+    """Whether the person is tracked (T,)."""
 
 
 def follow(
@@ -64,19 +65,19 @@ def follow(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Foretold:
-    """How far detections in held-out cameras were from what the others made of them."""
+    """Differences between detections in held-out cameras and their predictions from the others."""
 
     off_px: Floats
-    """(T, C, J), NaN where the detector was not sure or nobody was followed."""
+    """Distance (T, C, J) [px]; NaN for low confidence, or without a track."""
     off_either_px: Floats
-    """The same if, in a frame in which that fits better, the held-out detector is taken to have
-    exchanged left and right."""
+    """The same distance if left and right of a detection are exchanged in frames in which that fits
+    better."""
     inside: Floats
-    """(T, C, J) 1 where the detection lies in the 95 % region of belief and detector, else 0."""
+    """1 if the detection is in the 95 % region of estimate and detector (T, C, J), else 0."""
 
 
 def foretell(name: str, P: Floats, config: TrackerConfig, detections: Detections) -> Foretold:
-    """Hold every camera out once."""
+    """Hold out each camera once, and predict its detections."""
     n_frames, n_cameras, n_joints = detections.confidence.shape
     off = np.full((3, n_frames, n_cameras, n_joints), np.nan)
     for held in range(n_cameras):
@@ -96,7 +97,7 @@ def foretell(name: str, P: Floats, config: TrackerConfig, detections: Detections
 
 
 def _inside(P: Floats, track: Track, detections: Detections, camera: int) -> Bools:
-    """(T, J) whether a detection lies in the 95 % region that belief and detector claim."""
+    """Return whether detections are in the 95 % region of estimate and detector (T, J)."""
     points = np.concatenate([track.mean_world, np.ones((*track.mean_world.shape[:-1], 1))], -1)
     u, v, w = np.moveaxis(points @ P.T, -1, 0)
     px = np.stack([u / w, v / w], -1)
@@ -108,30 +109,34 @@ def _inside(P: Floats, track: Track, detections: Detections, camera: int) -> Boo
     return np.einsum("tji,tjik,tjk->tj", off, np.linalg.inv(cov), off) < CHI2_95_2D
 
 
-def foretold_metrics(foretold: Foretold) -> dict[str, Metric]:
-    """Median and 95th percentile [px], also with sides renamed, and coverage; blocks of frames are
-    drawn anew."""
+def summarize_foretold(foretold: Foretold) -> dict[str, Metric]:
+    """Return median and 95th percentile [px], also with exchanged sides, and coverage.
+
+    Intervals are by bootstrap over blocks of frames.
+    """
     n_blocks = max(len(foretold.inside) // _BLOCK, 1)
     out = {
-        f"{kind}.{part}": quantile_over(np.array_split(off, n_blocks), q, "px")
+        f"{kind}.{part}": estimate_quantile(np.array_split(off, n_blocks), q, "px")
         for kind, off in (("px", foretold.off_px), ("either_px", foretold.off_either_px))
         for part, q in (("median", 0.5), ("p95", 0.95))
     }
     inside = np.array_split(foretold.inside, n_blocks)
     counts = [np.isfinite(each).sum() for each in inside]
-    out["coverage95"] = ratio_over([np.nansum(each) for each in inside], counts, "share")
+    out["coverage95"] = estimate_ratio([np.nansum(each) for each in inside], counts, "share")
     return out
 
 
 def bone_std(track: Track) -> Metric:
-    """Standard deviation of bone lengths over time [m]: mean, least and largest over bones."""
+    """Return the standard deviation of bone lengths over time [m]: mean, least and largest over
+    bones."""
     joints = track.mean_world[track.tracked]
     lengths = np.linalg.norm(joints[:, BONES[:, 0]] - joints[:, BONES[:, 1]], axis=-1)
     return _over(lengths.std(0), float(lengths.std(0).mean()), "m")
 
 
 def jerk(track: Track, dt_s: float) -> Metric:
-    """Root mean squared third difference [m/s^3]: all joints, the calmest and the wildest."""
+    """Return the root mean squared third difference [m/s^3]: of all joints, the least and the
+    greatest."""
     squared = (np.diff(track.mean_world[track.tracked], 3, axis=0) ** 2).sum(-1) / dt_s**6
     return _over(np.sqrt(squared.mean(0)), float(np.sqrt(squared.mean())), "m/s^3")
 

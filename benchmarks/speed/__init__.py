@@ -1,1 +1,2 @@
-"""The speed bench: steps a second from end to end, and what each organ's share of a step is."""
+"""The speed benchmark: steps a second of whole environments, and the share of each part of a
+step."""

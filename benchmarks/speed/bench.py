@@ -1,7 +1,7 @@
-"""The speed bench: everybody takes turns, so that a noisy machine slows all of them alike.
+"""The speed benchmark: all contenders take turns, so that noise of the machine affects all alike.
 
 A round runs every contender for whole episodes, those at level `keypoints` once more with the
-stopwatch round their organs, and resets; then every id has a turn. Medians over rounds count.
+stopwatch around their parts, and resets; then every id has a turn. Medians over rounds count.
 """
 
 import math
@@ -12,9 +12,16 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from benchmarks.common import keys
+from benchmarks.common import list_endings
 from benchmarks.speed.contenders import OURS, PEER, Contender, Single, Starts, Vector
-from benchmarks.speed.declaration import REACHER, SHOWN, SINGLE, TASKS, organs_of, steps_of
+from benchmarks.speed.declaration import (
+    REACHER,
+    SHOWN,
+    SINGLE,
+    TASKS,
+    make_organs_table,
+    make_steps_table,
+)
 from benchmarks.speed.organs import Organs
 from benchmarks.speed.report import report
 from benchmarks.speed.tasks import Tasks, shares
@@ -22,60 +29,60 @@ from hrc_env.config import HRCConfig
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric, over
 from hrc_env.experiments.cache import PartCache, Progress
-from hrc_env.experiments.report import Metrics, Report, Table, quick_words
-from hrc_env.experiments.runner import at_least_one, is_as_short
+from hrc_env.experiments.report import Metrics, Report, Table, describe_quick_run
+from hrc_env.experiments.runner import check_at_least_one, is_as_short
 from hrc_env.safety.shield import find_shield
 from hrc_env.tasks.task import find_task
 
 EVERY = "every"
-"""In place of an id: all of them."""
+"""Name that stands for all ids."""
 WATCHED = "keypoints"
-"""The level whose organs are timed."""
+"""Level at which the parts of a step are timed."""
 _REACHERS = 64
-"""How many Reachers are one vector."""
+"""Number of Reachers in one vector."""
 _MAKING = 0.1
-"""The share of the progress that goes to making environments."""
+"""Share of the progress for making environments."""
 
 
 Measured = defaultdict[str, list[float]]
-"""One number a round, by "<kind>.<name>"; configurations: "single" and "<num_envs>.<threads>"."""
+"""One number per round, by "<kind>.<name>"; configurations: "single" and "<num_envs>.<threads>"."""
 BY_TASK = "task_steps_per_s"
-"""The kind of the ids' numbers."""
+"""Kind of the numbers of ids."""
 
 
 @dataclass(frozen=True, slots=True)
 class SpeedBench:
-    """The experiment, and how much is run."""
+    """The experiment, and the amount of data that is measured."""
 
     name = "bench speed"
     depends = ("env", "tracker", "emulator", "motion")
     seeds = (0,)
     n_parts = 1
     task: str = OURS
-    """Which environment, by its id; "every": the speed of each, and nothing else."""
+    """Id of the environment; "every": the speed of each id, and nothing else."""
     shield: str | None = None
-    """What may change its commands, by its name."""
+    """Name of the shield."""
     n_rounds: int = 6
-    """How often everybody has a turn."""
+    """Number of rounds."""
     least_steps: int = 4000
-    """Environment steps of a turn, at least; whole episodes are run."""
+    """Least number of environment steps in a turn; whole episodes are run."""
     n_resets: int = 25
-    """Resets of each kind in a round."""
+    """Number of resets of each kind in a round."""
     task_steps: int = 200
-    """Steps of each id's vector in a round; none if `task` is another one than the first."""
+    """Steps of each id's vector in a round; none if `task` is not the first id."""
     levels: tuple[str, ...] = (WATCHED, "truth", "none")
     """Perception levels."""
     sizes: tuple[int, ...] = (1, 16, 64, 256)
     """Numbers of environments."""
     threads: tuple[int, ...] = (1, 2)
-    """Numbers of threads; more than there are environments are left out."""
+    """Numbers of threads; those above the number of environments are left out."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for numbers that cannot work."""
         find_shield(self.shield)
         if self.task != EVERY:
             find_task(self.task)
-        at_least_one(self, "n_rounds", "least_steps", "n_resets", "task_steps")
+        check_at_least_one(self, "n_rounds", "least_steps", "n_resets", "task_steps")
         if WATCHED not in self.levels:
             raise ConfigError(f"levels must have {WATCHED!r} in them, got {self.levels}.")
 
@@ -83,17 +90,19 @@ class SpeedBench:
     def quick_note(self) -> str:
         """The warning on tables and figures of a short run; "" if it is long enough."""
         seconds = HRCConfig().ctrl_dt * self.least_steps
-        return quick_words(self.n_rounds, seconds, "round") if is_as_short(self, QUICK) else ""
+        return (
+            describe_quick_run(self.n_rounds, seconds, "round") if is_as_short(self, QUICK) else ""
+        )
 
     def settings(self) -> dict[str, Any]:
-        """Return what all numbers depend on."""
+        """Return the settings that all numbers depend on."""
         return {"bench": asdict(self)}
 
     def play(self, cache: PartCache) -> Measured:
-        """Return the numbers of all rounds; nothing is kept between runs.
+        """Return the numbers of all rounds; nothing is stored between runs.
 
         Raises:
-            HRCError: an organ's function is no longer called, so that its time would be missed.
+            HRCError: a function of a part is no longer called, so its time would be missed.
         """
         measured = Measured(list)
         if self.task != EVERY:
@@ -103,8 +112,8 @@ class SpeedBench:
         return measured
 
     def metrics(self, played: Measured) -> dict[str, Metric]:
-        """Return every number."""
-        return metrics_of(played)
+        """Return all metrics by name."""
+        return compute_metrics(played)
 
     @property
     def vectors(self) -> list[tuple[int, int]]:
@@ -114,24 +123,24 @@ class SpeedBench:
     def shown_tables(self) -> tuple[Table, ...]:
         """Return the tables of the documentation."""
         configurations = (SINGLE, *(f"{size}.{threads}" for size, threads in self.vectors))
-        return (steps_of(self.levels, configurations), organs_of(SHOWN), TASKS)
+        return (make_steps_table(self.levels, configurations), make_organs_table(SHOWN), TASKS)
 
     def report(self, played: Measured, metrics: Metrics, figures: Path) -> Report:
-        """Draw the figure; return the tables beside it."""
+        """Draw the figure and return the report."""
         return report(metrics, figures)
 
 
 QUICK = SpeedBench(n_rounds=1, least_steps=1000, task_steps=25)
-"""Every number, from one short turn."""
+"""The quick form: every number, from one short turn."""
 
 
 UNITS = {"env_steps_per_s": "1/s", "us_per_env_step": "us", "reset_ms": "ms"}
-"""By kind."""
+"""Units by kind."""
 
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """What somebody does in each round."""
+    """The turn of a contender in each round."""
 
     level: str
     configuration: str
@@ -139,11 +148,11 @@ class Turn:
     contender: Contender
     n_episodes: int
     cost: float
-    """What share of a round it takes, roughly and in any unit."""
+    """Approximate share of a round that it takes, in any unit."""
 
 
 def _play_tasks(config: SpeedBench, parts: PartCache, measured: Measured) -> None:
-    """Every id."""
+    """Measure every id."""
     share = (config.task == EVERY) / config.n_rounds
     with closing(Tasks()) as tasks:
         for _ in range(config.n_rounds):
@@ -153,7 +162,7 @@ def _play_tasks(config: SpeedBench, parts: PartCache, measured: Measured) -> Non
 
 
 def _play_sizes(config: SpeedBench, parts: PartCache, measured: Measured) -> None:
-    """One id in all sizes, organs, resets."""
+    """Measure one id in all sizes, its parts, and resets."""
     organs = Organs()
     with ExitStack() as exits:
         turns = [*_turns(config, exits, parts.progress)]
@@ -170,7 +179,7 @@ def _play_sizes(config: SpeedBench, parts: PartCache, measured: Measured) -> Non
 
 
 def _take(turn: Turn, measured: Measured, organs: Organs) -> None:
-    """Run as it is; then, where organs are timed, with the stopwatch round them."""
+    """Run a contender; then, if its parts are timed, run it with the stopwatch around them."""
     pace = turn.contender.run(turn.n_episodes)
     name = f"{turn.level}.{turn.configuration}"
     measured[f"env_steps_per_s.{name}"].append(pace.env_steps / pace.seconds)
@@ -181,7 +190,7 @@ def _take(turn: Turn, measured: Measured, organs: Organs) -> None:
 
 
 def _turns(config: SpeedBench, exits: ExitStack, progress: Progress) -> Iterator[Turn]:
-    """Make everybody, ready to run, to be closed in the end."""
+    """Yield the turns of all contenders, which are made first and closed in the end."""
     known = config.vectors
     n_contenders = len(config.levels) * (1 + len(known)) + 2
 
@@ -204,9 +213,11 @@ def _turns(config: SpeedBench, exits: ExitStack, progress: Progress) -> Iterator
             yield turn(level, f"{size}.{threads}", threads, contender)
 
 
-def metrics_of(measured: Measured) -> dict[str, Metric]:
-    """Medians over rounds with smallest and largest."""
+def compute_metrics(measured: Measured) -> dict[str, Metric]:
+    """Return medians over rounds with the smallest and the largest."""
     own = {name: values for name, values in measured.items() if not name.startswith(BY_TASK)}
-    by_task = {name: measured[f"{BY_TASK}.{name}"] for name in keys(measured, f"{BY_TASK}.")}
+    by_task = {
+        name: measured[f"{BY_TASK}.{name}"] for name in list_endings(measured, f"{BY_TASK}.")
+    }
     found = {name: over(values, UNITS[name.split(".")[0]]) for name, values in own.items()}
     return found | (shares(by_task) if by_task else {})

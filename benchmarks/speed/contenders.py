@@ -1,4 +1,5 @@
-"""Who is timed, by public doors: the environment in all sizes, Gymnasium's Reacher, resets."""
+"""The contenders, by public interfaces: the environment in all sizes, Gymnasium's Reacher,
+resets."""
 
 import time
 from collections.abc import Mapping
@@ -16,16 +17,17 @@ OURS, PEER = "HRCReach-v0", "Reacher-v5"
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """What a run came to."""
+    """The result of a run."""
 
     env_steps: int
-    """Steps in which an action was obeyed; a step that only starts an episode is none."""
+    """Number of steps in which an action was executed; steps that only start an episode do not
+    count."""
     seconds: float
-    """From the first action to the last info, resets inside."""
+    """Time from the first action to the last info, including resets [s]."""
 
 
 class Single:
-    """`gymnasium.make`: one environment, reset where its episode ends."""
+    """An environment of `gymnasium.make` that is reset when its episode ends."""
 
     def __init__(self, id: str, **arguments: Any) -> None:
         self.env: Any = gymnasium.make(id, **arguments)
@@ -33,7 +35,7 @@ class Single:
         self.env.reset(seed=0)
 
     def run(self, n_episodes: int) -> Pace:
-        """Random actions for whole episodes; every info is read."""
+        """Take random actions for whole episodes and read every info."""
         actions = _actions(self.env, n_episodes * self.episode_env_steps)
         started_s = time.perf_counter()
         for action in actions:
@@ -49,7 +51,7 @@ class Single:
 
 
 class Vector:
-    """`gymnasium.make_vec`: episodes start anew in the step after their end, its default."""
+    """An environment of `gymnasium.make_vec`; episodes restart in the step after their end."""
 
     def __init__(self, id: str, num_envs: int, **arguments: Any) -> None:
         self.env: Any = gymnasium.make_vec(id, num_envs, **arguments)
@@ -59,11 +61,11 @@ class Vector:
         self._ended: Bools = np.zeros(num_envs, bool)
 
     def run(self, n_episodes: int) -> Pace:
-        """Random actions for whole episodes; every info is read."""
+        """Take random actions for whole episodes and read every info."""
         return self.run_steps(n_episodes * (self.episode_steps + 1))
 
     def run_steps(self, n_steps: int) -> Pace:
-        """The same for so many steps of the vector, wherever its episodes are."""
+        """Take random actions for a number of steps of the vector, at any point of its episodes."""
         actions = _actions(self.env, n_steps)
         n_starts, ended = 0, self._ended
         started_s = time.perf_counter()
@@ -93,7 +95,7 @@ class Starts:
         self.vector.reset(seed=0)
 
     def run(self, n_resets: int) -> dict[str, float]:
-        """Milliseconds of `reset()` of one, and of 8 of 64 (who they are goes round); means."""
+        """Return mean milliseconds of `reset()` of one environment, and of 8 of 64 in turns."""
         started_s = time.perf_counter()
         for _ in range(n_resets):
             self.single.reset()
@@ -112,11 +114,11 @@ class Starts:
 
 
 Contender = Single | Vector
-"""What can be run for some episodes, again and again."""
+"""A contender that can run some episodes repeatedly."""
 
 
 def read(info: Mapping[str, Any]) -> None:
-    """Ask for every value, as whoever logs infos does."""
+    """Read every value of an info, as logging does."""
     for name in info:
         _ = info[name]
 

@@ -1,4 +1,4 @@
-"""The speed bench as it is declared: configurations, columns and tables."""
+"""The declaration of the speed benchmark: configurations, columns and tables."""
 
 from collections.abc import Iterable, Sequence
 
@@ -9,11 +9,11 @@ from hrc_env.tasks import BUILT_IN, DEFAULT
 
 ASKED = "What does a step of an environment cost, alone and beside others, and where does it go?"
 SINGLE = "single"
-"""The environment that `gymnasium.make` gives, as opposed to a vector of one."""
+"""The environment of `gymnasium.make`, unlike a vector of one."""
 REACHER = "reacher"
-"""Gymnasium's Reacher where levels are named."""
+"""Name of Gymnasium's Reacher among levels."""
 SHOWN = (SINGLE, "16.1", "64.1", "64.2")
-"""Configurations whose organs the documentation shows."""
+"""Configurations for which the documentation shows the parts of a step."""
 RESETS = {
     "reset_one": Column("reset_ms.1_of_1", plain=True),
     "reset_some": Column("reset_ms.8_of_64", plain=True),
@@ -33,7 +33,7 @@ TASKS = Table(
 
 
 def title(configuration: str) -> str:
-    """Return a configuration in words.
+    """Return the description of a configuration.
 
     Args:
         configuration: `SINGLE`, or "<num_envs>.<threads>".
@@ -44,12 +44,12 @@ def title(configuration: str) -> str:
     return f"{size} on {threads} thread{'s' if threads != '1' else ''}"
 
 
-def steps_of(levels: Sequence[str], configurations: Iterable[str]) -> Table:
+def make_steps_table(levels: Sequence[str], configurations: Iterable[str]) -> Table:
     """Return the table of steps a second.
 
     Args:
-        levels: of perception.
-        configurations: in the order of the rows.
+        levels: perception levels.
+        configurations: configurations in the order of the rows.
     """
     own = [Column(f"env_steps_per_s.{each}.{{}}", f"`{each}` [1/s]", 0) for each in levels]
     return Table(
@@ -64,11 +64,11 @@ def steps_of(levels: Sequence[str], configurations: Iterable[str]) -> Table:
     )
 
 
-def organs_of(configurations: Iterable[str]) -> Table:
-    """Return the table of the time of a step, by organ.
+def make_organs_table(configurations: Iterable[str]) -> Table:
+    """Return the table of the time of a step, by part.
 
     Args:
-        configurations: in the order of the columns.
+        configurations: configurations in the order of the columns.
     """
     return Table(
         "speed_organs",

@@ -1,9 +1,9 @@
-"""The time that camera images in observations take: python -m benchmarks.speed.images
+"""Time of camera images in observations: python -m benchmarks.speed.images
 
-Everybody takes turns, so that a noisy machine slows all of them alike: a step without images, the
-same with one and with all images, `render()`, and the rig drawn as it is for people. Milliseconds
-of processor time, medians with quartiles, and shares of `render()` and of a step; `--out` writes
-them as JSON.
+All contenders take turns, so that noise of the machine affects all alike: a step without images,
+the same with one and with all images, `render()`, and the rig rendered as for people. Results are
+milliseconds of processor time, medians with quartiles, and shares of `render()` and of a step;
+`--out` writes them as JSON.
 """
 
 import json
@@ -29,20 +29,20 @@ STEP, RENDER = "a step without images", "render(), with shadows"
 
 @dataclass(frozen=True)
 class Arguments:
-    """Measure the time that images take."""
+    """Measure the time of images."""
 
     rounds: int = 60
     """Number of turns of each contender."""
     size: int = 84
     """Sides of images and pictures [px]."""
     task: str = "HRCReach-v0"
-    """Which environment, by its id."""
+    """Id of the environment."""
     out: Path | None = None
-    """A JSON file for the numbers."""
+    """JSON file for the numbers."""
 
 
 def contenders(arguments: Arguments, exits: ExitStack) -> dict[str, Callable[[], Any]]:
-    """Make all contenders."""
+    """Return all contenders, as functions."""
     size = arguments.size
 
     def make(**given: Any) -> Any:
@@ -51,11 +51,11 @@ def contenders(arguments: Arguments, exits: ExitStack) -> dict[str, Callable[[],
         env.reset(seed=0)
         return env.unwrapped
 
-    def stepped(env: Any) -> Callable[[], Any]:
+    def make_step(env: Any) -> Callable[[], Any]:
         rng, n = np.random.default_rng(0), env.action_space.shape
         return lambda: env.step(rng.uniform(-1, 1, n).astype(np.float32))
 
-    def drawn(env: Any) -> Callable[[], Any]:
+    def make_draw(env: Any) -> Callable[[], Any]:
         return env.simulation.draw_images
 
     one = make(observe_images={"height": size, "width": size, "cameras": [0]})
@@ -63,11 +63,11 @@ def contenders(arguments: Arguments, exits: ExitStack) -> dict[str, Callable[[],
     shown = make(render_mode="rgb_array", width=size, height=size)
     rig = [resize(camera, size, size) for camera in shown.simulation.scene.cameras]
     return {
-        STEP: stepped(shown),
-        "a step with one image": stepped(one),
-        "a step with all images": stepped(every),
-        "one image": drawn(one),
-        "all images": drawn(every),
+        STEP: make_step(shown),
+        "a step with one image": make_step(one),
+        "a step with all images": make_step(every),
+        "one image": make_draw(one),
+        "all images": make_draw(every),
         RENDER: shown.render,
         "all cameras as for people": lambda: shown.views._drawn(rig, shown.views.glance()),
     }
@@ -88,7 +88,7 @@ def measure(arguments: Arguments) -> dict[str, list[float]]:
 
 
 def main(arguments: Arguments) -> int:
-    """Measure, print a table, write the numbers."""
+    """Measure, print a table, and write the numbers; return the exit status."""
     took = measure(arguments)
     table = Table("", "ms", "quartiles", "of render()", "of a step")
     numbers = {}

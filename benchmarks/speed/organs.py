@@ -1,7 +1,7 @@
-"""Which functions do each organ's work in a step, and how long they take.
+"""The functions of each part of a step, and their times.
 
-A function that is renamed is missed at once, and one that no step calls any more stops the
-bench: no organ can become free of charge by moving elsewhere.
+A function that is renamed is missed at once, and a function that no step calls any more stops the
+benchmark, so that no part becomes free by moving elsewhere.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,7 +20,7 @@ from hrc_env.scene.physics import Physics
 from hrc_env.vector import env, infos
 
 RESET, REST, TOTAL = "reset", "rest", "total"
-"""What stands in the organs' table besides organs: resets, what nobody does, and the sum."""
+"""Further rows of the table: resets, the rest, and the sum."""
 ORGANS: Mapping[str, Sequence[Place]] = {
     "physics": ((simulation, "joint_command"), (Physics, "step")),
     "motion": (
@@ -49,13 +49,15 @@ ORGANS: Mapping[str, Sequence[Place]] = {
     ),
     RESET: ((simulation.Simulation, "reset"),),
 }
-"""Level `keypoints`, one worker. Lines of sight are part of the `emulator`; `physics` has the
-controller in it, `distances` the robot's own bodies, `reward` the task, and `tracking` whatever
-carries keypoints to the estimator."""
+"""Functions by part of a step, at level `keypoints` with one worker.
+
+Lines of sight belong to the `emulator`; `physics` includes the controller, `distances` the robot's
+own bodies, `reward` the task, and `tracking` the transport of keypoints to the estimator.
+"""
 
 
 class Organs:
-    """Times the organs, and remembers which of their functions were never called."""
+    """Times the parts of a step, and records functions that were never called."""
 
     def __init__(self, organs: Mapping[str, Sequence[Place]] = ORGANS) -> None:
         self.organs = organs
@@ -64,10 +66,10 @@ class Organs:
     def us_per_env_step(
         self, contender: Contender, n_episodes: int, n_threads: int
     ) -> dict[str, float]:
-        """Microseconds per environment and step: of organs, resets, the rest, and the total.
+        """Return microseconds per environment and step: of parts, resets, the rest, and the total.
 
-        An organ's time is summed over threads and divided by their number: what it adds to the
-        whole, which is the time on the wall.
+        The time of a part is summed over threads and divided by their number: its contribution to
+        the wall time.
         """
         watch = Stopwatch(self.organs, whole=(RESET,))
         with watch.running():

@@ -1,18 +1,26 @@
-"""The speed bench as people read it: tables, and a picture of where the time goes."""
+"""The report of the speed benchmark: tables, and a figure of the parts of a step."""
 
 from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
 
-from benchmarks.common import keys
-from benchmarks.speed.declaration import ASKED, REACHER, SINGLE, TASKS, organs_of, steps_of, title
+from benchmarks.common import list_endings
+from benchmarks.speed.declaration import (
+    ASKED,
+    REACHER,
+    SINGLE,
+    TASKS,
+    make_organs_table,
+    make_steps_table,
+    title,
+)
 from benchmarks.speed.organs import ORGANS, REST, TOTAL
-from hrc_env.experiments.plots import label, new_figure, save
-from hrc_env.experiments.report import Metrics, Report, picture
+from hrc_env.experiments.plots import label_axes, make_figure, save
+from hrc_env.experiments.report import Metrics, Report, format_picture
 
 _COLOURS = (*(f"C{k}" for k in range(7)), "gold", "C9", "0.75")
-"""Of the organs, of resets and of the rest."""
+"""Colours of the parts, of resets and of the rest."""
 SPREAD = "the smallest and the largest of all rounds"
 _ABOUT_THE_ORGANS = """\
 Taken in runs of their own with a stopwatch round each organ's functions, which itself costs about
@@ -23,46 +31,47 @@ bodies, `reward` the task, `reset` all organs' work in resets, `rest` everything
 
 
 def report(metrics: Metrics, figures: Path) -> Report:
-    """Draw organs.png; return the tables beside it.
+    """Draw organs.png and return the report.
 
     Args:
-        metrics: of the bench.
-        figures: folder.
+        metrics: metrics by name.
+        figures: folder of the figure.
     """
-    tasks = TASKS.markdown(metrics)
+    tasks = TASKS.to_markdown(metrics)
     if f"env_steps_per_s.{REACHER}.{SINGLE}" not in metrics:
         return Report("Speed of every id", ASKED, [tasks], SPREAD)
     plot_organs(figures / "organs.png", metrics)
-    pairs = [name.split(".", 1) for name in keys(metrics, "env_steps_per_s.")]
+    pairs = [name.split(".", 1) for name in list_endings(metrics, "env_steps_per_s.")]
     levels = dict.fromkeys(level for level, _ in pairs if level != REACHER)
     sizes = sorted({configuration for _, configuration in pairs}, key=_size)
     return Report("Speed bench", ASKED, (
-        steps_of([*levels], sizes).markdown(metrics),
-        organs_of(keys(metrics, f"us_per_env_step.{TOTAL}.")).markdown(metrics), _ABOUT_THE_ORGANS,
-        picture(figures / "organs.png", "What a step costs, level `keypoints` (on the wall)."),
+        make_steps_table([*levels], sizes).to_markdown(metrics),
+        make_organs_table(list_endings(metrics, f"us_per_env_step.{TOTAL}.")).to_markdown(metrics),
+        _ABOUT_THE_ORGANS,
+        format_picture(figures / "organs.png", "Time of a step by part, level `keypoints` (wall)."),
         tasks,
     ), SPREAD)  # fmt: skip
 
 
 def _size(configuration: str) -> tuple[int, str]:
-    """By what configurations are sorted."""
+    """Return the sort key of a configuration."""
     size, _, how = configuration.partition(".")
     return (0, "") if configuration == SINGLE else (int(size), how)
 
 
 def plot_organs(path: Path, metrics: Metrics) -> None:
-    """Bars of microseconds per environment and step; one environment apart from many."""
+    """Draw bars of microseconds per environment and step; one environment is apart from many."""
     groups: tuple[list[str], list[str]] = ([], [])
-    for each in keys(metrics, f"us_per_env_step.{TOTAL}."):
+    for each in list_endings(metrics, f"us_per_env_step.{TOTAL}."):
         groups[each != SINGLE and not each.startswith("1.")].append(each)
     shown = [group for group in groups if group]
-    figure = new_figure(12.5, 7)
+    figure = make_figure(12.5, 7)
     axes = figure.subplots(
         1, len(shown), squeeze=False, width_ratios=[len(group) + 0.6 for group in shown]
     )[0]
     for axis, group in zip(axes, shown, strict=True):
         _stack(axis, group, metrics)
-    label(axes[0], y="microseconds per environment and step", grid="y")
+    label_axes(axes[0], y="microseconds per environment and step", grid="y")
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles[::-1], labels[::-1], loc="outside right center", frameon=False)
     save(figure, path)
@@ -75,7 +84,7 @@ def _bar_title(configuration: str) -> str:
 
 
 def _stack(axis: Axes, group: list[str], metrics: Metrics) -> None:
-    """A bar for each configuration, organ upon organ, the sum above it."""
+    """Draw a bar for each configuration, with its parts stacked and the sum above."""
     x, foot = np.arange(len(group)), np.zeros(len(group))
     for organ, colour in zip((*ORGANS, REST), _COLOURS, strict=True):
         us = np.array([metrics[f"us_per_env_step.{organ}.{each}"].value for each in group])

@@ -1,4 +1,4 @@
-"""A stopwatch that is put round functions from outside: what it times knows nothing of it."""
+"""A stopwatch that wraps functions from outside, without changes of their code."""
 
 import threading
 import time
@@ -14,22 +14,22 @@ Place = tuple[Any, str]
 
 @dataclass(slots=True)
 class _Hand:
-    """One thread's sums."""
+    """The sums of one thread."""
 
     seconds: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
     calls: Counter[str] = field(default_factory=Counter)
     within: list[float] = field(default_factory=list)
-    """For each timed call that is open, the seconds of the timed calls inside it."""
+    """Seconds of timed calls inside of each open timed call."""
     closed: bool = False
     """Whether a call is open that is timed as a whole."""
 
 
 class Stopwatch:
-    """Seconds of each organ by itself, on whatever threads it runs.
+    """Seconds of each part by itself, over all threads.
 
-    What a timed call spends in other timed calls counts for those only, so that organs add up.
-    Time that a thread waits for another one counts for the organ that waits. In the organs named
-    `whole` nothing is told apart.
+    Time that a timed call spends in other timed calls counts for those only, so parts add up. Time
+    that a thread waits for another one counts for the part that waits. Inside of the parts named
+    `whole` no other parts are distinguished.
     """
 
     def __init__(self, organs: Mapping[str, Sequence[Place]], whole: Sequence[str] = ()) -> None:
@@ -38,32 +38,32 @@ class Stopwatch:
 
     @property
     def seconds(self) -> dict[str, float]:
-        """Each organ's seconds, summed over threads."""
+        """Return each part's seconds, summed over threads."""
         return {organ: sum(hand.seconds[organ] for hand in self._hands) for organ in self.organs}
 
     @property
     def idle(self) -> list[str]:
-        """The places that nobody called."""
-        places = [name_of(place) for each in self.organs.values() for place in each]
+        """Return the functions that were never called."""
+        places = [format_name(place) for each in self.organs.values() for place in each]
         return [name for name in places if not any(hand.calls[name] for hand in self._hands)]
 
     @contextmanager
     def running(self) -> Iterator[None]:
-        """Time the organs' calls while this is open; afterwards everything is as it was."""
+        """Time the calls of all parts inside of the context; functions are restored afterwards."""
         kept: list[tuple[Any, str, Any]] = []
         try:
             for organ, places in self.organs.items():
                 for owner, name in places:
                     function = vars(owner)[name]
                     kept.append((owner, name, function))
-                    setattr(owner, name, self._timed(organ, name_of((owner, name)), function))
+                    setattr(owner, name, self._wrap(organ, format_name((owner, name)), function))
             yield
         finally:
             for owner, name, function in kept:
                 setattr(owner, name, function)
 
-    def _timed(self, organ: str, place: str, function: Callable[..., Any]) -> Callable[..., Any]:
-        """The function with a stopwatch round it."""
+    def _wrap(self, organ: str, place: str, function: Callable[..., Any]) -> Callable[..., Any]:
+        """Return a function that is timed."""
         closes = organ in self.whole
 
         def call(*arguments: Any, **named: Any) -> Any:
@@ -86,7 +86,7 @@ class Stopwatch:
         return call
 
     def _hand(self) -> _Hand:
-        """This thread's sums."""
+        """Return the sums of this thread."""
         try:
             return self._own.hand
         except AttributeError:
@@ -95,8 +95,8 @@ class Stopwatch:
             return hand
 
 
-def name_of(place: Place) -> str:
-    """A place as people say it: "hrc_env.scene.physics.Physics.step"."""
+def format_name(place: Place) -> str:
+    """Return the full name of a function, as "hrc_env.scene.physics.Physics.step"."""
     owner, name = place
     room = f"{owner.__module__}." if isinstance(owner, type) else ""
     return f"{room}{owner.__name__}.{name}"

@@ -1,4 +1,4 @@
-"""The speed of every id beside that of the first, by the same door and in turns."""
+"""The speed of every id relative to the first, by the same interface and in turns."""
 
 from collections.abc import Mapping, Sequence
 
@@ -7,12 +7,14 @@ from hrc_env.core.results import Metric, over
 from hrc_env.tasks import BUILT_IN
 
 WARM_STEPS, THREADS, AT_ONCE = 20, 2, 20
-"""Steps before anything is timed; threads that the environments of an id share; steps after which
-the next id has its turn, so that whatever else the machine does slows all of them alike."""
+"""Steps before the measurement, threads of an id's environments, and steps of one turn.
+
+Short turns let noise of the machine affect all ids alike.
+"""
 
 
 class Tasks:
-    """Every id as a vector of 64 on two threads, level `keypoints`, one worker each."""
+    """All ids as vectors of 64 on two threads, at level `keypoints` with one worker each."""
 
     def __init__(self) -> None:
         each = {"perception": "keypoints", "num_threads": THREADS, "n_workers": 1}
@@ -21,7 +23,7 @@ class Tasks:
             vector.run_steps(WARM_STEPS)
 
     def run(self, n_steps: int) -> dict[str, float]:
-        """Environment steps a second, by id; everybody goes on where they were."""
+        """Return environment steps a second by id; episodes continue between calls."""
         paces: dict[str, tuple[int, float]] = dict.fromkeys(self.vectors, (0, 0.0))
         for _ in range(0, n_steps, AT_ONCE):
             for task, vector in self.vectors.items():
@@ -36,8 +38,10 @@ class Tasks:
 
 
 def shares(paces: Mapping[str, Sequence[float]]) -> dict[str, Metric]:
-    """Of steps a second by id, a number a round: medians with the smallest and the largest, and
-    the same of their shares of the first id's in the same round."""
+    """Return the speeds of ids, and their shares of the first id's in the same round.
+
+    Each is a median with the smallest and the largest round.
+    """
     found = {f"task_steps_per_s.{task}": over(values, "1/s") for task, values in paces.items()}
     for task, values in paces.items():
         of = [own / ours for own, ours in zip(values, paces[OURS], strict=True)]

@@ -1,1 +1,1 @@
-"""The tracking bench: every estimator on the same sequences, beside the bound."""
+"""The tracking benchmark: every estimator on the same sequences, compared with the bound."""

@@ -1,4 +1,6 @@
-"""When frames arrive: every camera late in its own way, one at half the rate, some not at all."""
+"""Arrival times of frames: constant and random latencies, a lower frame rate, and losses."""
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -6,22 +8,32 @@ from benchmarks.tracking.rigs import DT_S
 from hrc_env.core.typing import Floats, Points2
 
 LONGEST_DELAY_S = 0.5
-"""How late a frame may be for the estimators' memory [s]."""
+"""Greatest delay of a frame that the estimators' memory covers [s]."""
 _LATENCY_S = (0.04, 0.20)
 _JITTER_S = 0.02
 _DROPPED = 0.05
 
 
-def delivered(px: Points2, seeds: list[int]) -> tuple[Points2, Floats]:
-    """What cameras deliver in each step, of frames (T, S, C, J, 2) taken at its end.
+class Delivered(NamedTuple):
+    """Frames by the step in which cameras deliver them."""
+
+    px: Points2
+    """Pixels (T, S, C, J, 2); NaN without a frame."""
+    time_s: Floats
+    """Times (T, S, C) at which the frames were taken [s], on a clock that is 0.04 s at the first
+    frame; NaN without a frame."""
+
+
+def deliver(px: Points2, seeds: list[int]) -> Delivered:
+    """Return the frames that cameras deliver in each step, from frames taken at its end.
 
     Every camera has a constant latency of 40 to 200 ms and, for each frame, up to 20 ms more; one
-    in four sequence by sequence takes every other frame only; one frame in twenty is lost. Of
+    in four, sequence by sequence, takes only every other frame; one frame in twenty is lost. Of
     frames that arrive in the same step the newest is delivered.
 
-    Returns:
-        pixels (T, S, C, J, 2), NaN where nothing arrived, and times (T, S, C) at which they were
-        taken [s], NaN likewise, on a clock that is 0.04 s at the first frame.
+    Args:
+        px: frames (T, S, C, J, 2).
+        seeds: seeds of the sequences.
     """
     out = np.full(px.shape, np.nan)
     time_s = np.full(px.shape[:3], np.nan)
@@ -36,11 +48,11 @@ def delivered(px: Points2, seeds: list[int]) -> tuple[Points2, Floats]:
         for taken, c in np.argwhere(~lost & (step < n_frames)):  # later ones replace earlier ones
             now = step[taken, c]
             out[now, s, c], time_s[now, s, c] = px[taken, s, c], (taken + 1) * DT_S
-    return out, time_s
+    return Delivered(out, time_s)
 
 
-def in_time(px: Points2, time_s: Floats) -> Points2:
-    """Delivered frames (T, S, C, ...) put back to the steps in which they were taken."""
+def restore_times(px: Points2, time_s: Floats) -> Points2:
+    """Return delivered frames (T, S, C, ...) in the steps in which they were taken."""
     out = np.full(px.shape, np.nan)
     now, s, c = np.nonzero(np.isfinite(time_s))
     out[np.rint(time_s[now, s, c] / DT_S).astype(int) - 1, s, c] = px[now, s, c]

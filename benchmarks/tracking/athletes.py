@@ -1,6 +1,7 @@
-"""People who run, spin, turn over and fall: motions that estimators do not expect.
+"""People running, spinning, turning over and falling: motions that estimators do not expect.
 
-Bodies are those of `walks`; who turns over or falls is turned about the middle of the hips.
+Bodies are those of `walks`; people turning over or falling are rotated about the middle of the
+hips.
 """
 
 from dataclasses import dataclass, replace
@@ -8,37 +9,38 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from benchmarks.tracking.rigs import DT_S
-from benchmarks.tracking.walks import Gait, Path, bodies_along, steer, walk
+from benchmarks.tracking.walks import Gait, Path, steer, walk, walk_along
 from hrc_env.core.skeleton import JOINT
 from hrc_env.core.typing import Floats, Points3
 from hrc_env.geometry.rotations import about_axis
 
 FALLS_S, LIES_S = 2.0, 3.0
-"""When people fall, and by when they lie."""
+"""Times at which people fall, and at which they lie [s]."""
 _GROUND_M, _HOP_M = 0.02, 0.4
 _PAUSE_S, _TRICK_S = (0.5, 1.5), (1.0, 1.4)
-"""Between two tricks; how long one takes."""
+"""Time between two turns, and duration of one [s]."""
 _LIES_PACE, _ROLL_RAD, _ROLL_S = 0.4, 1.5, (2.5, 5.0)
-"""Limbs of who lies go on so much slower; they roll over so far to either side, in such a time."""
+"""Factor on the speed of a lying person's limbs, angle of rolling to either side [rad], its time
+[s]."""
 _LIES_LOWER_M = 0.75
 SPINS_S, _EASED_S, _SPIN_RAD_S, _STEPS_HZ = 1.2, 0.4, (4.0, 8.0), 1.5
-"""When people begin to spin, how long until they do, how fast, and their steps."""
+"""Start of spinning [s], duration of its start [s], rates [rad/s], and frequency of steps [Hz]."""
 _ON_THE_SPOT = Gait((0.1, 0.3, 0.5), thigh_rad=0.15, knee_rad=0.2)
 
 
 @dataclass(frozen=True, slots=True)
 class Turns:
-    """How bodies (T, S) are turned about their hips [rad], and how much higher these are [m]."""
+    """Rotations of bodies (T, S) about their hips [rad], and the height added to these [m]."""
 
     forward: Floats
     aside: Floats
     roll: Floats
-    """About the line from the feet to the head."""
+    """Rotation about the line from the feet to the head."""
     up_m: Floats
 
 
 def run(walk_m: tuple[float, float], seeds: list[int], n_frames: int, speed_m_s: float) -> Points3:
-    """Joints (T, S, J, 3) [m] of runners; wrists and feet have 30 m/s2 and more."""
+    """Return joints (T, S, J, 3) [m] of runners; wrists and feet have 30 m/s2 and more."""
     return walk(walk_m, seeds, n_frames, _runs(speed_m_s))
 
 
@@ -50,17 +52,17 @@ def _runs(speed_m_s: float) -> Gait:
 
 
 def tumble(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
-    """Joints (T, S, J, 3) [m] of walkers who turn over in the air every second or so."""
+    """Return joints (T, S, J, 3) [m] of walkers that turn over in the air about every second."""
     joints = walk(walk_m, seeds, n_frames)
     tricks = [_tricks(np.random.default_rng([seed, 7]), n_frames) for seed in seeds]
-    return turned(joints, Turns(*np.stack(tricks, -1)))
+    return rotate(joints, Turns(*np.stack(tricks, -1)))
 
 
 def fall(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
-    """Joints (T, S, J, 3) [m] of walkers who fall, lie there and roll from side to side."""
+    """Return joints (T, S, J, 3) [m] of walkers that fall, lie and roll from side to side."""
     path = steer(walk_m, seeds, n_frames)
     time_s = DT_S * np.arange(n_frames, dtype=float)[:, None]
-    lying = _eased((time_s - FALLS_S) / (LIES_S - FALLS_S))
+    lying = _ease((time_s - FALLS_S) / (LIES_S - FALLS_S))
     walked = np.cumsum(1 - lying[:, 0]) - 1  # so many frames of their walk, then no further
     path = replace(
         path,
@@ -74,12 +76,14 @@ def fall(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points
     down = 0.5 * np.pi * lying
     roll = _ROLL_RAD * lying * np.sin(2 * np.pi * np.maximum(time_s - LIES_S, 0.0) / period_s)
     low = np.broadcast_to(-_LIES_LOWER_M * lying, roll.shape)
-    return turned(bodies_along(path), Turns(down * np.cos(way), down * np.sin(way), roll, low))
+    return rotate(walk_along(path), Turns(down * np.cos(way), down * np.sin(way), roll, low))
 
 
 def spin(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
-    """Joints (T, S, J, 3) [m] of people who stand, and from `SPINS_S` on spin on the spot at 4 to
-    8 rad/s while they gesture."""
+    """Return joints (T, S, J, 3) [m] of people standing and gesturing, who spin from `SPINS_S` on.
+
+    They spin on the spot at 4 to 8 rad/s.
+    """
     rngs = [np.random.default_rng([seed, 21]) for seed in seeds]
     rate, begin, x, y = np.array([
         (rng.uniform(*_SPIN_RAD_S) * rng.choice([-1, 1]), rng.uniform(-np.pi, np.pi),
@@ -87,19 +91,20 @@ def spin(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points
         for rng in rngs
     ]).T  # fmt: skip
     time_s = DT_S * np.arange(n_frames, dtype=float)[:, None]
-    heading = begin + DT_S * np.cumsum(_eased((time_s - SPINS_S) / _EASED_S) * rate, 0)
+    heading = begin + DT_S * np.cumsum(_ease((time_s - SPINS_S) / _EASED_S) * rate, 0)
     ground = np.broadcast_to(np.stack([x, y], -1), (*heading.shape, 2))
     gesture = np.clip(0.6 + 0.4 * np.sin(np.pi * time_s + begin), 0.0, 1.0)
     stride = np.broadcast_to(2 * np.pi * _STEPS_HZ * time_s, heading.shape)
     lean = np.full(heading.shape, 0.08)
     gestures = np.stack([gesture, gesture], -1)
-    return bodies_along(Path(ground, heading, stride, lean, gestures, _ON_THE_SPOT))
+    return walk_along(Path(ground, heading, stride, lean, gestures, _ON_THE_SPOT))
 
 
 def circle(
     walk_m: tuple[float, float], seeds: list[int], n_frames: int, radius_m: float, speed_m_s: float
 ) -> Points3:
-    """Joints (T, S, J, 3) [m] of people who run in a circle near the middle, either way round."""
+    """Return joints (T, S, J, 3) [m] of people running in a circle near the middle, in either
+    direction."""
     rngs = [np.random.default_rng([seed, 22]) for seed in seeds]
     way = np.array([rng.choice([-1.0, 1.0]) for rng in rngs])
     begin = np.array([rng.uniform(-np.pi, np.pi) for rng in rngs])
@@ -110,11 +115,11 @@ def circle(
     ground = middle + radius_m * np.stack([np.cos(angle), np.sin(angle)], -1)
     stride = np.broadcast_to(2 * np.pi * gait.cycles_per_m * way_m, angle.shape)
     lean, still = np.full(angle.shape, 0.2), np.zeros((*angle.shape, 2))
-    return bodies_along(Path(ground, angle + way * np.pi / 2, stride, lean, still, gait))
+    return walk_along(Path(ground, angle + way * np.pi / 2, stride, lean, still, gait))
 
 
-def turned(joints: Points3, turns: Turns) -> Points3:
-    """Joints (T, S, J, 3) turned, and lifted where they would be below the ground."""
+def rotate(joints: Points3, turns: Turns) -> Points3:
+    """Return joints (T, S, J, 3) rotated, and raised if they would be below the ground."""
     left, right = joints[..., JOINT["left_hip"], :], joints[..., JOINT["right_hip"], :]
     hips, across = 0.5 * (left + right)[..., None, :], left - right
     level = about_axis("z", np.arctan2(across[..., 1], across[..., 0]) - np.pi / 2)
@@ -128,27 +133,27 @@ def turned(joints: Points3, turns: Turns) -> Points3:
     return body
 
 
-def _eased(share: Floats) -> Floats:
-    """From 0 to 1, at rest at both ends."""
+def _ease(share: Floats) -> Floats:
+    """Return a smooth step from 0 to 1 that is at rest at both ends."""
     share = np.clip(share, 0.0, 1.0)
     return share**2 * (3 - 2 * share)
 
 
 def _at(values: Floats, frame: Floats) -> Floats:
-    """(T, ...) values at frames (T,) that are no whole numbers."""
+    """Return values (T, ...) interpolated at fractional frames (T,)."""
     whole = frame.astype(int)
     part = (frame - whole).reshape(-1, *(1,) * (values.ndim - 1))
     return (1 - part) * values[whole] + part * values[np.minimum(whole + 1, len(values) - 1)]
 
 
 def _tricks(rng: np.random.Generator, n_frames: int) -> Floats:
-    """(4, T) `Turns` of one body."""
+    """Return the `Turns` of one body (4, T)."""
     turns = np.zeros((4, n_frames))
     begin_s = rng.uniform(*_PAUSE_S)
     while begin_s < n_frames * DT_S:
         lasts_s, way = rng.uniform(*_TRICK_S), rng.choice([-np.pi, -np.pi / 2, 0.0, np.pi / 2])
         share = (DT_S * np.arange(n_frames, dtype=float) - begin_s) / lasts_s
-        over = 2 * np.pi * _eased(share) * (share < 1)
+        over = 2 * np.pi * _ease(share) * (share < 1)
         turns[0] += over * np.cos(way)
         turns[1] += over * np.sin(way)
         turns[3] += _HOP_M * np.sin(np.pi * np.clip(share, 0.0, 1.0)) ** 2

@@ -1,7 +1,7 @@
-"""The tracking bench: every estimator on the same sequences, beside the bound.
+"""The tracking benchmark: every estimator on the same sequences, compared with the bound.
 
-Each (rig, condition, estimator) is written to DIR/parts as soon as it is done, so that a bench
-that was stopped goes on where it was; parts made at other versions or settings are made anew.
+Each (rig, condition, estimator) is written to DIR/parts as soon as it is complete, so a run that
+was stopped continues there; parts of other versions or settings are computed again.
 """
 
 import hashlib
@@ -14,70 +14,75 @@ from benchmarks.tracking.cells import run_cell
 from benchmarks.tracking.declaration import BENCH, times
 from benchmarks.tracking.detections import CONDITIONS
 from benchmarks.tracking.env_sequences import ENV, make_env_rig
-from benchmarks.tracking.metrics import TIMING, Parts, metrics_of
+from benchmarks.tracking.metrics import TIMING, Parts, compute_metrics
 from benchmarks.tracking.names import DEFAULT, SMOOTHER, Selection
 from benchmarks.tracking.report import report
 from benchmarks.tracking.rigs import RIGS, SIGMA_PX, Rig, make_rig
-from benchmarks.tracking.sequences import MATCHED, Sequences, lasting, make_sequences
+from benchmarks.tracking.sequences import MATCHED, Sequences, find_durations, make_sequences
 from benchmarks.tracking.timing import BATCH, time_estimator
 from hrc_env.core.results import Metric
 from hrc_env.experiments.cache import Part, PartCache, PartProgress
-from hrc_env.experiments.report import Metrics, Report, Table, quick_words
-from hrc_env.experiments.runner import at_least_one, is_as_short
-from hrc_env.experiments.versions import key_of, source_digest
+from hrc_env.experiments.report import Metrics, Report, Table, describe_quick_run
+from hrc_env.experiments.runner import check_at_least_one, is_as_short
+from hrc_env.experiments.versions import hash_source, make_key
 from hrc_env.tracking.estimators import ESTIMATORS
 
 
 @dataclass(frozen=True, slots=True)
 class TrackingBench:
-    """The experiment, and how much is run."""
+    """The experiment, and the amount of data that is used."""
 
     name = "bench tracking"
     depends = ("env", "tracker", "emulator", "motion")
     n_seeds: int = 70
     """Sequences per rig and condition."""
     first_seed: int = 20_000
-    """Seed of the first sequence; the others count up. No setting was chosen on these: seeds
-    1000 to 1023, 5000 to 5023 and 7000 to 7023 served for that."""
+    """Seed of the first sequence; later ones count up.
+
+    No setting was chosen on these: seeds 1000 to 1023, 5000 to 5023 and 7000 to 7023 served for
+    that.
+    """
     n_matched: int = 140
     """Matched sequences per rig."""
     n_smoothed: int = 18
-    """Sequences per rig and condition for the smoother, which is slow; the first ones."""
+    """Number of sequences per rig and condition for the smoother, which is slow; the first ones."""
     timing_repeats: int = 7
-    """How often the time per update is taken."""
+    """Number of measurements of the time per update."""
     estimators: tuple[str, ...] = ()
-    """Who is run beside the default, as of `Selection`."""
+    """Estimators besides the default, as in `Selection`."""
     sequences: tuple[str, ...] = ()
-    """On what, as of `Selection`."""
+    """Sequences, as in `Selection`."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for numbers that cannot work."""
-        at_least_one(self, "n_seeds", "n_matched", "n_smoothed", "timing_repeats")
+        check_at_least_one(self, "n_seeds", "n_matched", "n_smoothed", "timing_repeats")
         self.selection.check()
 
     @property
     def selection(self) -> Selection:
-        """The part of the bench that is run."""
+        """The part of the benchmark that is run."""
         return Selection(self.estimators, self.sequences)
 
     @property
     def seeds(self) -> list[int]:
-        """Of sequences that are not matched."""
-        return seeds_of(self)
+        """Seeds of sequences that are not matched."""
+        return list_seeds(self)
 
     @property
     def n_parts(self) -> int:
-        """Estimators on every condition, and their times."""
+        """Number of parts: estimators on every condition, and their times."""
         run = self.selection
         return sum(len(run.names_of(each)) for _, each in run.conditions()) + len(run.timed())
 
     @property
     def quick_note(self) -> str:
         """The warning on tables and figures of a short run; "" if it is long enough."""
-        return quick_words(self.n_seeds, lasting()) if is_as_short(self, QUICK) else ""
+        return (
+            describe_quick_run(self.n_seeds, find_durations()) if is_as_short(self, QUICK) else ""
+        )
 
     def settings(self) -> dict[str, Any]:
-        """Return what all numbers depend on."""
+        """Return the settings that all numbers depend on."""
         bench = asdict(self)
         for name in ("estimators", "sequences"):
             if not bench[name]:
@@ -91,72 +96,74 @@ class TrackingBench:
         }
 
     def play(self, cache: PartCache) -> Parts:
-        """Return every estimator on everything, which is the same whatever else is run; times are
-        taken alone, at the end."""
+        """Return the parts of all estimators; times are measured alone, at the end.
+
+        A part does not depend on the selection of others.
+        """
         whole = {"experiment": self.name, **replace(self, estimators=(), sequences=()).settings()}
-        cache, run = replace(cache, key=key_of(whole, self.depends)), self.selection
+        cache, run = replace(cache, key=make_key(whole, self.depends)), self.selection
         asked = [(*each, name) for each in run.conditions() for name in run.names_of(each[1])]
-        parts = [cell_of(self, *each, cache.key) for each in asked]
-        played: Parts = dict(zip(asked, cache.parts(parts, one_core=True), strict=True))
+        parts = [make_part(self, *each, cache.key) for each in asked]
+        played: Parts = dict(zip(asked, cache.make_parts(parts, one_core=True), strict=True))
         return played | _timing(self, cache)
 
     def metrics(self, played: Parts) -> dict[str, Metric]:
-        """Return every number."""
-        return metrics_of(played, self.selection)
+        """Return all metrics by name."""
+        return compute_metrics(played, self.selection)
 
     def shown_tables(self) -> tuple[Table, ...]:
         """Return the tables of the documentation."""
         return (BENCH, times(self.selection.timed()))
 
     def report(self, played: Parts, metrics: Metrics, figures: Path) -> Report:
-        """Return the tables."""
+        """Return the report."""
         return report(metrics, self.selection)
 
 
 QUICK = TrackingBench(n_seeds=8, n_matched=30, n_smoothed=2, timing_repeats=2)
-"""Every number, from fewer sequences."""
+"""The quick form: every number, from fewer sequences."""
 
 
-def cell_of(config: TrackingBench, rig_name: str, condition: str, name: str, key: str) -> Part:
+def make_part(config: TrackingBench, rig_name: str, condition: str, name: str, key: str) -> Part:
     """Return the part of an estimator on one rig and condition."""
-    seeds = seeds_of(config, condition)
+    seeds = list_seeds(config, condition)
     n = min(config.n_smoothed, len(seeds)) if name == SMOOTHER else len(seeds)
     make = partial(_run, rig_name, condition, tuple(seeds), n, name)
-    return Part(f"{rig_name}.{condition}.{name}", make, own_key(name, key))
+    return Part(f"{rig_name}.{condition}.{name}", make, extend_key(name, key))
 
 
 def _run(
     rig_name: str, condition: str, seeds: tuple[int, ...], n: int, name: str, tick: PartProgress
 ) -> dict[str, Any]:
-    rig, given = _made(rig_name, condition, seeds)
-    return run_cell(name, rig, given.first(n), list(seeds[:n]), tick)
+    given = _make_sequences(rig_name, condition, seeds)
+    return run_cell(name, _rig(rig_name), given.first(n), list(seeds[:n]), tick)
 
 
 @lru_cache(maxsize=1)
-def _made(rig_name: str, condition: str, seeds: tuple[int, ...]) -> tuple[Rig, Sequences]:
-    """Return the sequences of a condition, which its estimators share; the last ones are kept."""
-    rig = _rig(rig_name)
-    return rig, make_sequences(rig, condition, list(seeds))
+def _make_sequences(rig_name: str, condition: str, seeds: tuple[int, ...]) -> Sequences:
+    """Return the sequences of a condition, which its estimators share; the last ones are cached."""
+    return make_sequences(_rig(rig_name), condition, list(seeds))
 
 
-def own_key(name: str, key: str) -> str:
-    """Return the key of an estimator's parts: of one of the user's own also its file counts."""
-    source = source_digest(ESTIMATORS[name].make) if name in ESTIMATORS else ""
+def extend_key(name: str, key: str) -> str:
+    """Return the key of an estimator's parts, which for users' estimators contains their file."""
+    source = hash_source(ESTIMATORS[name].make) if name in ESTIMATORS else ""
     return hashlib.sha256(f"{key} {source}".encode()).hexdigest()[:16] if source else key
 
 
-def seeds_of(config: TrackingBench, condition: str = "clean") -> list[int]:
-    """Of a condition's sequences."""
+def list_seeds(config: TrackingBench, condition: str = "clean") -> list[int]:
+    """Return the seeds of a condition's sequences."""
     n = config.n_matched if condition == MATCHED else config.n_seeds
     return [config.first_seed + k for k in range(n)]
 
 
+@cache
 def _rig(name: str) -> Rig:
     return make_env_rig() if name == ENV else make_rig(name)
 
 
 def _timing(config: TrackingBench, parts: PartCache) -> Parts:
-    """Microseconds per update of every estimator, on the lab's sequences."""
+    """Return microseconds per update of every estimator, on the lab's sequences."""
     rig = make_rig("lab")
     frames = cache(lambda kind: make_sequences(rig, kind, list(range(BATCH))))
     repeats = config.timing_repeats
@@ -165,8 +172,8 @@ def _timing(config: TrackingBench, parts: PartCache) -> Parts:
         return time_estimator(name, rig, frames("clean"), frames("hard"), repeats, tick)
 
     return {
-        ("lab", TIMING, name): parts.part(
-            f"{TIMING}.{name}", partial(make, name), own_key(name, parts.key)
+        ("lab", TIMING, name): parts.make_part(
+            f"{TIMING}.{name}", partial(make, name), extend_key(name, parts.key)
         )
         for name in config.selection.timed()
     }

@@ -18,8 +18,14 @@ from hrc_env.geometry.cameras import project
 
 
 def camera_information(P: Floats, joints: Points3, seen: Bools, sigma_px: float) -> Covariances3:
-    """What one frame of detections (S, C, J) tells of each joint (S, J, 3) alone, (S, J, 3, 3)
-    [1/m^2]."""
+    """Return the information (S, J, 3, 3) of one frame of detections about each joint [1/m^2].
+
+    Args:
+        P: projections of the cameras (C, 3, 4).
+        joints: joint positions (S, J, 3) [m].
+        seen: which joints each camera detects (S, C, J).
+        sigma_px: standard deviation of a detection [px].
+    """
     px, depth = project(P, joints)
     rows = P[:, None, :2, :3] - px[..., None] * P[:, None, 2:, :3]
     rows = np.where(seen[..., None, None], rows / depth[..., None, None], 0.0)
@@ -34,10 +40,10 @@ def posterior_bound(
     sigma_px: float,
     start_std: tuple[float, float] = (1.5, 1.0),
 ) -> Covariances3:
-    """Bound on the covariance of each joint's estimate, (T, S, J, 3, 3) [m^2].
+    """Return a bound on the covariance of each joint's estimate, (T, S, J, 3, 3) [m^2].
 
-    Of sequences (T, S, J, 3) [m] drawn from the model, with detections where they were `seen` (T,
-    S, C, J); `start_std` of positions [m] and velocities [m/s] is before the first frame.
+    Sequences (T, S, J, 3) [m] are drawn from the model, with detections where `seen` (T, S, C, J)
+    is true; `start_std` is that of positions [m] and velocities [m/s] before the first frame.
     """
     n_frames, n_sequences = joints.shape[:2]
     start = np.repeat(np.square(start_std), N_PLACES)
@@ -53,7 +59,7 @@ def posterior_bound(
 
 
 def _shrink(cov: Floats, information: Floats) -> Floats:
-    """Covariances (S, n, n) after (S, m, m) of information on the first m states."""
+    """Return covariances (S, n, n) after information (S, m, m) about the first m states."""
     m = information.shape[-1]
     gain = np.linalg.solve(np.eye(m) + information @ cov[:, :m, :m], information)
     after = cov - cov[:, :, :m] @ gain @ cov[:, :m]
@@ -61,7 +67,7 @@ def _shrink(cov: Floats, information: Floats) -> Floats:
 
 
 def _block_diagonal(blocks: Covariances3) -> Floats:
-    """(S, 45, 45) from (S, J, 3, 3)."""
+    """Return a block-diagonal matrix (S, 45, 45) from blocks (S, J, 3, 3)."""
     whole = np.zeros((len(blocks), N_JOINTS, 3, N_JOINTS, 3))
     each = np.arange(N_JOINTS)
     whole[:, each, :, each] = blocks.swapaxes(0, 1)
@@ -69,7 +75,7 @@ def _block_diagonal(blocks: Covariances3) -> Floats:
 
 
 def _joint_blocks(cov: Floats) -> Covariances3:
-    """(S, J, 3, 3) of the positions from (S, 90, 90)."""
+    """Return the blocks of positions (S, J, 3, 3) of a covariance (S, 90, 90)."""
     places = cov[:, :N_PLACES, :N_PLACES].reshape(len(cov), N_JOINTS, 3, N_JOINTS, 3)
     each = np.arange(N_JOINTS)
     return places[:, each, :, each].swapaxes(0, 1)

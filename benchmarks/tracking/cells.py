@@ -1,4 +1,4 @@
-"""One cell of the tracking bench: an estimator on the sequences of a rig and a condition."""
+"""One cell of the tracking benchmark: an estimator on the sequences of a rig and a condition."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.common import CHI2_95_3D
-from benchmarks.tracking.arrivals import in_time
-from benchmarks.tracking.couples import identities
+from benchmarks.tracking.arrivals import restore_times
+from benchmarks.tracking.couples import match_identities
 from benchmarks.tracking.dlt import triangulate_frame
 from benchmarks.tracking.names import DLT, SMOOTHER
 from benchmarks.tracking.rigs import DT_S, Rig
@@ -23,25 +23,26 @@ from hrc_env.tracking.people.association import associate
 from hrc_env.tracking.smoother import smooth
 
 UNKNOWN_M2 = 1e6
-"""Variance of a bone's length of which nothing is known [m^2]."""
+"""Variance of an unknown bone length [m^2]."""
 _AT_ONCE = 10
-"""Sequences that are smoothed at once: it keeps 90x90 numbers of every frame."""
+"""Number of sequences that are smoothed together; the smoother stores 90x90 numbers of every
+frame."""
 
 
 def beliefs(
     name: str, rig: Rig, sequences: Sequences, seeds: list[int]
 ) -> Iterator[tuple[Points3, Covariances3 | None]]:
-    """Mean (S, W, J, 3) and covariance (S, W, J, 3, 3) after each frame; DLT has none."""
+    """Yield mean (S, W, J, 3) and covariance (S, W, J, 3, 3) after each frame; DLT has none."""
     if name == DLT:
-        yield from _triangulated(rig, sequences)
+        yield from _triangulate(rig, sequences)
     elif name == SMOOTHER:
-        yield from _smoothed(rig, sequences, seeds)
+        yield from _smooth(rig, sequences, seeds)
     else:
-        for _, belief in _estimated(name, rig, sequences, seeds):
+        for _, belief in _estimate(name, rig, sequences, seeds):
             yield belief.mean_world, belief.cov_world
 
 
-def _triangulated(rig: Rig, sequences: Sequences) -> Iterator[tuple[Points3, None]]:
+def _triangulate(rig: Rig, sequences: Sequences) -> Iterator[tuple[Points3, None]]:
     shape = sequences.joints.shape[1:]
     last = np.tile(sequences.config.prior_mean_world, (shape[0], shape[1] * shape[2], 1))
     for px in sequences.px:
@@ -49,12 +50,12 @@ def _triangulated(rig: Rig, sequences: Sequences) -> Iterator[tuple[Points3, Non
         yield last.reshape(shape), None
 
 
-def _estimated(
+def _estimate(
     name: str, rig: Rig, sequences: Sequences, seeds: list[int]
 ) -> Iterator[tuple[Keypoints, PoseEstimate]]:
-    """An estimator as an environment runs it: what it is given, and what it believes then.
+    """Yield the input and the estimate of an estimator that runs as in an environment.
 
-    With several people, poses are given to the tracks whose predictions they fit.
+    With several people, poses are assigned to the tracks with predictions that they fit.
     """
     n_sequences, n_people = sequences.joints.shape[1:3]
     estimator = make_estimator(name, rig.P, DT_S, sequences.config)
@@ -72,21 +73,22 @@ def _estimated(
         yield keypoints, estimator.estimate(state)
 
 
-def _smoothed(
+def _smooth(
     rig: Rig, sequences: Sequences, seeds: list[int]
 ) -> Iterator[tuple[Points3, Covariances3]]:
-    """The smoother, to which late frames are given at their time, some sequences at once.
+    """Yield the results of the smoother, some sequences at once; late frames are used at their
+    time.
 
-    Of several people it smooths the tracks to which `kalman` gave the poses.
+    With several people it smooths the tracks to which `kalman` assigned the poses.
     """
     if sequences.time_s is not None:
-        px = in_time(sequences.px, sequences.time_s)
+        px = restore_times(sequences.px, sequences.time_s)
         config = replace(sequences.config, longest_delay_s=0.0)
         sequences = replace(sequences, px=px, time_s=None, config=config)
     if sequences.order is None:
         clip = [sequences.keypoints(t) for t in range(len(sequences.px))]
     else:
-        clip = [given for given, _ in _estimated("kalman", rig, sequences, seeds)]
+        clip = [given for given, _ in _estimate("kalman", rig, sequences, seeds)]
     parts = []
     for begin in range(0, len(seeds), _AT_ONCE):
         some = np.arange(begin, min(begin + _AT_ONCE, len(seeds)))
@@ -100,7 +102,7 @@ def _smoothed(
 
 
 def _forget_bones(state: Any) -> None:
-    """Tell an estimator, or each of its hypotheses, that nothing is known of bones' lengths."""
+    """Set bone lengths of an estimator, or of each of its hypotheses, to unknown."""
     trees = getattr(state, "trees", None)
     if trees is not None:
         trees["bone_variance"][...] = UNKNOWN_M2
@@ -109,7 +111,7 @@ def _forget_bones(state: Any) -> None:
 def run_cell(
     name: str, rig: Rig, sequences: Sequences, seeds: list[int], tick: PartProgress
 ) -> dict[str, Any]:
-    """Run one estimator; sums per sequence of each window, as `tally` gives them."""
+    """Run one estimator; return sums per sequence of each window, as of `tally`."""
     n_frames = len(sequences.joints)
     means = np.empty(sequences.joints.shape)
     covs = np.empty((*sequences.joints.shape, 3)) if name != DLT else None
@@ -127,12 +129,12 @@ def run_cell(
 def _window(
     frames: slice, sequences: Sequences, means: Points3, covs: Covariances3 | None
 ) -> dict[str, Any]:
-    """The sums of one window; where there are several people, each is held against one track."""
+    """Return the sums of one window; several people are each compared with one track."""
     truth, mean = sequences.joints[frames], means[frames]
     cov = None if covs is None else covs[frames]
     swaps = None
     if sequences.order is not None:
-        track, swaps = identities(truth, mean)
+        track, swaps = match_identities(truth, mean)
         mean = np.take_along_axis(mean, track[None, :, :, None, None], 2)
         if cov is not None:
             cov = np.take_along_axis(cov, track[None, :, :, None, None, None], 2)
@@ -145,8 +147,10 @@ def _window(
 
 
 def tally(truth: Points3, mean: Points3, cov: Covariances3 | None) -> dict[str, Any]:
-    """Sums by name, each a list over sequences, of joints (T, S, W, J, 3) [m] and what is claimed
-    of them [m^2], if anything is."""
+    """Return sums by name, as lists over sequences, of joints and estimates (T, S, W, J, 3) [m].
+
+    Covariances [m^2] may be missing.
+    """
     n_frames, n_sequences = truth.shape[:2]
     offset = mean - truth
     squared = (offset**2).sum(-1)
@@ -165,11 +169,11 @@ def tally(truth: Points3, mean: Points3, cov: Covariances3 | None) -> dict[str, 
 
 
 def _total(values: Floats | Bools) -> Floats:
-    """(S,) from (T, S, W, J)."""
+    """Return the sum (S,) of values (T, S, W, J)."""
     return values.sum(axis=(0, 2, 3), dtype=float)
 
 
 def _left(joints: Points3) -> Floats:
-    """(..., 2) from right to left across the torso, on the ground."""
+    """Return the horizontal direction (..., 2) from right to left across the torso."""
     a, b, c, d = (joints[..., j, :2] for j in TORSO)
     return a - b + c - d

@@ -1,26 +1,28 @@
-"""Two people who walk past each other, and what cameras that know no names see of them."""
+"""Two people walking past each other, and detections that are not labelled by person."""
 
 import itertools
+from typing import NamedTuple
 
 import numpy as np
 
 from benchmarks.tracking.detections import Damage, detect
 from benchmarks.tracking.rigs import DT_S
-from benchmarks.tracking.walks import Path, bodies_along
+from benchmarks.tracking.walks import Path, walk_along
 from hrc_env.core.skeleton import JOINT
 from hrc_env.core.typing import Bools, Floats, Ints, Points2, Points3
 
 MEETING_S = 3.0
-"""When the two are side by side."""
+"""Time at which the two are side by side [s]."""
 APART_M = 0.6
-"""How far from each other they are then, middle to middle."""
+"""Distance between their middles at that time [m]."""
 _TRUNK_M, _LEAST_JOINTS = 0.18, 6
 _LOST_EVERY_S, _LOST_S = 4.0, (0.2, 0.8)
 _SURE_M = 0.3
 
 
-def couples(seeds: list[int], n_frames: int) -> Points3:
-    """Joints (T, S, 2, J, 3) [m]: two walkers on parallel lines, in opposite directions."""
+def walk_couples(seeds: list[int], n_frames: int) -> Points3:
+    """Return joints (T, S, 2, J, 3) [m] of two walkers on parallel lines, in opposite
+    directions."""
     rngs = [np.random.default_rng([seed, 6]) for seed in seeds]
     along = np.stack([rng.uniform(0, 2 * np.pi) for rng in rngs])
     middle = np.stack([rng.uniform(-0.2, 0.2, 2) for rng in rngs])
@@ -42,38 +44,49 @@ def couples(seeds: list[int], n_frames: int) -> Points3:
             lean=np.full(stride.shape, 0.08),
             gesture=waving * gesture[:, k],
         )
-        people.append(bodies_along(path))
+        people.append(walk_along(path))
     return np.stack(people, 2)
 
 
 def detect_couples(P: Floats, joints: Points3, seeds: list[int]) -> Points2:
-    """Pixels (T, S, C, 2, J, 2) of joints (T, S, 2, J, 3), NaN where a joint was not found.
+    """Return pixels (T, S, C, 2, J, 2) of joints (T, S, 2, J, 3), NaN for missing detections.
 
-    Joints are lost as in `occluded`; who stands behind the other is hidden by that trunk; each
-    camera loses each person for 0.2-0.8 s every 4 s, and reports nobody with fewer than six
-    joints.
+    Joints are lost as in `occluded`; a trunk hides the person behind it; each camera loses each
+    person for 0.2-0.8 s every 4 s, and reports no person with fewer than six joints.
     """
     damage = Damage(occluded=True)
     px = np.stack(
         [detect(P, joints[:, :, k], damage, [2 * seed + k for seed in seeds]) for k in (0, 1)], 3
     )
-    seen = np.isfinite(px[..., 0]) & ~_hidden_by_each_other(P, joints)
+    seen = np.isfinite(px[..., 0]) & ~_find_hidden(P, joints)
     for s, seed in enumerate(seeds):
         rng = np.random.default_rng([seed, 7])
-        seen[:, s] &= ~_lost(rng, seen.shape[0], seen.shape[2])[..., None]
+        seen[:, s] &= ~_draw_losses(rng, seen.shape[0], seen.shape[2])[..., None]
     seen &= seen.sum(-1, keepdims=True) >= _LEAST_JOINTS
     return np.where(seen[..., None], px, np.nan)
 
 
-def shuffles(seeds: list[int], n_frames: int, n_cameras: int, n_people: int) -> Ints:
-    """(T, S, C, D) in which order each camera reports people, anew in every frame."""
+def draw_shuffles(seeds: list[int], n_frames: int, n_cameras: int, n_people: int) -> Ints:
+    """Return the order in which each camera reports people (T, S, C, D), drawn in every frame."""
     one = np.tile(np.arange(n_people), (n_frames, n_cameras, 1))
     return np.stack([np.random.default_rng([seed, 8]).permuted(one, axis=-1) for seed in seeds], 1)
 
 
-def identities(truth: Points3, mean: Points3) -> tuple[Ints, Floats]:
-    """Which track (S, W) is nearest to each person in the first frame, all together, and (S,) how
-    often that changes by more than 0.3 m from then on; of people and tracks (T, S, W, J, 3)."""
+class Identities(NamedTuple):
+    """Tracks of the people in some sequences."""
+
+    track: Ints
+    """Track of each person in the first frame, (S, W)."""
+    n_changes: Floats
+    """Number of later changes of the assignment, (S,)."""
+
+
+def match_identities(truth: Points3, mean: Points3) -> Identities:
+    """Assign tracks to people, and count later changes of the assignment.
+
+    Tracks are those nearest in the first frame, all together; changes are to tracks that are nearer
+    by more than 0.3 m. People and tracks are (T, S, W, J, 3).
+    """
     n_sequences, n_people = truth.shape[1:3]
     orders = np.array(list(itertools.permutations(range(n_people))))
     apart = np.linalg.norm((mean[:, :, :, None] - truth[:, :, None]).mean(-2), axis=-1)
@@ -86,11 +99,11 @@ def identities(truth: Points3, mean: Points3) -> tuple[Ints, Floats]:
         surely = now[every, best] + _SURE_M < now[every, current]
         swaps += surely
         current = np.where(surely, best, current)
-    return first, swaps
+    return Identities(first, swaps)
 
 
-def _hidden_by_each_other(P: Floats, joints: Points3) -> Bools:
-    """(T, S, C, 2, J) joints whose line of sight passes the other one's trunk."""
+def _find_hidden(P: Floats, joints: Points3) -> Bools:
+    """Return joints with lines of sight that pass the other person's trunk (T, S, C, 2, J)."""
     hidden = np.zeros((*joints.shape[:2], len(P), *joints.shape[2:4]), bool)
     for c, camera in enumerate(P):
         eye = -np.linalg.solve(camera[:, :3], camera[:, 3])
@@ -100,7 +113,7 @@ def _hidden_by_each_other(P: Floats, joints: Points3) -> Bools:
 
 
 def _passes(to_joints: Points3, to_other: Points3) -> Bools:
-    """(T, S, J) whether lines of sight pass a nearer trunk, all seen from the eye."""
+    """Return whether lines of sight pass a nearer trunk (T, S, J), seen from the camera."""
     shoulders = to_other[..., [JOINT["left_shoulder"], JOINT["right_shoulder"]], :].mean(-2)
     ankles = to_other[..., [JOINT["left_ankle"], JOINT["right_ankle"]], :].mean(-2)
     length = np.linalg.norm(to_joints, axis=-1)
@@ -114,8 +127,8 @@ def _passes(to_joints: Points3, to_other: Points3) -> Bools:
     return out
 
 
-def _lost(rng: np.random.Generator, n_frames: int, n_cameras: int) -> Bools:
-    """(T, C, 2) whether a camera has lost a person."""
+def _draw_losses(rng: np.random.Generator, n_frames: int, n_cameras: int) -> Bools:
+    """Return whether a camera has lost a person (T, C, 2)."""
     lost = np.zeros((n_frames, n_cameras, 2), bool)
     for c, k in itertools.product(range(n_cameras), (0, 1)):
         t = rng.exponential(_LOST_EVERY_S / DT_S)

@@ -1,4 +1,4 @@
-"""The tracking bench as it is declared: rows, kinds of numbers, and tables."""
+"""The declaration of the tracking benchmark: rows, kinds of metrics, and tables."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from hrc_env.experiments.report import Cells, Table
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A kind of number that every estimator has in every row."""
+    """A kind of metric that every estimator has in every row."""
 
     title: str
     digits: int
@@ -21,9 +21,9 @@ class Kind:
         """Return the column of an estimator.
 
         Args:
-            metric: the kind's name.
-            name: of the estimator.
-            heading: of the column.
+            metric: name of the kind.
+            name: name of the estimator.
+            heading: heading of the column.
         """
         return Column(f"{metric}.{{}}.{name}", heading, self.digits, self.scale)
 
@@ -35,7 +35,7 @@ KINDS = {
     "std_over_rmse": Kind("Reported standard deviation / RMSE", 2),
     "facing_wrong": Kind("Percent of frames in which the torso faces the wrong way", 2, 100),
 }
-"""By their names in metrics: a table each, with a row a window and a column an estimator."""
+"""Kinds by their names in metrics: each is a table with one row per window."""
 SHOWN = (
     ("rmse_m", DEFAULT, f"`{DEFAULT}` [cm]"),
     ("coverage95", DEFAULT, "coverage"),
@@ -48,19 +48,19 @@ SHOWN = (
     ("rmse_m", SMOOTHER, f"`{SMOOTHER}` [cm]"),
     ("coverage95", SMOOTHER, "coverage"),
 )
-"""Kinds, estimators and headings of the documentation."""
+"""Kinds, estimators and headings in the documentation."""
 WORDS = {
     "one_camera_half_second": "one camera, first 0.5 s",
     "one_camera_one_second": "one camera, first 1 s",
     "one_camera_two_seconds": "one camera, first 2 s",
     "one_camera": "one camera, 4 s",
 }
-"""Of windows whose names do not say it."""
+"""Descriptions of windows with names that are not plain."""
 BATCHES = {"64": "batch of 64 [us]", "hard_64": "the same, `hard` walks [us]", "1": "alone [us]"}
 
 
-def rows_of(selection: Selection) -> dict[str, Cells]:
-    """Return the words of every row by its key."""
+def describe_rows(selection: Selection) -> dict[str, Cells]:
+    """Return the descriptions of every row by its key."""
     return {
         f"{rig}.{window}": (f"{rig} {WORDS.get(window, window.replace('_', ' '))}",)
         for rig, _, window in selection.rows()
@@ -68,23 +68,23 @@ def rows_of(selection: Selection) -> dict[str, Cells]:
 
 
 def table_of_kind(metric: str, names: Sequence[str], selection: Selection) -> Table:
-    """Return the table of one kind of number.
+    """Return the table of one kind of metric.
 
     Args:
         metric: one of `KINDS`.
-        names: of the estimators.
-        selection: the part of the bench that is run.
+        names: names of the estimators.
+        selection: the part of the benchmark that is run.
     """
     kind = KINDS[metric]
     columns = [kind.column(metric, each, each) for each in names]
-    return Table(metric, kind.title, rows_of(selection), columns)
+    return Table(metric, kind.title, describe_rows(selection), columns)
 
 
 def times(names: Sequence[str]) -> Table:
     """Return the table of times.
 
     Args:
-        names: of the estimators.
+        names: names of the estimators.
     """
     return Table(
         "tracking_cost",
@@ -100,7 +100,11 @@ def times(names: Sequence[str]) -> Table:
 BENCH = Table(
     "tracking",
     "Tracking bench",
-    {row: words for row, words in rows_of(EVERYTHING).items() if not str(row).endswith(MATCHED)},
+    {
+        row: words
+        for row, words in describe_rows(EVERYTHING).items()
+        if not str(row).endswith(MATCHED)
+    },
     [KINDS[metric].column(metric, name, heading) for metric, name, heading in SHOWN],
     ("sequence",),
     "RMSE of a joint, share of joints within the reported 95 % region, reported standard deviation "

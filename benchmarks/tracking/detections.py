@@ -1,4 +1,5 @@
-"""What a detector makes of walkers: noise, lasting errors, occlusion, gross errors, swaps."""
+"""Simulated detections of walkers: noise, lasting errors, occlusion, gross errors, exchanged
+sides."""
 
 from dataclasses import dataclass
 
@@ -16,18 +17,23 @@ _DRIFT_TAU_S = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Damage:
-    """What goes wrong in the detections."""
+    """The errors of simulated detections."""
 
     sigma_px: float = SIGMA_PX
     """White noise on each coordinate [px]."""
     drift_px: float = 0.0
-    """Standard deviation of errors that last half a second, on each coordinate [px]; estimators
-    are not told of it."""
+    """Standard deviation of errors that last half a second, on each coordinate [px].
+
+    Estimators get no information about it.
+    """
     occluded: bool = False
-    """Each camera loses each joint for 0.5-2 s every 5 s; every 6 s a joint keeps only one
-    camera for 0.5-1.5 s, or, one time in five, none for 0.4-0.8 s."""
+    """Whether joints are occluded.
+
+    Each camera loses each joint for 0.5-2 s every 5 s; every 6 s a joint keeps only one camera for
+    0.5-1.5 s, or, one time in five, none for 0.4-0.8 s.
+    """
     gross: float = 0.0
-    """Share of detections that are errors, as wide as a third of the body."""
+    """Share of detections that are gross errors, as wide as a third of the body."""
     swapped: float = 0.0
     """Share of the time in which a camera exchanges left and right, 6 frames at a time."""
     mirrored_start: bool = False
@@ -58,24 +64,27 @@ SURPRISES: dict[str, Damage] = {
         Damage(alone_s=(1.0, 6.0)),
     ),
 }  # fmt: skip
-"""Damage by the conditions of `tests/properties/test_sudden_motions.py`."""
+"""Errors by the conditions of `tests/properties/test_sudden_motions.py`."""
 
 
 def detect(P: Floats, joints: Points3, damage: Damage, seeds: list[int]) -> Points2:
-    """Pixels (T, S, C, J, 2) of joints (T, S, J, 3), NaN where a joint was not found; each seed and
-    each kind of damage has its own stream, so that conditions differ by their damage alone."""
+    """Return pixels (T, S, C, J, 2) of joints (T, S, J, 3), NaN for missing detections.
+
+    Each seed and each kind of error has its own stream, so that conditions differ by their errors
+    alone.
+    """
     exact, depth = project(P, joints)
     exact, depth = exact.swapaxes(1, 2), depth.swapaxes(1, 2)
     inside = (exact >= 0).all(-1) & (exact[..., 0] < WIDTH_PX) & (exact[..., 1] < HEIGHT_PX)
     in_view = inside & (depth > 0.1)
     px = np.empty_like(exact)
     for s, seed in enumerate(seeds):
-        px[:, s] = _damaged(exact[:, s], in_view[:, s], damage, seed)
+        px[:, s] = _damage(exact[:, s], in_view[:, s], damage, seed)
     return px
 
 
-def _damaged(exact: Points2, in_view: Bools, damage: Damage, seed: int) -> Points2:
-    """One sequence: (T, C, J, 2) and (T, C, J) to pixels."""
+def _damage(exact: Points2, in_view: Bools, damage: Damage, seed: int) -> Points2:
+    """Return the pixels of one sequence, from (T, C, J, 2) and (T, C, J)."""
     rngs = [np.random.default_rng([seed, 2, kind]) for kind in range(5)]
     px = exact + damage.sigma_px * rngs[0].standard_normal(exact.shape)
     if damage.drift_px:
@@ -104,7 +113,8 @@ def _damaged(exact: Points2, in_view: Bools, damage: Damage, seed: int) -> Point
 
 
 def _drift(rng: np.random.Generator, shape: tuple[int, ...]) -> Floats:
-    """(T, ...) stationary, of unit variance, with correlation exp(-t / 0.5 s) over time."""
+    """Return stationary noise (T, ...) of unit variance with correlation exp(-t / 0.5 s) over
+    time."""
     keep = np.exp(-DT_S / _DRIFT_TAU_S)
     drift = rng.standard_normal(shape)
     for t in range(1, len(drift)):
@@ -113,7 +123,7 @@ def _drift(rng: np.random.Generator, shape: tuple[int, ...]) -> Floats:
 
 
 def _occlusions(rng: np.random.Generator, shape: tuple[int, ...]) -> Bools:
-    """(T, C, J) whether a camera may see a joint."""
+    """Return whether a camera can see a joint (T, C, J)."""
     n_frames, n_cameras, n_joints = shape
     free = np.ones(shape, bool)
     for c in range(n_cameras):
@@ -135,7 +145,7 @@ def _occlusions(rng: np.random.Generator, shape: tuple[int, ...]) -> Bools:
 
 
 def _swaps(rng: np.random.Generator, shape: tuple[int, ...], share: float) -> Bools:
-    """(T, C) whether a camera exchanges left and right."""
+    """Return whether a camera exchanges left and right (T, C)."""
     n_frames, n_cameras = shape
     swapped = np.zeros(shape, bool)
     pause = 6 / share * (1 - share)

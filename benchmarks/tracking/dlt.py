@@ -1,8 +1,8 @@
-"""The yardstick: plain direct linear transformation, frame by frame.
+"""A yardstick: plain direct linear transformation, frame by frame.
 
 Hartley and Zisserman, Multiple View Geometry, 2nd ed., section 12.2. No weights, no gate, no
-refinement; a joint that fewer than two cameras see stays where it was. Its error says how hard
-a set of sequences is, whoever made it.
+refinement; a joint that fewer than two cameras see keeps its position. Its error measures the
+difficulty of a set of sequences.
 """
 
 import numpy as np
@@ -11,8 +11,10 @@ from hrc_env.core.typing import Floats, Points2, Points3
 
 
 def triangulate_frame(P: Floats, px: Points2, last: Points3) -> Points3:
-    """(S, J, 3) points from one frame of pixels (S, C, J, 2), NaN where missing; the `last` ones
-    where fewer than two cameras see a joint."""
+    """Return points (S, J, 3) from one frame of pixels (S, C, J, 2), which are NaN if missing.
+
+    Joints that fewer than two cameras see keep their `last` position.
+    """
     seen = np.isfinite(px[..., 0])
     px = np.where(seen[..., None], px, 0.0)
     rows = px[..., None] * P[:, None, None, 2] - P[:, None, :2]

@@ -1,4 +1,4 @@
-"""A second, independent source of motion: the environment's own worker and its detector.
+"""An independent second source of motion: the environment's own worker and its detector.
 
 The bench's walkers (`walks`) and the environment's worker (`hrc_env.motion`) share no
 code, and neither do the bench's white detections and the environment's emulator, whose errors
@@ -7,6 +7,7 @@ last for half a second, have heavy tails and come with honest or dishonest confi
 
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,40 +25,52 @@ from hrc_env.tracking.config import ParticleConfig, cast_config
 from hrc_env.worker.body import worker_truth
 
 ENV = "env"
-"""Name of the rig: the environment's room and its four cameras."""
+"""Name of the rig with the environment's room and its four cameras."""
 ENV_CONDITIONS = ("four_cameras", "two_cameras", "one_camera", "occluded")
-"""With nothing in the way: all cameras, the first two, and all but for 4 s, in which one is
-left; then all with the room and a moving robot in the way of their lines of sight."""
+"""Conditions of the rig.
+
+Without obstacles: all cameras, the first two, and all but for 4 s with only one; then all with the
+room and a moving robot in their lines of sight.
+"""
 ENV_FRAMES = 150
 ALONE_FRAMES = slice(25, 125)
 _SLOWNESS = 0.95
 
 
 def make_env_rig() -> Rig:
-    """The environment's cameras and tracker settings."""
+    """Return the environment's cameras and tracker settings."""
     simulation = simulate(1)
     P = projections(simulation.scene.cameras)
     simulation.close()
     return Rig(ENV, P, (np.nan, np.nan), cast_config(HRCConfig().tracker, ParticleConfig))
 
 
-def record(condition: str, seeds: list[int]) -> tuple[Points3, Keypoints]:
-    """Joints (T, S, 1, J, 3) [m] and keypoints (T, S, C, 1, J, ...), one episode per seed."""
-    joints, free, hidden = _episodes(tuple(seeds))
+class EnvSequences(NamedTuple):
+    """One episode of the environment per seed."""
+
+    joints_world: Points3
+    """Joints, (T, S, 1, J, 3) [m]."""
+    keypoints: Keypoints
+    """Keypoints, (T, S, C, 1, J, ...)."""
+
+
+def record(condition: str, seeds: list[int]) -> EnvSequences:
+    """Return the sequences of a condition."""
+    episodes = _play_episodes(tuple(seeds))
     if condition == "occluded":
-        return joints, hidden
-    blind: Bools = np.zeros(free.confidence.shape, bool)
+        return EnvSequences(episodes.joints_world, episodes.hidden)
+    blind: Bools = np.zeros(episodes.free.confidence.shape, bool)
     if condition == "two_cameras":
         blind[:, :, 2:] = True
     elif condition == "one_camera":
         left = np.array(seeds) % blind.shape[2]
         others = np.arange(blind.shape[2]) != left[:, None]
         blind[ALONE_FRAMES] = others[:, :, None, None]
-    return joints, without(free, blind)
+    return EnvSequences(episodes.joints_world, remove_blind(episodes.free, blind))
 
 
-def without(keypoints: Keypoints, blind: Bools) -> Keypoints:
-    """Keypoints less those that are `blind` (..., C, W, J)."""
+def remove_blind(keypoints: Keypoints, blind: Bools) -> Keypoints:
+    """Return keypoints without those that are `blind` (..., C, W, J)."""
     return Keypoints(
         np.where(blind[..., None], np.nan, keypoints.px),
         np.where(blind, 0.0, keypoints.confidence),
@@ -68,7 +81,7 @@ def without(keypoints: Keypoints, blind: Bools) -> Keypoints:
 def watch(
     simulation: Simulation, seeds: Sequence[int], pushes: list[np.random.Generator], n_frames: int
 ) -> Iterator[tuple[WorkerTruth, Surroundings]]:
-    """The workers, and what hides them, while the robot moves about slowly, as `pushes` draw."""
+    """Yield the workers and their surroundings, while the robot moves slowly as `pushes` draw."""
     simulation.reset(np.arange(len(seeds)), [np.random.default_rng([seed, 9]) for seed in seeds])
     action = np.zeros((len(seeds), simulation.n_actions))
     for _ in range(n_frames):
@@ -91,14 +104,25 @@ class EmulatedDetector:
         emulator.reset(self.state, np.arange(len(rngs)), rngs)
 
     def detect(self, truth: WorkerTruth, between: Surroundings) -> Keypoints:
-        """What the detector would say, with so much in the way."""
+        """Return the detections of the truth with the given surroundings."""
         settings = self.config.emulator
         return emulator.emulate(self.state, self.rngs, truth, between, self.cameras, settings)
 
 
+class _Episodes(NamedTuple):
+    """Episodes of the environment with both kinds of keypoints."""
+
+    joints_world: Points3
+    """Joints, (T, S, 1, J, 3) [m]."""
+    free: Keypoints
+    """Keypoints with free lines of sight."""
+    hidden: Keypoints
+    """Keypoints occluded by the robot and the scene."""
+
+
 @lru_cache(maxsize=1)
-def _episodes(seeds: tuple[int, ...]) -> tuple[Points3, Keypoints, Keypoints]:
-    """Joints, keypoints with free lines of sight, and keypoints with the robot in the way."""
+def _play_episodes(seeds: tuple[int, ...]) -> _Episodes:
+    """Play one episode per seed; the last episodes are cached."""
     simulation = simulate(len(seeds))
     free, hidden, pushes = (
         [np.random.default_rng([seed, 10, k]) for seed in seeds] for k in range(3)
@@ -108,15 +132,15 @@ def _episodes(seeds: tuple[int, ...]) -> tuple[Points3, Keypoints, Keypoints]:
     seen: tuple[list[Keypoints], list[Keypoints]] = ([], [])
     for truth, lab in watch(simulation, seeds, pushes, ENV_FRAMES):
         joints.append(truth.joints_world.copy())
-        for said, detector, between in zip(
+        for frames, detector, between in zip(
             seen, detectors, (no_surroundings(len(seeds)), lab), strict=True
         ):
-            said.append(detector.detect(truth, between))
+            frames.append(detector.detect(truth, between))
     simulation.close()
-    return np.stack(joints), _stacked(seen[0]), _stacked(seen[1])
+    return _Episodes(np.stack(joints), _stack(seen[0]), _stack(seen[1]))
 
 
-def _stacked(records: list[Keypoints]) -> Keypoints:
+def _stack(records: list[Keypoints]) -> Keypoints:
     px, confidence, sigma_px = (
         np.stack([getattr(each, name) for each in records])
         for name in ("px", "confidence", "sigma_px")
@@ -125,6 +149,6 @@ def _stacked(records: list[Keypoints]) -> Keypoints:
 
 
 def simulate(batch: int, config: HRCConfig | None = None) -> Simulation:
-    """Environments whose cameras nobody looks through."""
+    """Return environments without rendered cameras."""
     config = config or HRCConfig()
     return Simulation(batch, settle(perception="none", estimator="triangulation", config=config))

@@ -1,10 +1,10 @@
 """Motion drawn from the estimators' own model, for which a bound on any estimator is known.
 
-The state is all joints' positions and velocities, 90 numbers: x' = f(x) + w, w ~ N(0, Q). f
-damps every joint towards its place on the body about the root (the torso's middle), turned as
-the torso is; Q has each joint's own noise and an acceleration that all joints share. The bodies
-have no bones: the Gaussian estimators describe them but for the places on the body, which they
-learn, and the turning, whose error they leave out.
+The state is all joints' positions and velocities, 90 numbers: x' = f(x) + w, w ~ N(0, Q). f damps
+every joint towards its place on the body about the root (the torso's middle), which turns with the
+torso; Q has each joint's own noise and an acceleration that all joints share. The bodies have no
+bones: the Gaussian estimators describe them except for the places on the body, which they learn,
+and the turning, whose error they ignore.
 """
 
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from hrc_env.tracking.tree.state import STANDING_M
 
 N_STATES = 6 * N_JOINTS
 N_PLACES = 3 * N_JOINTS
-"""The first half of the state: positions [m], joint by joint; then velocities [m/s]."""
+"""Number of positions in the state [m], joint by joint; velocities [m/s] follow."""
 _LEFT_RIGHT = np.zeros(N_JOINTS)
 _LEFT_RIGHT[TORSO] = (0.5, -0.5, 0.5, -0.5)
 _WARM_UP_FRAMES = 50
@@ -27,21 +27,23 @@ _WARM_UP_FRAMES = 50
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MatchedModel:
-    """A body that moves as the estimators think bodies move."""
+    """A body that moves by the estimators' model."""
 
     F: Floats
-    """(J, 2, 2) motion of (position, velocity) relative to the joint's place on the body."""
+    """Motion of (position, velocity) relative to the joint's place on the body (J, 2, 2)."""
     Q: Floats
-    """(90, 90) process noise."""
+    """Process noise (90, 90)."""
     linear: Floats
-    """(90, 90) derivative of f without the turning of the body."""
+    """Derivative of f without the turning of the body (90, 90)."""
     offset: Floats
-    """(J, 3) places on the body: forward, left, up of the root [m]."""
+    """Places on the body (J, 3): forward, left and up of the root [m]."""
 
 
-def matched_model(damping: float, root_acceleration: float) -> MatchedModel:
-    """The motion model of `tracking.tree.predict` as one of the whole body at 25 Hz; the settings
-    are those of `ParticleConfig`."""
+def make_matched_model(damping: float, root_acceleration: float) -> MatchedModel:
+    """Return the motion model of `tracking.tree.predict` as one of the whole body at 25 Hz.
+
+    The settings are those of `ParticleConfig`.
+    """
     F, own = discretise_joints(DT_S, damping, 0.0)
     average = np.zeros((N_JOINTS, N_JOINTS))
     average[:, TORSO] = 1 / len(TORSO)
@@ -64,9 +66,9 @@ def matched_model(damping: float, root_acceleration: float) -> MatchedModel:
 
 
 def draw(model: MatchedModel, seeds: list[int], n_frames: int) -> Points3:
-    """Joints (T, S, J, 3) [m] of one body per seed.
+    """Return joints (T, S, J, 3) [m] of one body per seed.
 
-    Limbs are let go two seconds before frame 0; until then the root is held at rest over the
+    Limbs are released two seconds before frame 0; until then the root is held at rest over the
     origin, so that the body, which drifts without bound, stays in view for a while.
     """
     rngs = [np.random.default_rng([seed, 3]) for seed in seeds]
@@ -78,14 +80,15 @@ def draw(model: MatchedModel, seeds: list[int], n_frames: int) -> Points3:
         noise = np.stack([rng.standard_normal(N_STATES) for rng in rngs])
         state = advance(model, state) + noise @ factor.T
         if t < 0:
-            state = _centred(state)
+            state = _centre(state)
         else:
             joints[t] = state[:, :N_PLACES].reshape(-1, N_JOINTS, 3)
     return joints
 
 
-def _centred(state: Floats) -> Floats:
-    """Root over the origin and at rest: shifts all joints alike, which f allows."""
+def _centre(state: Floats) -> Floats:
+    """Return the state with the root over the origin and at rest; f allows to shift all joints
+    alike."""
     body = state.reshape(len(state), 2, N_JOINTS, 3)
     root = body[:, :, TORSO].mean(2, keepdims=True)
     root[:, 0, :, 2] -= 1.0
@@ -93,10 +96,10 @@ def _centred(state: Floats) -> Floats:
 
 
 def advance(model: MatchedModel, state: Floats) -> Floats:
-    """f: the expected state (S, 90) a frame later."""
+    """Return f, the expected state (S, 90) one frame later."""
     body = state.reshape(-1, 2, N_JOINTS, 3)
     root = body[:, :, TORSO].mean(2, keepdims=True)
-    anchor = root[:, 0] + _turned(model.offset, heading(body[:, 0]))
+    anchor = root[:, 0] + _rotate(model.offset, heading(body[:, 0]))
     place, speed = body[:, 0] - anchor, body[:, 1] - root[:, 1]
     F = model.F[..., None]
     moved = np.stack(
@@ -110,7 +113,7 @@ def advance(model: MatchedModel, state: Floats) -> Floats:
 
 
 def transition(model: MatchedModel, joints: Points3) -> Floats:
-    """Derivative of f, (S, 90, 90), for bodies whose joints are at (S, J, 3)."""
+    """Return the derivative of f (S, 90, 90) for bodies with joints at (S, J, 3)."""
     angle = heading(joints)
     left = np.einsum("j,sji->si", _LEFT_RIGHT, joints)
     width2 = (left[:, :2] ** 2).sum(-1)
@@ -118,7 +121,7 @@ def transition(model: MatchedModel, joints: Points3) -> Floats:
     by_place[..., 0] = _LEFT_RIGHT * (-left[:, 1] / width2)[:, None]
     by_place[..., 1] = _LEFT_RIGHT * (left[:, 0] / width2)[:, None]
     level = np.array([1.0, 1.0, 0.0])
-    turning = _turned(model.offset * level, angle + np.pi / 2)
+    turning = _rotate(model.offset * level, angle + np.pi / 2)
     F = model.F[..., None]
     by_angle = np.stack([(1 - F[:, 0, 0]) * turning, -F[:, 1, 0] * turning], 1)
     n = len(joints)
@@ -128,13 +131,13 @@ def transition(model: MatchedModel, joints: Points3) -> Floats:
 
 
 def heading(joints: Points3) -> Floats:
-    """(S,) where bodies (S, J, 3) face, from the torso's left-right line [rad]."""
+    """Return the heading (S,) of bodies (S, J, 3) from the torso's left-right line [rad]."""
     left = np.einsum("j,sji->si", _LEFT_RIGHT, joints)
     return np.arctan2(left[:, 1], left[:, 0]) - np.pi / 2
 
 
-def _turned(offset: Floats, angle: Floats) -> Floats:
-    """(S, J, 3) offsets turned about the vertical."""
+def _rotate(offset: Floats, angle: Floats) -> Floats:
+    """Return offsets (S, J, 3) rotated about the vertical."""
     cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
     x, y, z = offset.T
     return np.stack([cos * x - sin * y, sin * x + cos * y, z + 0 * cos], -1)

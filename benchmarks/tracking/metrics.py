@@ -1,4 +1,4 @@
-"""From sums per sequence to numbers with intervals, bootstrapped over sequences."""
+"""Metrics from sums per sequence, with bootstrap intervals over sequences."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
@@ -11,19 +11,19 @@ from hrc_env.core.results import Metric, over
 from hrc_env.core.typing import Floats
 
 TIMING = "timing"
-"""The condition under which `Parts` holds microseconds."""
+"""Condition under which `Parts` holds microseconds."""
 Parts: TypeAlias = dict[tuple[str, str, str], dict[str, Any]]
-"""(rig, condition, name) to what the cell gave."""
+"""Results of the cells by rig, condition and name."""
 N_RESAMPLED = 1000
 _Sums: TypeAlias = Mapping[str, Floats]
 
 
-def metrics_of(parts: Parts, selection: Selection = EVERYTHING) -> dict[str, Metric]:
-    """All metrics of the bench by their dotted names."""
+def compute_metrics(parts: Parts, selection: Selection = EVERYTHING) -> dict[str, Metric]:
+    """Return all metrics of the benchmark by their dotted names."""
     metrics = _times(parts)
     for rig, condition, window in selection.rows():
         drawn = {
-            name: drawn_sums(parts[rig, condition, name][window])
+            name: resample_sums(parts[rig, condition, name][window])
             for name in selection.names_of(condition)
         }
         for name, sums in drawn.items():
@@ -55,18 +55,21 @@ STATISTICS: dict[str, tuple[str, Callable[[_Sums], Floats]]] = {
         lambda sums: 100 * sums["identity_swaps"] / sums["one"],
     ),
 }
-"""Each as a function of sums over sequences. The median is the mean of the sequences' medians;
-facing wrong is the share of frames in which the torso's left is where its right is."""
+"""Metrics as functions of sums over sequences.
+
+The median is the mean of the sequences' medians; "facing wrong" is the share of frames in which
+left and right of the torso are exchanged.
+"""
 _NEEDS = {
     **dict.fromkeys(("coverage95", "std_over_rmse"), "inside"),
     "identity_swaps": "identity_swaps",
 }
 
 
-def drawn_sums(sums: Mapping[str, Any]) -> dict[str, Floats]:
-    """Sums over all sequences, and over 1000 draws of as many with replacement: (1001, ...).
+def resample_sums(sums: Mapping[str, Any]) -> dict[str, Floats]:
+    """Return sums over all sequences, and over 1000 draws with replacement: (1001, ...).
 
-    The draws depend on the number of sequences only, so that two estimators' are the same.
+    The draws depend on the number of sequences only, so those of two estimators are the same.
     """
     arrays = {name: np.array(values, float) for name, values in sums.items()}
     n = len(arrays["n"])
@@ -79,7 +82,7 @@ def drawn_sums(sums: Mapping[str, Any]) -> dict[str, Floats]:
 
 
 def metric(values: Floats, unit: str, sums: _Sums, factor: int = 1) -> Metric:
-    """The first value, with the middle 95 % of the others."""
+    """Return the first value with the middle 95 % of the others."""
     low, high = np.percentile(values[1:], (2.5, 97.5))
     n = factor * round(float(sums["one"][0]))
     return Metric(float(values[0]), float(low), float(high), unit, n)
@@ -95,8 +98,8 @@ def _times(parts: Parts) -> dict[str, Metric]:
 
 
 def _bounds(parts: Parts, name: str, rigs: Sequence[str]) -> dict[str, Metric]:
-    """RMSE over its bound: root of the mean of the squared ratios over rigs, and of each."""
-    drawn = {rig: drawn_sums(parts[rig, MATCHED, name][MATCHED]) for rig in rigs}
+    """Return RMSE over its bound: the root mean square of the ratios over rigs, and each."""
+    drawn = {rig: resample_sums(parts[rig, MATCHED, name][MATCHED]) for rig in rigs}
     squared = {rig: sums["squared"] / sums["bound"] for rig, sums in drawn.items()}
     both = np.sqrt(np.mean(list(squared.values()), axis=0))
     return {

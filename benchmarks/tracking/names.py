@@ -1,4 +1,4 @@
-"""Who takes part in the tracking bench, and in which rows."""
+"""The participants of the tracking benchmark, and their rows."""
 
 from dataclasses import dataclass
 
@@ -9,24 +9,24 @@ from hrc_env.core.errors import check_names
 from hrc_env.tracking.estimators import ESTIMATORS
 
 DEFAULT = "particle"
-"""The estimator that an environment has if nobody asks for another."""
+"""Default estimator of an environment."""
 DLT = "dlt"
-"""Plain per-frame triangulation; where cameras do not know names, it is told them."""
+"""Plain triangulation per frame; it knows which person a detection belongs to."""
 SMOOTHER = "smoother"
-"""What could have been known in view of the whole clip; not where the bound is a filter's."""
+"""The smoother, which uses the whole clip; it is not compared with the filter's bound."""
 
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """The part of the bench that is run."""
+    """The part of the benchmark that is run."""
 
     estimators: tuple[str, ...] = ()
-    """Who beside the default; everybody if none are named."""
+    """Estimators besides the default; empty: all."""
     sequences: tuple[str, ...] = ()
-    """On which rigs and conditions: "lab", "hard" or "lab.hard"; on all if none are named."""
+    """Rigs and conditions: "lab", "hard" or "lab.hard"; empty: all."""
 
     def check(self) -> None:
-        """Raise `ConfigError` for names that there are not, with those that there are."""
+        """Raise `ConfigError` for unknown names, with the valid ones."""
         check_names("estimator", self.estimators, [*ESTIMATORS, DLT, SMOOTHER])
         pairs = _all_conditions()
         known = [*RIGS, ENV, *dict.fromkeys(name for _, name in pairs), *map(".".join, pairs)]
@@ -42,12 +42,12 @@ class Selection:
         ]  # fmt: skip
 
     def rivals(self) -> list[str]:
-        """Return who else there is, of those that know no more than the frames so far."""
+        """Return the other estimators that use only the frames up to now."""
         others = [*(name for name in ESTIMATORS if name != DEFAULT), DLT]
         return [name for name in others if not self.estimators or name in self.estimators]
 
     def names_of(self, condition: str) -> list[str]:
-        """Return who runs on a condition, the default first."""
+        """Return the estimators that run on a condition, the default first."""
         smooths = not self.estimators or SMOOTHER in self.estimators
         last = [SMOOTHER] if smooths and condition != MATCHED else []
         return [DEFAULT, *self.rivals(), *last]
@@ -75,9 +75,9 @@ def _all_conditions() -> list[tuple[str, str]]:
 
 
 EVERYTHING = Selection()
-"""The whole bench."""
+"""The whole benchmark."""
 
 
 def rows() -> list[tuple[str, str, str]]:
-    """Return (rig, condition, window) of every row of the whole bench."""
+    """Return (rig, condition, window) of every row of the whole benchmark."""
     return EVERYTHING.rows()

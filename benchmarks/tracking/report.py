@@ -1,14 +1,14 @@
-"""The tracking bench as people read it."""
+"""The report of the tracking benchmark."""
 
 from collections.abc import Mapping, Sequence
 from itertools import product
 
-from benchmarks.common import cell
+from benchmarks.common import format_number
 from benchmarks.tracking.declaration import BENCH, KINDS, table_of_kind, times
 from benchmarks.tracking.env_sequences import ENV
 from benchmarks.tracking.names import DEFAULT, DLT, EVERYTHING, SMOOTHER, Selection
 from benchmarks.tracking.sequences import MATCHED, TWO_WORKERS
-from hrc_env.experiments.report import Metrics, Report, table
+from hrc_env.experiments.report import Metrics, Report, format_table
 
 _LEAD = f"""\
 Numbers in brackets are 95 % bootstrap intervals over sequences. `lab` and `site` are the bench's
@@ -26,7 +26,7 @@ and still learn the joints' places on the body. The bound is that of each sequen
 
 
 def report(metrics: Metrics, selection: Selection = EVERYTHING) -> Report:
-    """Return the report; sections of which nothing was run are left out."""
+    """Return the report; sections without results are left out."""
     rivals = [DEFAULT, *selection.rivals()]
     with_names = [name for name in rivals if name != DLT]
     swaps = {"": f"identity_swaps.{{rig}}.{TWO_WORKERS}.{{name}}"}
@@ -39,15 +39,15 @@ def report(metrics: Metrics, selection: Selection = EVERYTHING) -> Report:
         sections.append((title, _by_rig(metrics, with_names, rigs, swaps)))
     parts = [part for title, text in sections if text for part in (f"## {title}", text)]
     names = list(dict.fromkeys(n for _, c in selection.conditions() for n in selection.names_of(c)))
-    shown = [times(selection.timed()).markdown(metrics)]
+    shown = [times(selection.timed()).to_markdown(metrics)]
     for each in (BENCH, *(table_of_kind(kind, names, selection) for kind in KINDS)):
-        shown.append(each.markdown(metrics, intervals=False))
+        shown.append(each.to_markdown(metrics, intervals=False))
     spread = "95 % intervals over seeds, times with the smallest and the largest"
     return Report("Tracking bench", _LEAD, [*parts, *filter(None, shown)], spread)
 
 
 def _lead(metrics: Metrics, selection: Selection) -> str:
-    """The default, row by row, beside the paper's algorithm and the best of the others."""
+    """Return the default row by row, beside the paper's algorithm and the best of the others."""
     lines, rivals = list[list[str]](), selection.rivals()
     header = ["", "RMSE, cm", "coverage", "std/RMSE"]
     header += ["paper, cm"] if "paper" in rivals else []
@@ -56,18 +56,18 @@ def _lead(metrics: Metrics, selection: Selection) -> str:
         key = f"{rig}.{window}"
         line = [
             f"{rig} {window}",
-            cell(metrics[f"rmse_m.{key}.{DEFAULT}"], 100, 2, True),
-            cell(metrics[f"coverage95.{key}.{DEFAULT}"], 1, 3),
-            cell(metrics[f"std_over_rmse.{key}.{DEFAULT}"], 1, 2),
+            format_number(metrics[f"rmse_m.{key}.{DEFAULT}"], 100, 2, True),
+            format_number(metrics[f"coverage95.{key}.{DEFAULT}"], 1, 3),
+            format_number(metrics[f"std_over_rmse.{key}.{DEFAULT}"], 1, 2),
         ]
         if "paper" in rivals:
-            line.append(cell(metrics[f"rmse_m.{key}.paper"], 100, 2))
+            line.append(format_number(metrics[f"rmse_m.{key}.paper"], 100, 2))
         if rivals:
             best = min(rivals, key=lambda name: metrics[f"rmse_m.{key}.{name}"].value)
-            line.append(f"{cell(metrics[f'rmse_m.{key}.{best}'], 100, 2)} {best}")
-            line.append(cell(metrics[f"default_over.{key}.{best}"], 1, 3, True))
+            line.append(f"{format_number(metrics[f'rmse_m.{key}.{best}'], 100, 2)} {best}")
+            line.append(format_number(metrics[f"default_over.{key}.{best}"], 1, 3, True))
         lines.append(line)
-    return table(header, lines)
+    return format_table(header, lines)
 
 
 def _by_rig(
@@ -77,18 +77,24 @@ def _by_rig(
     kinds: Mapping[str, str],
     *above: list[str],
 ) -> str:
-    """Rows per rig and title, columns per estimator; of each title a pattern of keys."""
+    """Return a table with one row per rig and title and one column per estimator.
+
+    Each title has a pattern of keys.
+    """
     lines = list(above)
     for rig, (title, key) in product(rigs, kinds.items()):
         scale, digits = (100, 2) if key.startswith("rmse_m") else (1, 3)
         found = (metrics.get(key.format(rig=rig, name=name)) for name in names)
-        lines.append([rig + title, *(cell(each, scale, digits, True) for each in found)])
-    return table(["", *names], lines)
+        lines.append([rig + title, *(format_number(each, scale, digits, True) for each in found)])
+    return format_table(["", *names], lines)
 
 
 def _bound(metrics: Metrics, selection: Selection, rigs: Sequence[str]) -> str:
     names = selection.names_of(MATCHED)
-    both = ["both rigs", *(cell(metrics[f"ratio_to_bound.{name}"], 1, 3, True) for name in names)]
+    both = [
+        "both rigs",
+        *(format_number(metrics[f"ratio_to_bound.{name}"], 1, 3, True) for name in names),
+    ]
     kinds = {
         "": "ratio_to_bound_in.{rig}.{name}",
         ": coverage": f"coverage95.{{rig}}.{MATCHED}.{{name}}",

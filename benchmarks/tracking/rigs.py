@@ -1,4 +1,4 @@
-"""The two camera rigs of the tracking bench, each about the world's origin."""
+"""The two camera rigs of the tracking benchmark, each around the world's origin."""
 
 from dataclasses import dataclass
 
@@ -13,26 +13,26 @@ from hrc_env.tracking.config import ParticleConfig
 DT_S = 0.04
 """Time between two sets of frames [s]."""
 SIGMA_PX = 3.0
-"""Standard deviation of a detection, which the estimators are told [px]."""
+"""Standard deviation of a detection, which the estimators know [px]."""
 WIDTH_PX, HEIGHT_PX = 1920, 1080
 _CORNERS = ((1, 1), (-1, 1), (-1, -1), (1, -1))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rig:
-    """Four cameras about a room, and where people walk in it."""
+    """Four cameras around a room, and the area in which people walk."""
 
     name: str
     P: Floats
-    """(4, 3, 4) projections."""
+    """Projections (4, 3, 4)."""
     walk_m: tuple[float, float]
     """Half the length and width of the area in which people walk [m]."""
     tracker: ParticleConfig
-    """Settings of the estimators: where a worker is expected, and how surely."""
+    """Settings of the estimators, with the prior position of a worker."""
 
 
 def make_rig(name: str) -> Rig:
-    """The rig called `name`: "lab" or "site".
+    """Return the rig with a name, "lab" or "site".
 
     lab: a room of 6.09 x 5.48 m, cameras 10 cm off its corners at 2.4 m with a field of view
     of 118.2 x 69.5 degrees. site: 20 x 20 m, cameras over the corners at 5 m, 90 degrees.

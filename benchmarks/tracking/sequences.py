@@ -1,4 +1,4 @@
-"""The sequences of the tracking bench: what all estimators are given and held against."""
+"""The sequences of the tracking benchmark: input and truth of all estimators."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
@@ -6,13 +6,13 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.tracking.arrivals import LONGEST_DELAY_S, delivered
+from benchmarks.tracking.arrivals import LONGEST_DELAY_S, deliver
 from benchmarks.tracking.athletes import circle, fall, run, spin, tumble
 from benchmarks.tracking.bound import posterior_bound
-from benchmarks.tracking.couples import couples, detect_couples, shuffles
+from benchmarks.tracking.couples import detect_couples, draw_shuffles, walk_couples
 from benchmarks.tracking.detections import CONDITIONS, SURPRISES, Damage, detect
 from benchmarks.tracking.env_sequences import ENV, ENV_CONDITIONS, ENV_FRAMES, record
-from benchmarks.tracking.matched import draw, matched_model
+from benchmarks.tracking.matched import draw, make_matched_model
 from benchmarks.tracking.rigs import DT_S, SIGMA_PX, Rig
 from benchmarks.tracking.walks import walk
 from benchmarks.tracking.workers import fall_and_get_up, run_to_and_fro
@@ -22,9 +22,12 @@ from hrc_env.tracking.config import TrackerConfig
 
 MATCHED, TWO_WORKERS, LATE = "matched", "two_workers", "late"
 SIMULATED = (*CONDITIONS, LATE, TWO_WORKERS, MATCHED)
-"""Conditions of the rigs lab and site; of `matched` the least mean squared error is known."""
+"""Conditions of the rigs lab and site; for `matched` the least mean squared error is known."""
 MATCHED_ROOT_ACCELERATION = 0.05
-"""Of the matched sequences and of the estimators on them, so that they stay in view [m^2/s^3]."""
+"""Acceleration of the root in matched sequences and in the estimators on them [m^2/s^3].
+
+It is small, so that bodies stay in view.
+"""
 MOTIONS: dict[str, Callable[[tuple[float, float], list[int], int], Points3]] = {
     "running": partial(run, speed_m_s=3.0),
     "running_fast": partial(run, speed_m_s=3.5),
@@ -39,7 +42,7 @@ MOTIONS: dict[str, Callable[[tuple[float, float], list[int], int], Points3]] = {
     "worker_falls": fall_and_get_up,
     "worker_falls_one_camera": fall_and_get_up,
 }
-"""What people do where they do not walk."""
+"""Motions of people other than walking, by condition."""
 N_FRAMES = {
     **dict.fromkeys(("clean", "occluded", "hard", "drifting"), 500),
     "one_camera": 175, LATE: 175, TWO_WORKERS: 125, MATCHED: 40, "mirrored_start": 50,
@@ -47,8 +50,8 @@ N_FRAMES = {
 }  # fmt: skip
 
 
-def lasting() -> tuple[float, float]:
-    """Return how long the shortest and the longest sequences last [s]."""
+def find_durations() -> tuple[float, float]:
+    """Return the durations of the shortest and the longest sequences [s]."""
     return DT_S * min(N_FRAMES.values()), DT_S * max(N_FRAMES.values())
 
 
@@ -80,14 +83,17 @@ WINDOWS: dict[str, dict[str, tuple[int, int]]] = {
     "worker_falls_one_camera": {"worker_falls_one_camera": (50, 150)},
     "fallen_one_camera": {"fallen_one_camera": (50, 150), "fallen_after_return": (160, 200)},
 }
-"""Frames that count: after the first second; while one camera sees, and from one second after
-the others' return; from half a second on after a mirrored start; from the fall on; matched
-sequences are short, lest the drifting body leave the images."""
+"""Frames that count, by condition.
+
+They begin after the first second; while one camera sees, and one second after the others' return;
+half a second after a mirrored start; at the fall. Matched sequences are short, so that the drifting
+body stays in the images.
+"""
 ENV_WINDOWS = {
     **{name: {name: (25, ENV_FRAMES)} for name in ENV_CONDITIONS},
     "one_camera": {"one_camera": (25, 125), "after_return": (135, ENV_FRAMES)},
 }
-"""The same of the environment's own motion; its return is looked at after 0.4 s."""
+"""Frames that count for the environment's own motion; its return counts after 0.4 s."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -95,32 +101,32 @@ class Sequences:
     """S sequences of T frames with W people."""
 
     joints: Points3
-    """(T, S, W, J, 3) [m]."""
+    """True joints (T, S, W, J, 3) [m]."""
     px: Points2
-    """(T, S, C, W, J, 2), by person."""
+    """Pixels by person (T, S, C, W, J, 2)."""
     windows: dict[str, tuple[int, int]]
-    """Name of each window and its frames."""
+    """Frames of each window by name."""
     config: TrackerConfig
     confidence: Floats | None = None
-    """(T, S, C, W, J); None: 0.9 where there is a pixel."""
+    """Confidence (T, S, C, W, J); None: 0.9 for each pixel."""
     sigma_px: Floats | None = None
-    """(T, S, C, W, J); None: `SIGMA_PX` where there is a pixel."""
+    """Standard deviation (T, S, C, W, J) [px]; None: `SIGMA_PX` for each pixel."""
     order: Ints | None = None
-    """(T, S, C, W) in which order cameras report people, whose names they do not know; None:
-    there is one."""
+    """Order in which cameras report people, without labels (T, S, C, W); None: there is one
+    person."""
     time_s: Floats | None = None
-    """(T, S, C) when the frame was taken that each camera delivers [s], as in `Keypoints`; None:
-    all are of now."""
+    """Time at which each delivered frame was taken (T, S, C) [s], as in `Keypoints`; None: all are
+    current."""
     bound_m2: Floats | None = None
-    """(T, S, J) the least mean squared error, where it is known."""
+    """Least mean squared error (T, S, J) if it is known [m^2]."""
 
     @property
     def has_bones(self) -> bool:
-        """Whether distances between neighbouring joints stay as they are."""
+        """Whether distances between neighbouring joints are constant."""
         return self.bound_m2 is None
 
     def first(self, n: int) -> "Sequences":
-        """The first n sequences."""
+        """Return the first n sequences."""
         arrays = {
             each.name: getattr(self, each.name)[:, :n]
             for each in fields(self)
@@ -129,7 +135,7 @@ class Sequences:
         return replace(self, **arrays)
 
     def keypoints(self, t: int) -> Keypoints:
-        """What cameras report of frame t."""
+        """Return the keypoints that cameras report of frame t."""
         px = self.px[t]
         seen = np.isfinite(px[..., 0])
         if self.confidence is None or self.sigma_px is None:
@@ -146,33 +152,34 @@ class Sequences:
 
 
 def make_sequences(rig: Rig, condition: str, seeds: list[int]) -> Sequences:
-    """Sequences of a rig and a condition, one per seed, each depending on its own seed only."""
+    """Return sequences of a rig and a condition, one per seed, each depending on its own seed
+    only."""
     if rig.name == ENV:
         joints, seen = record(condition, seeds)
         given = (seen.confidence, seen.sigma_px)
         return Sequences(joints, seen.px, ENV_WINDOWS[condition], rig.tracker, *given)
     if condition == MATCHED:
-        return _matched(rig, seeds)
+        return _make_matched(rig, seeds)
     n_frames, windows = N_FRAMES[condition], WINDOWS[condition]
     if condition == TWO_WORKERS:
-        joints = couples(seeds, n_frames)
+        joints = walk_couples(seeds, n_frames)
         px = detect_couples(rig.P, joints, seeds)
-        order = shuffles(seeds, n_frames, len(rig.P), joints.shape[2])
+        order = draw_shuffles(seeds, n_frames, len(rig.P), joints.shape[2])
         return Sequences(joints, px, windows, rig.tracker, order=order)
     joints = MOTIONS.get(condition, walk)(rig.walk_m, seeds, n_frames)
     if condition == LATE:
-        px, time_s = delivered(detect(rig.P, joints, Damage(), seeds), seeds)
+        px, time_s = deliver(detect(rig.P, joints, Damage(), seeds), seeds)
         config = replace(rig.tracker, longest_delay_s=LONGEST_DELAY_S)
         return Sequences(joints[:, :, None], px[:, :, :, None], windows, config, time_s=time_s)
     px = detect(rig.P, joints, (CONDITIONS | SURPRISES)[condition], seeds)
     return Sequences(joints[:, :, None], px[:, :, :, None], windows, rig.tracker)
 
 
-def _matched(rig: Rig, seeds: list[int]) -> Sequences:
-    """Sequences from the estimators' own model, of which they are told what can be told.
+def _make_matched(rig: Rig, seeds: list[int]) -> Sequences:
+    """Return sequences from the estimators' own model, with estimators that know its parameters.
 
-    That is: the shared acceleration, no outliers, no exchanged sides, detections as good as they
-    say, no bones, no floor, and that a body may be of any size.
+    These are the shared acceleration, no outliers, no exchanged sides, detections with the reported
+    noise, no bones, no floor, and bodies of any size.
     """
     config = replace(
         rig.tracker,
@@ -184,7 +191,7 @@ def _matched(rig: Rig, seeds: list[int]) -> Sequences:
         floor_std_m=np.inf,
         body_radius_m=10.0,
     )
-    model = matched_model(config.damping, config.root_acceleration)
+    model = make_matched_model(config.damping, config.root_acceleration)
     joints = draw(model, seeds, N_FRAMES[MATCHED])
     px = detect(rig.P, joints, Damage(), seeds)
     bound = posterior_bound(rig.P, model, joints, np.isfinite(px[..., 0]), SIGMA_PX)

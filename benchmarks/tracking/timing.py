@@ -1,4 +1,4 @@
-"""How long one worker's update takes: prediction and update, everything included."""
+"""Time of one worker's update, including the prediction."""
 
 import time
 from typing import Any
@@ -18,8 +18,11 @@ _N_FRAMES, _FIRST = 75, 25
 def time_estimator(
     name: str, rig: Rig, clean: Sequences, hard: Sequences, n_repeats: int, tick: PartProgress
 ) -> dict[str, list[float]]:
-    """Microseconds per worker and update, one number per repeat: medians over frames of `clean` at
-    batch 1 and 64 ("1", "64"), the mean of `hard` at batch 64 ("hard_64")."""
+    """Return microseconds per worker and update, one number per repeat.
+
+    These are medians over frames of `clean` at batch 1 and 64 ("1", "64"), and the mean of `hard`
+    at batch 64 ("hard_64").
+    """
     times: dict[str, list[float]] = {"1": [], "64": [], "hard_64": []}
     _frame_times(name, rig, clean, 1, 2)  # compiles
     for _ in range(n_repeats):
@@ -33,7 +36,7 @@ def time_estimator(
 def _frame_times(
     name: str, rig: Rig, sequences: Sequences, batch: int, n_frames: int = _N_FRAMES
 ) -> Floats:
-    """Microseconds per worker of each frame after the first second."""
+    """Return microseconds per worker of each frame after the first second."""
     estimator: Any = make_estimator(name, rig.P, DT_S, sequences.config)
     rngs = [np.random.default_rng([b, 5]) for b in range(batch)]
     state = estimator.init(batch, 1)

@@ -1,8 +1,8 @@
-"""Workers, and what an estimator made of them, frame by frame: what predictions are tried on.
+"""Workers and their tracks, frame by frame, for tests of predictions.
 
-Two sources: the environment's own worker through its own detector's emulator, the robot moving
-about, with or without cameras failing; and the tracking bench's walkers, of whom nothing that
-predicts was ever told.
+There are two sources: the environment's own worker through its own detector's emulator, with a
+moving robot, with or without failing cameras; and the tracking benchmark's walkers, on which no
+predictor was fitted.
 """
 
 from collections.abc import Callable
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.tracking.detections import CONDITIONS, detect
-from benchmarks.tracking.env_sequences import EmulatedDetector, simulate, watch, without
+from benchmarks.tracking.env_sequences import EmulatedDetector, remove_blind, simulate, watch
 from benchmarks.tracking.rigs import DT_S, SIGMA_PX, make_rig
 from benchmarks.tracking.walks import walk
 from hrc_env.config import HRCConfig
@@ -24,7 +24,7 @@ from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import Estimator, make_estimator
 
 LIVELY = {"dwell_s": (0.5, 4.0), "near_probability": 0.5}
-"""Changes to `MotionConfig` that make a worker walk for about half of the time."""
+"""Changes to `MotionConfig` with which a worker walks for about half of the time."""
 _FAILURE_S, _BETWEEN_S = (0.4, 3.0), 1.5
 Look = Callable[[Estimator[Any], Any], Any]
 
@@ -34,21 +34,21 @@ class Tracks:
     """T frames of S sequences with one worker each."""
 
     truth: Points3
-    """(T, S, J, 3) [m]."""
+    """True joints (T, S, J, 3) [m]."""
     speed: Velocities3
-    """(T, S, J, 3) true velocities [m/s]; NaN where the source does not say."""
+    """True velocities (T, S, J, 3) [m/s]; NaN if the source does not provide them."""
     estimates: list[PoseEstimate] = field(default_factory=list)
-    """T of them, (S, 1, J, ...)."""
+    """Estimates of T frames, each (S, 1, J, ...)."""
     looks: list[Any] = field(default_factory=list)
-    """What `look` said of the estimator and its state after each frame."""
+    """Results of `look` for the estimator and its state after each frame."""
 
 
-def _nothing(estimator: Estimator[Any], state: Any) -> None:
-    """Say nothing."""
+def _report_nothing(estimator: Estimator[Any], state: Any) -> None:
+    """Return nothing."""
 
 
 class _Follower:
-    """An estimator that is given one frame after the other."""
+    """An estimator that receives one frame after the other."""
 
     def __init__(self, tracks: Tracks, look: Look, P: Floats, config: TrackerConfig,
                  rngs: list[np.random.Generator]) -> None:  # fmt: skip
@@ -58,7 +58,7 @@ class _Follower:
         self.estimator.reset(self.state, np.arange(len(rngs)), rngs)
 
     def take(self, seen: Keypoints) -> None:
-        """One frame into the estimator, what it says into the tracks."""
+        """Update the estimator with one frame, and append its estimate to the tracks."""
         self.estimator.predict(self.state, DT_S, self.rngs)
         self.estimator.update(self.state, seen, self.rngs)
         self.tracks.estimates.append(self.estimator.estimate(self.state))
@@ -66,9 +66,9 @@ class _Follower:
 
 
 def follow_walkers(
-    seeds: list[int], n_frames: int, condition: str, look: Look = _nothing
+    seeds: list[int], n_frames: int, condition: str, look: Look = _report_nothing
 ) -> Tracks:
-    """The bench's walkers in its lab, under one of `tracking.detections.CONDITIONS`."""
+    """Return the benchmark's walkers in its lab, under one of `tracking.detections.CONDITIONS`."""
     rig = make_rig("lab")
     joints = walk(rig.walk_m, seeds, n_frames)
     tracks = Tracks(joints, np.full_like(joints, np.nan))
@@ -86,12 +86,12 @@ def follow_env(
     n_frames: int,
     lively: bool = False,
     failing: bool = False,
-    look: Look = _nothing,
+    look: Look = _report_nothing,
 ) -> Tracks:
-    """The environment's own worker at the level `keypoints`, one episode per seed.
+    """Return the environment's own worker at the level `keypoints`, one episode per seed.
 
     Lively workers walk more than the environment's. Failing cameras do so after the first second,
-    for up to 3 s, all but one or two at once; `look` is asked after every frame.
+    for up to 3 s, all but one or two at once; `look` is called after every frame.
     """
     config = HRCConfig()
     if lively:
@@ -108,13 +108,13 @@ def follow_env(
     blind = _failures(seeds, n_frames, len(P), failing)[..., None, None]
     for t, (truth, between) in enumerate(watch(simulation, seeds, pushes, n_frames)):
         tracks.truth[t], tracks.speed[t] = truth.joints_world[:, 0], truth.velocity_world[:, 0]
-        follower.take(without(detector.detect(truth, between), blind[t]))
+        follower.take(remove_blind(detector.detect(truth, between), blind[t]))
     simulation.close()
     return tracks
 
 
 def _failures(seeds: list[int], n_frames: int, n_cameras: int, failing: bool) -> Bools:
-    """(T, S, C) whether a camera sees nothing."""
+    """Return whether a camera sees nothing (T, S, C)."""
     blind = np.zeros((n_frames, len(seeds), n_cameras), bool)
     for s, seed in enumerate(seeds if failing else []):
         rng = np.random.default_rng([seed, 13])

@@ -1,8 +1,8 @@
-"""People who walk and gesture: the tracking bench's own motion, seeded, with rigid bones.
+"""People walking and gesturing: the tracking benchmark's own motion, seeded, with rigid bones.
 
-Independent of the package's motion room, so that estimators which were tuned there are asked
-about something else. A walker steers through the area at 0.9 to 1.5 m/s and turns back before
-its edge; legs swing with the stride; arms burst into gestures of up to 3 m/s at the wrist.
+It is independent of the package's motion, with which estimators were tuned. A walker steers through
+the area at 0.9 to 1.5 m/s and turns back before its edge; legs swing with the stride; arms gesture
+in bursts of up to 3 m/s at the wrist.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,8 @@ from hrc_env.geometry.rotations import about_axis
 
 _SUBSTEPS = 8
 _SHORTEST = 500
-"""Noise is scaled to unit variance over so many frames; shorter walks are cut from these."""
+"""Number of frames over which noise is scaled to unit variance; shorter walks are cut from
+these."""
 _NOISE_TAU_S = (1.5, 0.8, 1.2, 0.6, 0.6)
 """Widths of the noise in speed, steering, leaning and the two arms' gestures [s]."""
 _TURN_RATE, _TURN_TAU_S = 2.5, 0.25
@@ -26,22 +27,22 @@ _HIP_HEIGHT_M, _GROUND_M = 0.92, 0.02
 
 @dataclass(frozen=True, slots=True)
 class Gait:
-    """How somebody goes."""
+    """Parameters of a gait."""
 
     speed_m_s: tuple[float, float, float]
-    """Least, usual, most."""
+    """Least, usual and greatest speed [m/s]."""
     cycles_per_m: float = 0.72
-    """Of both legs."""
+    """Cycles of both legs per metre."""
     thigh_rad: float = 0.45
-    """How far thighs swing to either side."""
+    """Amplitude of the thighs' swing [rad]."""
     knee_rad: float = 0.55
-    """How much more knees bend where a leg swings forward."""
+    """Further bend of the knee while its leg swings forward [rad]."""
     arm_rad: float = 0.4
-    """How far upper arms swing to either side."""
+    """Amplitude of the upper arms' swing [rad]."""
     elbow_rad: float = 0.3
-    """How much elbows are bent."""
+    """Bend of the elbows [rad]."""
     bounce_m: float = 0.02
-    """How far the hips go up and down, to either side."""
+    """Amplitude of the hips' vertical motion [m]."""
 
 
 WALKING = Gait((0.9, 1.25, 1.5))
@@ -49,29 +50,31 @@ WALKING = Gait((0.9, 1.25, 1.5))
 
 @dataclass(frozen=True, slots=True)
 class Path:
-    """A walk on the ground, and what the limbs make of it; all (T, S), T in frames of 0.04 s."""
+    """A walk on the ground with the motion of the limbs; arrays (T, S), T in frames of 0.04 s."""
 
     ground: Floats
-    """(T, S, 2) [m]."""
+    """Position on the ground (T, S, 2) [m]."""
     heading: Floats
     stride: Floats
     """Phase of the stride [rad]."""
     lean: Floats
     gesture: Floats
-    """(T, S, 2) how much the left and right arm gesture, in [0, 1]."""
+    """Gestures of the left and right arm (T, S, 2), in [0, 1]."""
     gait: Gait = WALKING
 
 
 def walk(
     walk_m: tuple[float, float], seeds: list[int], n_frames: int, gait: Gait = WALKING
 ) -> Points3:
-    """Joints (T, S, J, 3) [m] of one walker per seed, which depends on that only, at 25 Hz in an
-    area about the origin of twice `walk_m` (length, width)."""
-    return bodies_along(steer(walk_m, seeds, max(n_frames, _SHORTEST), gait))[:n_frames]
+    """Return joints (T, S, J, 3) [m] of one walker per seed, on which alone it depends, at 25 Hz.
+
+    The area around the origin has twice the size `walk_m` (length, width).
+    """
+    return walk_along(steer(walk_m, seeds, max(n_frames, _SHORTEST), gait))[:n_frames]
 
 
-def bodies_along(path: Path) -> Points3:
-    """Joints (T, S, J, 3) [m] of walkers who go along `path`."""
+def walk_along(path: Path) -> Points3:
+    """Return joints (T, S, J, 3) [m] of walkers along `path`."""
     body = _body(path)
     joints = np.einsum("tsij,tskj->tski", about_axis("z", path.heading), body)
     joints[..., :2] += path.ground[:, :, None]
@@ -84,7 +87,7 @@ def bodies_along(path: Path) -> Points3:
 def steer(
     walk_m: tuple[float, float], seeds: list[int], n_frames: int, gait: Gait = WALKING
 ) -> Path:
-    """Walk in substeps; returns every frame."""
+    """Walk in substeps; return every frame."""
     dt, n_steps = DT_S / _SUBSTEPS, n_frames * _SUBSTEPS
     rngs = [np.random.default_rng([seed, 1]) for seed in seeds]
     starts = np.stack([rng.uniform(-0.5, 0.5, 3) for rng in rngs])
@@ -119,7 +122,8 @@ def steer(
 
 
 def _smooth(rng: np.random.Generator, n_steps: int, dt: float) -> Floats:
-    """(5, n) white noise under Gaussian windows of `_NOISE_TAU_S`, of unit variance."""
+    """Return white noise (5, n) smoothed by Gaussian windows of `_NOISE_TAU_S`, of unit
+    variance."""
     width = np.array(_NOISE_TAU_S) / dt
     padded = n_steps + int(8 * width.max())
     spectrum = np.fft.rfft(rng.standard_normal((len(width), padded)))
@@ -130,12 +134,12 @@ def _smooth(rng: np.random.Generator, n_steps: int, dt: float) -> Floats:
 
 
 def _limb(angle: Floats, length_m: float) -> Points3:
-    """A limb that hangs down at angle 0 and swings forward."""
+    """Return a limb that hangs down at angle 0 and swings forward."""
     return length_m * np.stack([np.sin(angle), np.zeros_like(angle), -np.cos(angle)], -1)
 
 
 def _body(path: Path) -> Points3:
-    """(T, S, J, 3) joints about the middle of the hips: x forward, y left, z up."""
+    """Return joints (T, S, J, 3) relative to the middle of the hips: x forward, y left, z up."""
     body = np.zeros((*path.heading.shape, N_JOINTS, 3))
     lean, upright = np.sin(path.lean), np.cos(path.lean)
     level = np.zeros_like(lean)
@@ -157,7 +161,7 @@ def _body(path: Path) -> Points3:
 
 
 def _leg(swing: Floats, sign: float, gait: Gait) -> tuple[Points3, ...]:
-    """Hip, knee, ankle and foot of one side."""
+    """Return hip, knee, ankle and foot of one side."""
     thigh = gait.thigh_rad * np.sin(swing)
     shank = thigh - 0.15 - gait.knee_rad * np.clip(np.cos(swing), 0, 1) ** 2
     hip = np.broadcast_to(np.array([0.0, 0.11 * sign, 0.0]), (*swing.shape, 3))
@@ -169,7 +173,8 @@ def _leg(swing: Floats, sign: float, gait: Gait) -> tuple[Points3, ...]:
 def _arm(
     shoulder: Points3, swing: Floats, gesture: Floats, sign: float, time_s: Floats, gait: Gait
 ) -> tuple[Points3, ...]:
-    """Shoulder, elbow and wrist of one side; a gesture lifts, spreads and shakes the arm."""
+    """Return shoulder, elbow and wrist of one side; a gesture raises, spreads and shakes the
+    arm."""
     pace = 2 * np.pi * (0.7 if sign > 0 else 0.95)
     start = 0.0 if sign > 0 else 1.0
     shake = gesture * (0.9 + 0.75 * np.sin(pace * time_s + start))

@@ -1,6 +1,6 @@
-"""The environment's own workers, running and falling: such motion a second time, beside `athletes`.
+"""The environment's own workers that run and fall: a second source of the motions of `athletes`.
 
-Their bodies are the eight baked ones, in turns; they share no code with the bench's walkers.
+Bodies are the eight baked ones, in turns; they share no code with the benchmark's walkers.
 """
 
 import numpy as np
@@ -17,40 +17,41 @@ from hrc_env.motion.state import Worker
 from hrc_env.worker.body import load_body, worker_names, worker_truth
 
 _FASTEST_M_S, _WALK_M_S, _LIES_S, _WAY_M = 3.5, 1.3, (2.0, 4.0), 4.0
-"""Speeds; how long they lie; how far they want to walk who fall."""
+"""Speeds of running and walking [m/s], time of lying [s], and desired length of a walk [m]."""
 
 
 def run_to_and_fro(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
-    """Joints (T, S, J, 3) [m] of workers who run from corner to corner, as fast as the way lets."""
+    """Return joints (T, S, J, 3) [m] of workers that run from corner to corner as fast as they
+    can."""
 
     def run(draws: Floats, height_m: float, me: Worker) -> float:
-        yaw = _across(me)
+        yaw = _plan_across(me)
         return plan_run(yaw, limit_run_speed(_FASTEST_M_S, me), me)
 
-    return _played(Act(st.RUN, run, 0.0), walk_m, seeds, n_frames)
+    return _play_act(Act(st.RUN, run, 0.0), walk_m, seeds, n_frames)
 
 
 def fall_and_get_up(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
-    """Joints (T, S, J, 3) [m] of workers who walk, fall, lie for 2 to 4 s and get up."""
+    """Return joints (T, S, J, 3) [m] of workers that walk, fall, lie for 2 to 4 s and get up."""
 
     def fall(draws: Floats, height_m: float, me: Worker) -> float:
-        yaw = _across(me, _WAY_M)
+        yaw = _plan_across(me, _WAY_M)
         lies_s = _LIES_S[0] + draws.item(4) * (_LIES_S[1] - _LIES_S[0])
         return plan_fall(draws, yaw, _WALK_M_S, lies_s, OPEN, me)
 
-    return _played(Act(st.FALL, fall, 0.0), walk_m, seeds, n_frames)
+    return _play_act(Act(st.FALL, fall, 0.0), walk_m, seeds, n_frames)
 
 
-def _across(me: Worker, most_m: float = np.inf) -> float:
-    """Lay a path past the middle, as far as it is to there; its direction [rad]."""
+def _plan_across(me: Worker, most_m: float = np.inf) -> float:
+    """Plan a path past the middle, as long as the distance to it; return its direction [rad]."""
     x, y = float(me.start_x), float(me.start_y)
     share = min(2.0, most_m / np.hypot(x, y))
     lay_path(Point(x, y), np.zeros((0, 3)), Point(x - share * x, y - share * y), me)
     return float(np.arctan2(-y, -x))
 
 
-def _played(act: Act, walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
-    """Joints (T, S, J, 3) of workers who begin in a corner and do it, and again, and so on."""
+def _play_act(act: Act, walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
+    """Return joints (T, S, J, 3) of workers that start in a corner and repeat an activity."""
     sequences = []
     for seed in seeds:
         rng = np.random.default_rng([seed, 11])

@@ -1,4 +1,4 @@
-"""A detector of your own, as RTMPose would be: here BlazePose on the crop and on its mirror image.
+"""A detector of your own, such as RTMPose; here BlazePose on the crop and on its mirror image.
 
 python -m hrc_env --import examples/bring_your_own/detector.py play \
     --config detector.keypoints=mirrored

@@ -13,7 +13,7 @@ from hrc_env import PoseTracker, crop_window, read_rig
 
 
 class Frames:
-    """The present image of every camera, (H, W, 3) RGB each: all that a source is."""
+    """Source of images: the present image of every camera, (H, W, 3) RGB each."""
 
     def __init__(self, images):
         self.images = images
@@ -23,7 +23,8 @@ class Frames:
 
 
 def poses(rig, films):
-    """The middle of the body (3,) and its deviation [m] in every set of frames; None: nobody."""
+    """Yield the middle of the body (3,) and its deviation [m] for every set of frames; None: no
+    person."""
     tracker = PoseTracker(read_rig(rig), dt_s=1 / 25)
     for images in zip(*(imageio.get_reader(film) for film in films), strict=False):
         estimate = tracker.update(Frames(images))

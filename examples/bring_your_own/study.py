@@ -1,4 +1,5 @@
-"""A study of your own: what a shield costs and keeps, on the same 40 episodes with and without it.
+"""A study of your own: the cost and the benefit of a shield, on the same 40 episodes with and
+without it.
 
 python examples/bring_your_own/study.py out/my_study
 """

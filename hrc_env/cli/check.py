@@ -1,7 +1,7 @@
-"""python -m hrc_env check: is this machine ready? Each line is ok or says what to do.
+"""Check whether this machine is ready; each line is ok or names the remedy.
 
-Whatever is wrong must end up in its line: imports are inside the checks, and what may take a
-process with it (drivers, libraries that clash) is tried in one of its own.
+Every failure must end up in its line: imports are inside of the checks, and code that can end the
+process (drivers, libraries that clash) runs in a process of its own.
 """
 
 import importlib.util
@@ -11,134 +11,150 @@ import sys
 import time
 from dataclasses import dataclass
 from importlib.metadata import version
+from typing import NamedTuple
 
 from rich.console import Console
 from rich.markup import escape
 
 from hrc_env.core.errors import HRCError, MissingExtraError, learner
 
-Finding = tuple[bool, str]
+
+class Finding(NamedTuple):
+    """The result of one check."""
+
+    is_ok: bool
+    message: str
+    """The version or state that was found, or the remedy."""
+
 
 PACKAGES = ("mujoco", "gymnasium", "numpy", "numba")
-DRAW = "from hrc_env.scene import gl; ok, said = gl.gl_status(); print(said); ok or exit(1)"
-"""Draws a pixel; says with what, or what to do."""
+DRAW = "from hrc_env.scene import gl; ok, text = gl.gl_status(); print(text); ok or exit(1)"
+"""Code that draws a pixel and prints the renderer, or the remedy."""
 NAMES = (
     "python", "packages", "torch", "machine", "OpenGL", "triton", "kernels", "weights", "OpenVINO",
     "environment",
 )  # fmt: skip
-"""What is checked, each by the function of that name."""
+"""Names of the checks; each is the function `_check_NAME`."""
 LITTLE_GB = 2.0
-"""Level `pixels` and a film do not fit into much less [GB]."""
+"""Memory below which level `pixels` and films do not fit [GB]."""
 
 
 @dataclass(frozen=True)
 class Check:
-    """Versions, machine, OpenGL, kernels, weights, one step: each line ok, or what to do."""
+    """Check versions, machine, OpenGL, kernels, weights and one step of an environment.
+
+    Each line is ok or names the remedy.
+    """
 
     def run(self) -> int:
-        """Print the findings; 0 if all are ok."""
-        console, fine = Console(), True
+        """Print the findings; return 0 if all are ok, otherwise 1."""
+        console, all_ok = Console(), True
         for name in NAMES:
             try:
-                ok, message = globals()[f"_{name.lower()}"]()
+                finding = globals()[f"_check_{name.lower()}"]()
             except HRCError as error:
-                ok, message = False, str(error)
-            except Exception as error:  # whatever is wrong with this machine, say it
-                ok, message = False, f"{type(error).__name__}: {error}"
-            fine &= ok
-            mark = "[green]ok  [/]" if ok else "[red]TODO[/]"
-            console.print(f"{mark} {name:12s} {escape(message)}", soft_wrap=True)
-        return 0 if fine else 1
+                finding = Finding(False, str(error))
+            except Exception as error:  # any failure is a finding
+                finding = Finding(False, f"{type(error).__name__}: {error}")
+            all_ok &= finding.is_ok
+            mark = "[green]ok  [/]" if finding.is_ok else "[red]TODO[/]"
+            console.print(f"{mark} {name:12s} {escape(finding.message)}", soft_wrap=True)
+        return 0 if all_ok else 1
 
 
-def _python() -> Finding:
-    return sys.version_info >= (3, 11), f"{sys.version.split()[0]} (3.11 or newer is needed)"
+def _check_python() -> Finding:
+    is_ok = sys.version_info >= (3, 11)
+    return Finding(is_ok, f"{sys.version.split()[0]} (3.11 or newer is needed)")
 
 
-def _packages() -> Finding:
+def _check_packages() -> Finding:
     from hrc_env import __version__
 
     others = ", ".join(f"{name} {version(name)}" for name in PACKAGES)
-    return True, f"hrc_env {__version__}, {others}"
+    return Finding(True, f"hrc_env {__version__}, {others}")
 
 
-def _torch() -> Finding:
+def _check_torch() -> Finding:
     try:
         with learner():
             import stable_baselines3
             import torch
     except MissingExtraError as error:
-        return True, f"not installed, the environment does without. {error}"
+        return Finding(True, f"not installed; only training needs it. {error}")
     gpus = {"CUDA": torch.version.cuda, "ROCm": torch.version.hip}
     builds = [f"{name} {number} build" for name, number in gpus.items() if number] or ["CPU build"]
     ours = f"{torch.__version__} ({builds[0]})"
-    return True, f"{ours}, stable-baselines3 {stable_baselines3.__version__}"
+    return Finding(True, f"{ours}, stable-baselines3 {stable_baselines3.__version__}")
 
 
-def _machine() -> Finding:
+def _check_machine() -> Finding:
     from hrc_env.core.machine import usable_cores, usable_memory_gb
 
     cores, memory_gb = usable_cores(), usable_memory_gb()
-    said = f"{cores:g} cores" if cores > 1 else f"{cores:g} core: pixels will be slow"
-    said += f", {memory_gb:.1f} GB of memory"
-    return True, said + (": too little for pixels and films" if memory_gb < LITTLE_GB else "")
+    text = f"{cores:g} cores" if cores > 1 else f"{cores:g} core: pixels will be slow"
+    text += f", {memory_gb:.1f} GB of memory"
+    too_little = ": too little for pixels and films" if memory_gb < LITTLE_GB else ""
+    return Finding(True, text + too_little)
 
 
-def _opengl() -> Finding:
-    return _in_a_process(DRAW)
+def _check_opengl() -> Finding:
+    return _run_in_process(DRAW)
 
 
-def _triton() -> Finding:
+def _check_triton() -> Finding:
     if importlib.util.find_spec("triton") is None:
-        return True, "not installed (torch's CPU build has none): nothing that clashes with Mesa"
+        return Finding(True, "not installed (torch's CPU build has none): no clash with Mesa")
     ours = version("triton")
-    if not _in_a_process(DRAW)[0]:
-        return True, f"{ours}; OpenGL does not draw, so that they cannot clash"
-    ok, said = _in_a_process(f"{DRAW}; import triton")
-    said = "can be imported after OpenGL has drawn" if ok else f"after OpenGL has drawn: {said}"
-    return ok, f"{ours} {said}"
+    if not _run_in_process(DRAW).is_ok:
+        return Finding(True, f"{ours}; OpenGL does not draw, so they cannot clash")
+    finding = _run_in_process(f"{DRAW}; import triton")
+    after = "can be imported after OpenGL has drawn"
+    text = after if finding.is_ok else f"after OpenGL has drawn: {finding.message}"
+    return Finding(finding.is_ok, f"{ours} {text}")
 
 
-def _in_a_process(code: str) -> Finding:
-    """Whether Python code ends well, and the last line that it prints."""
+def _run_in_process(code: str) -> Finding:
+    """Run Python code in a process; return whether it succeeds, and the last line it prints."""
     command = [sys.executable, "-c", code]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
     if done.returncode < 0:
-        return False, f"the process was ended by {signal.Signals(-done.returncode).name}"
+        return Finding(False, f"ended by signal {signal.Signals(-done.returncode).name}")
     lines = (done.stdout if done.stdout.strip() else done.stderr).strip().splitlines()
-    return done.returncode == 0, lines[-1] if lines else f"exit status {done.returncode}"
+    last = lines[-1] if lines else f"exit status {done.returncode}"
+    return Finding(done.returncode == 0, last)
 
 
-def _kernels() -> Finding:
+def _check_kernels() -> Finding:
     from hrc_env.core.kernels import ahead
     from hrc_env.core.kernels.cache import folder
     from hrc_env.core.machine import n_cores
 
     todo = ahead.missing()
     if not todo:
-        return True, f"compiled, in {folder()}"
-    wait_s = sum(each.seconds for each in todo) / n_cores()
-    said = f"{len(todo)} are not compiled yet: whoever first needs them waits, about {wait_s:.0f} s"
-    return True, f"{said} for all; or do it now: python -m hrc_env setup"
+        return Finding(True, f"compiled, in {folder()}")
+    wait_s = sum(signature.seconds for signature in todo) / n_cores()
+    text = f"{len(todo)} are not compiled yet, which takes about {wait_s:.0f} s for all when they"
+    return Finding(True, f"{text} are first used; to compile them now: python -m hrc_env setup")
 
 
-def _weights() -> Finding:
+def _check_weights() -> Finding:
     from hrc_env.perception import weights
 
     for name in weights.ALWAYS:
         weights.find_weights(name)
-    return True, f"official, in {weights.cache_dir()}"
+    return Finding(True, f"official, in {weights.cache_dir()}")
 
 
-def _openvino() -> Finding:
+def _check_openvino() -> Finding:
     from hrc_env.perception import vino
 
     if not vino.is_installed():
-        return True, f"not installed; it makes pixels faster: {vino.INSTALL}"
-    return True, f"computes in {vino.precision()} where detector.runtime is openvino or auto"
+        return Finding(True, f"not installed; it makes pixels faster: {vino.INSTALL}")
+    text = f"computes in {vino.precision()} where detector.runtime is openvino or auto"
+    return Finding(True, text)
 
 
-def _environment() -> Finding:
+def _check_environment() -> Finding:
     import gymnasium
 
     from hrc_env.tasks import DEFAULT
@@ -149,4 +165,5 @@ def _environment() -> Finding:
     env.step(env.action_space.sample() * 0)
     env.close()
     taken_s = time.monotonic() - started_s
-    return True, f"{DEFAULT} at level keypoints: made, reset and stepped in {taken_s:.1f} s"
+    text = f"{DEFAULT} at level keypoints: made, reset and stepped in {taken_s:.1f} s"
+    return Finding(True, text)

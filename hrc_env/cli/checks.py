@@ -1,4 +1,4 @@
-"""Whether a command can do what it was asked, found out before it begins."""
+"""Checks of a command's arguments that run before its work begins."""
 
 import math
 import tempfile
@@ -7,28 +7,33 @@ from pathlib import Path
 from hrc_env.core.errors import ConfigError, HRCError
 
 
-def at_least(option: str, value: float | None, low: float) -> None:
-    """Raise `ConfigError` unless the number is `low` or more; None is a default, and fine."""
+def check_at_least(option: str, value: float | None, low: float) -> None:
+    """Raise `ConfigError` if an option's number is below `low` or not finite; None is accepted."""
     if value is not None and not (math.isfinite(value) and value >= low):
         raise ConfigError(f"{option} must be {low:g} or more, got {value:g}.")
 
 
-def writable_folder(path: Path, option: str = "--out") -> None:
-    """Raise `HRCError` unless files can be written into the folder; it need not exist yet."""
+def check_writable_folder(path: Path, option: str = "--out") -> None:
+    """Raise `HRCError` if files cannot be written into a folder, which need not exist yet."""
     reason = "a file of that name is there, and a folder is needed" if path.is_file() else ""
-    _refuse(option, path, reason or _unwritable(path))
+    _raise_if(reason or _explain_unwritable(path), option, path)
 
 
-def writable_file(path: Path, suffix: str = "", option: str = "--out") -> None:
-    """Raise `HRCError` unless a file of that name and ending can be written."""
+def check_writable_file(path: Path, suffix: str = "", option: str = "--out") -> None:
+    """Raise an error if no file of this name and ending can be written.
+
+    Raises:
+        ConfigError: the name has another ending.
+        HRCError: the place cannot be written.
+    """
     if suffix and path.suffix.lower() != suffix:
         raise ConfigError(f"{option} must end in {suffix}, got {path.name!r}.")
     reason = "it is a folder, and a file is needed" if path.is_dir() else ""
-    _refuse(option, path, reason or _unwritable(path.parent))
+    _raise_if(reason or _explain_unwritable(path.parent), option, path)
 
 
-def _unwritable(folder: Path) -> str:
-    """Why nothing can be written into the folder, or the nearest one above it that exists."""
+def _explain_unwritable(folder: Path) -> str:
+    """Return why a folder, or its nearest parent that exists, cannot be written; "" if it can."""
     there = folder.absolute()
     while not there.exists() and there != there.parent:
         there = there.parent
@@ -40,6 +45,6 @@ def _unwritable(folder: Path) -> str:
     return ""
 
 
-def _refuse(option: str, path: Path, reason: str) -> None:
+def _raise_if(reason: str, option: str, path: Path) -> None:
     if reason:
         raise HRCError(f"{path} cannot be written ({reason}). Name another place with {option}.")

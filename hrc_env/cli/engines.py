@@ -1,4 +1,4 @@
-"""Where a command computes: its options, and the engine that they name."""
+"""Options of commands that compute by an engine, and the choice of that engine."""
 
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar
@@ -9,33 +9,34 @@ from hrc_env.engines.engine import Engine, engine_called
 
 @dataclass(frozen=True, kw_only=True)
 class EngineArguments:
-    """Where parts are played; their numbers are the same everywhere."""
+    """Options that choose where parts are computed; the numbers are the same everywhere."""
 
     stays: ClassVar[str] = ""
-    """Why all of a command is played in its own process; "" of commands that take engines."""
+    """Why the command computes all of its work in its own process; "" for commands that take
+    engines."""
     engine: str | None = None
     """Engine: serial, one part after the other; processes, as many at once as there are cores; ray,
-    as tasks of a cluster (docs/many_machines.md). If not given, what is faster on this
-    machine."""
+    as tasks of a cluster (docs/many_machines.md). Default: the fastest on this machine."""
     workers: int | None = None
-    """With processes and ray: how many parts are played at once; all cores if not given."""
+    """With processes and ray: number of parts computed at once (default: all cores)."""
     address: str | None = None
-    """With ray: the cluster, as auto, HOST:6379 or ray://HOST:10001; one on this machine if not
-    given."""
+    """With ray: the cluster, as auto, HOST:6379 or ray://HOST:10001 (default: one on this
+    machine)."""
 
-    def chosen(self) -> Engine | None:
-        """Return the engine, or None if none is named.
+    def choose_engine(self) -> Engine | None:
+        """Return the engine of the options, or None if none is named.
 
         Raises:
-            ConfigError: there is no such engine, it takes no workers or address, or the command
-                takes none.
+            ConfigError: the engine does not exist, it takes no workers or address, or the command
+                takes no engine.
         """
         if self.stays and self.engine not in (None, "serial"):
-            raise ConfigError(f"--engine {self.engine} cannot be: {self.stays}. Leave it out.")
+            raise ConfigError(
+                f"--engine {self.engine} does not work here: {self.stays}. Leave it out."
+            )
         return engine_called(self.engine, self.workers, self.address)
 
-    def without_engine(self) -> dict[str, Any]:
-        """Return the other arguments by name."""
-        ours = {each.name for each in fields(EngineArguments)}
-        return {each.name: getattr(self, each.name) for each in fields(self)
-                if each.name not in ours}  # fmt: skip
+    def exclude_engine(self) -> dict[str, Any]:
+        """Return the arguments other than the engine's by name."""
+        names = {field.name for field in fields(self)} - {f.name for f in fields(EngineArguments)}
+        return {name: getattr(self, name) for name in names}

@@ -1,4 +1,4 @@
-"""How a command is called: its words fill its record, and errors are shown without a traceback."""
+"""The call of a command: parse its arguments, and print errors without a traceback."""
 
 import os
 import sys
@@ -11,8 +11,11 @@ from hrc_env.registration import IMPORT, import_files
 
 
 def show_errors(run: Callable[[], int]) -> int:
-    """Run something; return its exit status, 2 for what was asked wrongly, 130 for what was stopped
-    by Ctrl-C."""
+    """Run a function and return its exit status.
+
+    Returns:
+        The function's own status; 2 after an `HRCError`, which is printed; 130 after Ctrl-C.
+    """
     try:
         return run()
     except HRCError as error:
@@ -29,32 +32,32 @@ def show_errors(run: Callable[[], int]) -> int:
 
 
 def import_first(words: Sequence[str], program: str) -> list[str]:
-    """Import the files of `--import FILE`, here or in the process that started this one; return the
-    other words."""
+    """Import the files of `--import FILE`, and those of the parent process; return the other
+    words."""
     words = list(words)
     while "--import" in words:
         at = words.index("--import")
         if at + 1 == len(words):
-            raise ConfigError("--import wants a Python file, as in --import my_task.py.")
+            raise ConfigError("--import takes a Python file, as in --import my_task.py.")
         known, file = os.environ.get(IMPORT, ""), str(Path(words[at + 1]).resolve())
         os.environ[IMPORT] = os.pathsep.join(filter(None, (known, file)))
         words = words[:at] + words[at + 2 :]
     import_files()
     if not words:
-        raise ConfigError(f"--import goes with a command; {program} --help names them.")
+        raise ConfigError(f"--import needs a command; {program} --help lists them.")
     return words
 
 
 def run_command(command: type[Any], words: Sequence[str], program: str) -> int:
-    """Make a command's record of words and run it; return the exit status."""
+    """Parse the arguments of a command, run it and return its exit status."""
     import tyro
 
-    from hrc_env.cli.options import understood
+    from hrc_env.cli.options import normalize_words
 
-    filled = tyro.cli(
+    parsed = tyro.cli(
         command,
         prog=program,
-        args=understood(command, words, program),
+        args=normalize_words(command, words, program),
         config=(tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
     )
-    return int(filled.run() or 0)
+    return int(parsed.run() or 0)

@@ -1,19 +1,20 @@
-"""Estimators as words of a command: names, or functions of the user's own."""
+"""Estimators as arguments of a command: names, or functions as MODULE:FUNCTION."""
 
 from collections.abc import Sequence
 
 
-def estimators_named(words: Sequence[str]) -> tuple[str, ...]:
-    """Return the names of estimators; those given as MODULE:FUNCTION are registered by the
-    function's name.
+def resolve_estimators(words: Sequence[str]) -> tuple[str, ...]:
+    """Return names of estimators; those given as MODULE:FUNCTION are registered first.
+
+    Such an estimator gets the name of its function.
 
     Raises:
-        ConfigError: no such function or name, or an estimator that lacks something.
+        ConfigError: the function or name does not exist, or the estimator is incomplete.
     """
-    return tuple(dict.fromkeys(_registered(word) if ":" in word else word for word in words))
+    return tuple(dict.fromkeys(_register(word) if ":" in word else word for word in words))
 
 
-def _registered(word: str) -> str:
+def _register(word: str) -> str:
     from hrc_env.core.brought import function_called  # here: --help imports no simulator
     from hrc_env.registration import register_estimator
     from hrc_env.tracking.estimators import ESTIMATORS, find_estimator

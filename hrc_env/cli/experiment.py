@@ -1,4 +1,4 @@
-"""python -m hrc_env experiment: the paper's two, what perception is worth, ablations."""
+"""Run an experiment: the paper's two, the effects of perception on safety, or ablations."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -8,144 +8,154 @@ from typing import Annotated, ClassVar
 
 import tyro
 
-from hrc_env.cli.checks import at_least
+from hrc_env.cli.checks import check_at_least
 from hrc_env.cli.engines import EngineArguments
-from hrc_env.cli.estimators import estimators_named
+from hrc_env.cli.estimators import resolve_estimators
 from hrc_env.cli.show import show
 from hrc_env.tasks import DEFAULT
 
 
 @dataclass(frozen=True)
 class AnyExperiment(EngineArguments):
-    """What every experiment is asked."""
+    """Arguments of every experiment."""
 
     name: ClassVar[str]
     out: Path
-    """Folder for report.html, results.json and figures; a run that was stopped goes on there."""
+    """Folder for report.html, results.json and figures; a run that was stopped continues there."""
     quick: bool = False
-    """Every number, from fewer seeds."""
+    """Make every number from fewer seeds."""
     seeds: int | None = None
-    """How many seeds."""
+    """Number of seeds."""
     overwrite: bool = False
-    """Delete the results of something else, or with other settings, in the folder."""
+    """Delete earlier results in the folder that are of another run or other settings."""
 
     def run(self) -> int:
-        """Run, show the tables."""
-        at_least("--seeds", self.seeds, 1)
+        """Run the experiment and print its tables; return the exit status."""
+        check_at_least("--seeds", self.seeds, 1)
         experiment = import_module(f"hrc_env.experiments.{self.name}.experiment")
         runner = import_module("hrc_env.experiments.runner")
-        asked, engine = self.without_engine(), self.chosen()
-        out, overwrite = asked.pop("out"), asked.pop("overwrite")
-        if "estimator" in asked:
-            asked["estimator"] = estimators_named(asked["estimator"])
-        made = experiment.make_experiment(**asked)
+        arguments, engine = self.exclude_engine(), self.choose_engine()
+        out, overwrite = arguments.pop("out"), arguments.pop("overwrite")
+        if "estimator" in arguments:
+            arguments["estimator"] = resolve_estimators(arguments["estimator"])
+        made = experiment.make_experiment(**arguments)
         run = partial(runner.run_experiment, made, overwrite=overwrite, engine=engine)
         return show(run, out, "experiment")
 
 
 @dataclass(frozen=True)
 class SiteExperiment(AnyExperiment):
-    """The paper's simulation: a walk over the site, single cameras against four."""
+    """Run the paper's simulation: a walk over the site, single cameras against four."""
 
     name = "site"
     out: Path = Path("out/site")
     seeds: int | None = None
-    """Walks, instead of 9 (2 if quick)."""
+    """Number of walks (default: 9, quick: 2)."""
     estimator: tuple[str, ...] = ("particle", "paper")
-    """Estimators: python -m hrc_env list."""
+    """Estimators; python -m hrc_env list shows their names."""
 
 
 @dataclass(frozen=True)
 class LabExperiment(AnyExperiment):
-    """The paper's laboratory: all joints, six kinds of motion, one camera against four."""
+    """Run the paper's laboratory: all joints, six kinds of motion, one camera against four."""
 
     name = "lab"
     out: Path = Path("out/lab")
     seeds: int | None = None
-    """Films of every motion, instead of 7 (2 if quick)."""
+    """Number of films per motion (default: 7, quick: 2)."""
     folded: str = "full"
-    """The landmark network for workers who are folded up: full, or heavy, which is fetched once
-    with `python -m hrc_env setup --networks heavy`."""
+    """Landmark network for folded postures: full, or heavy, which `python -m hrc_env setup
+    --networks heavy` fetches once."""
 
 
 @dataclass(frozen=True)
 class ImpactExperiment(AnyExperiment):
-    """What perception is worth in safety: the same robots and workers, other detections."""
+    """Measure the effect of perception on safety: same robots and workers, other detections."""
 
     name = "impact"
     out: Path = Path("out/impact")
     task: str = DEFAULT
-    """What the robots do, by the environment's id."""
+    """Task of the robots, by the environment's id."""
     shield: str | None = None
-    """What may change their commands: qp, ssm, pfl, or one that was registered (--import)."""
+    """Shield that may change their commands: qp, ssm, pfl, or a registered one (--import)."""
     seeds: int | None = None
-    """Episodes of every row, instead of 90 (8 if quick)."""
+    """Number of episodes per row (default: 90, quick: 8)."""
     estimator: tuple[str, ...] = ()
-    """Compare these only, with the default one, the truth and nothing; all setups if not given.
-    Names, or MODULE:FUNCTION, which makes one of (P, ctrl_dt, config)."""
+    """Estimators to compare with the default one, the truth and no perception (default: all
+    setups). Names, or MODULE:FUNCTION, a function of (P, ctrl_dt, config)."""
     robots: tuple[str, ...] = ()
-    """Who acts, instead of scripted, scripted_slowed and ppo, which is trained here first: some of
-    these, random, hrc://ID/NAME, files (.zip, .safetensors) or MODULE:FUNCTION, as of play."""
+    """Agents of the robots, instead of scripted, scripted_slowed and ppo, which is trained
+    first: any of these, random, hrc://ID/NAME, files (.zip, .safetensors) or MODULE:FUNCTION, as
+    in play."""
     control: str | None = None
-    """Control of policies whose files do not name one: joint, if not given, tool or twist."""
+    """Control of policies without one in their files: joint (default), tool or twist."""
     trust: bool = False
-    """Read pickles in their checkpoints, which run code of whoever made them; see play."""
+    """Load pickles in their checkpoints, which can run arbitrary code; see play."""
 
 
 @dataclass(frozen=True)
 class PriceExperiment(AnyExperiment):
-    """What sight costs at one rate of contacts: every pair of eyes has the margin that it needs."""
+    """Measure the cost of perception at one rate of contacts.
+
+    Every perception setup gets the safety margin with which it reaches that rate.
+    """
 
     name = "price"
     out: Path = Path("out/price")
     task: str = DEFAULT
-    """What the robots do, by the environment's id."""
+    """Task of the robots, by the environment's id."""
     seeds: int | None = None
-    """Episodes of every step of a search, instead of 300; then 10 for 3 of these confirm it,
-    instead of 1000 (600 if quick)."""
+    """Number of episodes per search step (default: 300). Each margin found is then confirmed by 10
+    episodes for every 3 of these (default: 1000; quick: 600)."""
     eyes: tuple[str, ...] = ()
-    """Compare these only, by name, as truth particle one_camera; quick: twelve."""
+    """Perception setups to compare, by name, as truth particle one_camera (default: all; quick:
+    12)."""
     robots: tuple[str, ...] = ()
-    """Who acts, instead of scripted: one of random, scripted_slowed, hrc://ID/NAME, a file (.zip,
-    .safetensors) or MODULE:FUNCTION, as of play. Other tasks are then left out."""
+    """Agent of the robots, instead of scripted: one of random, scripted_slowed, hrc://ID/NAME, a
+    file (.zip, .safetensors) or MODULE:FUNCTION, as in play. Other tasks are then left out."""
     control: str | None = None
-    """Its control, if its file does not name one: joint, if not given, tool or twist."""
+    """Control of the agent if its file does not name one: joint (default), tool or twist."""
     trust: bool = False
-    """Read pickles in its checkpoint, which run code of whoever made it; see play."""
+    """Load pickles in its checkpoint, which can run arbitrary code; see play."""
 
 
 @dataclass(frozen=True)
 class AblationsExperiment(AnyExperiment):
-    """What the paper leaves open: cameras and places, N and M of Algorithm 1, latency,
-    calibration, occlusion, several workers, what the parts of the default filter contribute."""
+    """Study the settings that the paper leaves open.
+
+    These are the number and places of cameras, N and M of Algorithm 1, latency, calibration,
+    occlusion, several workers, and the parts of the default filter.
+    """
 
     name = "ablations"
     out: Path = Path("out/ablations")
     seeds: int | None = None
-    """Episodes of every setting, instead of 30 (4 if quick)."""
+    """Number of episodes per setting (default: 30, quick: 4)."""
     studies: tuple[str, ...] | None = None
-    """Which of cameras, algorithm1, latency, calibration, occlusion, workers, filter, kinematics;
-    all if not given."""
+    """Studies to run: cameras, algorithm1, latency, calibration, occlusion, workers, filter,
+    kinematics (default: all)."""
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """The paper's two experiments (site, lab), what perception is worth in safety (impact), what
-    sight costs at one rate of contacts (price), ablations of rigs and estimators (ablations).
+    """Run an experiment of the paper or of this package.
 
-    Each takes --quick (minutes) and --out DIR, where it writes report.html, results.json and
-    figures; it keeps what is finished when it is stopped, and goes on there.
+    The paper's two experiments are site and lab; impact measures the effect of perception on
+    safety, price the cost of perception at one rate of contacts, and ablations compares rigs and
+    estimators. Each takes --quick (minutes) and --out DIR, where it writes report.html,
+    results.json and figures. Finished parts are kept when it is stopped, and the same command
+    continues there.
     """
 
-    what: (
+    experiment: (
         Annotated[SiteExperiment, tyro.conf.subcommand("site")]
         | Annotated[LabExperiment, tyro.conf.subcommand("lab")]
         | Annotated[ImpactExperiment, tyro.conf.subcommand("impact")]
         | Annotated[PriceExperiment, tyro.conf.subcommand("price")]
         | Annotated[AblationsExperiment, tyro.conf.subcommand("ablations")]
     )
-    """Which experiment."""
+    """Experiment to run."""
 
     def run(self) -> int:
-        """Run it."""
-        return self.what.run()
+        """Run the experiment; return the exit status."""
+        return self.experiment.run()

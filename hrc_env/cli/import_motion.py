@@ -1,4 +1,4 @@
-"""python -m hrc_env import-motion: a recording of a person becomes a clip that workers play."""
+"""Import a recording of a person as a clip that workers play."""
 
 import math
 from contextlib import closing
@@ -10,7 +10,7 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from hrc_env.cli.checks import writable_file
+from hrc_env.cli.checks import check_writable_file
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.progress import progress_bar
 from hrc_env.core.skeleton import JOINTS
@@ -22,55 +22,61 @@ if TYPE_CHECKING:  # --help imports no simulator
     from hrc_env.motion.clip import Clip
 
 USUAL_FPS = 60.0
-"""Faster recordings are thinned out to this rate: a step keeps 30 frames."""
+"""Frame rate to which faster recordings are resampled [1/s]: a step keeps 30 frames."""
 TILE = (300, 400)
 N_MOMENTS, COLUMNS = 12, 6
 STAGE_M = (0.9, 0.3)
-"""Where the worker's middle is put in every picture [m]: a strip shows poses, not ways."""
-EYE_M, TARGET_Z_M, HFOV_DEG = (1.4, -1.7, 1.35), 0.95, 44.0
-"""The camera's place from there, the height that it looks at [m], its field of view."""
+"""Position of the worker's middle in every picture [m]: a strip shows poses, not paths."""
+EYE_M = (1.4, -1.7, 1.35)
+"""Position of the camera relative to the worker's middle, its height above the floor [m]."""
+TARGET_Z_M = 0.95
+"""Height that the camera looks at [m]."""
+HFOV_DEG = 44.0
+"""Horizontal field of view of the camera [deg]."""
 
 
 @dataclass(frozen=True)
 class ImportMotion:
-    """Bring your own motion capture: a BVH, ASF/AMC or npz recording becomes a clip.
+    """Import motion capture: a BVH, ASF/AMC or npz recording becomes a clip.
 
-    Unit, upward axis, a T-pose in the first frame, short gaps and exchanged axes are found and
-    mended, and said; what cannot be mended is refused with the reason. The person's joints are
-    fitted by a worker's body, standing feet are locked, and the error is printed a joint.
-    docs/people_and_scenes.md has the names of joints that are understood.
+    Unit, upward axis, a T-pose in the first frame, short gaps and exchanged axes are detected,
+    repaired and reported; a recording that cannot be repaired is refused with the reason. The
+    joints are fitted by a worker's body, standing feet are locked, and the error of each joint is
+    printed. docs/people_and_scenes.md lists the joint names that are recognized.
     """
 
     file: tyro.conf.Positional[Path]
     """The recording: .bvh, .amc (its .asf beside it), or .npz with joints (T, 15, 3) and fps."""
     out: Path
-    """The clip to write, .npz; there whole or not at all."""
+    """The clip to write, .npz; an interrupted run leaves no partial file."""
     fps: float | None = None
-    """Frames a second of the clip; the recording's own, at most 60, if not given."""
+    """Frames a second of the clip (default: the recording's own, at most 60)."""
     source_fps: float | None = None
-    """The recording's true rate, where its file has none (AMC) or a wrong one."""
+    """The recording's true frame rate, if its file has none (AMC) or a wrong one."""
     skeleton: Path | None = None
     """The .asf file of an .amc file, if it is not beside it."""
     joint: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
-    """The name of a joint in the file, if it is not recognized: left_shoulder=lShldr, or a TOML
-    file of such lines. The option may be repeated."""
+    """Name of a joint in the file, if it is not recognized: left_shoulder=lShldr, or a TOML file of
+    such lines. The option may be repeated."""
     up: str | None = None
     """The upward axis of the file, if it is not recognized: --up=+x, -x, +y, -y, +z or -z."""
     allow_off_floor: bool = False
-    """Accept feet that are not on one level floor: on stairs or terrain, long in the air, or above
-    the floor for want of the right .asf file. The clip is played as if all that were not so."""
+    """Accept feet that are not on one level floor: on stairs or terrain, long in the air, or
+    above the floor because the right .asf file is missing. The clip is played as if the floor
+    were level."""
     worker: str = "worker_1"
-    """The body to fit; others play the clip, too, scaled to their legs and arms."""
+    """Body to fit; others can play the clip, too, scaled to their legs and arms."""
     picture: Path | None = None
     """Also draw a film strip of the clip into this PNG file (needs OpenGL)."""
 
     def run(self) -> int:
-        """Read, fit, tell, write."""
-        writable_file(self.out, ".npz")
+        """Read and fit the recording, print the errors and write the clip; return the exit
+        status."""
+        check_writable_file(self.out, ".npz")
         if self.out.resolve() == self.file.resolve():
             raise ConfigError("--out is the recording itself; give the clip another name.")
         if self.picture is not None:
-            writable_file(self.picture, ".png", "--picture")
+            check_writable_file(self.picture, ".png", "--picture")
         from hrc_env.mocap.retarget import retarget
         from hrc_env.motion import fit
         from hrc_env.motion.clip import save_clip
@@ -81,11 +87,11 @@ class ImportMotion:
         capture = self._read(self.fps)
         if self.fps is None and capture.fps > USUAL_FPS:
             capture = self._read(USUAL_FPS)
-        tell_capture(console, capture)
+        print_capture(console, capture)
         name = f"fitting {self.worker}"
         with progress_bar(console, name) as say:
             clip, error = retarget(capture, body, lambda share: say(share, name))
-        tell_error(console, capture, clip, error)
+        print_error(console, capture, clip, error)
         played = fit.measure_played_s(clip, all_grounds(), ANY)
         save_clip(clip, self.out)
         ready = f"play it with motions=[{str(self.out)!r}]. " if any(played.values()) else ""
@@ -94,7 +100,7 @@ class ImportMotion:
             import imageio.v2 as imageio
 
             self.picture.parent.mkdir(parents=True, exist_ok=True)
-            imageio.imwrite(self.picture, _film_strip(clip, self.worker))
+            imageio.imwrite(self.picture, _draw_film_strip(clip, self.worker))
             console.print(f"In [bold]{self.picture}[/]: a film strip")
         return 0
 
@@ -108,17 +114,17 @@ class ImportMotion:
         )  # fmt: skip
 
 
-def tell_capture(console: Console, capture: "Capture") -> None:
-    """What was found and what was mended."""
+def print_capture(console: Console, capture: "Capture") -> None:
+    """Print the length and rate of a recording, and each repair."""
     n_frames = len(capture.joints_world)
-    said = f"[bold]{capture.source}[/]: {n_frames} frames at {capture.fps:g} a second, "
-    console.print(said + f"{(n_frames - 1) / capture.fps:.1f} s", highlight=False)
+    text = f"[bold]{capture.source}[/]: {n_frames} frames at {capture.fps:g} a second, "
+    console.print(text + f"{(n_frames - 1) / capture.fps:.1f} s", highlight=False)
     for sentence in capture.notes:
         console.print(f"[yellow]Repaired:[/] {sentence}", highlight=False)
 
 
-def tell_error(console: Console, capture: "Capture", clip: "Clip", error: "RetargetError") -> None:
-    """Which joints were found, and how near the worker comes to them."""
+def print_error(console: Console, capture: "Capture", clip: "Clip", error: "RetargetError") -> None:
+    """Print the recognized joints with the distance between worker and person at each."""
     table = Table("joint", "in the file", "mean [cm]", "p95 [cm]", title="worker beside person")
     joints = zip(JOINTS, capture.node_names, 100 * error.mean_m, 100 * error.p95_m, strict=True)
     for joint, name, mean_cm, p95_cm in joints:
@@ -137,8 +143,8 @@ def tell_error(console: Console, capture: "Capture", clip: "Clip", error: "Retar
     )  # fmt: skip
 
 
-def _film_strip(clip: "Clip", worker: str) -> "Image":
-    """Moments of a clip at equal intervals, each with its time."""
+def _draw_film_strip(clip: "Clip", worker: str) -> "Image":
+    """Return poses of a clip at equal intervals as one picture, each with its time."""
     import numpy as np  # here: --help imports no simulator
 
     from hrc_env.core.records import WorkerMotion

@@ -1,4 +1,4 @@
-"""python -m hrc_env list: the names that arguments take, or the configuration that they make."""
+"""List the names that arguments take, or print the configuration that arguments make."""
 
 from dataclasses import asdict, dataclass
 
@@ -11,16 +11,17 @@ from hrc_env.env_words import EnvironmentArguments
 
 @dataclass(frozen=True, kw_only=True)
 class List(EnvironmentArguments):
-    """Environments, perception levels, estimators, scenes, cameras, shields and agents by name.
+    """List environments, perception levels, estimators, scenes, cameras, shields and agents by
+    name.
 
-    With --config: every setting of the environment that the arguments say, as a TOML file has it.
+    With --config: print every setting of the environment that the arguments describe, as TOML.
     """
 
     config: tuple[str, ...] | None = None  # type: ignore[assignment]
-    """Show the configuration, with these changes if any are given: FIELD=VALUE or a .toml file."""
+    """Print the configuration, with these changes if any are given: FIELD=VALUE or a .toml file."""
 
     def run(self) -> int:
-        """Print the table, or the configuration."""
+        """Print the table or the configuration; return the exit status."""
         if self.config is not None:
             return self._show_config()
         from hrc_env.agents import policies  # here: --help imports no simulator
@@ -39,7 +40,7 @@ class List(EnvironmentArguments):
             "robot": ROBOTS, "cameras": [camera.name for camera in LAB_CAMERAS],
             "control": CONTROLS, "shield": SHIELDS,
             "agent": (
-                *AGENTS, *policies.names(), "a checkpoint: PATH.zip",
+                *AGENTS, *policies.list_names(), "a checkpoint: PATH.zip",
                 "a policy: PATH.safetensors", "a function: MODULE:FUNCTION",
             ),
         }  # fmt: skip

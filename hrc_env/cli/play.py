@@ -1,64 +1,67 @@
-"""python -m hrc_env play, demo: let an agent loose, in the terminal, a film or a window."""
+"""Play episodes with an agent: in the terminal, in a film or in a window."""
 
 import time
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 from rich.console import Console
 from rich.table import Table
 
 import hrc_env
-from hrc_env.cli.checks import at_least, writable_file
+from hrc_env.cli.checks import check_at_least, check_writable_file
 from hrc_env.core.errors import check_names
 from hrc_env.core.progress import track
 from hrc_env.env_words import EnvironmentArguments
 from hrc_env.pipeline.ready import make_ready
 from hrc_env.tasks import DEFAULT
 
+if TYPE_CHECKING:  # --help imports no simulator
+    from hrc_env.agents.env_info import Agent, EnvInfo
+
 
 @dataclass(frozen=True, kw_only=True)
 class Play(EnvironmentArguments):
-    """Play episodes of an environment with an agent; say how they went."""
+    """Play episodes of an environment with an agent and print their scores."""
 
     task: Annotated[str, tyro.conf.Positional] = DEFAULT
-    """Which environment, by its id."""
+    """Id of the environment."""
     agent: str = "scripted_slowed"
     """Agent: random, scripted, scripted_slowed, hrc://ID/NAME (python -m hrc_env list); the path of
     a checkpoint of `train` or of Stable-Baselines3 (.zip) or of a policy of `export`
-    (.safetensors); or MODULE:FUNCTION, a function that is given an EnvInfo and returns an
-    object with act(observation). Files of this package know --control."""
+    (.safetensors); or MODULE:FUNCTION, a function that takes an EnvInfo and returns an object with
+    act(observation). Files of this package contain their --control."""
     trust: bool = False
-    """Read pickles in a checkpoint of Stable-Baselines3, which run code of whoever made it: for
-    policy or network classes of its author's own, and for statistics of VecNormalize."""
+    """Load pickles in a checkpoint of Stable-Baselines3, which can run arbitrary code: needed for
+    its author's own policy or network classes, and for statistics of VecNormalize."""
     episodes: int = 1
-    """How many episodes to play."""
+    """Number of episodes to play."""
     seed: int = 0
-    """Seed of the first episode; the next ones count up."""
+    """Seed of the first episode; later ones count up."""
     video: Path | None = None
-    """Film the first episode, and play no other, into this .mp4 file."""
+    """Write a film of the first episode to this .mp4 file, and play no other."""
     viewer: bool = False
     """Show the scene in MuJoCo's interactive viewer (needs a display)."""
 
     def run(self) -> int:
-        """Play."""
+        """Play the episodes; return the exit status."""
         check_names("environment", [self.task], hrc_env.IDS)
-        at_least("--episodes", self.episodes, 1)
-        at_least("--seed", self.seed, 0)
-        from hrc_env.agents.registry import control_of  # here: --help imports no simulator
+        check_at_least("--episodes", self.episodes, 1)
+        check_at_least("--seed", self.seed, 0)
+        from hrc_env.agents.registry import find_control  # here: --help imports no simulator
 
-        asked = replace(self, control=self.control or control_of(self.agent))
+        arguments = replace(self, control=self.control or find_control(self.agent))
         if self.video is not None:
-            writable_file(self.video, ".mp4", "--video")
-            filmed(asked, self.agent, self.video, trust=self.trust)
+            check_writable_file(self.video, ".mp4", "--video")
+            film_agent(arguments, self.agent, self.video, trust=self.trust)
             return 0
         import gymnasium
 
         make_ready(Console(), self.perception)
-        with closing(gymnasium.make(self.task, **asked.keywords())) as env:
+        with closing(gymnasium.make(self.task, **arguments.keywords())) as env:
             for episode in range(self.episodes):
                 self._play(env, self.seed + episode)
         return 0
@@ -70,9 +73,10 @@ class Play(EnvironmentArguments):
         inner = env.unwrapped
         window = Viewer(inner.simulation.scene) if self.viewer else None
         limit = env.spec.max_episode_steps
-        played = film.begin(env, named(self.agent, seed, self.trust), seed, limit)
+        make = make_agent_factory(self.agent, seed, self.trust)
+        steps = film.begin_episode(env, make, seed, limit)
         started_s, total, step, info = time.monotonic(), 0.0, 0, {}
-        for step, made in enumerate(track(played, f"episode {seed}", limit), 1):
+        for step, made in enumerate(track(steps, f"episode {seed}", limit), 1):
             total, info = total + float(made.reward), made.info
             if window is not None:
                 window.show(*inner.views.pose())
@@ -81,10 +85,10 @@ class Play(EnvironmentArguments):
         if window is not None:
             window.close()
         counts = inner.simulation.task.counts(info).items()
-        said = [f"return {total:.1f}", *(f"{name} {n:.0f}" for name, n in counts)]
+        parts = [f"return {total:.1f}", *(f"{name} {n:.0f}" for name, n in counts)]
         pace = step / (time.monotonic() - started_s)
-        said += [f"cost {info['episode_cost']:.0f}", f"{pace:.0f} steps/s"]
-        Console().print(f"seed {seed}: {', '.join(said)}")
+        parts += [f"cost {info['episode_cost']:.0f}", f"{pace:.0f} steps/s"]
+        Console().print(f"seed {seed}: {', '.join(parts)}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,56 +96,65 @@ class Demo(EnvironmentArguments):
     """Film the scripted reacher, slowed by the separation that it estimates from pixels."""
 
     out: Path = Path("out/demo.mp4")
-    """The film; a still PNG is written beside it."""
+    """The film to write; a still PNG is written beside it."""
     seed: int = 7
     """Seed of the episode."""
     seconds: float = 10.0
-    """Length of the film."""
+    """Length of the film [s]."""
 
     def run(self) -> int:
-        """Film and tell."""
-        at_least("--seed", self.seed, 0)
-        writable_file(self.out, ".mp4")
+        """Write the film and print its scores; return the exit status."""
+        check_at_least("--seed", self.seed, 0)
+        check_writable_file(self.out, ".mp4")
         Console().print("Loading the simulator ...")
         from hrc_env.settings import settle  # here: --help imports no simulator
 
         ctrl_dt = settle(**self.keywords()).config.ctrl_dt
-        at_least("--seconds", self.seconds, ctrl_dt)
+        check_at_least("--seconds", self.seconds, ctrl_dt)
         make_ready(Console(), self.perception, draws=True, installs=True)
         title = "the worker is known through four cameras only"
-        filmed(self, "scripted_slowed", self.out, round(self.seconds / ctrl_dt), title)
+        film_agent(self, "scripted_slowed", self.out, round(self.seconds / ctrl_dt), title)
         Console().print(f"Watch [bold]{self.out}[/] (still: {self.out.with_suffix('.png')})")
         return 0
 
 
-def filmed(
-    asked: Play | Demo,
+def film_agent(
+    arguments: Play | Demo,
     agent: str,
     path: Path,
     n_steps: int | None = None,
     title: str = "",
     trust: bool = False,
 ) -> None:
-    """Film an episode of an agent by its name, up to its end; show what came of it."""
+    """Film one episode of an agent and print its totals.
+
+    Args:
+        arguments: the command, with the environment and the seed.
+        agent: name of the agent.
+        path: the .mp4 file to write.
+        n_steps: length of the film in control steps (default: the whole episode).
+        title: title of the table that is printed.
+        trust: whether pickles in a checkpoint may be loaded.
+    """
     from hrc_env.evaluation import film
 
-    make, keywords = named(agent, asked.seed, trust), asked.keywords()
-    totals = film.film_episode(make, path, asked.seed, n_steps=n_steps, **keywords)
-    Console().print(table(totals, title))
+    make, keywords = make_agent_factory(agent, arguments.seed, trust), arguments.keywords()
+    totals = film.film_episode(make, path, arguments.seed, n_steps=n_steps, **keywords)
+    Console().print(make_table(totals, title))
 
 
-def named(agent: str, seed: int, trust: bool) -> Callable[[Any], Any]:
-    """What makes an agent, by its name, for an `EnvInfo`."""
+def make_agent_factory(agent: str, seed: int, trust: bool) -> "Callable[[EnvInfo], Agent]":
+    """Return a function that makes the agent of this name for an `EnvInfo`."""
     from hrc_env.agents.registry import make_agent
 
     return lambda env_info: make_agent(agent, env_info, seed, trust)
 
 
-def table(totals: dict[str, float], title: str = "") -> Table:
-    """Return what `film_episode` has measured as a table, each value with its unit."""
+def make_table(totals: dict[str, float], title: str = "") -> Table:
+    """Return the totals of `film_episode` as a table, each value with its unit."""
     rows = Table("", "", "unit", title=title or None)
     rows.columns[1].justify = "right"
     for name, value in totals.items():
-        what, _, unit = name.removesuffix("]").partition(" [")
-        rows.add_row(what, f"{value:.{({'count': 0, 'm': 2}).get(unit, 1)}f}", unit)
+        quantity, _, unit = name.removesuffix("]").partition(" [")
+        rows.add_row(quantity, f"{value:.{({'count': 0, 'm': 2}).get(unit, 1)}f}", unit)
     return rows

@@ -1,4 +1,4 @@
-"""python -m hrc_env setup: everything that pip does not bring."""
+"""Set up everything that pip does not install."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -10,15 +10,16 @@ from hrc_env.pipeline.ready import compile_kernels, fetch_networks, find_opengl
 
 @dataclass(frozen=True)
 class Setup:
-    """Fetch the pose network's weights (once, checked), compile the kernels for this machine, and
-    see that headless OpenGL works."""
+    """Fetch the weights of the pose network, compile the kernels and check headless OpenGL.
+
+    Weights are fetched once and verified; kernels are compiled for this machine.
+    """
 
     networks: tuple[Literal["lite", "heavy"], ...] = ()
-    """Other landmark networks that are to be fetched, too (41 MB): for detector.folded and
-    detector.network."""
+    """Other landmark networks to fetch, too (41 MB), for detector.folded and detector.network."""
 
     def run(self) -> int:
-        """Set up; 0 also without OpenGL, which only pictures need."""
+        """Set up; return 0, even without OpenGL, which only pictures need."""
         console = Console()
         fetch_networks(console, [f"pose_landmark_{network}" for network in self.networks])
         ready, message = find_opengl(console)
@@ -28,6 +29,6 @@ class Setup:
         else:
             console.print(
                 f"[yellow]no headless OpenGL[/]: {message}\n"
-                "Without it everything works but perception='pixels' and pictures."
+                "Everything works without it except perception='pixels' and pictures."
             )
         return 0

@@ -1,4 +1,4 @@
-"""Run what writes a report, and show it."""
+"""Run a function that writes a report, and print the report."""
 
 from collections.abc import Callable
 from itertools import groupby
@@ -7,13 +7,13 @@ from pathlib import Path
 from rich.console import Console
 from rich.markdown import Markdown
 
-from hrc_env.cli.checks import writable_folder
+from hrc_env.cli.checks import check_writable_folder
 from hrc_env.core.progress import Say, progress_bar
 
 
 def show(run: Callable[[Path, Say], object], out: Path, name: str) -> int:
-    """Run a bench or an experiment under a progress bar, then show its report.md."""
-    writable_folder(out)
+    """Run a benchmark or an experiment under a progress bar, then print its report.md."""
+    check_writable_folder(out)
     console = Console()
     with progress_bar(console, name) as say:
         run(out, say)
@@ -23,8 +23,11 @@ def show(run: Callable[[Path, Say], object], out: Path, name: str) -> int:
 
 
 def print_report(console: Console, text: str) -> None:
-    """Print a report in Markdown: rendered in a terminal in which its tables fit, otherwise as it
-    is, with the columns of its tables aligned, so that no number is cut."""
+    """Print a report in Markdown.
+
+    It is rendered if its tables fit in the terminal. Otherwise it is printed as it is, with the
+    columns of its tables aligned, so that no number is cut.
+    """
     text = align_tables(text)
     widest = max((len(line) for line in text.splitlines() if line.startswith("|")), default=0)
     if console.is_terminal and widest <= console.width:
@@ -34,14 +37,14 @@ def print_report(console: Console, text: str) -> None:
 
 
 def align_tables(text: str) -> str:
-    """Return Markdown whose tables have cells of one width in each column."""
+    """Return Markdown with all cells of a table column padded to one width."""
     blocks = groupby(text.splitlines(), key=lambda line: line.startswith("|"))
     return "\n".join(
-        line for is_table, lines in blocks for line in (_aligned([*lines]) if is_table else lines)
+        line for is_table, lines in blocks for line in (_align([*lines]) if is_table else lines)
     )
 
 
-def _aligned(lines: list[str]) -> list[str]:
+def _align(lines: list[str]) -> list[str]:
     rows = [[cell.strip() for cell in line.strip().strip("|").split("|")] for line in lines]
     if len({len(row) for row in rows}) > 1:  # a cell with a bar in it
         return lines
@@ -49,10 +52,10 @@ def _aligned(lines: list[str]) -> list[str]:
         return lines
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     is_right = [cell.endswith(":") for cell in rows[1]]
-    return [f"| {' | '.join(map(_filled, row, widths, is_right))} |" for row in rows]
+    return [f"| {' | '.join(map(_pad, row, widths, is_right))} |" for row in rows]
 
 
-def _filled(cell: str, width: int, is_right: bool) -> str:
-    if set(cell) <= {"-", ":"} and len(cell) > 2:  # a dash alone is a number that is not known
+def _pad(cell: str, width: int, is_right: bool) -> str:
+    if set(cell) <= {"-", ":"} and len(cell) > 2:  # a single dash is a missing number
         return "-" * (width - 1) + ":" if is_right else "-" * width
     return cell.rjust(width) if is_right else cell.ljust(width)

@@ -1,1 +1,2 @@
-"""Engines: where the parts of an experiment are played, in this process, in others, by Ray."""
+"""Engines: places where the parts of an experiment are computed: this process, other processes,
+Ray."""

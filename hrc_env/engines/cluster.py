@@ -24,9 +24,9 @@ except ModuleNotFoundError as missing:
 
 VERSION = version("hrc_env")
 START_S = "300"
-"""How long a machine under load may take to start Ray [s]; its own limit is 30."""
+"""Greatest time that a machine under load may take to start Ray [s]; the default of Ray is 30."""
 ANSWER_S = 10.0
-"""How long a cluster may take to answer at all [s]."""
+"""Greatest time that a cluster may take to answer [s]."""
 STORE_BYTES = 500_000_000
 """Shared memory of a cluster on this machine."""
 Note = Callable[[str], None]
@@ -46,16 +46,17 @@ class Machine:
 def connected(
     address: str | None, note: Note = print, dashboard: bool = False
 ) -> Iterator[list[Machine]]:
-    """Be connected to a cluster; yield its machines.
+    """Connect to a cluster; yield its machines.
 
     Args:
-        address: of a cluster: "auto" on one of its machines, "HOST:6379", or "ray://HOST:10001";
-            None: one is started on this machine, and stopped at the end.
+        address: address of a cluster: "auto" on one of its machines, "HOST:6379", or
+            "ray://HOST:10001"; None: one is started on this machine, and stopped at the end.
         note: receives notes on the cluster.
         dashboard: whether a cluster on this machine has Ray's dashboard.
 
     Raises:
-        ConfigError: there is no cluster, it is of another Ray or Python, or wants a token.
+        ConfigError: there is no cluster, it has another version of Ray or Python, or requires a
+            token.
     """
     os.environ.setdefault("RAY_raylet_start_wait_time_s", START_S)
     os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
@@ -113,7 +114,7 @@ def _remedy(said: str) -> str:
 
 
 def list_machines() -> list[Machine]:
-    """Return the machines of the cluster that live and have cores."""
+    """Return the living machines of the cluster that have cores."""
     return [
         Machine(each["NodeID"], each["NodeManagerAddress"], each["Resources"]["CPU"])
         for each in ray.nodes()
@@ -122,11 +123,11 @@ def list_machines() -> list[Machine]:
 
 
 def share_of(workers: int, machines: list[Machine], note: Note = print) -> float:
-    """Return the share of a core that each worker counts as, so that all find a place.
+    """Return the share of a core that each worker counts as, so that all fit.
 
     Args:
-        workers: how many there will be.
-        machines: of the cluster.
+        workers: number of workers.
+        machines: machines of the cluster.
         note: receives a warning if there are more workers than cores.
     """
     n = sum(each.n_cores for each in machines)
@@ -140,13 +141,15 @@ def share_of(workers: int, machines: list[Machine], note: Note = print) -> float
 def check_machines(
     machines: list[Machine], works: Callable[[], None] | None = None, note: Note = print
 ) -> None:
-    """Raise `ConfigError` for a machine without the package, with another version of it, or on
-    which `works` fails; machines that compile kernels are waited for.
+    """Check all machines and wait for those that compile kernels.
 
     Args:
-        machines: of the cluster.
-        works: called on each machine; its `HRCError` says what is missing.
+        machines: machines of the cluster.
+        works: called on each machine; the message of its `HRCError` names the missing requirement.
         note: receives the addresses of machines that are waited for.
+
+    Raises:
+        ConfigError: a machine lacks the package, has another version of it, or `works` fails on it.
     """
     registrations = pack()
     asked = {
@@ -194,7 +197,7 @@ def _check_answer(answer: Any, machine: Machine) -> None:
 
 
 def reason_of(error: BaseException) -> str:
-    """Return the error of a worker in words."""
+    """Return the message of a worker's error."""
     cause: Any = getattr(error, "cause", None) if isinstance(error, RayTaskError) else None
     found = cause if isinstance(cause, BaseException) else error
     while isinstance(found, RayTaskError) and isinstance(found.cause, BaseException):
@@ -215,7 +218,7 @@ def reason_of(error: BaseException) -> str:
 
 @contextmanager
 def plain_errors() -> Iterator[None]:
-    """Raise errors of ours without those that they came of, which others may not unpickle."""
+    """Raise errors of this package without their causes, which other processes may not unpickle."""
     try:
         yield
     except HRCError as error:

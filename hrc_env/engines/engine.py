@@ -1,4 +1,4 @@
-"""The engines by name, and what they have in common."""
+"""Engines by name, and their protocol."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
@@ -8,23 +8,23 @@ from typing import Any, Protocol
 from hrc_env.core.errors import ConfigError, check_names, whole
 
 Tick = Callable[[float], None]
-"""Receives the growth of the finished share of a call."""
+"""Receives the increase of the completed share of a call."""
 Call = Callable[[Tick], Any]
-"""Something to be computed, of what it was made with alone: the result is the same everywhere."""
+"""A computation that depends only on its construction: its result is the same everywhere."""
 ENGINES = ("serial", "processes", "ray")
-"""One call after the other in this process, whose environments share all cores; as many processes
-as cores, of one thread each; tasks of Ray."""
+"""`serial` computes one call after the other in this process, whose environments share all cores;
+`processes` as many at once as there are cores, on one thread each; `ray` as tasks of Ray."""
 
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """A call that has returned."""
+    """Result of a call."""
 
     k: int
-    """Its number."""
+    """Number of the call."""
     result: Any
     seconds: float
-    """Time that it took."""
+    """Duration of the call."""
 
 
 class Engine(Protocol):
@@ -32,7 +32,7 @@ class Engine(Protocol):
 
     @property
     def is_parallel(self) -> bool:
-        """Whether calls run in other processes, which must be able to unpickle them."""
+        """True if calls run in other processes, which must be able to unpickle them."""
         ...
 
     def opened(self) -> AbstractContextManager[object]:
@@ -40,15 +40,15 @@ class Engine(Protocol):
         ...
 
     def run(self, calls: Sequence[Call], tick: Callable[[int, float], None]) -> Iterator[Done]:
-        """Compute calls; yield each as soon as it is done, in any order.
+        """Compute calls; yield each result as soon as it is there, in any order.
 
         Args:
             calls: functions of a `Tick`.
-            tick: receives the number of a call and the growth of its finished share; of a call in
-                another process once, at its end.
+            tick: receives the number of a call and the increase of its completed share; for a call
+                in another process once, at its end.
 
         Raises:
-            HRCError: an error of a call; or a worker died again and again.
+            HRCError: an error of a call; or a worker died repeatedly.
         """
         ...
 
@@ -59,12 +59,12 @@ def engine_called(
     """Return an engine.
 
     Args:
-        name: one of `ENGINES`; None: none is chosen.
-        workers: calls that are computed at once; None: as many as there are cores.
-        address: of a cluster of Ray; None: one that is started on this machine.
+        name: one of `ENGINES`; None: no engine.
+        workers: number of calls at a time; None: the number of cores.
+        address: address of a cluster of Ray; None: one that is started on this machine.
 
     Raises:
-        ConfigError: no such engine, or it takes no workers or no address.
+        ConfigError: there is no such engine, or it takes no workers or no address.
     """
     if name is not None:
         check_names("engine", [name], ENGINES)

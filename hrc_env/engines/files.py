@@ -1,4 +1,4 @@
-"""Files on their way to machines that do not have them."""
+"""Transfer of files to machines that do not have them."""
 
 import hashlib
 from pathlib import Path
@@ -7,24 +7,24 @@ from hrc_env.core.folders import temporary_cache
 
 
 class CarriedFile(str):
-    """The path of a file; pickled it takes the file along.
+    """Path of a file whose content is pickled with it.
 
-    Unpickled it is the path of a file of the same content: the same path where the file is there,
+    Unpickled it is the path of a file of the same content: the same path where this file exists,
     else one in a folder of this user's temporary files.
     """
 
     def __reduce__(self) -> tuple[object, tuple[str, bytes]]:
-        """Return the function that makes the path anew, and the content of the file."""
+        """Return the function that restores the path, and the content of the file."""
         return carried_to, (str(self), Path(self).read_bytes())
 
 
 def carried(name: str) -> str:
-    """Return a name, of which a file that is there travels with it."""
+    """Return a name; the file of this name, if it exists, is transferred with it."""
     return CarriedFile(name) if Path(name).is_file() else name
 
 
 def carried_to(path: str, content: bytes) -> CarriedFile:
-    """Return the path of a file of this content on this machine, written if need be."""
+    """Return the path of a file of this content on this machine, written if necessary."""
     here = Path(path)
     if here.is_file() and here.read_bytes() == content:
         return CarriedFile(path)

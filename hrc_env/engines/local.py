@@ -17,7 +17,7 @@ from hrc_env.core.machine import CORES, n_cores
 from hrc_env.engines.engine import Call, Done
 
 ATTEMPTS = 3
-"""A call in whose process something dies is computed again, so often in all."""
+"""Number of attempts at a call whose process died."""
 SINGLE = {CORES: "1", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 """Environment variables of a process that computes on one core."""
 
@@ -33,7 +33,7 @@ class Serial:
         return nullcontext()
 
     def run(self, calls: Sequence[Call], tick: Callable[[int, float], None]) -> Iterator[Done]:
-        """As of `Engine`."""
+        """Compute calls as of `Engine`."""
         for k, call in enumerate(calls):
             started_s = time.monotonic()
             result = call(partial(tick, k))
@@ -45,7 +45,7 @@ class Processes:
     """Processes on this machine, each of which computes on one core."""
 
     workers: int | None = None
-    """How many; None: as many as there are cores."""
+    """Number of processes; None: the number of cores."""
     is_parallel = True
 
     def opened(self) -> AbstractContextManager[object]:
@@ -53,7 +53,7 @@ class Processes:
         return nullcontext()
 
     def run(self, calls: Sequence[Call], tick: Callable[[int, float], None]) -> Iterator[Done]:
-        """As of `Engine`; unfinished calls of a process that died are computed again."""
+        """Compute calls as of `Engine`; unfinished calls of a process that died are repeated."""
         left, deaths = dict(enumerate(calls)), 0
         while left:
             try:
@@ -71,7 +71,7 @@ class Processes:
                     ) from error
 
     def _run_once(self, calls: dict[int, Call]) -> Iterator[Done]:
-        """Compute calls with one pool; yield those that are done before a process dies."""
+        """Compute calls with one pool; yield the results that are there before a process dies."""
         n = min(self.workers or n_cores(), len(calls))
         context = multiprocessing.get_context("spawn")
         made = partial(ProcessPoolExecutor, n, mp_context=context, initializer=end_with_parent)
@@ -90,7 +90,7 @@ class Processes:
 
 
 def end_with_parent() -> None:
-    """End this process as soon as the one that started it has ended, also if that was killed."""
+    """End this process as soon as its parent has ended, also if that was killed."""
     parent = multiprocessing.parent_process()
 
     def wait_for_end() -> None:
@@ -111,7 +111,7 @@ def call_pickled(call: bytes) -> tuple[Any, float]:
 
 
 def ignore(share: float) -> None:
-    """Drop the progress of a call."""
+    """Discard the progress of a call."""
 
 
 def pickled(call: Call) -> bytes:

@@ -1,4 +1,4 @@
-"""The engine ray: every call is a task of a cluster."""
+"""Engine `ray`: every call is a task of a cluster."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
@@ -17,12 +17,12 @@ from ray.exceptions import RayError, RayTaskError  # isort: skip
 
 @dataclass(frozen=True, slots=True)
 class RayTasks:
-    """Tasks of one core each; Ray starts those again whose worker or machine died."""
+    """Tasks of one core each; Ray restarts tasks whose worker or machine died."""
 
     workers: int | None = None
-    """Calls that are computed at once; None: as many as the cluster has cores."""
+    """Number of calls at a time; None: the number of cores of the cluster."""
     address: str | None = None
-    """Of the cluster, as of `cluster.connected`."""
+    """Address of the cluster, as of `cluster.connected`."""
     note: Callable[[str], None] = print
     """Receives notes on the cluster."""
     is_parallel = True
@@ -32,7 +32,7 @@ class RayTasks:
         return cluster.connected(self.address, self.note)
 
     def run(self, calls: Sequence[Call], tick: Callable[[int, float], None]) -> Iterator[Done]:
-        """As of `Engine`."""
+        """Compute calls as of `Engine`."""
         with cluster.connected(self.address, self.note) as machines:
             cluster.check_machines(machines, None, self.note)
             n = self.workers or int(sum(each.n_cores for each in machines)) or 1

@@ -1,4 +1,4 @@
-"""Registrations of this process on their way to machines that share no files with it."""
+"""Transfer of this process's registrations to machines that share no files with it."""
 
 import os
 from collections.abc import Mapping
@@ -15,22 +15,22 @@ from hrc_env.registration import IMPORT, adopt, import_files
 
 @dataclass(frozen=True, slots=True)
 class Registrations:
-    """What was registered, and the Python files that do so, whole."""
+    """Registrations, and the complete Python files that make them."""
 
     registered: Snapshot
     sources: Mapping[str, bytes]
     """Contents of files by their paths here."""
     imported: tuple[str, ...] = ()
-    """Those of `--import` and of the environment variable `IMPORT`."""
+    """Files of `--import` and of the environment variable `IMPORT`."""
 
     def unpack(self) -> None:
-        """Make them known in this process.
+        """Register all of them in this process.
 
-        Files that are not here, or otherwise, are written to a folder of this user, and imported
+        Files that are missing here, or differ, are written to a folder of this user and imported
         from there.
 
         Raises:
-            HRCError: a file cannot be imported here, as it imports what is not installed.
+            HRCError: a file cannot be imported, because a package that it imports is not installed.
         """
         here = {path: str(carried_to(path, text)) for path, text in self.sources.items()}
         for path in self.imported:

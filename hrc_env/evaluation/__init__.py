@@ -1,1 +1,1 @@
-"""Play agents, count what came of their episodes, and say how sure the numbers are."""
+"""Play agents, summarize their episodes, and give every number its confidence interval."""

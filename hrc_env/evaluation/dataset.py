@@ -1,8 +1,8 @@
-"""Data sets of episodes in a folder: a file of arrays for each episode, and metadata.
+"""Data sets of episodes in a folder: one file of arrays per episode, and metadata.
 
 `dataset.json` holds versions, command, arguments, configuration and cameras; `episode_00000.npz`
-and so on hold the arrays, with belief and truth under names of their own ("belief/...",
-"truth/..."). `load_episodes` reads them back; `numpy.load` and `json.load` do, too.
+and so on hold the arrays, those of belief and truth as "belief/..." and "truth/...".
+`load_episodes` reads them back, and so do `numpy.load` and `json.load`.
 """
 
 import json
@@ -20,47 +20,47 @@ from hrc_env.core.records import Keypoints
 from hrc_env.evaluation.moments import PROJECTIONS
 
 ABOUT = "dataset.json"
-"""The file of a folder's metadata."""
+"""Name of the metadata file in a folder."""
 FORMAT = 1
-"""Version of the folder's form."""
+"""Version of the folder's format."""
 Arrays = Mapping[str, NDArray[Any]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Episode:
-    """One recorded episode of T steps: T + 1 moments, of which the first is the reset's.
+    """One recorded episode of T steps, which has T + 1 moments; the first is the reset.
 
-    `belief` is the robot's, `truth` the world's: an agent that learns from `truth` uses information
-    that no robot has. Positions are in the world [m].
+    `belief` is the robot's estimate, `truth` the simulator's state: an agent that learns from
+    `truth` uses information that no robot has. Positions are in the world frame [m].
     """
 
     seed: int
-    """The episode begins with `reset(seed=seed)`."""
+    """Seed of the `reset(seed=seed)` that begins the episode."""
     observations: NDArray[np.float32] | dict[str, NDArray[Any]]
-    """(T + 1, n), or arrays by name where goals or images stand apart: "image_<camera>" is
-    (T + 1, H, W, 3) of uint8."""
+    """Observations (T + 1, n), or arrays by name if goals or images are separate: "image_<camera>"
+    is (T + 1, H, W, 3) of uint8."""
     actions: NDArray[np.float32]
-    """(T, A) in [-1, 1]."""
+    """Actions (T, A) in [-1, 1]."""
     rewards: NDArray[np.float64]
-    """(T,)."""
+    """Rewards (T,)."""
     terminations: NDArray[np.bool_]
-    """(T,) whether the step ended the episode."""
+    """Truth values (T,): the step ended the episode."""
     truncations: NDArray[np.bool_]
-    """(T,) whether the time limit did."""
+    """Truth values (T,): the step reached the time limit."""
     belief: Arrays
-    """(T + 1, ...) infos of the belief by name ("reward/proximity", "perception/..."). With poses
-    "joints_world" (T + 1, W, J, 3) [m], "joints_cov_world" (T + 1, W, J, 3, 3) [m^2],
+    """Infos of the belief by name, (T + 1, ...), as "reward/proximity" and "perception/...". With
+    poses also "joints_world" (T + 1, W, J, 3) [m], "joints_cov_world" (T + 1, W, J, 3, 3) [m^2],
     "joints_velocity_world" [m/s], "age_s", "tracked" and "unknown"."""
     truth: Arrays
-    """(T + 1, ...) infos of the truth by name ("cost" [control steps], "safety/...", "is_success").
-    With poses "joints_world" (T + 1, W, J, 3) [m] and "present" (T + 1, W); who is not there has
-    NaN."""
+    """Infos of the truth by name, (T + 1, ...), as "cost" [control steps], "safety/..." and
+    "is_success". With poses also "joints_world" (T + 1, W, J, 3) [m], NaN for workers who are
+    absent, and "present" (T + 1, W)."""
     keypoints: Keypoints | None = None
-    """(T + 1, C, W, J) as the estimator was given them, pixels of the projections `P`; None: they
-    were not recorded."""
+    """Keypoints (T + 1, C, W, J) that the estimator received, in pixels of the projections `P`;
+    None if they were not recorded."""
     P: NDArray[np.float64] | None = None
-    """(C, 3, 4) projections of this episode's cameras, from the world [m] to pixels, beside
-    keypoints where rigs are drawn; NaN of one that did not hang. None: those of
+    """Projections (C, 3, 4) of this episode's cameras, from the world frame [m] to pixels, if
+    keypoints are recorded and rigs are drawn; NaN for a camera that is missing. None: those of
     `metadata["cameras"]`."""
 
     def __len__(self) -> int:
@@ -69,13 +69,13 @@ class Episode:
 
 
 class EpisodeSet(Sequence[Episode]):
-    """The episodes of a folder, each read when it is asked for.
+    """The episodes of a folder, each of which is read when it is indexed.
 
     Args:
-        path: of the folder.
-        metadata: what `dataset.json` holds: "command", "arguments", "environment" (arguments of
-            `gymnasium.make`), "config", "versions" and other provenance, "seeds", "ctrl_dt_s",
-            "cameras" with their projections from the world [m] to pixels, and "episodes".
+        path: the folder.
+        metadata: the contents of `dataset.json`: "command", "arguments", "environment" (arguments
+            of `gymnasium.make`), "config", "versions" and other provenance, "seeds", "ctrl_dt_s",
+            "cameras" with their projections from the world frame [m] to pixels, and "episodes".
     """
 
     def __init__(self, path: Path, metadata: Mapping[str, Any]) -> None:
@@ -90,7 +90,9 @@ class EpisodeSet(Sequence[Episode]):
         n = len(self)
         if isinstance(k, int | np.integer) and not -n <= k < n:  # ends a loop over the set
             raise IndexError(f"There are {n} episodes in {self.path}, got number {k}.")
-        return _episode(read_arrays(self.path / name_of(whole("number", k, -n, n - 1) % n)))
+        return _make_episode(
+            read_arrays(self.path / format_file_name(whole("number", k, -n, n - 1) % n))
+        )
 
     def __iter__(self) -> Iterator[Episode]:
         return (self[k] for k in range(len(self)))
@@ -100,23 +102,23 @@ class EpisodeSet(Sequence[Episode]):
 
 
 def load_episodes(path: str | Path) -> EpisodeSet:
-    """Return the episodes that `python -m hrc_env record --folder PATH` has recorded.
+    """Return the episodes recorded by `python -m hrc_env record --folder PATH`.
 
     Args:
-        path: of the folder.
+        path: the folder.
 
     Raises:
-        ConfigError: there is no such folder, it holds no data set, or one of a newer form.
+        ConfigError: the folder does not exist, or it holds no data set or one of a newer format.
     """
     folder = Path(path)
     about = folder / ABOUT
     if not about.is_file():
-        draft = draft_of(folder)
+        draft = get_draft_path(folder)
         hint = (
-            f"Its recording was stopped: the same command goes on with {draft}."
+            f"Its recording was stopped: the same command continues it from {draft}."
             if draft.exists()
             else "python -m hrc_env record --folder makes one; minari.load_dataset(NAME) loads "
-            "what record --out has made."
+            "data sets of record --out."
         )
         raise ConfigError(f"{folder} is no folder of recorded episodes: {ABOUT} is missing. {hint}")
     try:
@@ -126,44 +128,45 @@ def load_episodes(path: str | Path) -> EpisodeSet:
         raise ConfigError(f"{about} cannot be read: {type(error).__name__} {error}.") from error
     if form > FORMAT:
         raise ConfigError(
-            f"{about} is of form {form}, this version reads up to {FORMAT}: install the version of "
-            f"hrc_env that recorded it ({metadata.get('hrc_env')})."
+            f"{about} has format {form}, and this version reads formats up to {FORMAT}: install "
+            f"the version of hrc_env that recorded it ({metadata.get('hrc_env')})."
         )
     return EpisodeSet(folder, metadata)
 
 
-def draft_of(path: Path) -> Path:
-    """Return the folder in which a data set grows until it is whole."""
+def get_draft_path(path: Path) -> Path:
+    """Return the folder in which a data set is recorded until it is complete."""
     return path.with_name(f".{path.name}.draft")
 
 
-def name_of(k: int) -> str:
-    """Return the name of an episode's file."""
+def format_file_name(k: int) -> str:
+    """Return the name of the k-th episode's file."""
     return f"episode_{k:05d}.npz"
 
 
 def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
-    """Return the arrays of an episode's file; `HRCError` if it cannot be read."""
+    """Return the arrays of an episode's file; raise `HRCError` if it cannot be read."""
     try:
         with np.load(path) as file:
             return {name: file[name] for name in file.files}
     except (OSError, ValueError, zipfile.BadZipFile) as error:
-        raise HRCError(f"{path} cannot be read ({error}): record the data set anew.") from error
+        raise HRCError(f"{path} cannot be read ({error}): record the data set again.") from error
 
 
-def within(arrays: Arrays, folder: str) -> dict[str, NDArray[Any]]:
-    """Return the arrays called "folder/...", by the rest of the name."""
+def select_folder(arrays: Arrays, folder: str) -> dict[str, NDArray[Any]]:
+    """Return the arrays named "folder/...", by the rest of their names."""
     return {k[len(folder) + 1 :]: v for k, v in arrays.items() if k.startswith(f"{folder}/")}
 
 
-def _episode(arrays: Arrays) -> Episode:
-    seen, found = within(arrays, "observations"), within(arrays, "keypoints")
+def _make_episode(arrays: Arrays) -> Episode:
+    observations = select_folder(arrays, "observations")
+    keypoints = select_folder(arrays, "keypoints")
     names = ("actions", "rewards", "terminations", "truncations")
-    projections = found.pop(PROJECTIONS, None)
+    projections = keypoints.pop(PROJECTIONS, None)
     return Episode(
-        seed=int(arrays["seed"]), observations=seen.get("", seen),
+        seed=int(arrays["seed"]), observations=observations.get("", observations),
         **{name: arrays[name] for name in names},
-        belief=within(arrays, "belief"), truth=within(arrays, "truth"),
-        keypoints=Keypoints(**found) if found else None,
+        belief=select_folder(arrays, "belief"), truth=select_folder(arrays, "truth"),
+        keypoints=Keypoints(**keypoints) if keypoints else None,
         P=None if projections is None else projections[0],
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""What an agent is worth: fixed seeds, deterministic actions, cost counted on the truth."""
+"""Evaluation of agents: fixed seeds, deterministic actions, cost computed from the truth."""
 
 from collections.abc import Callable
 from contextlib import closing
@@ -10,7 +10,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from hrc_env.agents.env_info import Agent, env_info
+from hrc_env.agents.env_info import Agent, AgentFactory, EnvInfo, env_info
 from hrc_env.core.brought import check_arguments, described
 from hrc_env.core.errors import ConfigError, whole
 from hrc_env.core.machine import n_cores
@@ -19,7 +19,7 @@ from hrc_env.engines.engine import Engine, Tick, engine_called
 from hrc_env.engines.files import carried
 from hrc_env.engines.local import Processes, Serial
 from hrc_env.env import HRCEnv
-from hrc_env.evaluation.intervals import goals_over, mean_over, rate_of
+from hrc_env.evaluation.intervals import estimate_goal_rate, estimate_mean, estimate_rate
 from hrc_env.evaluation.rollout import Transition, rollout
 from hrc_env.evaluation.sums import ACHIEVED, COST_UNIT, FAILED, EpisodeSums
 from hrc_env.tasks import DEFAULT
@@ -27,37 +27,39 @@ from hrc_env.vector.env import HRCVectorEnv
 from hrc_env.vector.member import info_of
 
 EVALUATION_SEED = 1_000_000
-"""First seed of evaluations, far from those that training uses."""
-TOGETHER, DRAWN_TOGETHER = 64, 4
-"""Episodes of a shard, and at level `pixels`."""
+"""First seed of evaluations, far from the seeds of training."""
+TOGETHER = 64
+"""Number of episodes that are played together in a shard."""
+DRAWN_TOGETHER = 4
+"""Number of episodes in a shard at level `pixels`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """The score of an agent: means over episodes."""
+    """Means of an agent's statistics over episodes."""
 
     episodes: int
-    """How many were played."""
+    """Number of episodes."""
     success_rate: float
-    """Share of all attempts that were achieved (`Task.achieved` and `Task.failed`)."""
+    """Share of attempts that were achieved (`Task.achieved` and `Task.failed`)."""
     is_success: float
-    """Share of episodes whose last `info["is_success"]` was 1."""
+    """Share of episodes that end with `info["is_success"]` of 1."""
     goals_per_minute: float
-    """Goals reached in a minute of all episodes together [1/min]."""
+    """Goals reached per minute, of all episodes together [1/min]."""
     contacts_per_episode: float
-    """Touches of the true worker; one that lasts counts once."""
+    """Contacts with the true worker; a lasting contact counts once."""
     cost_per_episode: float
-    """Mean sum of `info["cost"]`, which is counted on the truth [control steps]."""
+    """Mean sum of `info["cost"]`, which is computed from the truth [control steps]."""
     close_steps_per_episode: float
-    """Steps nearer than the proximity limit to the true worker."""
+    """Mean number of steps closer to the true worker than the proximity limit."""
     median_min_separation_m: float
-    """Median of the least distance to the true worker in an episode [m]."""
+    """Median over episodes of the least distance to the true worker [m]."""
     return_mean: float
-    """Mean sum of the rewards."""
+    """Mean sum of rewards."""
 
 
 def evaluate(
-    make: str | Callable[[Any], Agent],
+    make: str | AgentFactory,
     n_episodes: int = 64,
     seed: int = EVALUATION_SEED,
     *,
@@ -69,26 +71,26 @@ def evaluate(
     """Return the score of an agent over whole episodes with fixed seeds.
 
     Args:
-        make: builds the agent for an `EnvInfo`; or an agent as `make_agent` takes it: a name, a
-            file or "module:function".
-        n_episodes: how many episodes; the k-th begins with `reset(seed=seed + k)`.
-        seed: of the first.
-        engine: where they are played, which changes nothing: "serial", "processes", or "ray" (the
-            cluster that this process is connected to, or one on this machine); None: what is
+        make: a function that makes the agent for an `EnvInfo`; or an agent as `make_agent` takes
+            it: a name, a file or "module:function".
+        n_episodes: number of episodes; the k-th begins with `reset(seed=seed + k)`.
+        seed: seed of the first episode.
+        engine: where episodes are played, without effect on the score: "serial", "processes", or
+            "ray" (the cluster that this process is connected to, or one on this machine); None: the
             fastest on this machine.
-        tick: called with the share that was done since the last call.
-        trust: whether pickles in a checkpoint are read, as of `make_agent`.
-        kwargs: the environment's, as of `HRCVectorEnv`: task, perception, estimator, ...
+        tick: is called with the share that was completed since the last call.
+        trust: whether pickles in a checkpoint may be loaded, as in `make_agent`.
+        kwargs: arguments of the environment, as of `HRCVectorEnv`: task, perception, estimator, ...
 
     Raises:
-        ConfigError: no such agent, engine, or no episode.
+        ConfigError: the agent or the engine does not exist, or there is no episode.
     """
     given = {"engine": engine, "tick": tick, "trust": trust, **kwargs}
     return summarize(evaluate_episodes(make, n_episodes, seed, **given))
 
 
 def evaluate_episodes(
-    make: str | Callable[[Any], Agent],
+    make: str | AgentFactory,
     n_episodes: int = 64,
     seed: int = EVALUATION_SEED,
     *,
@@ -105,13 +107,14 @@ def evaluate_episodes(
         compare_means([e["cost"] for e in ours], [e["cost"] for e in theirs])
 
     Args:
-        make, n_episodes, seed, engine, tick, trust, kwargs: as of `evaluate`.
+        make, n_episodes, seed, engine, tick, trust, kwargs: as in `evaluate`.
 
     Returns:
-        Of each its return `r`, `cost`, `contacts`, `goals_reached`, `success`, `seconds`, ...
+        One record per episode, with its return `r`, `cost`, `contacts`, `goals_reached`,
+            `success`, `seconds`, ...
 
     Raises:
-        ConfigError: no such agent, engine, or no episode.
+        ConfigError: the agent or the engine does not exist, or there is no episode.
     """
     whole("n_episodes", n_episodes, 1, 10**9)
     if isinstance(engine, str):
@@ -122,32 +125,32 @@ def evaluate_episodes(
         make = partial(registry.make_agent, carried(make), trust=trust)
     if not callable(make):
         raise ConfigError(
-            "evaluate wants a function that makes an agent for an EnvInfo, or an agent as "
+            "evaluate takes a function that makes an agent for an EnvInfo, or an agent as "
             f"make_agent takes it, got {type(make).__name__}."
         )
     return play_shards(make, n_episodes, seed, engine, tick, **kwargs)
 
 
 def play_shards(
-    make: Callable[[Any], Agent],
+    make: AgentFactory,
     n_episodes: int,
     seed: int = EVALUATION_SEED,
     engine: Engine | None = None,
     tick: Callable[[float], None] = lambda share: None,
     **kwargs: Any,
 ) -> list[dict[str, float]]:
-    """Return what `play_episodes` does, of shards that an engine plays.
+    """Return the statistics of `play_episodes`, from shards that an engine plays.
 
-    Shards are the same for every engine, so that a network of an agent, whose sums may depend on
-    how many observations it is given at once, gives the same actions.
+    Shards are the same for every engine: sums inside of an agent's network may depend on the number
+    of observations in a batch.
 
     Args:
-        make: builds the agent for an `EnvInfo`.
-        n_episodes: their number.
-        seed: of the first.
-        engine: None: several processes at level pixels, else this one.
-        tick: called with the share that was done since the last call.
-        kwargs: as of `play_episodes`.
+        make: makes the agent for an `EnvInfo`.
+        n_episodes: number of episodes.
+        seed: seed of the first episode.
+        engine: where shards are played; None: several processes at level pixels, else this one.
+        tick: is called with the share that was completed since the last call.
+        kwargs: as in `play_episodes`.
     """
     is_drawn = kwargs.get("perception") == "pixels"
     together = DRAWN_TOGETHER if is_drawn else TOGETHER
@@ -161,38 +164,40 @@ def play_shards(
     shards: list[list[dict[str, float]]] = [[] for _ in calls]
     for done in engine.run(calls, lambda k, share: tick(share * sizes[k] / n_episodes)):
         shards[done.k] = done.result
-    return [each for shard in shards for each in shard]
+    return [episode for shard in shards for episode in shard]
 
 
 def _play_shard(
-    make: Callable[[Any], Agent], n: int, seed: int, kwargs: dict[str, Any], tick: Tick
+    make: AgentFactory, n: int, seed: int, kwargs: dict[str, Any], tick: Tick
 ) -> list[dict[str, float]]:
     return play_episodes(make, n, seed, tick, **kwargs)
 
 
 def play_episodes(
-    make: Callable[[Any], Agent],
+    make: AgentFactory,
     n_episodes: int,
     seed: int = EVALUATION_SEED,
     tick: Callable[[float], None] = lambda share: None,
     **kwargs: Any,
 ) -> list[dict[str, float]]:
-    """Return the statistics of whole episodes, the k-th after `reset(seed=seed + k)` whatever the
-    agent, so that agents and perception levels can be compared episode by episode.
+    """Return the statistics of whole episodes, each a record by name.
+
+    The k-th episode begins with `reset(seed=seed + k)` for every agent, so agents and perception
+    levels can be compared episode by episode.
 
     Args:
-        make: builds the agent for an `EnvInfo`.
-        n_episodes: their number.
-        seed: of the first.
-        tick: called with the share that was done since the last call.
-        kwargs: as of `HRCVectorEnv`; with perception="pixels", which has no batched form, as of
-            `gymnasium.make`.
+        make: makes the agent for an `EnvInfo`.
+        n_episodes: number of episodes.
+        seed: seed of the first episode.
+        tick: is called with the share that was completed since the last call.
+        kwargs: arguments of `HRCVectorEnv`; with perception="pixels", which is not batched, those
+            of `gymnasium.make`.
     """
     if kwargs.get("perception") == "pixels":
         return play_one_by_one(make, n_episodes, seed, tick, **kwargs)
     with closing(HRCVectorEnv(n_episodes, **kwargs)) as env:
         inner = env.shards.first
-        agent, sums = _made(make, env_info(inner)), EpisodeSums(n_episodes)
+        agent, sums = _make_agent(make, env_info(inner)), EpisodeSums(n_episodes)
         episodes: list[dict[str, float]] = [{} for _ in range(n_episodes)]
         for step in rollout(env, agent, env.reset(seed=seed)[0]):
             sums.add(step.reward, step.info)
@@ -204,29 +209,29 @@ def play_episodes(
 
 
 def play_one_by_one(
-    make: Callable[[Any], Agent],
+    make: AgentFactory,
     n_episodes: int,
     seed: int,
     tick: Callable[[float], None] = lambda share: None,
     **kwargs: Any,
 ) -> list[dict[str, float]]:
-    """Return what `play_episodes` does, played in the single environment."""
+    """Return the statistics of `play_episodes`, played in the single environment."""
     with closing(gymnasium.make(kwargs.pop("task", DEFAULT), **kwargs)) as env:
         inner: HRCEnv = env.unwrapped  # type: ignore[assignment]  # as every id of ours
-        agent, done = _made(make, env_info(inner.simulation)), []
+        agent, done = _make_agent(make, env_info(inner.simulation)), []
         for k in range(n_episodes):
             sums, last = EpisodeSums(1), {}
             for step in rollout(env, agent, env.reset(seed=seed + k)[0]):
-                sums.add(np.array([step.reward]), _as_batch(step))
+                sums.add(np.array([step.reward]), _to_batch(step))
                 last = step.info
             done.append(sums.summarize(0, last, inner.simulation.task, inner.config.ctrl_dt))
             tick(1 / n_episodes)
         return done
 
 
-def _made(make: Callable[[Any], Agent], info: Any) -> Agent:
-    """Return the agent of a function; `ConfigError` for other arguments or results."""
-    check_arguments("What makes an agent", make, "env_info")
+def _make_agent(make: AgentFactory, info: EnvInfo) -> Agent:
+    """Return the agent of a factory; raise `ConfigError` for other arguments or results."""
+    check_arguments("The function that makes an agent", make, "env_info")
     agent = make(info)
     if not callable(getattr(agent, "act", None)):
         raise ConfigError(
@@ -236,15 +241,15 @@ def _made(make: Callable[[Any], Agent], info: Any) -> Agent:
     return agent
 
 
-def _as_batch(step: Transition) -> dict[str, Any]:
-    """Return the info of a single environment as that of a batch of one."""
+def _to_batch(step: Transition) -> dict[str, Any]:
+    """Return the info of a single environment as the info of a batch of one."""
     arrays = {name: np.array([value]) for name, value in step.info.items()}
     return arrays | {f"_{name}": np.ones(1, np.bool_) for name in arrays}
 
 
 def summarize(episodes: list[dict[str, float]]) -> Score:
     """Return the score of finished episodes."""
-    column = {name: np.array([each[name] for each in episodes]) for name in episodes[0]}
+    column = {name: np.array([row[name] for row in episodes]) for name in episodes[0]}
     reached, missed = column[ACHIEVED].sum(), column[FAILED].sum()
     minutes = column["seconds"].sum() / 60
     return Score(
@@ -260,24 +265,24 @@ def summarize(episodes: list[dict[str, float]]) -> Score:
     )
 
 
-def contradiction(score: Score) -> str:
-    """Return a sentence where most attempts were achieved and no episode succeeded; else ""."""
+def describe_contradiction(score: Score) -> str:
+    """Return a warning if most attempts were achieved but no episode succeeded, else ""."""
     if score.is_success > 0 or score.success_rate < 0.5:
         return ""
     return (
-        f"{score.success_rate:.0%} of the attempts were achieved (Task.achieved of it and "
-        "Task.failed), but no episode ended with is_success: these are two questions, and this "
-        "task's info answers them differently."
+        f"{score.success_rate:.0%} of the attempts were achieved (Task.achieved over the sum with "
+        "Task.failed), but no episode ended with is_success: the task defines the two differently."
     )
 
 
 def measure(episodes: list[dict[str, float]]) -> dict[str, Metric]:
-    """Return means over episodes with 95 % intervals: exact ones of contacts, else bootstraps."""
-    column = {name: [each[name] for each in episodes] for name in episodes[0]}
+    """Return means over episodes with 95 % intervals: exact for contacts, bootstrap for the
+    others."""
+    column = {name: [row[name] for row in episodes] for name in episodes[0]}
     minutes = [seconds / 60 for seconds in column["seconds"]]
     return {
-        "return": mean_over(column["r"], "1"),
-        "goals_per_minute": goals_over(column["goals_reached"], minutes),
-        "cost_per_episode": mean_over(column["cost"], COST_UNIT),
-        "contacts_per_episode": rate_of(column["contacts"], len(episodes), "1"),
+        "return": estimate_mean(column["r"], "1"),
+        "goals_per_minute": estimate_goal_rate(column["goals_reached"], minutes),
+        "cost_per_episode": estimate_mean(column["cost"], COST_UNIT),
+        "contacts_per_episode": estimate_rate(column["contacts"], len(episodes), "1"),
     }

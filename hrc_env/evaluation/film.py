@@ -1,19 +1,19 @@
-"""Films of an agent: played, drawn and encoded; and which episode is worth one."""
+"""Films of an agent's episodes, and the search for an episode with a close encounter."""
 
 import os
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import imageio.v2 as imageio
 import numpy as np
 from rich.console import Console
 
-from hrc_env.agents.env_info import env_info
+from hrc_env.agents.env_info import AgentFactory, env_info
 from hrc_env.core.progress import track
 from hrc_env.core.typing import Image
 from hrc_env.env import HRCEnv
@@ -22,25 +22,38 @@ from hrc_env.pipeline.ready import make_ready
 from hrc_env.render.frame import MOMENT, Diary, compose
 
 STEPS_PER_FRAME = 2
-"""A film shows every second step, in real time."""
+"""Control steps per film frame; the film runs in real time."""
 CLOSE_M = 0.1
-"""The still shows the closest moment that is not yet closer than this [m]."""
+"""Distance of a near miss [m]: the still shows the closest moment beyond it."""
 H264 = ("-preset", "superfast", "-crf", "18")
-"""A fifth of the usual preset's time; sharp."""
+"""Encoder options: a fifth of the usual preset's time, and sharp."""
 FRAMES_BEHIND = 2
-"""So many frames may wait to be drawn."""
+"""Greatest number of frames that wait to be drawn."""
 
-Make = Callable[[Any], Any]
-"""Builds the agent for an `EnvInfo`."""
+
+class FilmResult(NamedTuple):
+    """The result of a film."""
+
+    totals: dict[str, float]
+    """Totals of the episode by "name [unit]"."""
+    still: Image
+    """The frame of the closest moment that is not a near miss, or the first frame."""
 
 
 def film_episode(
-    make: Make, path: Path, seed: int = 0, n_steps: int | None = None, **kwargs: Any
+    make: AgentFactory, path: Path, seed: int = 0, n_steps: int | None = None, **kwargs: Any
 ) -> dict[str, float]:
-    """Film an agent in the `HRCEnv` of `kwargs` into an .mp4 file; what came of it, by name [unit].
+    """Film an agent's episode in the `HRCEnv` of `kwargs` and return its totals by "name [unit]".
 
-    The film ends with the episode, or after `n_steps` (None: the task's time limit). A still of the
-    closest moment that is no near miss yet, or of the first, is written beside it.
+    The film ends with the episode, or after `n_steps` (default: the task's time limit). A still of
+    the closest moment that is not a near miss, or of the first moment, is written beside it.
+
+    Args:
+        make: makes the agent for an `EnvInfo`.
+        path: the .mp4 file to write.
+        seed: seed of the episode.
+        n_steps: greatest number of control steps.
+        kwargs: arguments of `HRCEnv`.
     """
     level = kwargs.get("perception", "pixels")
     make_ready(Console(), level, draws=True)
@@ -49,53 +62,52 @@ def film_episode(
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_suffix(".draft.mp4")
     try:
-        totals, still = _filmed(env, make, draft, seed, n_steps or _limit(env))
-        imageio.imwrite(path.with_suffix(".png"), still)
+        result = _film(env, make, draft, seed, n_steps or _get_time_limit(env))
+        imageio.imwrite(path.with_suffix(".png"), result.still)
         os.replace(draft, path)
     finally:
         env.close()
         draft.unlink(missing_ok=True)
-    return totals
+    return result.totals
 
 
-def nearest_seed(
-    make: Make, seeds: Iterable[int], n_steps: int | None = None, **kwargs: Any
+def find_nearest_seed(
+    make: AgentFactory, seeds: Iterable[int], n_steps: int | None = None, **kwargs: Any
 ) -> int:
-    """Of some seeds the one whose episode comes closest to the worker without touching them.
+    """Return the seed of the episode that comes closest to the worker without a near miss.
 
-    Nothing is drawn: "pixels" is played as "keypoints", and may come out otherwise in the film.
+    Nothing is drawn: "pixels" is played as "keypoints", so the film's episode may differ.
     """
     if kwargs.get("perception", "pixels") == "pixels":
         kwargs = {**kwargs, "perception": "keypoints", "appearance": None}
     with closing(HRCEnv(**kwargs)) as env:
+        limit = n_steps or _get_time_limit(env)
         tried = track(list(seeds), "looking for an encounter")
-        closest_m = {seed: _closest_m(env, make, seed, n_steps or _limit(env)) for seed in tried}
-    free = [seed for seed, metres in closest_m.items() if metres > CLOSE_M]
+        closest_m = {seed: _find_closest_m(env, make, seed, limit) for seed in tried}
+    free = [seed for seed, distance_m in closest_m.items() if distance_m > CLOSE_M]
     if free:
         return min(free, key=closest_m.__getitem__)
     return max(closest_m, key=closest_m.__getitem__)  # all are near misses: the least one
 
 
-def begin(env: Any, make: Make, seed: int, n_steps: int) -> Iterator[Transition]:
-    """Begin an episode of the agent that is made; return its steps up to its end."""
+def begin_episode(env: Any, make: AgentFactory, seed: int, n_steps: int) -> Iterator[Transition]:
+    """Reset an environment, make its agent, and return the steps of the episode."""
     agent = make(env_info(env.unwrapped.simulation))
     return rollout(env, agent, env.reset(seed=seed)[0], n_steps)
 
 
-def _limit(env: HRCEnv) -> int:
+def _get_time_limit(env: HRCEnv) -> int:
     return env.simulation.task.max_episode_steps
 
 
-def _closest_m(env: HRCEnv, make: Make, seed: int, n_steps: int) -> float:
-    played = begin(env, make, seed, n_steps)
-    return min(float(step.info["safety/min_separation_m"]) for step in played)
+def _find_closest_m(env: HRCEnv, make: AgentFactory, seed: int, n_steps: int) -> float:
+    steps = begin_episode(env, make, seed, n_steps)
+    return min(float(step.info["safety/min_separation_m"]) for step in steps)
 
 
-def _filmed(
-    env: HRCEnv, make: Make, path: Path, seed: int, n_steps: int
-) -> tuple[dict[str, float], Image]:
-    """Play, while a thread draws and encodes every second step; what came of it, and the still."""
-    played, waiting = begin(env, make, seed, n_steps), deque[Future[Image]]()
+def _film(env: HRCEnv, make: AgentFactory, path: Path, seed: int, n_steps: int) -> FilmResult:
+    """Play an episode, while a thread draws and encodes every second step."""
+    steps, waiting = begin_episode(env, make, seed, n_steps), deque[Future[Image]]()
     writer: Any = imageio.get_writer(
         path, fps=1 / env.config.ctrl_dt / STEPS_PER_FRAME,
         quality=None, macro_block_size=4, output_params=list(H264),
@@ -110,8 +122,8 @@ def _filmed(
     diary, closest_m, started_s = np.zeros(n_steps, MOMENT), np.inf, time.monotonic()
     step, counts = 0, {}
     with closing(writer), ThreadPoolExecutor(1, "hrc_env-film") as thread:
-        for step, made in enumerate(track(played, "filming", n_steps)):
-            info = made.info
+        for step, transition in enumerate(track(steps, "filming", n_steps)):
+            info = transition.info
             believed = env.simulation.belief.separation.distance_m
             true_m = info["safety/min_separation_m"]
             error_m = info["tracking/mpjpe_m"] if info["tracking/mpjpe_measured"] else np.nan
@@ -125,17 +137,17 @@ def _filmed(
                 still = waiting[-1] if closer or step == 0 else still
                 if len(waiting) > FRAMES_BEHIND:
                     waiting.popleft().result()
-        for drawn in waiting:
-            drawn.result()
+        for frame in waiting:
+            frame.result()
         seconds = time.monotonic() - started_s
-    return _totals(diary[: step + 1], counts, seconds), still.result()
+    return FilmResult(_sum_up(diary[: step + 1], counts, seconds), still.result())
 
 
-def _totals(diary: Diary, counts: Mapping[str, float], seconds: float) -> dict[str, float]:
-    known = diary["error_m"][np.isfinite(diary["error_m"])]
+def _sum_up(diary: Diary, counts: Mapping[str, float], seconds: float) -> dict[str, float]:
+    errors_m = diary["error_m"][np.isfinite(diary["error_m"])]
     return {
-        "median tracking error [mm]": 1e3 * float(np.median(known)) if len(known) else np.nan,
-        "lost steps [%]": 100 * (1 - len(known) / len(diary)),
+        "median tracking error [mm]": 1e3 * float(np.median(errors_m)) if len(errors_m) else np.nan,
+        "lost steps [%]": 100 * (1 - len(errors_m) / len(diary)),
         "minimum separation [m]": float(diary["true_m"].min()),
         **{f"{name} [count]": n for name, n in counts.items()},
         "cost [control steps]": float(diary["cost"].sum()),

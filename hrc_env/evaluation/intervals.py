@@ -1,8 +1,8 @@
-"""Numbers with 95 % intervals: one bootstrap over seeds, of which frames are no independent part.
+"""Metrics with 95 % intervals, by bootstrap over seeds, as the frames of a seed are dependent.
 
-Rows that share their seeds are compared seed by seed (`paired`). Events that are rare and shares of
-trials have exact intervals (`rate_of`, `share_of`): draws of zeros are zeros, and would say that
-an event that did not happen cannot happen.
+Rows that share their seeds are compared seed by seed (`compare_paired`). Rates of rare events and
+shares of trials have exact intervals (`estimate_rate`, `estimate_share`): a bootstrap of zeros has
+no width, as if an event that did not happen could not happen.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,42 +22,45 @@ from hrc_env.evaluation.counts import Bins
 Metrics = dict[str, Metric]
 Numbers = Sequence[float] | Floats
 Statistic = Callable[[Ints], Floats]
-"""From how often each seed is drawn (R, n) to a number for each draw (R,)."""
+"""A function from the number of times that each seed is drawn (R, n) to a value for each draw
+(R,)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """How much one row has more than another."""
+    """The difference between two rows."""
 
     difference: Metric
-    """With its 95 % interval."""
+    """Difference with its 95 % interval."""
     p: float
-    """Two-sided probability of a difference as large as that if there were none; NaN: not known."""
+    """Two-sided probability of a difference at least that large if there were none; NaN if
+    undefined."""
 
 
 def compare_means(ours: Numbers, theirs: Numbers, unit: str = "1") -> Comparison:
     """Return the difference of two means over the same seeds, pair by pair.
 
-    Its interval is a bootstrap over pairs, p is by exchanging the two of a pair at random (Fisher
-    1935): below .05 with 6 pairs or more. Pairs of which a number is not finite do not count.
+    The interval is a bootstrap over pairs; p is from exchanging the two of a pair at random (Fisher
+    1935), and can fall below .05 with 6 pairs or more. Pairs with a number that is not finite do
+    not count.
 
     Args:
-        ours: (n,) a number with each seed.
-        theirs: (n,) those of what it is compared with, with the same seeds in the same order.
-        unit: of both.
+        ours: (n,) one number per seed.
+        theirs: (n,) numbers to compare with, for the same seeds in the same order.
+        unit: unit of both.
 
     Raises:
-        ConfigError: not two columns of one length.
+        ConfigError: these are not two columns of one length.
     """
-    x, y = _column("ours", ours), _column("theirs", theirs)
+    x, y = _check_column("ours", ours), _check_column("theirs", theirs)
     if len(x) != len(y):
         raise ConfigError(
-            f"ours and theirs must be of the same seeds, got {len(x)} and {len(y)} numbers."
+            f"ours and theirs must have the same seeds, got {len(x)} and {len(y)} numbers."
         )
-    x, y = _usable(x, y)
+    x, y = _keep_finite(x, y)
     both = [*x, *y]
-    found = paired("it", ratio_of(both, np.ones(len(both))), len(x), unit)
-    return Comparison(found["difference.it"], found["p.it"].value)
+    metrics = compare_paired("it", make_ratio(both, np.ones(len(both))), len(x), unit)
+    return Comparison(metrics["difference.it"], metrics["p.it"].value)
 
 
 def compare_rates(
@@ -67,23 +70,26 @@ def compare_rates(
     their_exposure: Numbers | float,
     unit: str = "1",
 ) -> Comparison:
-    """Return the difference of how often something rare happened, from exact intervals.
+    """Return the difference of two rates of rare events, from exact intervals.
 
-    Its interval follows from those of both rates (`rate_of`; Zou and Donner 2008,
-    doi:10.1002/sim.3095), also where nothing happened at all; p is exact, of how the events are
-    shared out (Przyborowski and Wilenski 1940, doi:10.1093/biomet/31.3-4.313).
+    The interval follows from those of both rates (`estimate_rate`; Zou and Donner 2008,
+    doi:10.1002/sim.3095), also if there was no event at all. The p-value is exact, from the
+    distribution of the events over both (Przyborowski and Wilenski 1940,
+    doi:10.1093/biomet/31.3-4.313).
 
     Args:
-        ours: (n,) how often it happened with each seed.
-        theirs: (m,) the same of what it is compared with.
-        our_exposure: in how much it was counted, with each seed or with all together.
-        their_exposure: the same of what it is compared with.
-        unit: of a count over an exposure.
+        ours: (n,) number of events per seed.
+        theirs: (m,) number of events per seed to compare with.
+        our_exposure: exposure of `ours`, per seed or in total.
+        their_exposure: exposure of `theirs`, per seed or in total.
+        unit: unit of an event per exposure.
 
     Raises:
-        ConfigError: counts that are no whole numbers, or an exposure below 0.
+        ConfigError: counts are not whole numbers, or an exposure is below 0.
     """
-    difference = excess_of(rate_of(ours, our_exposure, unit), rate_of(theirs, their_exposure, unit))
+    difference = subtract_rates(
+        estimate_rate(ours, our_exposure, unit), estimate_rate(theirs, their_exposure, unit)
+    )
     x, y = int(np.sum(ours)), int(np.sum(theirs))
     over, under = float(np.sum(our_exposure)), float(np.sum(their_exposure))
     if not over or not under:
@@ -93,12 +99,13 @@ def compare_rates(
 
 
 def bootstrap(statistic: Statistic, n: int, unit: str, n_draws: int = 4000) -> Metric:
-    """A statistic of n seeds with its percentile interval; draws without a value do not count."""
+    """Return a statistic of n seeds with its percentile interval; draws without a value do not
+    count."""
     if n == 0:
         return Metric(np.nan, np.nan, np.nan, unit, 0)
     with np.errstate(divide="ignore", invalid="ignore"):
         point = float(statistic(np.ones((1, n), np.int64))[0])
-        drawn = statistic(draws(n, n_draws)) if n > 1 else np.array([point])
+        drawn = statistic(draw_seeds(n, n_draws)) if n > 1 else np.array([point])
     drawn = drawn[~np.isnan(drawn)]
     if np.isnan(point) or not np.isfinite(drawn).all() or not drawn.size:
         return Metric(point, point, point, unit, n)
@@ -106,51 +113,56 @@ def bootstrap(statistic: Statistic, n: int, unit: str, n_draws: int = 4000) -> M
     return Metric(point, float(low), float(high), unit, n)
 
 
-def paired(name: str, statistic: Statistic, n: int, unit: str, n_draws: int = 4000) -> Metrics:
+def compare_paired(
+    name: str, statistic: Statistic, n: int, unit: str, n_draws: int = 4000
+) -> Metrics:
     """Return the difference of a statistic between two rows with the same seeds.
 
-    Of numbers `ours` and `theirs` (n,) the difference of the means, as `compare_means` gives it:
+    With one number per seed, `ours` and `theirs` (n,), the difference of the means, as by
+    `compare_means`:
 
         both = np.array([*ours, *theirs])
-        paired("mean", lambda weights: weights @ both / weights.sum(-1), len(ours), "m")
+        compare_paired("mean", lambda weights: weights @ both / weights.sum(-1), len(ours), "m")
 
     Args:
-        name: of the statistic.
-        statistic: of one row, not the difference. It is given weights (R, 2n), how often each seed
-            counts, of ours and then of theirs; for the statistic of ours those of theirs are 0.
+        name: name of the statistic.
+        statistic: of one row, not of the difference. It takes weights (R, 2n), the number of times
+            that each seed counts, of ours and then of theirs; for the statistic of ours those of
+            theirs are 0.
         n: number of seeds of a row.
-        unit: of the statistic.
-        n_draws: how often seeds are drawn.
+        unit: unit of the statistic.
+        n_draws: number of draws of seeds.
 
     Returns:
         "difference.NAME" with its 95 % interval over draws of whole pairs; and "p.NAME", two-sided,
-        by exchanging the rows in each pair at random (Fisher 1935), below .05 with 6 seeds or more.
+            from exchanging the rows of each pair at random (Fisher 1935), below .05 with 6 seeds or
+            more.
     """
 
-    def off(ours: Ints, theirs: Ints) -> Floats:
+    def subtract(ours: Ints, theirs: Ints) -> Floats:
         return statistic(np.hstack([ours, theirs])) - statistic(np.hstack([theirs, ours]))
 
-    found = bootstrap(lambda w: off(w, 0 * w), n, unit, n_draws)
+    difference = bootstrap(lambda weights: subtract(weights, 0 * weights), n, unit, n_draws)
     flips = np.random.default_rng(0).integers(0, 2, (n_draws, n))
     with np.errstate(divide="ignore", invalid="ignore"):
-        is_less = np.abs(off(flips, 1 - flips)) < abs(found.value) * (1 - 1e-9)
-    p = (1 + int((~is_less).sum())) / (1 + n_draws) + 0 * found.value  # not known if that is not
-    return {f"difference.{name}": found, f"p.{name}": Metric(p, p, p, "p", n)}
+        is_less = np.abs(subtract(flips, 1 - flips)) < abs(difference.value) * (1 - 1e-9)
+    p = (1 + int((~is_less).sum())) / (1 + n_draws) + 0 * difference.value  # NaN if that is NaN
+    return {f"difference.{name}": difference, f"p.{name}": Metric(p, p, p, "p", n)}
 
 
-def ratio_of(above: Numbers, below: Numbers) -> Statistic:
-    """Sum of one number a seed over the sum of another."""
+def make_ratio(above: Numbers, below: Numbers) -> Statistic:
+    """Return the statistic "sum of one number per seed over the sum of another"."""
     x, y = np.asarray(above, float), np.asarray(below, float)
     return lambda weights: (weights @ x) / (weights @ y)
 
 
-def rmse_of(squared: Numbers, counts: Numbers) -> Statistic:
-    """Root of the mean of squares, from their sum and number a seed."""
-    return lambda weights: np.sqrt(ratio_of(squared, counts)(weights))
+def make_rmse(squared: Numbers, counts: Numbers) -> Statistic:
+    """Return the statistic "root mean square", from a sum of squares and a count per seed."""
+    return lambda weights: np.sqrt(make_ratio(squared, counts)(weights))
 
 
-def quantile_of(values: Sequence[Numbers], q: float) -> Statistic:
-    """A quantile of all values of all seeds together."""
+def make_quantile(values: Sequence[Numbers], q: float) -> Statistic:
+    """Return the statistic "quantile of all values of all seeds together"."""
     owner = np.repeat(np.arange(len(values)), [len(each) for each in values])
     together = np.concatenate([*values, []])
 
@@ -161,42 +173,46 @@ def quantile_of(values: Sequence[Numbers], q: float) -> Statistic:
     return quantile
 
 
-def counted_quantile_of(bins: Bins, counts: Any, q: float) -> Statistic:
-    """A quantile of counts (n, bins), a row a seed; what is beyond the last limit is that limit."""
+def make_binned_quantile(bins: Bins, counts: Any, q: float) -> Statistic:
+    """Return the statistic "quantile of counts" (n, bins), one row per seed.
+
+    Values beyond the last edge count as that edge.
+    """
     rows, most = np.asarray(counts, float), bins.edges[-1]
     return lambda weights: np.minimum(bins.quantile(weights @ rows, q), most)
 
 
-def ratio_over(above: Numbers, below: Numbers, unit: str) -> Metric:
-    """Sum of one number a seed over the sum of another: rates, shares, ratios of paired rows."""
-    x, y = _usable(above, below)
-    return bootstrap(ratio_of(x, y), len(x), unit)
+def estimate_ratio(above: Numbers, below: Numbers, unit: str) -> Metric:
+    """Return the sum of one number per seed over the sum of another: a rate, share or ratio of
+    rows."""
+    x, y = _keep_finite(above, below)
+    return bootstrap(make_ratio(x, y), len(x), unit)
 
 
-def rate_of(counts: Numbers, exposure: Numbers | float, unit: str = "1") -> Metric:
-    """Return how often something rare happened, with its exact 95 % interval.
+def estimate_rate(counts: Numbers, exposure: Numbers | float, unit: str = "1") -> Metric:
+    """Return the rate of a rare event, with its exact 95 % interval.
 
-    That of a Poisson count says how often an event that did not happen still may (Garwood 1936,
-    doi:10.2307/2333958).
+    The interval of a Poisson count bounds the rate also of an event that did not happen (Garwood
+    1936, doi:10.2307/2333958).
 
     Args:
-        counts: (n,) how often it happened with each seed.
-        exposure: in how much it was counted, with each seed (n,) or with all together.
-        unit: of a count over an exposure.
+        counts: (n,) number of events per seed.
+        exposure: the time, distance or number of trials observed, per seed (n,) or in total.
+        unit: unit of an event per exposure.
 
     Raises:
-        ConfigError: counts that are no whole numbers, or an exposure below 0.
+        ConfigError: counts are not whole numbers, or an exposure is below 0.
     """
-    events = _column("counts", counts)
+    events = _check_column("counts", counts)
     if not (np.isfinite(events).all() and (events >= 0).all() and (events % 1 == 0).all()):
         raise ConfigError(
-            "counts must be whole numbers from 0 on, one with each seed: of other numbers take "
-            f"mean_over; got {described(counts)}."
+            "counts must be whole numbers from 0 on, one per seed; estimate_mean takes other "
+            f"numbers; got {described(counts)}."
         )
-    if np.ndim(exposure) and len(_column("exposure", exposure)) != len(events):
+    if np.ndim(exposure) and len(_check_column("exposure", exposure)) != len(events):
         raise ConfigError(
-            f"counts and exposure must be of the same seeds, got {len(events)} and "
-            f"{np.size(exposure)} numbers; one number is the exposure of all together."
+            f"counts and exposure must have the same seeds, got {len(events)} and "
+            f"{np.size(exposure)} numbers; a single number is the exposure of all seeds."
         )
     if not np.all(np.asarray(exposure, float) >= 0):
         raise ConfigError(f"exposure must not be negative, got {described(exposure)}.")
@@ -210,66 +226,86 @@ def rate_of(counts: Numbers, exposure: Numbers | float, unit: str = "1") -> Metr
     return Metric(value, low, high, unit, len(counts))
 
 
-def share_of(seen: Sequence[bool] | Bools) -> Metric:
-    """Return the share of trials in which something was seen, with its exact 95 % interval.
+def estimate_share(outcomes: Sequence[bool] | Bools) -> Metric:
+    """Return the share of trials with a true outcome, with its exact 95 % interval.
 
-    The interval is binomial (Clopper and Pearson 1934, doi:10.1093/biomet/26.4.404); NaN of no
-    trials. `ConfigError` for anything but a column of truth values.
+    The interval is binomial (Clopper and Pearson 1934, doi:10.1093/biomet/26.4.404); the share of
+    no trials is NaN.
+
+    Args:
+        outcomes: (n,) truth values.
+
+    Raises:
+        ConfigError: outcomes are not a column of truth values.
     """
-    column = _column("seen", seen)
+    column = _check_column("outcomes", outcomes)
     if not np.isin(column, (0.0, 1.0)).all():
-        raise ConfigError(f"seen must be true or false of each trial, got {described(seen)}.")
-    n, n_seen = len(column), int(column.sum())
+        raise ConfigError(f"outcomes must be true or false per trial, got {described(outcomes)}.")
+    n, n_true = len(column), int(column.sum())
     if n == 0:
         return Metric(np.nan, np.nan, np.nan, "share", 0)
-    found = stats.binomtest(n_seen, n).proportion_ci(0.95, method="exact")
-    return Metric(n_seen / n, float(found.low), float(found.high), "share", n)
+    interval = stats.binomtest(n_true, n).proportion_ci(0.95, method="exact")
+    return Metric(n_true / n, float(interval.low), float(interval.high), "share", n)
 
 
-def goals_over(goals: Numbers, minutes: Numbers) -> Metric:
-    """Goals a minute: they come so regularly that a bootstrap is narrower than the interval of a
-    Poisson count, which stands where no goal was reached."""
-    return (ratio_over if np.any(goals) else rate_of)(goals, minutes, "1/min")
+def estimate_goal_rate(goals: Numbers, minutes: Numbers) -> Metric:
+    """Return goals per minute, with a bootstrap interval if any goal was reached, else an exact
+    one.
 
-
-def success_over(achieved: Numbers, tries: Numbers) -> Metric:
-    """The share of tries that succeeded; where all or none did, its interval is the exact one of
-    as many trials as there are seeds, as tries with one seed are alike."""
-    found = ratio_over(achieved, tries, "1")
-    if found.value not in (0.0, 1.0):
-        return found
-    exact = share_of([bool(found.value)] * found.n)
-    return replace(found, low=exact.low, high=exact.high)
-
-
-def excess_of(ours: Metric, theirs: Metric) -> Metric:
-    """One rate less another, with the interval that follows from both of theirs (Zou and Donner
-    2008, doi:10.1002/sim.3095): also where both are zero it has a width."""
-    less = ours.value - theirs.value
-    low = less - np.hypot(ours.value - ours.low, theirs.high - theirs.value)
-    high = less + np.hypot(ours.high - ours.value, theirs.value - theirs.low)
-    return Metric(less, float(low), float(high), ours.unit, ours.n)
-
-
-def mean_over(values: Numbers, unit: str = "1") -> Metric:
-    """Return the mean of one number a seed with its 95 % bootstrap interval.
-
-    Seeds without a finite number do not count: `Metric.n` says how many did. `ConfigError` for
-    anything but a column of numbers.
+    Goals are more regular than a Poisson process, so the bootstrap's interval is narrower.
     """
-    values = _column("values", values)
-    return ratio_over(values, np.ones(len(values)), unit)
+    return (estimate_ratio if np.any(goals) else estimate_rate)(goals, minutes, "1/min")
 
 
-def rmse_over(squared: Numbers, counts: Numbers, unit: str) -> Metric:
-    """Root of the mean of squares, from their sum and number a seed; or the ratio of two RMSEs."""
-    x, y = _usable(squared, counts)
-    return bootstrap(rmse_of(x, y), len(x), unit)
+def estimate_success(achieved: Numbers, tries: Numbers) -> Metric:
+    """Return the share of attempts that succeeded, with a bootstrap interval.
+
+    If all or none did, the interval is the exact one of as many trials as there are seeds, because
+    attempts with one seed are alike.
+    """
+    share = estimate_ratio(achieved, tries, "1")
+    if share.value not in (0.0, 1.0):
+        return share
+    exact = estimate_share([bool(share.value)] * share.n)
+    return replace(share, low=exact.low, high=exact.high)
 
 
-def iqm_over(values: Numbers, unit: str) -> Metric:
-    """The mean of the middle half of the seeds (Agarwal et al. 2021, arXiv:2108.13264)."""
-    (x,) = _usable(values)
+def subtract_rates(ours: Metric, theirs: Metric) -> Metric:
+    """Return the difference of two rates, with the interval that follows from both of theirs.
+
+    The interval (Zou and Donner 2008, doi:10.1002/sim.3095) has a width also if both rates are 0.
+    """
+    difference = ours.value - theirs.value
+    low = difference - np.hypot(ours.value - ours.low, theirs.high - theirs.value)
+    high = difference + np.hypot(ours.high - ours.value, theirs.value - theirs.low)
+    return Metric(difference, float(low), float(high), ours.unit, ours.n)
+
+
+def estimate_mean(values: Numbers, unit: str = "1") -> Metric:
+    """Return the mean of one number per seed with its 95 % bootstrap interval.
+
+    Seeds without a finite number do not count; `Metric.n` is the number of those that do.
+
+    Args:
+        values: (n,) one number per seed.
+        unit: unit of the numbers.
+
+    Raises:
+        ConfigError: values are not a column of numbers.
+    """
+    values = _check_column("values", values)
+    return estimate_ratio(values, np.ones(len(values)), unit)
+
+
+def estimate_rmse(squared: Numbers, counts: Numbers, unit: str) -> Metric:
+    """Return the root mean square from a sum of squares and a count per seed, or a ratio of two."""
+    x, y = _keep_finite(squared, counts)
+    return bootstrap(make_rmse(x, y), len(x), unit)
+
+
+def estimate_iqm(values: Numbers, unit: str) -> Metric:
+    """Return the mean of the middle half of the seeds (Agarwal et al. 2021, arXiv:2108.13264)."""
+    (x,) = _keep_finite(values)
 
     def iqm(weights: Ints) -> Floats:
         drawn = np.repeat(np.tile(x, len(weights)), weights.ravel()).reshape(weights.shape)
@@ -278,21 +314,26 @@ def iqm_over(values: Numbers, unit: str) -> Metric:
     return bootstrap(iqm, len(x), unit)
 
 
-def quantile_over(values: Sequence[Numbers], q: float, unit: str) -> Metric:
-    """A quantile of all values of all seeds together; its n is their number."""
-    groups = [_usable(each)[0] for each in values]
-    found = bootstrap(quantile_of(groups, q), len(groups), unit, 400)
-    return replace(found, n=sum(each.size for each in groups))
+def estimate_quantile(values: Sequence[Numbers], q: float, unit: str) -> Metric:
+    """Return a quantile of all values of all seeds together; its n is the number of values."""
+    groups = [_keep_finite(each)[0] for each in values]
+    metric = bootstrap(make_quantile(groups, q), len(groups), unit, 400)
+    return replace(metric, n=sum(group.size for group in groups))
 
 
-def counted_quantile_over(bins: Bins, counts: Any, q: float, unit: str) -> Metric:
-    """A quantile of counts (n, bins), a row a seed."""
-    return bootstrap(counted_quantile_of(bins, counts, q), len(counts), unit, 1000)
+def estimate_binned_quantile(bins: Bins, counts: Any, q: float, unit: str) -> Metric:
+    """Return a quantile of counts (n, bins), one row per seed."""
+    return bootstrap(make_binned_quantile(bins, counts, q), len(counts), unit, 1000)
 
 
-def crossing(x: Floats, y: Floats, level: float) -> float:
-    """Where falling values y (n,) at x (n,) first come down to a level: linearly between the two
-    nearest, the last x if they never do."""
+def find_crossing(x: Floats, y: Floats, level: float) -> float:
+    """Return the x at which falling values y first reach a level.
+
+    Args:
+        x: (n,) increasing.
+        y: (n,) values at x, between which they are interpolated linearly.
+        level: the level; if it is never reached, the last x is returned.
+    """
     reached = np.flatnonzero(y <= level)
     if not reached.size or reached[0] == 0:
         return x[0] if reached.size else x[-1]
@@ -300,27 +341,25 @@ def crossing(x: Floats, y: Floats, level: float) -> float:
     return float(np.interp(-level, -y[nearest], x[nearest]))
 
 
-def _column(what: str, values: Any) -> Floats:
-    """Return (n,) numbers, or raise `ConfigError`."""
+def _check_column(name: str, values: Any) -> Floats:
+    """Return values as numbers (n,); raise `ConfigError` if they are not."""
     try:
         column = np.asarray(values, float)
     except (TypeError, ValueError) as error:
-        raise ConfigError(f"{what} must be numbers, got {described(values)}: {error}.") from error
+        raise ConfigError(f"{name} must be numbers, got {described(values)}: {error}.") from error
     if column.ndim != 1:
-        raise ConfigError(
-            f"{what} must have shape (n,), a number with each seed, got {column.shape}."
-        )
+        raise ConfigError(f"{name} must have shape (n,), one number per seed, got {column.shape}.")
     return column
 
 
-def _usable(*samples: Numbers) -> list[Floats]:
-    """(n,) each: the seeds of which every number is finite."""
+def _keep_finite(*samples: Numbers) -> list[Floats]:
+    """Return samples (n,) of the seeds for which every number is finite."""
     arrays = [np.asarray(each, float) for each in samples]
     finite = np.all(np.isfinite(arrays), axis=0)
     return [each[finite] for each in arrays]
 
 
 @lru_cache(maxsize=8)
-def draws(n: int, n_draws: int, stream: int = 0) -> Ints:
-    """(R, n) how often each seed is drawn, always the same of a stream."""
+def draw_seeds(n: int, n_draws: int, stream: int = 0) -> Ints:
+    """Return the number of times that each seed is drawn (R, n), always the same for a stream."""
     return np.random.default_rng(stream).multinomial(n, np.full(n, 1 / n), n_draws)

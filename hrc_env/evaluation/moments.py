@@ -1,4 +1,4 @@
-"""Parts of every moment of recorded episodes: chosen infos, poses, keypoints."""
+"""Arrays of each moment of recorded episodes: selected infos, poses and keypoints."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -14,53 +14,58 @@ from hrc_env.vector.env import HRCVectorEnv
 from hrc_env.worker.body import worker_truth
 
 PROJECTIONS = "P"
-"""Name of the projections of cameras beside keypoints, where every episode's rig is drawn."""
+"""Name of the projections beside keypoints, for rigs that are drawn in every episode."""
 Moment = dict[str, NDArray[Any]]
-"""Arrays (B, ...) by name; belief and truth have names of their own, "belief/..." and so on."""
+"""Arrays (B, ...) by name; those of belief and truth begin with "belief/" and "truth/"."""
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
-    """The parts of a moment that are kept."""
+class MomentParts:
+    """The parts of a moment that are recorded."""
 
     infos: tuple[str, ...] = ()
-    """Names of infos."""
+    """Names of the infos to record."""
     poses: bool = False
-    """Whether the workers' joints are, as believed and as they are."""
+    """Whether to record the workers' joints, estimated and true."""
     keypoints: bool = False
-    """Whether the keypoints that the estimator was given are."""
+    """Whether to record the keypoints that the estimator receives."""
 
-    def of(self, env: HRCVectorEnv, info: Mapping[str, Any]) -> Moment:
-        """Return the present moment of every environment, with the infos of its step or reset."""
-        moment = {grouped(name): np.array(info[name]) for name in self.infos}
-        parts = [dict(self._of_part(part)) for part in env.shards.parts]
+    def read(self, env: HRCVectorEnv, info: Mapping[str, Any]) -> Moment:
+        """Return the present moment of every environment.
+
+        Args:
+            env: the environments.
+            info: the infos of their last step or reset.
+        """
+        moment = {add_folder(name): np.array(info[name]) for name in self.infos}
+        parts = [dict(self._read_part(part)) for part in env.shards.parts]
         for name in parts[0]:
             moment[name] = np.concatenate([part[name] for part in parts])
         return moment
 
-    def _of_part(self, part: Simulation) -> Iterator[tuple[str, NDArray[Any]]]:
+    def _read_part(self, part: Simulation) -> Iterator[tuple[str, NDArray[Any]]]:
         if self.poses:
-            yield from _poses(part)
+            yield from _read_poses(part)
         if self.keypoints:
-            found = part.pipeline.measurements
+            keypoints = part.pipeline.measurements
             for name in ("px", "confidence", "sigma_px", "time_s"):
-                if (value := getattr(found, name)) is not None:
+                if (value := getattr(keypoints, name)) is not None:
                     yield f"keypoints/{name}", value.copy()
             if part.cameras.are_drawn:
                 yield f"keypoints/{PROJECTIONS}", part.cameras.projections()
 
 
-def grouped(name: str) -> str:
-    """Return the name of an info behind "belief/" or "truth/", by what it is of."""
+def add_folder(name: str) -> str:
+    """Return the name of an info with its folder, "belief/" or "truth/"."""
     return f"{'belief' if is_of_belief(name) else 'truth'}/{name}"
 
 
-def _poses(part: Simulation) -> Iterator[tuple[str, NDArray[Any]]]:
-    now, present = part.estimate, part.present
+def _read_poses(part: Simulation) -> Iterator[tuple[str, NDArray[Any]]]:
+    estimate, present = part.estimate, part.present
     believed = {
-        "joints_world": now.mean_world, "joints_cov_world": now.cov_world,
-        "joints_velocity_world": now.velocity_world, "age_s": now.age_s,
-        "tracked": now.tracked, "unknown": now.unknown,
+        "joints_world": estimate.mean_world, "joints_cov_world": estimate.cov_world,
+        "joints_velocity_world": estimate.velocity_world, "age_s": estimate.age_s,
+        "tracked": estimate.tracked, "unknown": estimate.unknown,
     }  # fmt: skip
     for name, value in believed.items():
         yield f"belief/{name}", value.copy()

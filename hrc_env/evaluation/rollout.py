@@ -1,4 +1,4 @@
-"""The loop in which an agent acts."""
+"""The loop of an agent and its environment."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from hrc_env.core.typing import Bools
 
 
 class Steppable(Protocol):
-    """An environment, or a batch of them, as Gymnasium steps it."""
+    """An environment, or a batch of them, with the `step` of Gymnasium."""
 
     def step(self, action: Any, /) -> tuple[Any, Any, Any, Any, Mapping[str, Any]]:
         """Return observation, reward, terminated, truncated and info after an action."""
@@ -20,22 +20,22 @@ class Steppable(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """One control step of an environment, or of a batch, whose arrays begin with (B,)."""
+    """One control step of an environment, or of a batch, with arrays that begin with (B,)."""
 
     action: Any
-    """The agent's action (..., A)."""
+    """Action of the agent (..., A)."""
     observation: Observation
-    """The observation after the step (..., n)."""
+    """Observation after the step (..., n)."""
     reward: Any
-    """Of the step: a number, or (B,)."""
+    """Reward of the step, a number or (B,)."""
     terminated: Any
-    """Whether the step ended the episode, or (B,)."""
+    """Whether the step ended the episode, () or (B,)."""
     truncated: Any
-    """Whether the time limit did, or (B,)."""
+    """Whether the step reached the time limit, () or (B,)."""
     info: Mapping[str, Any]
-    """What the environment says of the step (docs/reference/infos.md)."""
+    """Infos of the step (docs/reference/infos.md)."""
     is_playing: Bools
-    """(B,), or () of a single environment: the step belongs to the first episode."""
+    """Whether the step belongs to the first episode, () for a single environment or (B,)."""
 
     @property
     def ends(self) -> Bools:
@@ -46,19 +46,19 @@ class Transition:
 def rollout(
     env: Steppable, agent: Agent, observation: Observation, n_steps: int | None = None
 ) -> Iterator[Transition]:
-    """Let an agent act until the first episode of every environment has ended.
+    """Step an environment with an agent until the first episode has ended.
 
-    Of a batch, environments whose episode has ended are stepped on until all others have ended,
-    too; `Transition.is_playing` tells their steps apart.
+    In a batch, environments whose episode has ended are stepped until all others have ended, too;
+    `Transition.is_playing` marks the steps of first episodes.
 
     Args:
-        env: a Gymnasium environment, a vector environment, or anything with their `step`.
-        agent: its actions go to `env` as they are.
-        observation: the one that `env.reset` has returned.
-        n_steps: the greatest number of steps; None: no limit but the environment's own.
+        env: a Gymnasium environment, a vector environment, or any object with their `step`.
+        agent: its actions are passed to `env` as they are.
+        observation: the observation that `env.reset` returned.
+        n_steps: greatest number of steps (default: no limit but the environment's own).
 
     Yields:
-        Every step as soon as it was made.
+        Each step as soon as it was made.
     """
     is_playing, step = None, 0
     while (is_playing is None or is_playing.any()) and step != n_steps:
@@ -66,8 +66,8 @@ def rollout(
         observation, reward, terminated, truncated, info = env.step(action)
         if is_playing is None:
             is_playing = np.ones(np.shape(terminated), np.bool_)
-        made = Transition(
+        transition = Transition(
             action, observation, reward, terminated, truncated, info, is_playing.copy()
         )
-        yield made
-        is_playing, step = np.asarray(is_playing & ~made.ends), step + 1
+        yield transition
+        is_playing, step = np.asarray(is_playing & ~transition.ends), step + 1

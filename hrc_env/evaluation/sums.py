@@ -1,4 +1,4 @@
-"""What an episode comes to, summed step by step."""
+"""Sums of an episode's infos, updated step by step, and the statistics computed from them."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -10,68 +10,70 @@ from hrc_env.safety.incidents import KINDS
 from hrc_env.tasks.task import Task
 
 COSTS = ("cost", "cost_proximity", "cost_contact")
-"""Infos whose sums over an episode are kept."""
+"""Infos that are summed over an episode."""
 SUMS = np.dtype(
     [(name, "f8") for name in ("steps", "reward", *COSTS, "contacts", "touching", "nearest_m")]
 )
-"""Sums of an episode so far; a long touch is one contact."""
+"""Sums of the current episode; a lasting contact counts once."""
 ACHIEVED, FAILED = "goals_reached", "goals_missed"
-"""What an episode's statistics call the attempts of every task (`Task.achieved`, `Task.failed`)."""
+"""Names of an episode's numbers of achieved and failed attempts (`Task.achieved`,
+`Task.failed`)."""
 
 STATISTICS = (
     "r", "l", "seconds", "cost", "cost_steps", "contacts",
     *(f"contacts_{kind}" for kind in KINDS), ACHIEVED, FAILED, "success", "min_separation_m",
 )  # fmt: skip
-"""What an episode comes to, by name (`EpisodeSums.summarize`)."""
+"""Names of the statistics of an episode (`EpisodeSums.summarize`)."""
 COST_UNIT = "control steps"
+"""Unit of costs."""
 UNITS = {
     "cost": COST_UNIT, "cost_steps": COST_UNIT, "l": "control steps", "seconds": "s",
     "min_separation_m": "m",
 }  # fmt: skip
-"""Of statistics that are no numbers of something, by name; "1" is that of the others."""
+"""Units of statistics by name; those that are missing here are numbers, of unit "1"."""
 
 
 class EpisodeSums:
-    """Sums over the episode of each of some environments."""
+    """Sums over the current episode of each environment."""
 
     def __init__(self, num_envs: int) -> None:
         self.sums = np.zeros(num_envs, SUMS)
         self.begin(np.arange(num_envs))
 
     def begin(self, ids: Ints) -> None:
-        """Begin the episodes of environments `ids`."""
+        """Reset the sums of environments `ids` for a new episode."""
         self.sums[ids] = np.zeros(1, SUMS)
         self.sums["nearest_m"][ids] = np.inf
 
     def add(self, reward: Floats, infos: Mapping[str, Any]) -> Floats:
-        """Add a step of all environments; return its cost (num_envs,).
+        """Add one step of all environments and return its cost (num_envs,).
 
         Args:
-            reward: (num_envs,).
-            infos: of a vector environment, with their masks.
+            reward: rewards (num_envs,).
+            infos: infos of a vector environment, with their masks.
         """
-        now = self.sums
-        now["steps"] += 1
-        now["reward"] += reward
-        costs = {name: value_of_step(infos, name, len(now)) for name in COSTS}
+        sums = self.sums
+        sums["steps"] += 1
+        sums["reward"] += reward
+        costs = {name: read_step_value(infos, name, len(sums)) for name in COSTS}
         for name, cost in costs.items():
-            now[name] += cost
+            sums[name] += cost
         touching = costs["cost_contact"] > 0
-        now["contacts"] += touching > now["touching"]
-        now["touching"] = touching
-        separation_m = value_of_step(infos, "safety/min_separation_m", len(now))
-        now["nearest_m"] = np.fmin(now["nearest_m"], separation_m)
+        sums["contacts"] += touching > sums["touching"]
+        sums["touching"] = touching
+        separation_m = read_step_value(infos, "safety/min_separation_m", len(sums))
+        sums["nearest_m"] = np.fmin(sums["nearest_m"], separation_m)
         return costs["cost"]
 
     def summarize(
         self, b: int, info: Mapping[str, Any], task: Task, ctrl_dt_s: float
     ) -> dict[str, float]:
-        """Return the statistics of the episode of environment `b`.
+        """Return the statistics of the episode of environment `b` by name.
 
         Args:
-            b: the environment.
-            info: the episode's last.
-            task: the environment's.
+            b: index of the environment.
+            info: the last info of the episode.
+            task: the environment's task.
             ctrl_dt_s: the control step [s].
         """
         episode = self.sums[b]
@@ -90,9 +92,11 @@ class EpisodeSums:
         }
 
 
-def value_of_step(infos: Mapping[str, Any], name: str, num_envs: int) -> Floats:
-    """Return a value of the step itself (num_envs,), also where an episode ended with it; NaN where
-    there is none."""
+def read_step_value(infos: Mapping[str, Any], name: str, num_envs: int) -> Floats:
+    """Return an info of the step itself (num_envs,), NaN if there is none.
+
+    If an episode ended with the step, it is read from its final info.
+    """
     value = np.full(num_envs, np.nan)
     for part in (infos, infos.get("final_info", {})):
         if name in part:

@@ -1,3 +1,3 @@
-"""Experiments: what the package can do, measured against ground truth and theory."""
+"""Experiments that compare perception, estimators and policies on the ground truth."""
 
 from hrc_env.experiments import columns as columns

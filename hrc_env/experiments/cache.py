@@ -1,4 +1,4 @@
-"""The folder of a study: whose it is, and the finished parts by which a stopped run goes on."""
+"""The folder of a study: its owner, and the finished parts from which a stopped run continues."""
 
 import json
 import os
@@ -17,92 +17,102 @@ from hrc_env.engines.engine import Done, Engine
 from hrc_env.engines.local import Processes, Serial
 
 Progress = Callable[[float, str], None]
-"""Told by how much the share that is done grew, and what is being done; shares sum to 1."""
+"""Callback that takes the growth of the completed share, and a label of the current part.
+
+Shares sum to 1.
+"""
 PartProgress = Callable[[float], None]
-"""Told by how much the share of a part that is done grew."""
+"""Callback that takes the growth of the completed share of a part."""
 LABEL = "experiment.json"
-_MOST_SAID = 3
-"""Differences of settings that an error names."""
+"""Name of the file that identifies the study of a folder."""
+_MAX_DIFFERENCES = 3
+"""Number of different settings that an error lists."""
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """What is played at once, and kept."""
+    """A unit of work of a study, which is computed at once and stored."""
 
     label: str
-    """Its name, which is also its file's."""
+    """Name of the part and of its file."""
     make: Callable[[PartProgress], dict[str, Any]]
-    """Makes it, and reports its progress; for engines in other processes it can be pickled."""
+    """Computes the part and reports its progress; it can be pickled for engines in other
+    processes."""
     key: str | None = None
-    """Key of what it is made from; the cache's own if it is not given."""
+    """Key of the part's inputs; None: that of the cache."""
     notes: Mapping[str, float] = field(default_factory=dict)
-    """Numbers that are kept beside it, for a study whose labels do not say all that is needed to
-    make it again."""
+    """Numbers that are stored beside the part, if its label alone does not suffice to compute it
+    again."""
     weight: float = 1.0
-    """How much of the progress it is; all of a study sum to its `n_parts`."""
+    """Weight of the part in the progress; the weights of a study sum to its `n_parts`."""
 
 
 @dataclass(frozen=True, slots=True)
 class PartCache:
-    """Finished parts, each a JSON file beside the key of what it was made from."""
+    """Finished parts, each a JSON file with the key of its inputs."""
 
     folder: Path
     key: str
-    """Key of parts that are given none of their own (`versions.key_of`)."""
+    """Key of parts without one of their own (`versions.make_key`)."""
     n_parts: float
-    """A part is one of so many in the progress."""
+    """Total weight of the study's parts."""
     progress: Progress
     engine: Engine | None = field(default=None, kw_only=True)
-    """Where parts are made; None: where it is fastest on this machine."""
+    """Where parts are computed; None: the fastest on this machine."""
 
-    def part(
+    def make_part(
         self,
         label: str,
         make: Callable[[PartProgress], dict[str, Any]],
         key: str | None = None,
         notes: Mapping[str, float] | None = None,
     ) -> dict[str, Any]:
-        """Return the part that is there, if its key is the same, or make it in this process.
+        """Return a part from its file if the key is the same, else compute it in this process.
 
         Args:
-            label: here and below: as of `Part`.
+            label: name of the part.
+            make: computes the part, as in `Part`.
+            key: key of the part, as in `Part`.
+            notes: numbers to store beside the part, as in `Part`.
         """
-        return self._parts([Part(label, make, key, notes or {})], Serial())[0]
+        return self._make_parts([Part(label, make, key, notes or {})], Serial())[0]
 
-    def parts(self, parts: Sequence[Part], one_core: bool = False) -> list[dict[str, Any]]:
-        """Return parts, of which the engine makes those that are not there; each is kept as soon as
-        it is done.
+    def make_parts(self, parts: Sequence[Part], one_core: bool = False) -> list[dict[str, Any]]:
+        """Return parts from their files, and compute the others by the engine.
+
+        Each part is stored as soon as it is complete.
 
         Args:
-            parts: none needs another.
-            one_core: whether making one keeps one core busy only; where no engine is chosen,
-                several processes then make them.
+            parts: parts that do not depend on each other.
+            one_core: whether computing a part keeps only one core busy; if no engine is chosen,
+                several processes then compute them.
         """
         engine = self.engine or (Processes() if one_core and n_cores() > 1 else Serial())
-        return self._parts(parts, engine)
+        return self._make_parts(parts, engine)
 
-    def _parts(self, parts: Sequence[Part], engine: Engine) -> list[dict[str, Any]]:
-        found = {k: kept for k, each in enumerate(parts) if (kept := self._load(each)) is not None}
-        for k in found:
+    def _make_parts(self, parts: Sequence[Part], engine: Engine) -> list[dict[str, Any]]:
+        loaded = {k: self._load(part) for k, part in enumerate(parts)}
+        results = {k: result for k, result in loaded.items() if result is not None}
+        for k in results:
             self.progress(parts[k].weight / self.n_parts, parts[k].label)
-        missing = [k for k in range(len(parts)) if k not in found]
-        told = dict.fromkeys(missing, 0.0)
+        missing = [k for k in range(len(parts)) if k not in results]
+        reported = dict.fromkeys(missing, 0.0)
 
         def tick(number: int, share: float) -> None:
             k = missing[number]
-            told[k] += share
+            reported[k] += share
             self.progress(share * parts[k].weight / self.n_parts, parts[k].label)
 
         if missing:
             self.progress(0.0, parts[missing[0]].label)
         for done in engine.run([parts[k].make for k in missing], tick):
             k = missing[done.k]
-            found[k] = done.result
-            self._keep(parts[k], done)
-            tick(done.k, max(1.0 - told[k], 0.0))
-        return [found[k] for k in range(len(parts))]
+            results[k] = done.result
+            self._store(parts[k], done)
+            tick(done.k, max(1.0 - reported[k], 0.0))
+        return [results[k] for k in range(len(parts))]
 
-    def _keep(self, part: Part, done: Done) -> None:
+    def _store(self, part: Part, done: Done) -> None:
         content = {
             "key": part.key or self.key,
             "seconds": round(done.seconds, 2),
@@ -123,64 +133,66 @@ class PartCache:
         return content["part"]
 
 
-def own_folder(
+def claim_folder(
     out: Path, name: str, overwrite: bool = False, settings: Mapping[str, Any] | None = None
 ) -> None:
     """Make `out` the folder of a study.
 
     Args:
-        out: folder. Parts that an earlier run with the same settings finished there stay.
-        name: of the study.
-        overwrite: delete other results; parts of the same study stay, as each has the key
-            of its settings.
-        settings: all that the numbers depend on; None: not known.
+        out: the folder. Finished parts of an earlier run with the same settings are kept.
+        name: name of the study.
+        overwrite: whether to delete other results; parts of the same study are kept, as each has
+            the key of its settings.
+        settings: all settings that the numbers depend on; None if unknown.
 
     Raises:
-        ConfigError: a file, or other results that are not to be deleted.
+        ConfigError: `out` is a file, or holds other results that may not be deleted.
     """
     if out.exists() and not out.is_dir():
         raise ConfigError(f"--out must be a folder; {out} is a file.")
-    owner, asked = owner_of(out), None if settings is None else _as_written(settings)
+    owner, given = read_owner(out), None if settings is None else _normalize(settings)
     differs = ""
     if owner not in (None, name):
         differs = f"the results of {owner!r}; this is {name!r}"
-    elif owner is not None and asked is not None and (found := _settings_in(out)) is not None:
-        differs = "; ".join(_differences(found, asked))
+    elif owner is not None and given is not None and (found := _read_settings(out)) is not None:
+        differs = "; ".join(_list_differences(found, given))
         differs = differs and f"results of {name!r} with other settings: {differs}"
     if differs:
         if not overwrite:
             raise ConfigError(
-                f"{out} holds {differs}. Choose another folder (--out), or delete what is there: "
+                f"{out} holds {differs}. Choose another folder (--out), or delete these results: "
                 "--overwrite, in Python overwrite=True."
             )
         for each in ("figures",) if owner == name else ("parts", "figures"):
             shutil.rmtree(out / each, ignore_errors=True)
         (out / "results.json").unlink(missing_ok=True)
-    known = {} if asked is None else {"settings": asked}
+    known = {} if given is None else {"settings": given}
     write_whole(out / LABEL, json.dumps({"experiment": name, **known}))
 
 
-def disown(out: Path) -> None:
-    """Let any settings go on in a folder, with the parts that are the same."""
+def release_folder(out: Path) -> None:
+    """Let a study with any settings continue in a folder and use its parts of equal keys."""
     for each in (LABEL, "results.json"):
         (out / each).unlink(missing_ok=True)
 
 
-def _as_written(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Return settings as JSON has them, without digests of source files: after a change of code a
-    study goes on in the same folder, and parts that depend on it are made anew."""
+def _normalize(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return settings in the form that JSON gives them, without digests of source files.
 
-    def kept(value: Any) -> Any:
+    After a change of code a study continues in the same folder, and parts that depend on the code
+    are computed again.
+    """
+
+    def strip(value: Any) -> Any:
         if isinstance(value, dict):
-            named = {k: each for k, each in value.items() if not k.endswith("source")}
-            return {name: kept(each) for name, each in named.items()}
-        return [kept(each) for each in value] if isinstance(value, list) else value
+            return {k: strip(item) for k, item in value.items() if not k.endswith("source")}
+        return [strip(item) for item in value] if isinstance(value, list) else value
 
-    return kept(json.loads(json.dumps(settings, default=str)))
+    return strip(json.loads(json.dumps(settings, default=str)))
 
 
-def _settings_in(out: Path) -> dict[str, Any] | None:
-    """Return the settings with which a folder's study began; None: not known."""
+def _read_settings(out: Path) -> dict[str, Any] | None:
+    """Return the settings with which a folder's study began; None if unknown."""
     label, results = out / LABEL, out / "results.json"
     content = json.loads(label.read_text()) if label.exists() else {}
     found = content.get("settings")
@@ -188,30 +200,30 @@ def _settings_in(out: Path) -> dict[str, Any] | None:
         with suppress(json.JSONDecodeError, KeyError):
             found = json.loads(results.read_text())["config"]
             found.pop("experiment", None)
-    return None if found is None else _as_written(found)
+    return None if found is None else _normalize(found)
 
 
-def _differences(found: Any, asked: Any, where: str = "") -> list[str]:
-    """Return in words where two settings differ, at most `_MOST_SAID` places."""
-    said: list[str] = []
-    if isinstance(found, dict) and isinstance(asked, dict):
-        for name in dict.fromkeys((*found, *asked)):
-            here = f"{where}.{name}" if where else name
-            theirs, ours = found.get(name, "nothing"), asked.get(name, "nothing")
-            said += _differences(theirs, ours, here) if theirs != ours else []
-    elif found != asked:
-        said.append(f"{where} is {_short(found)} there and {_short(asked)} here")
-    more = len(said) - _MOST_SAID
-    return said if more <= 0 else [*said[:_MOST_SAID], f"and {more} more"]
+def _list_differences(found: Any, given: Any, path: str = "") -> list[str]:
+    """Return descriptions of at most `_MAX_DIFFERENCES` differences between two settings."""
+    texts: list[str] = []
+    if isinstance(found, dict) and isinstance(given, dict):
+        for name in dict.fromkeys((*found, *given)):
+            inner = f"{path}.{name}" if path else name
+            theirs, ours = found.get(name, "nothing"), given.get(name, "nothing")
+            texts += _list_differences(theirs, ours, inner) if theirs != ours else []
+    elif found != given:
+        texts.append(f"{path} is {_shorten(found)} there and {_shorten(given)} here")
+    more = len(texts) - _MAX_DIFFERENCES
+    return texts if more <= 0 else [*texts[:_MAX_DIFFERENCES], f"and {more} more"]
 
 
-def _short(value: Any) -> str:
+def _shorten(value: Any) -> str:
     text = json.dumps(value)
     return text if len(text) <= 80 else f"{text[:77]}..."
 
 
-def owner_of(out: Path) -> str | None:
-    """Whose results a folder holds; None: nobody's."""
+def read_owner(out: Path) -> str | None:
+    """Return the name of the study that owns a folder; None if it has none."""
     for path in (out / LABEL, out / "results.json"):
         if path.exists():
             try:

@@ -1,12 +1,12 @@
-"""Columns of tables: which number of a row stands there, how it is counted, and how it is shown.
+"""Columns of tables: the metric of each row, its computation, and its format.
 
-`mean("cost", "cost")` is the mean cost of a row's episodes, under the heading "cost", and is
-called `ROW.cost` in results.json. All intervals are 95 % (`hrc_env.evaluation.intervals`).
+`mean("cost", "cost")` is the mean cost of a row's episodes, under the heading "cost", and has the
+name `ROW.cost` in results.json. All intervals are 95 % (`hrc_env.evaluation.intervals`).
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, TypedDict, Unpack
+from typing import Literal, NamedTuple, TypedDict, Unpack
 
 import numpy as np
 
@@ -19,9 +19,9 @@ from hrc_env.evaluation.sums import ACHIEVED, FAILED, STATISTICS, UNITS
 Episodes = Sequence[Mapping[str, float]]
 """Statistics of episodes (`hrc_env.evaluation.sums`), in the order of their seeds."""
 Key = str | tuple[str, ...]
-"""Of a row: what stands in the names of its metrics in place of `{}`, or of `{0}` and `{1}`."""
+"""Key of a row, which replaces `{}`, or `{0}` and `{1}`, in the names of its metrics."""
 Measure = Callable[[Episodes, Episodes], Metric]
-"""A number of a row's episodes; beside them those of its baseline on the same seeds."""
+"""A function from a row's episodes, and those of its baseline on the same seeds, to a metric."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,30 +29,32 @@ class Column:
     """A column of a table."""
 
     metric: str
-    """Name of the metric, with `{}` in place of the row's key, or `{0}` and `{1}` of its two."""
+    """Name of the metric, with `{}` in place of the row's key, or `{0}` and `{1}` for its two
+    parts."""
     heading: str = ""
-    """With its unit, as "cost [1/min]"; "" of a number that results.json alone has."""
+    """Heading with the unit, as "cost [1/min]"; "" for a metric that only results.json contains."""
     digits: int = 1
+    """Number of decimals."""
     scale: float = 1.0
     """Factor from the metric's unit to the heading's."""
     signed: bool = False
-    """Whether it is a difference, which has its sign."""
+    """Whether it is a difference, which is shown with its sign."""
     marked: bool = True
-    """Whether a difference has a dot where its interval leaves out zero."""
+    """Whether a difference gets a dot if its interval excludes zero."""
     counted: bool = False
     """Whether it counts rare events, so that its interval is always shown."""
     plain: bool = False
     """Whether its interval is never shown."""
     shows: Literal["value", "n", "count"] = "value"
-    """The value; or the number of observations; or a share of them as "8 of 9"."""
+    """The number to show: the value; the number of observations; or a share as "8 of 9"."""
     beside: str = ""
-    """Name of another metric, whose value stands behind in brackets in place of an interval."""
+    """Name of another metric; its value follows in brackets in place of an interval."""
     measure: Measure | None = None
-    """How it is counted; None: the study counts it by itself, or another column does."""
+    """Computes the metric; None: the study or another column computes it."""
     is_paired: bool = False
     """Whether `measure` compares the row with its baseline."""
 
-    def names(self, row: Key) -> list[str]:
+    def list_metrics(self, row: Key) -> list[str]:
         """Return the metrics of a row: that of the column, and the one beside it.
 
         Args:
@@ -63,7 +65,7 @@ class Column:
 
 
 class Shown(TypedDict, total=False):
-    """How a column is shown; fields of `Column`."""
+    """Format of a column: fields of `Column`."""
 
     digits: int
     scale: float
@@ -82,17 +84,17 @@ def mean(
 
     Args:
         statistic: one of `STATISTICS`.
-        heading: of the column; "": it is not shown.
-        name: of the metric; the statistic's own if not given.
-        unit: of the metric; None: the statistic's own.
+        heading: heading of the column; "": it is not shown.
+        name: name of the metric (default: that of the statistic).
+        unit: unit of the metric (default: that of the statistic).
         shown: fields of `Column`.
     """
     check_names("statistic", [statistic], STATISTICS)
-    counted_in = UNITS.get(statistic, "1") if unit is None else unit
-    return _column(
+    metric_unit = UNITS.get(statistic, "1") if unit is None else unit
+    return _make_column(
         name or statistic,
         heading,
-        lambda own, _: intervals.mean_over(_values(own, statistic), counted_in),
+        lambda own, _: intervals.estimate_mean(_get_values(own, statistic), metric_unit),
         **shown,
     )
 
@@ -104,21 +106,23 @@ def per_minute(
     unit: str | None = None,
     **shown: Unpack[Shown],
 ) -> Column:
-    """Return the column of a sum over episodes, by the minutes that they took.
+    """Return the column of a sum over episodes, divided by their duration in minutes.
 
     Args:
-        statistic, heading, name, unit, shown: as of `mean`. What a task achieves
-            (`hrc_env.evaluation.sums.ACHIEVED`) has an exact interval where it is zero.
+        statistic, heading, name, unit, shown: as in `mean`. For the achievements of a task
+            (`hrc_env.evaluation.sums.ACHIEVED`) a rate of zero has an exact interval.
     """
     check_names("statistic", [statistic], STATISTICS)
-    over = intervals.goals_over if statistic == ACHIEVED else None
+    over = intervals.estimate_goal_rate if statistic == ACHIEVED else None
     counted_in = f"{UNITS.get(statistic, '1')}/min" if unit is None else unit
 
     def measure(own: Episodes, _: Episodes) -> Metric:
-        values, minutes = _values(own, statistic), _values(own, "seconds") / 60
-        return over(values, minutes) if over else intervals.ratio_over(values, minutes, counted_in)
+        values, minutes = _get_values(own, statistic), _get_values(own, "seconds") / 60
+        return (
+            over(values, minutes) if over else intervals.estimate_ratio(values, minutes, counted_in)
+        )
 
-    return _column(name or f"{statistic}_per_minute", heading, measure, **shown)
+    return _make_column(name or f"{statistic}_per_minute", heading, measure, **shown)
 
 
 def rate(
@@ -128,63 +132,72 @@ def rate(
     per: str = "episode",
     **shown: Unpack[Shown],
 ) -> Column:
-    """Return the column of how often something rare happened, with an exact interval.
+    """Return the column of the rate of rare events, with an exact interval.
 
     Args:
         statistics: one of `STATISTICS`, or several that are added.
-        heading, name, shown: as of `mean`.
-        per: what is counted in: a name in `EXPOSURES`.
+        heading, name, shown: as in `mean`.
+        per: the exposure, a name in `EXPOSURES`.
     """
     names = (statistics,) if isinstance(statistics, str) else tuple(statistics)
     check_names("statistic", names, STATISTICS)
     check_names("exposure", [per], EXPOSURES)
-    unit, exposure = EXPOSURES[per]
+    exposure = EXPOSURES[per]
 
     def measure(own: Episodes, _: Episodes) -> Metric:
-        counts = np.sum([_values(own, each) for each in names], axis=0)
-        return intervals.rate_of(counts, exposure(own), unit)
+        counts = np.sum([_get_values(own, name) for name in names], axis=0)
+        return intervals.estimate_rate(counts, exposure.measure(own), exposure.unit)
 
-    return _column(name or names[0], heading, measure, **{"counted": True, **shown})
+    return _make_column(name or names[0], heading, measure, **{"counted": True, **shown})
 
 
-EXPOSURES: dict[str, tuple[str, Callable[[Episodes], float | Floats]]] = {
-    "episode": ("1", len),
-    "1000 episodes": ("per 1000", lambda own: len(own) / 1000),
-    "hour": ("1/h", lambda own: _values(own, "seconds") / 3600),
+class Exposure(NamedTuple):
+    """The amount of time or of episodes in which rare events are counted."""
+
+    unit: str
+    """Unit of a count over the exposure."""
+    measure: Callable[[Episodes], float | Floats]
+    """Returns the exposure of episodes."""
+
+
+EXPOSURES: dict[str, Exposure] = {
+    "episode": Exposure("1", len),
+    "1000 episodes": Exposure("per 1000", lambda episodes: len(episodes) / 1000),
+    "hour": Exposure("1/h", lambda episodes: _get_values(episodes, "seconds") / 3600),
 }
-"""Units, and how much there is of each in episodes: what rare events are counted in."""
+"""Exposures of rare events by name."""
 
 
 def share_of_episodes(statistic: str, heading: str = "", **shown: Unpack[Shown]) -> Column:
-    """Return the column of the share of episodes of which a statistic is not zero.
+    """Return the column of the share of episodes in which a statistic is not zero.
 
     Args:
-        statistic, heading, shown: as of `mean`.
+        statistic, heading, shown: as in `mean`.
     """
     check_names("statistic", [statistic], STATISTICS)
 
     def measure(own: Episodes, _: Episodes) -> Metric:
-        return intervals.share_of([bool(each[statistic]) for each in own])
+        return intervals.estimate_share([bool(each[statistic]) for each in own])
 
-    return _column(statistic, heading, measure, **shown)
+    return _make_column(statistic, heading, measure, **shown)
 
 
 def share_of_tries(heading: str = "", clustered: bool = True, **shown: Unpack[Shown]) -> Column:
-    """Return the column "success": the share of a task's tries that succeeded.
+    """Return the column "success": the share of a task's attempts that succeeded.
 
     Args:
-        heading, shown: as of `mean`.
-        clustered: whether tries in one episode are alike, so that the interval is one over
-            episodes; if not, it is that of as many trials as there were tries.
+        heading, shown: as in `mean`.
+        clustered: whether attempts in one episode are dependent, so that the interval is over
+            episodes; otherwise every attempt counts as a trial.
     """
 
     def measure(own: Episodes, _: Episodes) -> Metric:
-        achieved, failed = _values(own, ACHIEVED), _values(own, FAILED)
+        achieved, failed = _get_values(own, ACHIEVED), _get_values(own, FAILED)
         if clustered:
-            return intervals.success_over(achieved, achieved + failed)
-        return intervals.share_of([True] * int(achieved.sum()) + [False] * int(failed.sum()))
+            return intervals.estimate_success(achieved, achieved + failed)
+        return intervals.estimate_share([True] * int(achieved.sum()) + [False] * int(failed.sum()))
 
-    return _column("success", heading, measure, **shown)
+    return _make_column("success", heading, measure, **shown)
 
 
 def share_of_baseline(
@@ -193,37 +206,39 @@ def share_of_baseline(
     """Return the column of a sum as a share of the baseline's on the same seeds.
 
     Args:
-        statistic, heading, name, shown: as of `mean`.
+        statistic, heading, name, shown: as in `mean`.
     """
     check_names("statistic", [statistic], STATISTICS)
 
     def measure(own: Episodes, theirs: Episodes) -> Metric:
-        return intervals.ratio_over(_values(own, statistic), _values(theirs, statistic), "share")
+        return intervals.estimate_ratio(
+            _get_values(own, statistic), _get_values(theirs, statistic), "share"
+        )
 
-    return _column(name, heading, measure, is_paired=True, **shown)
+    return _make_column(name, heading, measure, is_paired=True, **shown)
 
 
-def less_baseline(
+def difference_from_baseline(
     statistic: str, heading: str = "", name: str = "", unit: str = "1", **shown: Unpack[Shown]
 ) -> Column:
     """Return the column of the mean difference from the baseline, seed by seed.
 
     Args:
-        statistic, heading, unit, shown: as of `mean`.
-        name: of the metric; `difference.STATISTIC` if not given.
+        statistic, heading, unit, shown: as in `mean`.
+        name: name of the metric (default: `difference.STATISTIC`).
     """
     check_names("statistic", [statistic], STATISTICS)
 
     def measure(own: Episodes, theirs: Episodes) -> Metric:
-        both = [*_values(own, statistic), *_values(theirs, statistic)]
-        ratio = intervals.ratio_of(both, np.ones(len(both)))
-        return intervals.paired("it", ratio, len(own), unit)["difference.it"]
+        both = [*_get_values(own, statistic), *_get_values(theirs, statistic)]
+        ratio = intervals.make_ratio(both, np.ones(len(both)))
+        return intervals.compare_paired("it", ratio, len(own), unit)["difference.it"]
 
     name = name or f"difference.{statistic}"
-    return _column(name, heading, measure, is_paired=True, signed=True, **shown)
+    return _make_column(name, heading, measure, is_paired=True, signed=True, **shown)
 
 
-def _column(
+def _make_column(
     name: str,
     heading: str,
     measure: Measure,
@@ -237,6 +252,6 @@ def _column(
     )
 
 
-def _values(episodes: Episodes, statistic: str) -> Floats:
+def _get_values(episodes: Episodes, statistic: str) -> Floats:
     """Return a statistic of every episode (n,)."""
     return np.array([each[statistic] for each in episodes], float)

@@ -1,4 +1,4 @@
-"""The benchmark of policies: conditions and seeds that are the same for everybody, and entries."""
+"""The benchmark of policies: fixed conditions and seeds, and the entries of the leaderboard."""
 
 import datetime
 import json
@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from hrc_env.agents.registry import control_of
+from hrc_env.agents.registry import find_control
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric, provenance, write_whole
 from hrc_env.evaluation.sums import ACHIEVED
@@ -20,16 +20,16 @@ from hrc_env.tasks import BUILT_IN
 from hrc_env.tasks.task import find_task
 
 VERSION = 1
-"""Of the conditions, seeds and counts: numbers of different versions do not compare."""
+"""Version of the conditions, seeds and counts: numbers of different versions are not comparable."""
 SEED = 5_000_000
-"""Of the first episode, far from those of training and of other evaluations."""
+"""Seed of the first episode, far from those of training and of other evaluations."""
 SETUPS = {
     "truth": ("the truth", PerceptionSetup("truth")),
     "keypoints": ("four cameras", PerceptionSetup()),
     "late": ("four cameras, 200 ms late", PerceptionSetup(latency_s=0.2)),
     "one": ("one camera after 1 s", PerceptionSetup(n_cameras=1)),
 }
-"""How robots perceive, and that in words; late images say so."""
+"""Perception setups with their descriptions; late images carry their time stamps."""
 COLUMNS = (
     per_minute(ACHIEVED, "goals a minute", name="goals_per_minute"),
     share_of_tries("success", digits=2),
@@ -45,43 +45,48 @@ COLUMNS = (
     rate([f"contacts_{kind}" for kind in KINDS], name="contacts_per_hour", per="hour"),
 )
 ABOUT = """\
-What a policy does and how safe it is, on fixed seeds. A contact is *towards* where the robot moved
-towards the worker when it began, *fleeing* where it moved away, *standing* else; contacts and cost
-are counted on the truth."""
+Performance and safety of a policy, on fixed seeds. A contact is *towards* if the robot moved
+towards the worker when it began, *fleeing* if it moved away, else *standing*; contacts and cost
+are computed from the truth."""
 
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """Beside whom a policy acts, with which perception, under which shield."""
+    """The people, the perception and the shield of a row."""
 
     people: str = "unaware"
+    """Kind of people."""
     setup: str = "keypoints"
-    """A name in `SETUPS`."""
+    """Perception setup, a name in `SETUPS`."""
     shield: str | None = None
+    """Name of the shield."""
 
     @property
     def name(self) -> str:
-        """As in results.json."""
+        """Name in results.json."""
         return f"{self.people}.{self.setup}.{self.shield or 'none'}"
 
     @property
     def words(self) -> str:
-        """As in tables."""
+        """Description in tables."""
         shield = "no shield" if self.shield is None else f"shield `{self.shield}`"
         return f"{self.people} people, {SETUPS[self.setup][0]}, {shield}"
 
 
-def _conditions() -> tuple[Condition, ...]:
-    """Return everybody with four cameras, unaware people with other perception; each twice."""
+def _make_conditions() -> tuple[Condition, ...]:
+    """Return all people with four cameras, and unaware people with other perception.
+
+    Each is without and with a shield.
+    """
     bare = [Condition(people) for people in ("unaware", "hurried", "attentive")]
     bare += [Condition(setup=setup) for setup in SETUPS if setup != "keypoints"]
     return tuple(replace(each, shield=shield) for each in bare for shield in (None, "qp"))
 
 
-CONDITIONS = {each.name: each for each in _conditions()}
-"""By name, in the order of tables."""
+CONDITIONS = {condition.name: condition for condition in _make_conditions()}
+"""Conditions by name, in the order of tables."""
 MAIN = (Condition().name, Condition(shield="qp").name)
-"""Conditions that the leaderboard shows."""
+"""Names of the conditions that the leaderboard shows."""
 
 
 def make_study(
@@ -94,19 +99,18 @@ def make_study(
     """Return the study of a policy under all conditions.
 
     Args:
-        policy: as `hrc_env.agents.registry.make_agent` takes it.
-        ids: which environments; a learnt policy is for one.
-        control: what its actions are; None: those of the policy's file, or else velocities of
-            the joints.
-        n_seeds: episodes of every row.
-        trust: whether pickles in the policy's checkpoint are read, as of `make_agent`.
+        policy: the policy as `hrc_env.agents.registry.make_agent` takes it.
+        ids: environments; a learnt policy fits one of them.
+        control: control of its actions; None: that of the policy's file, or else joint velocities.
+        n_seeds: number of episodes per row.
+        trust: whether pickles in the policy's checkpoint may be loaded, as in `make_agent`.
 
     Raises:
-        ConfigError: an unknown policy or environment, or no episode.
+        ConfigError: the policy or an environment does not exist, or there is no episode.
     """
-    for each in ids:
-        find_task(each)
-    control = control or control_of(policy)
+    for task in ids:
+        find_task(task)
+    control = control or find_control(policy)
     env = {} if control is None else {"control": control}
     rows = {
         f"{task}.{name}": Row(
@@ -129,16 +133,16 @@ def make_study(
     )  # fmt: skip
 
 
-PER = {
+ENTRY_METRICS = {
     "goals_per_minute": "goals a minute",
     "success": "success",
     "cost_per_minute": "cost a minute",
     "towards_per_hour": "contacts towards an hour",
     "contacts_per_hour": "contacts an hour",
 }
-"""What entries hold of every task and condition, and how the leaderboard calls it."""
+"""Metrics of each task and condition in an entry, with their headings on the leaderboard."""
 Scores = Mapping[str, Metric]
-"""By "ID.CONDITION.WHAT"."""
+"""Metrics by "ID.CONDITION.METRIC"."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,44 +150,49 @@ class Entry:
     """One policy on the leaderboard."""
 
     policy: str
-    """As `--policy` names it."""
+    """The policy as `--policy` takes it."""
     commit: str
+    """Commit of the repository."""
     date: str
+    """Date of the run."""
     scores: Scores
+    """Metrics of all tasks and conditions."""
 
 
 def read_entry(path: Path) -> Entry:
-    """Return an entry.
+    """Return an entry from its file.
 
     Raises:
-        ConfigError: the file is of another version of the benchmark, or no entry.
+        ConfigError: the file is of another version of the benchmark, or not an entry.
     """
     try:
         content = json.loads(path.read_text())
         version, scores = content.pop("version"), content.pop("scores")
         if version != VERSION:
             raise ConfigError(
-                f"{path} is of version {version} of the benchmark, this is version {VERSION}: "
-                "their numbers do not compare. Run it again: python -m hrc_env benchmark."
+                f"{path} is of version {version} of the benchmark, and this is version {VERSION}: "
+                "their numbers are not comparable. Run python -m hrc_env benchmark again."
             )
         metrics = {key: Metric(v, low, high, "", n) for key, (v, low, high, n) in scores.items()}
         return Entry(content["policy"], content["commit"], content["date"], metrics)
     except (json.JSONDecodeError, KeyError, TypeError, ValueError) as error:
         if isinstance(error, ConfigError):
             raise
-        raise ConfigError(f"{path} is no entry of the benchmark ({error!r}).") from error
+        raise ConfigError(f"{path} is not an entry of the benchmark ({error!r}).") from error
 
 
 def write_entry(path: Path, entry: Entry) -> None:
-    """Write an entry, whole or not at all."""
-    kept = {name: m for name, m in entry.scores.items() if name.rsplit(".", 1)[1] in PER}
-    scores = {name: [*map(_shorten, (m.value, m.low, m.high)), m.n] for name, m in kept.items()}
+    """Write an entry; an interrupted write leaves no partial file."""
+    selected = {
+        name: m for name, m in entry.scores.items() if name.rsplit(".", 1)[1] in ENTRY_METRICS
+    }
+    scores = {name: [*map(_shorten, (m.value, m.low, m.high)), m.n] for name, m in selected.items()}
     content: dict[str, Any] = {"version": VERSION, "name": path.stem, **asdict(entry)}
     lines = json.dumps({**content, "scores": scores}, indent=1)
     write_whole(path, lines.replace("\n   ", " ").replace("\n  ]", "]") + "\n")
 
 
-def enter(path: Path, policy: str, results: Path) -> None:
+def add_entry(path: Path, policy: str, results: Path) -> None:
     """Write the entry of a policy from the results.json of its run."""
     content = json.loads(results.read_text())
     scores = {key: Metric(**value) for key, value in content["metrics"].items()}

@@ -1,4 +1,4 @@
-"""What figures of all studies share: paper, error bars, axes, saving."""
+"""Functions that the figures of all studies share: style, error bars, axes and saving."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,37 +14,38 @@ from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats
 
 
-def new_figure(width_in: float, height_in: float) -> Figure:
-    """An empty figure that finds room for what is drawn."""
+def make_figure(width_in: float, height_in: float) -> Figure:
+    """Return an empty figure with a layout that adapts to its content."""
     return Figure(figsize=(width_in, height_in), layout="constrained")
 
 
 def save(figure: Figure, path: Path, dpi: int = 110) -> None:
-    """Write a PNG; its folder is made."""
+    """Write a figure as PNG; its folder is created."""
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=dpi)
 
 
-def stamp(path: Path, words: str) -> None:
-    """Write words across the top of a picture that is there, in a strip of its own."""
+def stamp(path: Path, text: str) -> None:
+    """Write a text into a strip that is added at the top of a picture file."""
     with Image.open(path) as picture:
-        drawn = picture.convert("RGB")
-    size = max(12, drawn.width // 60)
-    strip = Image.new("RGB", (drawn.width, drawn.height + 2 * size), "white")
-    strip.paste(drawn, (0, 2 * size))
-    place = (drawn.width // 2, size)
+        image = picture.convert("RGB")
+    size = max(12, image.width // 60)
+    strip = Image.new("RGB", (image.width, image.height + 2 * size), "white")
+    strip.paste(image, (0, 2 * size))
+    place = (image.width // 2, size)
     font = ImageFont.load_default(size)
-    ImageDraw.Draw(strip).text(place, words, "#b00020", font, anchor="mm")
+    ImageDraw.Draw(strip).text(place, text, "#b00020", font, anchor="mm")
     strip.save(path)
 
 
-def ends(metrics: Sequence[Metric], scale: float = 1.0) -> Floats:
-    """(2, n) how far the intervals go to either side of the values."""
+def compute_error_bars(metrics: Sequence[Metric], scale: float = 1.0) -> Floats:
+    """Return the distances (2, n) from the values to the lower and upper ends of their
+    intervals."""
     return scale * np.abs([[m.value - m.low, m.high - m.value] for m in metrics]).T
 
 
-def label(axis: Axes, x: str = "", y: str = "", title: str = "", grid: str = "both") -> None:
-    """Words at an axis, and a pale grid behind what is drawn."""
+def label_axes(axis: Axes, x: str = "", y: str = "", title: str = "", grid: str = "both") -> None:
+    """Set the labels and the title of axes, and draw a pale grid in the background."""
     axis.set_xlabel(x, fontsize=12)
     axis.set_ylabel(y, fontsize=12)
     axis.set_title(title, fontsize=13)
@@ -52,8 +53,8 @@ def label(axis: Axes, x: str = "", y: str = "", title: str = "", grid: str = "bo
     axis.set_axisbelow(True)
 
 
-def plain_log(axis: Axis) -> None:
-    """A logarithmic axis with plain numbers, as many as have room; call it when all is drawn."""
+def use_plain_log_ticks(axis: Axis) -> None:
+    """Label a logarithmic axis with plain numbers; call it after drawing the data."""
     low, high = axis.get_view_interval()
     span = np.log10(high / low)
     fine = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0) if span < 0.9 else (1.0, 2.0, 5.0)

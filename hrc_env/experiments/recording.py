@@ -1,6 +1,6 @@
-"""What cameras saw of a worker beside a resting arm, once; then every estimator on just that.
+"""Recordings of a worker beside a resting arm, on which every estimator can be replayed.
 
-Crops follow the estimator that the film is taken with, and nobody who is given it afterwards.
+Crops follow the estimator with which the film is recorded, not those that are replayed.
 """
 
 from collections.abc import Sequence
@@ -28,20 +28,22 @@ RecordT = TypeVar("RecordT")
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """T frames of one worker before a rig."""
+    """T frames of one worker in view of a rig."""
 
     scene: Scene
+    """The scene with its cameras."""
     config: HRCConfig
+    """The configuration of the environment."""
     motions: WorkerMotion
-    """(T, 1, S, ...) truth."""
+    """True motion (T, 1, S, ...)."""
     joints_world: Points3
-    """(T, J, 3) truth [m]."""
+    """True joint positions (T, J, 3) [m]."""
     keypoints: Keypoints
-    """(T, C, 1, J, ...), in pinhole pixels of the rig's cameras."""
+    """Keypoints (T, C, 1, J, ...) in pinhole pixels of the rig's cameras."""
     windows: tuple[Windows, ...]
-    """(T) where each camera looked."""
+    """Crop windows of the cameras, one per frame."""
     beliefs: PoseEstimate
-    """(T, 1, ...) of the estimator that the crops followed."""
+    """Estimates (T, 1, ...) of the estimator that the crops followed."""
 
 
 def record(
@@ -52,39 +54,55 @@ def record(
     seed: int,
     tick: PartProgress,
 ) -> Recording:
-    """Film the worker of a scene with all its cameras, whose crops follow what an estimator
-    predicts; the motions (T, 1, S, ...) are `config.ctrl_dt` apart."""
+    """Record the worker of a scene with all its cameras.
+
+    Args:
+        scene: the scene.
+        motions: motion of the worker (T, 1, S, ...), in steps of `config.ctrl_dt`.
+        config: the configuration of the environment.
+        estimator: estimator whose predictions the crops follow.
+        seed: seed of detector and estimator.
+        tick: is called with the growth of the completed share.
+    """
     truth = worker_truth(load_bodies(scene.bodies), motions)
     pipeline = make_pipeline("pixels", estimator, scene, 1, config)
     rngs = [[np.random.default_rng([seed, k])] for k in range(2)]
     q, ids = scene.home_q[None], np.zeros(1, int)
-    keypoints, windows, said = [], [], []
+    keypoints, windows, estimates = [], [], []
     with closing(pipeline):
         pipeline.reset(ids, *rngs)
         for frame in range(len(truth.joints_world)):
             pipeline.sensor.expose(SensorInput(ids, q, rows(motions, np.array([frame]))))
-            said.append(rows(pipeline.perceive(ids, *rngs), ids))
-            seen, looked = pipeline.last_detections(0)
-            if seen is not None:
-                keypoints.append(rows(replace(seen, time_s=None), ids))
-            windows.append([list(of_worker) for of_worker in looked])
+            estimates.append(rows(pipeline.perceive(ids, *rngs), ids))
+            detections, searched = pipeline.last_detections(0)
+            if detections is not None:
+                keypoints.append(rows(replace(detections, time_s=None), ids))
+            windows.append([list(of_worker) for of_worker in searched])
             tick(1.0 / len(truth.joints_world))
     return Recording(
         scene, config, motions, truth.joints_world[:, 0],
-        concatenated(keypoints), tuple(windows), concatenated(said),
+        concatenate(keypoints), tuple(windows), concatenate(estimates),
     )  # fmt: skip
 
 
 def replay(
     recording: Recording, estimator: str, cameras: Sequence[int], n_start: int, seed: int
 ) -> PoseEstimate:
-    """(T, 1, ...) what an estimator makes of the detections of some of the cameras.
+    """Return the estimates (T, 1, ...) of an estimator from the detections of some cameras.
 
-    The first `n_start` frames are given of all cameras, by which every estimator begins a track.
+    Args:
+        recording: the recorded detections.
+        estimator: name of the estimator.
+        cameras: indices of the cameras.
+        n_start: number of frames at the start for which all cameras are used, so that every
+            estimator begins a track.
+        seed: seed of the estimator.
     """
-    P, found = projections(recording.scene.cameras), recording.keypoints
+    P, keypoints = projections(recording.scene.cameras), recording.keypoints
     dt_s = recording.config.ctrl_dt
-    px, confidence, sigma_px = map(np.array, (found.px, found.confidence, found.sigma_px))
+    px, confidence, sigma_px = map(
+        np.array, (keypoints.px, keypoints.confidence, keypoints.sigma_px)
+    )
     unused = np.setdiff1d(np.arange(len(P)), cameras)
     px[n_start:, unused] = np.nan
     confidence[n_start:, unused], sigma_px[n_start:, unused] = 0.0, np.inf
@@ -92,20 +110,20 @@ def replay(
     tracker = make_estimator(estimator, P, dt_s, recording.config.tracker)
     state, rngs = tracker.init(1, 1), [np.random.default_rng([seed, 1])]
     tracker.reset(state, np.zeros(1, int), rngs)
-    said = []
+    estimates = []
     for frame in range(len(px)):
         tracker.predict(state, dt_s, rngs)
         tracker.update(state, rows(given, np.array([frame])), rngs)
-        said.append(our_joints(tracker.estimate(state)))
-    return concatenated(said)
+        estimates.append(our_joints(tracker.estimate(state)))
+    return concatenate(estimates)
 
 
-def concatenated(records: Sequence[RecordT]) -> RecordT:
-    """Records of arrays (n, ...), and of records of such, one after the other."""
+def concatenate(records: Sequence[RecordT]) -> RecordT:
+    """Return records of arrays (n, ...), which may be nested, concatenate along the first axis."""
     first: Any = records[0]
     if isinstance(first, np.ndarray):
         return np.concatenate(records)  # type: ignore[return-value, call-overload]
     if first is None:
         return records[0]
-    parts = [concatenated([getattr(r, each.name) for r in records]) for each in fields(first)]
+    parts = [concatenate([getattr(r, each.name) for r in records]) for each in fields(first)]
     return type(first)(*parts)

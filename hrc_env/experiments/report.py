@@ -1,4 +1,4 @@
-"""A report: pictures, tables, and what each column means; as HTML, Markdown and results.json."""
+"""Reports of studies: figures, tables and explanations, as HTML, Markdown and results.json."""
 
 import base64
 import html
@@ -35,27 +35,28 @@ code { background: #f0f2f6; padding: .1rem .3rem; border-radius: 3px; }
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Rows of numbers under one title, in a report and in the documentation."""
+    """Rows of metrics under one title, in a report and in the documentation."""
 
     name: str
-    """By which a page of the documentation asks for it."""
+    """Name by which a page of the documentation refers to the table."""
     title: str
+    """Title of the table."""
     rows: Rows
-    """Cells before the numbers, by key."""
+    """Cells before the numbers of each row, by its key."""
     columns: Sequence[Column]
+    """Columns of numbers."""
     heads: tuple[str, ...] = ("",)
     """Headings of the cells before the numbers."""
     note: str = ""
-    """What stands below; `{n[METRIC]}` is how many observations a metric is made of, `{NAME}` one
+    """Text below the table; `{n[METRIC]}` is the number of observations of a metric, `{NAME}` one
     of `numbers`."""
     numbers: Mapping[str, Column] = field(default_factory=dict)
-    """By name: numbers in the note, and in sentences of the documentation."""
+    """Metrics in the note and in sentences of the documentation, by name."""
     printed: Mapping[str, float] = field(default_factory=dict)
-    """Numbers that others report, by names of metrics."""
+    """Numbers that other publications report, by names of metrics."""
 
     def check(self, known: Collection[str]) -> None:
-        """Raise `ConfigError` for a row that has another number of cells than there are heads, for
-        a column of which no row has a metric, and for one of `numbers` that has none.
+        """Raise `ConfigError` if a row has the wrong number of cells or a column no metric.
 
         Args:
             known: names of metrics.
@@ -66,87 +67,91 @@ class Table:
                     f"Table {self.name!r}: row {row!r} must have a cell for each of the heads "
                     f"{self.heads}, got {cells}."
                 )
-        shown = [(each.metric, [each.names(row) for row in self.rows]) for each in self.columns]
-        shown += [(each.metric, [each.names(())]) for each in self.numbers.values()]
-        for metric, names in shown:
-            if not any({*each} <= {*known, *self.printed} for each in names):
+        shown = [(col.metric, [col.list_metrics(row) for row in self.rows]) for col in self.columns]
+        shown += [(col.metric, [col.list_metrics(())]) for col in self.numbers.values()]
+        for metric, rows in shown:
+            if not any({*names} <= {*known, *self.printed} for names in rows):
                 raise ConfigError(
                     f"Table {self.name!r}: no row has the metric {metric!r}; a row has "
                     f"{', '.join(sorted({name.rpartition('.')[2] for name in known}))}."
                 )
 
-    def asked(self) -> set[str]:
-        """Return the names of all metrics that it can show."""
-        found = {name for row in self.rows for each in self.columns for name in each.names(row)}
-        return (found | {each.metric for each in self.numbers.values()}) - self.printed.keys()
+    def list_metrics(self) -> set[str]:
+        """Return the names of all metrics that the table can show."""
+        names = {name for row in self.rows for c in self.columns for name in c.list_metrics(row)}
+        return (names | {c.metric for c in self.numbers.values()}) - self.printed.keys()
 
-    def number(self, name: str, metrics: Metrics) -> str:
-        """Return one of `numbers` as sentences have it.
+    def format_number(self, name: str, metrics: Metrics) -> str:
+        """Return one of `numbers` in the format of a sentence.
 
         Args:
-            name: of the number.
-            metrics: by name.
+            name: name of the number.
+            metrics: metrics by name.
         """
-        return cell(self.numbers[name], metrics, ())
+        return format_cell(self.numbers[name], metrics, ())
 
-    def note_of(self, metrics: Metrics) -> str:
-        """Return the note with its numbers; 0 where rows were left out."""
-        n = defaultdict(int, {name: each.n for name, each in metrics.items()})
-        return self.note.format(n=n, **{name: self.number(name, metrics) for name in self.numbers})
+    def format_note(self, metrics: Metrics) -> str:
+        """Return the note with its numbers; they are 0 if rows were left out."""
+        n = defaultdict(int, {name: metric.n for name, metric in metrics.items()})
+        numbers = {name: self.format_number(name, metrics) for name in self.numbers}
+        return self.note.format(n=n, **numbers)
 
-    def markdown(self, metrics: Metrics, intervals: bool = True) -> str:
-        """Return the table with its title and note, without rows of which there is no number; "" if
-        there are none.
+    def to_markdown(self, metrics: Metrics, intervals: bool = True) -> str:
+        """Return the table in Markdown with its title and note, without rows that have no number.
 
         Args:
-            metrics: by name.
-            intervals: whether those are shown that do not count rare events.
+            metrics: metrics by name.
+            intervals: whether to show intervals of metrics that do not count rare events.
+
+        Returns:
+            The table, or "" if no row has a number.
         """
         known = {name: Metric(value, value, value, "", 1) for name, value in self.printed.items()}
         known |= metrics
         columns = (
             self.columns if intervals else [replace(c, plain=not c.counted) for c in self.columns]
         )
-        lines = lines_of(self.rows, columns, known)
+        lines = format_rows(self.rows, columns, known)
         if not lines:
             return ""
         heads = (*self.heads, *(each.heading for each in columns))
-        shown = table(heads, lines, len(self.heads))
-        return "\n\n".join(filter(None, (f"**{self.title}**", shown, self.note_of(metrics))))
+        text = format_table(heads, lines, len(self.heads))
+        return "\n\n".join(filter(None, (f"**{self.title}**", text, self.format_note(metrics))))
 
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What a study found."""
+    """The results of a study as text."""
 
     title: str
-    asked: str
-    """The question and how it is answered."""
+    """Title of the report."""
+    question: str
+    """The question and the method of the study."""
     parts: Sequence[str]
-    """In the order of reading, as Markdown: paragraphs, headings, tables, pictures."""
+    """Paragraphs, headings, tables and pictures as Markdown, in their order."""
     spread: str = "95 % intervals over seeds"
-    """What the low and high ends of its numbers are."""
+    """Meaning of the low and high ends of the numbers."""
     quick: str = ""
-    """The warning of a run that is too short to compare anything, below each
-    table and on each figure, which mark no difference then; "" of other runs."""
+    """Warning of a quick run below each table and on each figure, without marks of differences; ""
+    for other runs."""
 
     def write(
         self, out: Path, settings: Mapping[str, Any], seeds: Sequence[int], metrics: Metrics
     ) -> None:
-        """Write results.json, report.md and report.html, which holds its pictures, into `out`."""
+        """Write results.json, report.md and report.html, which embeds its pictures, into `out`."""
         write_results(out / "results.json", settings, seeds, metrics)
         origin = f"Version {provenance()['hrc_env']}, seeds {min(seeds)} to {max(seeds)}; "
         origin += f"numbers are given with {self.spread}, all of them in results.json."
         head, parts = [f"# {self.title}"], [*filter(None, self.parts)]
         if self.quick:
             head.append(f"**{self.quick}**")
-            parts = [_as_quick(each, self.quick) for each in parts]
+            parts = [_add_warning(part, self.quick) for part in parts]
             for name in _FIGURE.findall("\n".join(parts)):
                 stamp(out / "figures" / name, self.quick)
-        text = "\n\n".join([*head, self.asked, *parts, origin]) + "\n"
+        text = "\n\n".join([*head, self.question, *parts, origin]) + "\n"
         write_whole(out / "report.md", text)
         body = MarkdownIt("commonmark", {"html": False}).enable("table").render(text)
-        body = re.sub(r'src="([^"]+)"', lambda found: f'src="{_embedded(out, found[1])}"', body)
+        body = re.sub(r'src="([^"]+)"', lambda found: f'src="{_embed(out, found[1])}"', body)
         page = (
             '<!doctype html><html lang="en"><head><meta charset="utf-8">'
             f"<title>{html.escape(self.title)}</title><style>{_STYLE}</style></head>"
@@ -155,95 +160,95 @@ class Report:
         write_whole(out / "report.html", page)
 
 
-def quick_words(
+def describe_quick_run(
     n: int,
     seconds: float | tuple[float, float],
-    what: str = "seed",
-    why: str = "too few to compare anything",
+    unit: str = "seed",
+    consequence: str = "too few to compare anything",
 ) -> str:
-    """Return the warning in the report of a short run.
+    """Return the warning in the report of a quick run.
 
     Args:
-        n: number of seeds or other repetitions, at most.
-        seconds: that one lasts [s]; (least, most) where they differ.
-        what: name of a repetition.
-        why: the consequence, for the reader.
+        n: greatest number of seeds or other repetitions.
+        seconds: duration of a repetition [s]; (least, most) if they differ.
+        unit: name of a repetition.
+        consequence: the consequence for the reader.
     """
     least, most = seconds if isinstance(seconds, tuple) else (seconds, seconds)
-    lasting = f"{least:.3g} s" if least == most else f"{least:.3g} to {most:.3g} s"
-    return f"Quick run, {n} {what}{'' if n == 1 else 's'} of {lasting}: {why}."
+    duration = f"{least:.3g} s" if least == most else f"{least:.3g} to {most:.3g} s"
+    return f"Quick run, {n} {unit}{'' if n == 1 else 's'} of {duration}: {consequence}."
 
 
 _FIGURE = re.compile(r"\]\(figures/([^)]+)\)")
 _TABLE = re.compile(r"^\|---", re.M)
 _DOT = " ●"
-"""Behind a difference whose interval leaves out zero."""
+"""Mark after a difference with an interval that excludes zero."""
 
 
-def _as_quick(part: str, words: str) -> str:
-    """Return a part of a report without marks, and with the words below its table or figure."""
+def _add_warning(part: str, words: str) -> str:
+    """Return a part of a report without marks, with a warning below its table or figure."""
     part = part.replace(_DOT, "")
     is_shown = _TABLE.search(part) or _FIGURE.search(part)
     return f"{part}\n\n*{words}*" if is_shown else part
 
 
-def picture(path: Path, caption: str) -> str:
-    """A PNG in the folder `figures` beside the report, and what it shows."""
+def format_picture(path: Path, caption: str) -> str:
+    """Return the Markdown of a PNG in the folder `figures` beside the report, with its caption."""
     return f"![{caption}](figures/{path.name})\n\n*{caption}*"
 
 
-def table(header: Sequence[str], rows: Iterable[Sequence[str]], n_heads: int = 1) -> str:
+def format_table(header: Sequence[str], rows: Iterable[Sequence[str]], n_heads: int = 1) -> str:
     """Return a table in Markdown.
 
     Args:
         header: headings of the columns.
-        rows: cells.
-        n_heads: how many columns, the first ones, name the rows.
+        rows: cells of each row.
+        n_heads: number of first columns that name the rows.
     """
     lines = [" | ".join(line) for line in (header, *rows)]
     rule = "---|" * n_heads + "---:|" * (len(header) - n_heads)
     return "\n".join([f"| {lines[0]} |", f"|{rule}", *(f"| {line} |" for line in lines[1:])])
 
 
-def table_of(
+def format_metrics(
     name: str, rows: Mapping[str, str], columns: Sequence[Column], metrics: Metrics
 ) -> str:
-    """Return a table of metrics, "" if there are none.
+    """Return a table of metrics in Markdown, or "" if there are none.
 
     Args:
         name: heading of the rows.
-        rows: by key, with their words.
-        columns: of the metrics.
-        metrics: by name.
+        rows: names of rows by key.
+        columns: columns of metrics.
+        metrics: metrics by name.
     """
-    lines = lines_of({row: (words,) for row, words in rows.items()}, columns, metrics)
-    return table((name, *(each.heading for each in columns)), lines) if lines else ""
+    lines = format_rows({row: (words,) for row, words in rows.items()}, columns, metrics)
+    return format_table((name, *(c.heading for c in columns)), lines) if lines else ""
 
 
-def lines_of(rows: Rows, columns: Sequence[Column], metrics: Metrics) -> list[tuple[str, ...]]:
-    """Return the cells of the rows of which there is any number.
+def format_rows(rows: Rows, columns: Sequence[Column], metrics: Metrics) -> list[tuple[str, ...]]:
+    """Return the cells of all rows that have any number.
 
     Args:
-        rows: cells before the numbers, by key.
-        columns: of the metrics.
-        metrics: by name.
+        rows: cells before the numbers, by key of the row.
+        columns: columns of metrics.
+        metrics: metrics by name.
     """
     return [
-        (*cells, *(cell(each, metrics, row) for each in columns))
+        (*cells, *(format_cell(column, metrics, row) for column in columns))
         for row, cells in rows.items()
-        if any(each.names(row)[0] in metrics for each in columns)
+        if any(column.list_metrics(row)[0] in metrics for column in columns)
     ]
 
 
-def cell(column: Column, metrics: Metrics, row: Key) -> str:
-    """Return the number of a row as its column shows it; a dash where there is none.
+def format_cell(column: Column, metrics: Metrics, row: Key) -> str:
+    """Return the number of a row in the format of its column; a dash if there is none.
 
     Args:
-        column: which number, and how it is shown.
-        metrics: by name.
+        column: the metric and its format.
+        metrics: metrics by name.
         row: key of the row.
     """
-    names = column.names(row)
+    names = column.list_metrics(row)
     if not metrics.keys() >= {*names}:
         return "-"
     metric, *others = (metrics[name] for name in names)
@@ -256,39 +261,42 @@ def cell(column: Column, metrics: Metrics, row: Key) -> str:
     text = format_metric(shown, column.scale, column.digits, column.signed)
     for other in others:
         text += f" ({column.scale * other.value:,.{column.digits}f})"
-    is_told_apart = column.signed and (shown.low > 0 or shown.high < 0)
-    return text + (_DOT if column.marked and is_told_apart else "")
+    is_different = column.signed and (shown.low > 0 or shown.high < 0)
+    return text + (_DOT if column.marked and is_different else "")
 
 
 def format_metric(metric: Metric, scale: float = 1.0, digits: int = 1, signed: bool = False) -> str:
-    """Return a number with its interval, as tables show it; a dash where it is not known.
+    """Return a number with its interval in the format of tables; a dash if it is not finite.
 
     Args:
         metric: the number.
-        scale: factor from its unit to the shown one.
-        digits: how many stand behind the point.
-        signed: whether a positive one has its sign.
+        scale: factor from its unit to the unit shown.
+        digits: number of decimals.
+        signed: whether a positive number gets its sign.
     """
     if not math.isfinite(metric.value):
         return "-"
     low, high = sorted((scale * metric.low, scale * metric.high))
-    return with_interval((scale * metric.value, low, high), digits, "+" if signed else "")
+    return format_interval(scale * metric.value, low, high, digits, "+" if signed else "")
 
 
-def with_interval(three: Sequence[float], digits: int, sign: str = "") -> str:
-    """Return a value with the ends of its interval in brackets, which are left out where the digits
-    show no width: such an interval would say more than it knows.
+def format_interval(value: float, low: float, high: float, digits: int, sign: str = "") -> str:
+    """Return a value with the ends of its interval in brackets.
+
+    The interval is left out if it has no width at this number of digits.
 
     Args:
-        three: value, low end, high end.
-        digits: how many stand behind the point.
-        sign: "+" puts one before positive numbers, too.
+        value: the value.
+        low: low end of the interval.
+        high: high end of the interval.
+        digits: number of decimals.
+        sign: "+" gives positive numbers their sign, too.
     """
-    value, low, high = (f"{each:{sign}z,.{digits}f}" for each in three)
-    return value if value == low == high else f"{value} ({low} to {high})"
+    texts = [f"{number:{sign}z,.{digits}f}" for number in (value, low, high)]
+    return texts[0] if len({*texts}) == 1 else f"{texts[0]} ({texts[1]} to {texts[2]})"
 
 
-def _embedded(out: Path, source: str) -> str:
-    """A picture's file as a data URI."""
+def _embed(out: Path, source: str) -> str:
+    """Return a picture's file as a data URI."""
     data = base64.b64encode((out / source).read_bytes()).decode()
     return f"data:image/png;base64,{data}"

@@ -1,6 +1,7 @@
-"""Which cameras hang in episodes: settings take turns in rigs, so that no number hangs on a place.
+"""Choices of cameras in episodes: settings rotate over rigs, so no result depends on one place.
 
-Fewer than four are what is left of four after a while, so that every estimator begins a track.
+With fewer than four cameras, the others fail after a warm-up, so that every estimator begins a
+track.
 """
 
 from collections.abc import Sequence
@@ -12,45 +13,54 @@ from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.scene.rigs import RIGS
 
 WARM_UP_S, DT_S = 1.0, HRCConfig().ctrl_dt
-"""Until when cameras that a setting takes away are there, and a control step [s]."""
+"""Duration for which cameras that a setting removes are still there, and a control step [s]."""
 N_WARM_UP = round(WARM_UP_S / DT_S)
+"""Number of control steps in the warm-up."""
 Rig = tuple[int, ...]
-"""Cameras of a scene, counted from 0."""
+"""Indices of cameras of a scene, from 0."""
 ALL: Rig = (0, 1, 2, 3)
 SINGLE: tuple[Rig, ...] = ((0,), (1,), (2,), (3,))
 NEIGHBOURS: tuple[Rig, ...] = ((0, 1), (1, 2), (2, 3), (3, 0))
 OPPOSITE: tuple[Rig, ...] = ((0, 2), (1, 3))
 TRIPLES: tuple[Rig, ...] = ((0, 1, 2), (1, 2, 3), (2, 3, 0), (3, 0, 1))
 MULTI = "multi"
-"""All four cameras, in the names of numbers."""
-SPOKEN = {f"camera_{k}": f"camera {k}" for k in range(1, 5)} | {MULTI: "all four"}
-"""Each camera alone and all together, in words."""
-CHOICES: dict[str, Rig] = dict(zip(SPOKEN, (*SINGLE, ALL), strict=True))
-"""The same, as rigs."""
+"""Name of all four cameras in names of metrics."""
+CAMERA_LABELS = {f"camera_{k}": f"camera {k}" for k in range(1, 5)} | {MULTI: "all four"}
+"""Labels of each single camera and of all together, by their names in metrics."""
+CHOICES: dict[str, Rig] = dict(zip(CAMERA_LABELS, (*SINGLE, ALL), strict=True))
+"""Rigs of each single camera and of all together, by their names in metrics."""
 
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """Cameras and what goes wrong with them, for some of a setting's episodes."""
+    """Cameras and their faults, for some of a setting's episodes."""
 
     cameras: tuple[CameraConfig, ...] = ()
-    """All that hang there; none: the scene's own."""
+    """All cameras of the rig; empty: the scene's own."""
     faults: tuple[FaultConfig, ...] = ()
+    """Faults of the cameras."""
 
 
-def left_with(rig: Sequence[CameraConfig], kept: Rig) -> Turn:
-    """A rig of which these cameras are left when the warm-up is over."""
+def keep_cameras(rig: Sequence[CameraConfig], kept: Rig) -> Turn:
+    """Return a turn with a rig of which only the given cameras work after the warm-up."""
     lost = tuple(camera.name for c, camera in enumerate(rig) if c not in kept)
     return Turn(tuple(rig), (FaultConfig("lost", lost, from_s=WARM_UP_S),) if lost else ())
 
 
-def left_of(scene: str, rigs: Sequence[Rig]) -> tuple[Turn, ...]:
-    """Turns in which a scene's own four cameras are left in these choices."""
-    return tuple(left_with(RIGS[scene], rig) for rig in rigs)
+def make_turns(scene: str, rigs: Sequence[Rig]) -> tuple[Turn, ...]:
+    """Return a turn with a scene's own four cameras for each choice that works after the
+    warm-up."""
+    return tuple(keep_cameras(RIGS[scene], rig) for rig in rigs)
 
 
-def late(turn: Turn, latency_s: float, is_told: bool) -> Turn:
-    """A turn whose images are late: they say when they were taken, or claim to be new."""
+def delay(turn: Turn, latency_s: float, is_told: bool) -> Turn:
+    """Return a turn with late images.
+
+    Args:
+        turn: the turn.
+        latency_s: delay of the images [s].
+        is_told: whether images carry their time stamp; otherwise they appear to be current.
+    """
     if latency_s and is_told:
         cameras = tuple(replace(camera, latency_s=latency_s) for camera in turn.cameras)
         return Turn(cameras, turn.faults)

@@ -1,4 +1,4 @@
-"""Runs an experiment: plays the parts that are not there yet, then writes numbers and report."""
+"""The runner of experiments: computes missing parts, then writes metrics and report."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
@@ -9,23 +9,24 @@ from typing import Any, Protocol, TypeVar
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric
 from hrc_env.engines.engine import Engine
-from hrc_env.experiments.cache import PartCache, Progress, own_folder
+from hrc_env.experiments.cache import PartCache, Progress, claim_folder
 from hrc_env.experiments.report import Report
-from hrc_env.experiments.versions import key_of
+from hrc_env.experiments.versions import make_key
 
 PlayedT = TypeVar("PlayedT")
 RecordT = TypeVar("RecordT")
 
 
 class Experiment(Protocol[PlayedT]):
-    """What the runner asks of an experiment, whose fields are its settings.
+    """The interface of an experiment for the runner; its fields are its settings.
 
-    `hrc_env.experiments.study.Study` is one for whole episodes. Others play parts of their own.
+    `hrc_env.experiments.study.Study` implements it for whole episodes; others have parts of their
+    own.
     """
 
     @property
     def name(self) -> str:
-        """As its folder and its results are called."""
+        """Name of the experiment in its folder and its results."""
         ...
 
     @property
@@ -35,45 +36,45 @@ class Experiment(Protocol[PlayedT]):
 
     @property
     def seeds(self) -> Sequence[int]:
-        """Of everything that is drawn."""
+        """Seeds of all random draws."""
         ...
 
     @property
     def n_parts(self) -> float:
-        """How many parts the progress is made of."""
+        """Total weight of the parts in the progress."""
         ...
 
     def settings(self) -> Mapping[str, Any]:
-        """Return all that its numbers depend on, as JSON can hold it."""
+        """Return all settings that its numbers depend on, for JSON."""
         ...
 
     def play(self, cache: PartCache) -> PlayedT:
-        """Return what all parts came to, each from the cache or anew."""
+        """Return the results of all parts, from the cache or computed."""
         ...
 
     def metrics(self, played: PlayedT) -> dict[str, Metric]:
-        """Return every number."""
+        """Return all metrics by name."""
         ...
 
     def report(self, played: PlayedT, metrics: dict[str, Metric], figures: Path) -> Report:
-        """Draw the figures into a folder; return the report.
+        """Draw the figures into a folder and return the report.
 
-        An experiment that may be too short to compare anything warns here, as `Report.quick`,
-        or by `quick_note`. Tables that the documentation shows, too, are those of `shown_tables`.
+        An experiment that may be too short to compare anything warns here, by `Report.quick` or by
+        `quick_note`. Tables that also appear in the documentation come from `shown_tables`.
         """
         ...
 
 
-def settings_of(experiment: Experiment[Any]) -> dict[str, Any]:
-    """Return the settings of an experiment with its name, as results.json has them."""
+def describe_experiment(experiment: Experiment[Any]) -> dict[str, Any]:
+    """Return the settings of an experiment with its name, as in results.json."""
     return {"experiment": experiment.name, **experiment.settings()}
 
 
-def cache_of(
+def make_cache(
     experiment: Experiment[Any], parts: Path, progress: Progress, engine: Engine | None = None
 ) -> PartCache:
     """Return the cache of an experiment's parts in a folder."""
-    key = key_of(settings_of(experiment), experiment.depends)
+    key = make_key(describe_experiment(experiment), experiment.depends)
     return PartCache(parts, key, experiment.n_parts, progress, engine=engine)
 
 
@@ -87,61 +88,64 @@ def run_experiment(
     """Run an experiment, and write results.json, figures/, report.html and report.md.
 
     Args:
-        experiment: what is played and counted.
-        out: folder of the results, and of parts: those that an earlier run with the same settings
-            and versions finished there are not played again.
-        progress: called with the growth of the share that is done, and its part.
-        overwrite: delete the results of something else, or with other settings, in the folder.
-        engine: where parts are played, which changes none of them; None: where it is fastest on
-            this machine.
+        experiment: the experiment.
+        out: folder of results and parts; parts of an earlier run with the same settings and
+            versions are not computed again.
+        progress: is called with the growth of the completed share, and its part.
+        overwrite: whether to delete results in the folder that are of another study or other
+            settings.
+        engine: where parts are computed, without effect on them; None: the fastest on this machine.
 
     Returns:
-        Every number by its name.
+        All metrics by name.
 
     Raises:
-        ConfigError: the folder holds the results of something else, or with other settings: what
-            differs is said.
+        ConfigError: the folder holds results of another study or other settings; the differences
+            are listed.
     """
     out = Path(out)
-    own_folder(out, experiment.name, overwrite, experiment.settings())
+    claim_folder(out, experiment.name, overwrite, experiment.settings())
     with nullcontext() if engine is None else engine.opened():
-        played = experiment.play(cache_of(experiment, out / "parts", progress, engine))
+        played = experiment.play(make_cache(experiment, out / "parts", progress, engine))
     metrics = experiment.metrics(played)
     report = experiment.report(played, metrics, out / "figures")
     report = replace(report, quick=getattr(experiment, "quick_note", report.quick))
-    report.write(out, settings_of(experiment), experiment.seeds, metrics)
+    report.write(out, describe_experiment(experiment), experiment.seeds, metrics)
     return metrics
 
 
 def is_as_short(config: Any, quick: Any) -> bool:
-    """Return whether a number in the settings of an experiment is no greater than in its short
-    form, of those that this makes smaller.
+    """Return whether an experiment is as short as its quick form.
+
+    It is if any of the numbers that the quick form reduces is no greater than in the quick form.
 
     Args:
-        config: the settings, a dataclass of which every field has a default.
-        quick: its short form.
+        config: the settings, a dataclass whose fields all have defaults.
+        quick: its quick form.
     """
     usual = type(quick)()
-    names = [each.name for each in fields(quick)]
+    names = [field.name for field in fields(quick)]
     values = [(getattr(usual, n), getattr(quick, n), getattr(config, n)) for n in names]
-    return any(_size(now) <= _size(short) < _size(most) for most, short, now in values)
+    return any(
+        _get_size(value) <= _get_size(short) < _get_size(most) for most, short, value in values
+    )
 
 
-def _size(value: Any) -> float:
-    """A number, or how many a list holds; of anything else 0."""
+def _get_size(value: Any) -> float:
+    """Return a number, or the length of a list; 0 for other values."""
     if isinstance(value, tuple | list):
         return len(value)
     return float(value) if isinstance(value, int | float) else 0.0
 
 
-def changed(record: RecordT, **values: Any) -> RecordT:
-    """Return a record with the values that are given; None leaves a field as it is."""
+def override(record: RecordT, **values: Any) -> RecordT:
+    """Return a record with the given values; None keeps a field."""
     given = {name: value for name, value in values.items() if value is not None}
     return replace(record, **given)  # type: ignore[type-var]
 
 
-def at_least_one(record: Any, *names: str) -> None:
-    """Raise `ConfigError` unless these fields of a record are at least 1."""
+def check_at_least_one(record: Any, *names: str) -> None:
+    """Raise `ConfigError` if one of these fields of a record is below 1."""
     for name in names:
         if getattr(record, name) < 1:
             option = "--seeds" if name == "n_seeds" else name

@@ -1,4 +1,4 @@
-"""The perception setups that are exchanged: level, estimator, cameras, lateness."""
+"""Perception setups that studies compare: level, estimator, cameras and latency."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,37 +11,37 @@ from hrc_env.experiments.rigs import (
     TRIPLES,
     WARM_UP_S,
     Turn,
-    late,
-    left_with,
+    delay,
+    keep_cameras,
 )
 from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.scene.rigs import RIGS
 from hrc_env.tracking.estimators import ESTIMATORS
 
 RIGS_OF = {4: (ALL,), 3: TRIPLES, 2: (*OPPOSITE, (0, 1), (2, 3)), 1: SINGLE}
-"""By how many cameras there are; episodes take turns in them."""
+"""Rigs by number of cameras; episodes rotate over them."""
 
 
 @dataclass(frozen=True, slots=True)
 class PerceptionSetup:
-    """How a robot perceives in a study: level, estimator, cameras that are left, lateness."""
+    """The perception of a robot in a study: level, estimator, working cameras and latency."""
 
     level: str = "keypoints"
-    """As `perception=` of an environment."""
+    """Perception level, as `perception=` of an environment."""
     estimator: str = "particle"
-    """Its name, where the level has cameras."""
+    """Name of the estimator, for levels with cameras."""
     n_cameras: int = 4
-    """That are left after the warm-up, of the scene's four."""
+    """Number of the scene's four cameras that work after the warm-up."""
     latency_s: float = 0.0
-    """From taking an image to having it [s]."""
+    """Delay from exposure to arrival of an image [s]."""
     is_told: bool = True
-    """Whether images say when they were taken; if not, they claim to be new."""
+    """Whether images carry their time stamp; otherwise they appear to be current."""
     is_alone: bool = False
-    """Whether the other cameras were never there."""
+    """Whether the other cameras are missing from the start."""
 
     @property
     def name(self) -> str:
-        """As in results.json."""
+        """Name in results.json."""
         if self.level in ("truth", "none"):
             return self.level
         name = f"{self.level}_{self.estimator}_{self.n_cameras}cam_{1000 * self.latency_s:.0f}ms"
@@ -49,7 +49,7 @@ class PerceptionSetup:
 
     @property
     def words(self) -> str:
-        """As in tables and figures."""
+        """Description in tables and figures."""
         if self.level in ("truth", "none"):
             return self.level
         words = f"{self.estimator}, {self.n_cameras} camera{'s' if self.n_cameras > 1 else ''}"
@@ -59,44 +59,44 @@ class PerceptionSetup:
             words += " from the start" if self.is_alone else f" after {WARM_UP_S:g} s"
         if self.latency_s:
             words += f", {1000 * self.latency_s:.0f} ms late"
-            words += "" if self.is_told else ", delay unknown"
+            words += "" if self.is_told else ", not time-stamped"
         return words
 
     @property
     def is_plain(self) -> bool:
-        """Whether all cameras are there, on time."""
+        """Whether all cameras work and are on time."""
         return self.n_cameras == 4 and not self.latency_s
 
     @property
     def turns(self) -> tuple[Turn, ...]:
-        """Cameras and their faults, in which episodes take turns."""
+        """Cameras and their faults, over which episodes rotate."""
         return self.list_turns(RIGS["lab"])
 
     def list_turns(self, rig: Sequence[CameraConfig]) -> tuple[Turn, ...]:
-        """Return cameras and their faults with another rig of four.
+        """Return cameras and their faults for another rig of four.
 
         Args:
-            rig: its cameras.
+            rig: the cameras of the rig.
         """
         turns = (
-            Turn(tuple(rig[c] for c in kept)) if self.is_alone else left_with(rig, kept)
+            Turn(tuple(rig[c] for c in kept)) if self.is_alone else keep_cameras(rig, kept)
             for kept in RIGS_OF[self.n_cameras]
         )
-        return tuple(late(turn, self.latency_s, self.is_told) for turn in turns)
+        return tuple(delay(turn, self.latency_s, self.is_told) for turn in turns)
 
 
 LATE_S = (0.12, 0.2)
-"""How late images are [s]: three and five control steps."""
+"""Delays of late images [s]: three and five control steps."""
 LATE = tuple(PerceptionSetup(latency_s=s, is_told=told) for told in (True, False) for s in LATE_S)
-"""Late images of four cameras: those that say how late they are, and those that do not."""
+"""Setups of four cameras with late images, with and without time stamps."""
 ON_REQUEST = ("kalman", "ransac", "paper")
 """Estimators that are compared on request only; with four cameras `kalman` equals the default."""
 REFERENCE = PerceptionSetup().name
-"""What everybody is compared with."""
+"""Name of the setup with which all others are compared."""
 
 
-def all_setups() -> dict[str, PerceptionSetup]:
-    """By name, with every estimator that is registered now; the slowest last."""
+def list_setups() -> dict[str, PerceptionSetup]:
+    """Return the setups by name, with every registered estimator; the slowest is last."""
     setups = (
         PerceptionSetup("truth"),
         PerceptionSetup("none"),
@@ -110,13 +110,13 @@ def all_setups() -> dict[str, PerceptionSetup]:
     return {each.name: each for each in setups}
 
 
-def usual_setups() -> tuple[str, ...]:
-    """The names of those that are compared if nobody asks for others."""
-    return tuple(name for name, each in all_setups().items() if each.estimator not in ON_REQUEST)
+def list_default_setups() -> tuple[str, ...]:
+    """Return the names of the setups that are compared by default."""
+    return tuple(name for name, each in list_setups().items() if each.estimator not in ON_REQUEST)
 
 
-def setup_called(name: str) -> PerceptionSetup:
-    """A setup by name, or a `ConfigError`."""
-    setups = all_setups()
+def find_setup(name: str) -> PerceptionSetup:
+    """Return a setup by name; raise `ConfigError` if there is none."""
+    setups = list_setups()
     check_names("perception setup", [name], setups)
     return setups[name]

@@ -1,7 +1,7 @@
-"""Environments with one perception setup, in which episodes of a fixed length are played.
+"""Environments with one perception setup, for episodes of a fixed length.
 
-Workers take no notice of the robot, so that all policies, estimators and shields meet the same
-ones. Episodes take turns in the setup's cameras.
+Workers ignore the robot, so all policies, estimators and shields meet the same motions. Episodes
+rotate over the setup's cameras.
 """
 
 import warnings
@@ -25,17 +25,17 @@ from hrc_env.step_result import Observation
 from hrc_env.vector.shards import Shards
 
 PEOPLE = "unaware"
-"""Workers who take no notice of the robot: their walk is then the same whatever it does."""
+"""Kind of workers, which ignore the robot: their motion does not depend on its actions."""
 N_TOGETHER = 300
-"""So many episodes are played side by side."""
+"""Number of episodes that are played together."""
 Rows = dict[str, list[Any]]
-"""Sums by name, one an episode."""
+"""Lists of sums by name, one value per episode."""
 Block = Callable[[Shards, list[int], PartProgress], Rows]
-"""Plays one episode of each seed, side by side; returns what they came to."""
+"""A function that plays one episode per seed together and returns their sums."""
 
 
 class Stage:
-    """Environments of one setup, built when they are needed and used again."""
+    """Environments of one setup, which are built when needed and reused."""
 
     def __init__(
         self, setup: PerceptionSetup, turns: Sequence[Turn], made_with: Mapping[str, Any]
@@ -44,21 +44,21 @@ class Stage:
         self._envs: dict[tuple[int, int], Shards] = {}
 
     def play(self, seeds: Sequence[int], play_block: Block, tick: PartProgress) -> Rows:
-        """Return what every episode came to, in the order of the seeds.
+        """Return the sums of all episodes, in the order of the seeds.
 
         Args:
-            seeds: one an episode, of which the k-th has turn k modulo the number of turns.
-            play_block: plays some of them.
-            tick: called with the growth of the share that is done.
+            seeds: one seed per episode; the k-th has turn k modulo the number of turns.
+            play_block: plays some of the episodes.
+            tick: is called with the growth of the completed share.
         """
         rows, n = Rows(), len(seeds)
         for k, turn in enumerate(self.turns[:n]):
-            mine = np.arange(k, n, len(self.turns))
-            for ids in np.array_split(mine, -(-len(mine) // N_TOGETHER)):
-                env, share = self._env(k, turn, len(ids)), len(ids) / n
-                note = partial(lambda of, done: tick(of * done), share)
-                played = play_block(env, [seeds[i] for i in ids], note)
-                for name, values in played.items():
+            turn_ids = np.arange(k, n, len(self.turns))
+            for ids in np.array_split(turn_ids, -(-len(turn_ids) // N_TOGETHER)):
+                env, share = self._get_env(k, turn, len(ids)), len(ids) / n
+                tick_block = partial(lambda of, done: tick(of * done), share)
+                sums = play_block(env, [seeds[i] for i in ids], tick_block)
+                for name, values in sums.items():
                     row = rows.setdefault(name, [None] * n)
                     for i, value in zip(ids.tolist(), values, strict=True):
                         row[i] = value
@@ -69,7 +69,7 @@ class Stage:
         for env in self._envs.values():
             env.close()
 
-    def _env(self, k: int, turn: Turn, n_episodes: int) -> Shards:
+    def _get_env(self, k: int, turn: Turn, n_episodes: int) -> Shards:
         if (k, n_episodes) not in self._envs:
             settings = settle(
                 perception=self.setup.level, estimator=self.setup.estimator, people=PEOPLE,
@@ -77,27 +77,27 @@ class Stage:
             )  # fmt: skip
             threads = 1 if self.setup.level == "pixels" else min(n_cores(), n_episodes)
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # that one camera is a poor rig is what we ask
-                made = Shards(n_episodes, threads, partial(Simulation, settings=settings))
-            self._envs[k, n_episodes] = made
+                warnings.simplefilter("ignore")  # a rig of one camera is intended here
+                env = Shards(n_episodes, threads, partial(Simulation, settings=settings))
+            self._envs[k, n_episodes] = env
         return self._envs[k, n_episodes]
 
 
-class Endless:
-    """Environments whose episodes go on after their end, for studies of a fixed length."""
+class EndlessEpisodes:
+    """Environments with episodes that continue after their end, for studies of a fixed length."""
 
     def __init__(self, env: Shards) -> None:
         self.env = env
         self.terminated: Bools = np.zeros(env.bounds[-1], np.bool_)
-        """(B,) whether an episode ended with the last step."""
+        """Truth values (B,): an episode ended with the last step."""
 
     def reset(self, seeds: Sequence[int]) -> Observation:
-        """Begin an episode of every seed; return the observation."""
+        """Begin an episode for every seed and return the observation."""
         rngs = [seeding.np_random(seed)[0] for seed in seeds]
         return self.env.reset(np.arange(len(seeds)), rngs).observation
 
     def step(self, action: Any) -> tuple[Observation, Floats, Bools, Bools, Info]:
-        """Step every environment; no episode is over."""
+        """Step every environment; no episode ever ends."""
         shape = len(self.terminated), self.env.first.n_actions
         result = self.env.step(checked_action(action, shape, self.env.first.control))
         self.terminated, never = result.terminated, np.zeros_like(result.terminated)

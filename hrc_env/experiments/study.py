@@ -1,15 +1,7 @@
 """Studies of whole episodes: a question, the rows that answer it, and their statistics.
 
-    SHIELD = Study(
-        name="shielded", title="What the shield keeps", about="...", depends=("env", "shield"),
-        first_seed=8_000_000,
-        rows={
-            "bare": Row("four cameras, no shield", 2000),
-            "four": Row("four cameras", 2000, env={"shield": "qp"}, baseline="bare"),
-        },
-        columns=(share_of_baseline("goals_reached", "throughput [%]", scale=100), mean("cost")),
-    )
-    run_experiment(SHIELD, Path("out/shielded"))
+A declaration that cannot work raises a `ConfigError` at once: an unknown agent, estimator, shield,
+environment or argument; a baseline that is no row; a column of an unknown statistic.
 
 A declaration that cannot work raises a `ConfigError` at once: an unknown agent,
 estimator, shield, environment or argument; a baseline that is no row; a column of no statistic.
@@ -19,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, is_dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,13 +20,13 @@ from hrc_env.core.results import Metric
 from hrc_env.core.typing import Ints
 from hrc_env.engines.files import carried
 from hrc_env.evaluation.episodes import play_episodes
-from hrc_env.experiments.agents import AgentChoice, check_choice, described, maker_of
+from hrc_env.experiments.agents import AgentChoice, check_choice, describe_agent, get_agent_factory
 from hrc_env.experiments.cache import Part, PartCache, PartProgress
 from hrc_env.experiments.columns import Column
-from hrc_env.experiments.report import Metrics, Report, Table, quick_words
+from hrc_env.experiments.report import Metrics, Report, Table, describe_quick_run
 from hrc_env.experiments.rigs import DT_S
 from hrc_env.experiments.setups import PerceptionSetup
-from hrc_env.experiments.versions import check_subsystems, key_of, source_digest
+from hrc_env.experiments.versions import check_subsystems, hash_source, make_key
 from hrc_env.pipeline.levels import LEVELS
 from hrc_env.safety.shield import SHIELDS
 from hrc_env.scene.rigs import RIGS
@@ -46,47 +38,54 @@ from hrc_env.tracking.estimators import ESTIMATORS
 Played = Mapping[str, list[dict[str, float]]]
 """Statistics of episodes by row, in the order of their seeds."""
 FOUR = PerceptionSetup()
-"""Four cameras, on time, by the emulator."""
+"""Four cameras, on time, simulated by the emulator."""
 GIVEN_BY_SETUP = ("perception", "estimator")
 """Arguments of the environment that come from `Row.setup`."""
 
 
+class Shard(NamedTuple):
+    """The episodes of one part of a row."""
+
+    first_seed: int
+    n_episodes: int
+
+
 @dataclass(frozen=True, slots=True)
 class Row:
-    """Who acts, beside whom, with which perception, under which shield."""
+    """One row of a study: agent, people, perception and shield."""
 
     words: str | tuple[str, ...]
-    """Cells before the numbers of its line."""
+    """Cells before the numbers of the row."""
     n_episodes: int
-    """Its episodes are the first so many of the study's seeds."""
+    """Number of episodes, which use the first seeds of the study."""
     agent: AgentChoice = "scripted"
-    """As `hrc_env.agents.registry.make_agent` takes it; or a function that makes one."""
+    """Agent as `hrc_env.agents.registry.make_agent` takes it, or a function that makes one."""
     setup: PerceptionSetup = FOUR
-    """What the robot sees with; episodes take turns in the cameras that are left."""
+    """Perception of the robot; episodes rotate over its cameras."""
     env: Mapping[str, Any] = field(default_factory=dict)
     """Other arguments of the environment, as of `gymnasium.make`."""
     baseline: str | None = None
-    """The row whose episodes on the same seeds `is_paired` columns compare it with."""
+    """Name of the row with which `is_paired` columns compare this row on the same seeds."""
     n_together: int = 250
-    """So many episodes are one part, played side by side."""
+    """Number of episodes in one part, which are played together."""
     is_shown: bool = True
-    """Whether it is a line of the table."""
+    """Whether the row appears in the table."""
     trust: bool = False
-    """Whether pickles in the agent's checkpoint are read, as of `make_agent`."""
+    """Whether pickles in the agent's checkpoint may be loaded, as in `make_agent`."""
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """The cells before the numbers."""
+        """Cells before the numbers."""
         return (self.words,) if isinstance(self.words, str) else self.words
 
     @property
     def n_steps(self) -> int:
-        """Control steps of an episode, at most."""
+        """Greatest number of control steps in an episode."""
         asked = self.env.get("max_episode_steps")
         return asked or find_task(self.env.get("task", DEFAULT)).max_episode_steps
 
     def keywords(self) -> list[dict[str, Any]]:
-        """Return the arguments of environments, in which episodes take turns."""
+        """Return the arguments of environments, over which episodes rotate."""
         setup, known = self.setup, dict(self.env)
         known["perception"] = setup.level
         if setup.level in ("keypoints", "pixels"):
@@ -101,21 +100,21 @@ class Row:
         ]
 
     def settings(self) -> dict[str, Any]:
-        """Return all that its episodes depend on besides seeds, as JSON can hold it."""
-        found = {
-            "agent": described(self.agent),
+        """Return all settings that its episodes depend on besides seeds, for JSON."""
+        settings = {
+            "agent": describe_agent(self.agent),
             "setup": asdict(self.setup),
             "env": describe(self.env),
         }
-        if source := source_digest(ESTIMATORS[self.setup.estimator].make):
-            found["estimator_source"] = source
+        if source := hash_source(ESTIMATORS[self.setup.estimator].make):
+            settings["estimator_source"] = source
         shield = self.env.get("shield")
-        if isinstance(shield, str) and (source := source_digest(SHIELDS[shield])):
-            found["shield_source"] = source
-        return found
+        if isinstance(shield, str) and (source := hash_source(SHIELDS[shield])):
+            settings["shield_source"] = source
+        return settings
 
     def check(self) -> None:
-        """Raise `ConfigError` for what cannot be played."""
+        """Raise `ConfigError` if the row cannot be played."""
         for name in GIVEN_BY_SETUP:
             if name in self.env:
                 raise ConfigError(f"env must leave out {name}, which comes from the row's setup.")
@@ -133,40 +132,40 @@ class Row:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Study:
-    """A declaration of what is played, counted and shown."""
+    """The declaration of a study: rows, columns and tables."""
 
     name: str
-    """As its folder and its results are called."""
+    """Name of the study in its folder and its results."""
     title: str
-    """Of the report."""
+    """Title of the report."""
     about: str
-    """The question, and how it is answered."""
+    """The question and the method."""
     depends: tuple[str, ...]
     """Subsystems that its numbers depend on (`behaviour.toml`)."""
     first_seed: int
-    """Of the episodes of every row; the others count up."""
+    """Seed of the first episode of every row; later ones count up."""
     rows: Mapping[str, Row]
-    """By name, in the order in which they are played and shown; those of policies that have not
-    learnt yet may be left out, where `tables` are given."""
+    """Rows by name, in the order in which they are played and shown. Rows of policies that are not
+    trained yet may be missing if `tables` are given."""
     columns: tuple[Column, ...]
     """Statistics of every row (`hrc_env.columns`)."""
     heads: tuple[str, ...] = ("",)
-    """Headings of the rows' words."""
+    """Headings of the cells before the numbers."""
     note: str = ""
-    """What stands below the table, as `Table.note`."""
+    """Text below the table, as `Table.note`."""
     tables: tuple[Table, ...] = ()
-    """What is shown in place of one table of all rows and columns."""
+    """Tables to show instead of one table of all rows and columns."""
     derive: Callable[[Metrics], Metrics] | None = None
     """Returns further metrics from those of the columns."""
     n_quick: int = 4
-    """Episodes of each row in the short form."""
+    """Number of episodes per row in the quick form."""
     threads: int | None = None
-    """Threads that environments share; None: as many as there are cores."""
+    """Number of threads that environments share; None: the number of cores."""
     is_quick: bool = False
-    """Whether it is the short form."""
+    """Whether this is the quick form."""
 
     def __post_init__(self) -> None:
-        """Raise `ConfigError` for a row, a column or a table that names nothing."""
+        """Raise `ConfigError` for a row, a column or a table that refers to nothing."""
         check_subsystems(self.depends)
         if not self.columns or not (self.rows or self.tables):
             raise ConfigError(f"Study {self.name!r} must have rows and columns.")
@@ -176,16 +175,16 @@ class Study:
             except ConfigError as error:
                 raise ConfigError(f"Row {name!r} of {self.name!r}: {error}") from error
             self._check_baseline(name, row)
-        known = self._metric_names()
+        known = self._list_metrics()
         if len(set(known)) < len(known):
             twice = next(each for each in known if known.count(each) > 1)
             raise ConfigError(f"Study {self.name!r} measures {twice!r} twice.")
-        for each in self.shown_tables():
+        for table in self.shown_tables():
             if self.derive is None:
-                each.check(known)
+                table.check(known)
 
     def _check_baseline(self, name: str, row: Row) -> None:
-        """Raise `ConfigError` unless the row's baseline is there and long enough."""
+        """Raise `ConfigError` if the row's baseline is missing or too short."""
         paired = [column.metric.format(name) for column in self.columns if column.is_paired]
         if row.baseline is None:
             if paired:
@@ -201,39 +200,39 @@ class Study:
                 f"must have as many; it has {self.rows[row.baseline].n_episodes}."
             )
 
-    def _metric_names(self) -> list[str]:
+    def _list_metrics(self) -> list[str]:
         return [c.metric.format(row) for row in self.rows for c in self.columns if c.measure]
 
     @property
     def seeds(self) -> Sequence[int]:
-        """Of the longest row."""
+        """Seeds of the longest row."""
         n_episodes = max((row.n_episodes for row in self.rows.values()), default=0)
         return range(self.first_seed, self.first_seed + n_episodes)
 
     @property
     def n_parts(self) -> int:
-        """The number of parts of all rows."""
-        return sum(len(shards_of(row, self.first_seed)) for row in self.rows.values())
+        """Number of parts of all rows."""
+        return sum(len(split_row(row, self.first_seed)) for row in self.rows.values())
 
     @property
     def quick_note(self) -> str:
-        """The warning on tables of the short form; "" of the whole study."""
+        """The warning on tables of the quick form; "" for the whole study."""
         if not (self.is_quick and self.rows):
             return ""
         seconds = DT_S * max(row.n_steps for row in self.rows.values())
-        return quick_words(max(row.n_episodes for row in self.rows.values()), seconds)
+        return describe_quick_run(max(row.n_episodes for row in self.rows.values()), seconds)
 
     def settings(self) -> dict[str, Any]:
-        """Return all that its numbers depend on, as JSON can hold it."""
+        """Return all settings that its numbers depend on, for JSON."""
         rows = {name: {"n_episodes": row.n_episodes, **row.settings()}
                 for name, row in self.rows.items()}  # fmt: skip
         return {"first_seed": self.first_seed, "rows": rows}
 
     def select(self, beginnings: Sequence[str]) -> "Study":
-        """Return the study of the rows whose names begin so, and of their baselines.
+        """Return the study of rows with the given beginnings of names, and their baselines.
 
         Raises:
-            ConfigError: no row begins like one of them.
+            ConfigError: no row begins with one of them.
         """
         for each in beginnings:
             if not any(name.startswith(each) for name in self.rows):
@@ -242,46 +241,47 @@ class Study:
         kept |= {baseline for name in kept if (baseline := self.rows[name].baseline) is not None}
         return replace(self, rows={name: row for name, row in self.rows.items() if name in kept})
 
-    def quick(self) -> "Study":
-        """Return the short form: few episodes of each row; of rendered images one, cut short."""
+    def shorten(self) -> "Study":
+        """Return the quick form: few episodes per row; one short episode of rendered images."""
 
-        def shorten(row: Row) -> Row:
+        def shorten_row(row: Row) -> Row:
             if row.setup.level == "pixels":
                 return replace(row, n_episodes=1, env={**row.env, "max_episode_steps": 10})
             return replace(row, n_episodes=min(row.n_episodes, self.n_quick))
 
-        rows = {name: shorten(row) for name, row in self.rows.items()}
+        rows = {name: shorten_row(row) for name, row in self.rows.items()}
         return replace(self, rows=rows, is_quick=True)
 
     def play(self, cache: PartCache) -> Played:
-        """Return the episodes of every row, each part of them from the cache or anew."""
-        rows = [(name, shard) for name, row in self.rows.items()
-                for shard in shards_of(row, self.first_seed)]  # fmt: skip
-        drawn = [self.rows[name].setup.level == "pixels" for name, _ in rows]
-        parts = [self._part(name, *shard) for name, shard in rows]
-        found: dict[str, list[dict[str, float]]] = {name: [] for name in self.rows}
-        for (name, _), part in zip(rows, cache.parts(parts, one_core=all(drawn)), strict=True):
-            found[name] += part["episodes"]
-        return found
+        """Return the episodes of every row, each part from the cache or computed."""
+        shards = [(name, shard) for name, row in self.rows.items()
+                  for shard in split_row(row, self.first_seed)]  # fmt: skip
+        is_drawn = [self.rows[name].setup.level == "pixels" for name, _ in shards]
+        parts = [self._make_part(name, shard) for name, shard in shards]
+        episodes: dict[str, list[dict[str, float]]] = {name: [] for name in self.rows}
+        made = cache.make_parts(parts, one_core=all(is_drawn))
+        for (name, _), part in zip(shards, made, strict=True):
+            episodes[name] += part["episodes"]
+        return episodes
 
-    def _part(self, name: str, first_seed: int, n_episodes: int) -> Part:
+    def _make_part(self, name: str, shard: Shard) -> Part:
         row = self.rows[name]
-        made_of = {"row": row.settings(), "first_seed": first_seed, "n": n_episodes}
-        travels = replace(row, agent=carried(row.agent)) if isinstance(row.agent, str) else row
-        make = partial(play_shard, travels, first_seed, n_episodes, self.threads)
-        label = f"{name.replace('/', '.')}.{first_seed}"
-        return Part(label, make, key_of(made_of, self.depends))
+        made_of = {"row": row.settings(), "first_seed": shard.first_seed, "n": shard.n_episodes}
+        sent = replace(row, agent=carried(row.agent)) if isinstance(row.agent, str) else row
+        make = partial(play_shard, sent, shard.first_seed, shard.n_episodes, self.threads)
+        label = f"{name.replace('/', '.')}.{shard.first_seed}"
+        return Part(label, make, make_key(made_of, self.depends))
 
     def metrics(self, played: Played) -> dict[str, Metric]:
-        """Return every number, as "ROW.NAME"."""
-        found: dict[str, Metric] = {}
+        """Return all metrics as "ROW.NAME"."""
+        metrics: dict[str, Metric] = {}
         for name, row in self.rows.items():
             own, theirs = played[name], played[row.baseline or name]
             for column in self.columns:
                 if column.measure is not None:
                     beside = theirs[: len(own)]
-                    found[column.metric.format(name)] = column.measure(own, beside)
-        return found if self.derive is None else {**found, **self.derive(found)}
+                    metrics[column.metric.format(name)] = column.measure(own, beside)
+        return metrics if self.derive is None else {**metrics, **self.derive(metrics)}
 
     def shown_tables(self) -> tuple[Table, ...]:
         """Return the tables of the report and of the documentation."""
@@ -296,17 +296,17 @@ class Study:
 
         Args:
             played: episodes by row.
-            metrics: every number of them.
-            figures: folder; a study of episodes draws none.
+            metrics: all metrics by name.
+            figures: folder of figures; a study of episodes draws none.
         """
-        parts = [each.markdown(metrics) for each in self.shown_tables()]
+        parts = [table.to_markdown(metrics) for table in self.shown_tables()]
         return Report(self.title, self.about, parts)
 
 
-def shards_of(row: Row, first_seed: int) -> list[tuple[int, int]]:
-    """Return the parts of a row: their first seeds, and how many episodes they have."""
+def split_row(row: Row, first_seed: int) -> list[Shard]:
+    """Return the parts of a row, of at most `Row.n_together` episodes each."""
     return [
-        (first_seed + k, min(row.n_together, row.n_episodes - k))
+        Shard(first_seed + k, min(row.n_together, row.n_episodes - k))
         for k in range(0, row.n_episodes, row.n_together)
     ]
 
@@ -314,16 +314,16 @@ def shards_of(row: Row, first_seed: int) -> list[tuple[int, int]]:
 def play_shard(
     row: Row, first_seed: int, n_episodes: int, threads: int | None, tick: PartProgress
 ) -> dict[str, Any]:
-    """Return the episodes of a part, of which each turn of the row's cameras has a block.
+    """Return the episodes of a part; each turn of the row's cameras has a block of them.
 
     Args:
-        row: who is played.
-        first_seed: of the first episode.
-        n_episodes: how many.
-        threads: that environments share; None: as many as there are cores.
-        tick: called with the growth of the share that is done.
+        row: the row.
+        first_seed: seed of the first episode.
+        n_episodes: number of episodes.
+        threads: number of threads that environments share; None: the number of cores.
+        tick: is called with the growth of the completed share.
     """
-    make, found = maker_of(row.agent, row.trust), list[dict[str, float]]()
+    make, episodes = get_agent_factory(row.agent, row.trust), list[dict[str, float]]()
     turns = row.keywords()
     blocks: list[Ints] = np.array_split(np.arange(n_episodes), len(turns))
     for ids, keywords in zip(blocks, turns, strict=True):
@@ -332,12 +332,12 @@ def play_shard(
         if row.setup.level != "pixels":
             keywords["num_threads"] = threads
         share = partial(lambda of, done: tick(done * of), len(ids) / n_episodes)
-        found += play_episodes(make, len(ids), first_seed + int(ids[0]), tick=share, **keywords)
-    return {"episodes": found}
+        episodes += play_episodes(make, len(ids), first_seed + int(ids[0]), tick=share, **keywords)
+    return {"episodes": episodes}
 
 
 def describe(value: Any) -> Any:
-    """Return a value as JSON can hold it: of a function its name and the digest of its file."""
+    """Return a value in a form for JSON: a function becomes its name and the digest of its file."""
     if isinstance(value, Mapping):
         return {str(name): describe(each) for name, each in value.items()}
     if isinstance(value, list | tuple):
@@ -350,5 +350,5 @@ def describe(value: Any) -> Any:
         return str(value)
     if callable(value):
         name = getattr(value, "__qualname__", type(value).__qualname__)
-        return {"function": name, "source": source_digest(value)}
+        return {"function": name, "source": hash_source(value)}
     return value

@@ -1,9 +1,9 @@
-"""Versions of behaviour: the numbers by which finished parts and tables are known to be current.
+"""Versions of behaviour, by which finished parts and tables are known to be current.
 
-`behaviour.toml` gives each subsystem a number. A study names the subsystems that its numbers
-depend on; a part that was made at other numbers, or with other settings, is made anew. Probes
-(`tests/behaviour/`) raise a number when the behaviour of its subsystem moves, so that a change
-of code that moves nothing makes nothing anew.
+`behaviour.toml` gives each subsystem a number. A study names the subsystems that its numbers depend
+on; a part made at other versions or with other settings is computed again. Probes
+(`tests/behaviour/`) raise a number when the behaviour of its subsystem changes, so a change of code
+without effect on behaviour keeps all parts.
 """
 
 import hashlib
@@ -50,9 +50,9 @@ def read_versions(path: Path | None = None) -> dict[str, int]:
     for name in SUBSYSTEMS:
         version = versions.get(name)
         if not isinstance(version, int) or isinstance(version, bool) or version < 1:
-            came = "nothing" if version is None else repr(version)
+            given = "nothing" if version is None else repr(version)
             raise ConfigError(
-                f"{path.name} must give {name} a whole number from 1 on, and gives {came}."
+                f"{path.name} must give {name} a whole number from 1 on, and gives {given}."
             )
     return versions
 
@@ -68,7 +68,7 @@ def check_subsystems(subsystems: Iterable[str]) -> None:
     check_names("subsystem", names, SUBSYSTEMS)
 
 
-def versions_of(subsystems: Iterable[str]) -> dict[str, int]:
+def select_versions(subsystems: Iterable[str]) -> dict[str, int]:
     """Return the versions of some subsystems, in the order of `SUBSYSTEMS`."""
     names = tuple(subsystems)
     check_subsystems(names)
@@ -76,31 +76,31 @@ def versions_of(subsystems: Iterable[str]) -> dict[str, int]:
     return {name: versions[name] for name in SUBSYSTEMS if name in names}
 
 
-def key_of(settings: Mapping[str, Any], subsystems: Iterable[str]) -> str:
+def make_key(settings: Mapping[str, Any], subsystems: Iterable[str]) -> str:
     """Return the key of a finished part: a digest of its settings and of the subsystems' versions.
 
     Args:
-        settings: all that the part's numbers depend on besides code, as JSON can hold it.
+        settings: all settings that the part's numbers depend on besides code, for JSON.
         subsystems: names of the subsystems that they depend on.
     """
-    content = json.dumps([settings, versions_of(subsystems)], sort_keys=True)
+    content = json.dumps([settings, select_versions(subsystems)], sort_keys=True)
     return hashlib.sha256(content.encode()).hexdigest()[:16]
 
 
-def digest_of(path: Path) -> str:
+def hash_file(path: Path) -> str:
     """Return the digest of a file."""
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def source_digest(made: object) -> str:
-    """Return the digest of the file that defines something that a user registered.
+def hash_source(item: object) -> str:
+    """Return the digest of the file that defines an object which a user registered.
 
-    An estimator of the user's own has no version; its file stands for it. The digest is "" for
-    parts of this package, which have one, and for anything that has no file.
+    A user's estimator has no version; its file stands for it. The digest is "" for objects of this
+    package, which has versions, and for objects without a file.
     """
     try:
-        path = Path(inspect.getfile(made)).absolute()  # type: ignore[arg-type]
+        path = Path(inspect.getfile(item)).absolute()  # type: ignore[arg-type]
         is_ours = path.is_relative_to(_PACKAGE)
-        return "" if is_ours else digest_of(path)
+        return "" if is_ours else hash_file(path)
     except (OSError, TypeError):
         return ""

@@ -27,7 +27,7 @@ import hrc_env
 from assets.recordings.written import ORDERS, Y_UP, cmu_name, write_acclaim, write_bvh
 from hrc_env.agents import policies as trained
 from hrc_env.agents.env_info import env_info
-from hrc_env.agents.registry import control_of, make_agent
+from hrc_env.agents.registry import find_control, make_agent
 from hrc_env.belief import (
     Belief,
     covariance_factor_m,
@@ -604,9 +604,10 @@ class Policy(NamedTuple):
 
 def policies() -> list[Policy]:
     """Return one trained policy of each id that has some."""
-    found = {address.split("/")[2]: address for address in reversed(trained.names())}
+    found = {address.split("/")[2]: address for address in reversed(trained.list_names())}
     return [
-        Policy(env_id, address, control_of(address) or "joint") for env_id, address in found.items()
+        Policy(env_id, address, find_control(address) or "joint")
+        for env_id, address in found.items()
     ]
 
 
@@ -694,10 +695,10 @@ def learn(
 
 def recipe_of(env_id: str, algorithm: str | None) -> dict[str, str]:
     """Return how a task is learnt by a learner, or by its own if None, where nothing is asked."""
-    from hrc_env.agents.recipes import filled
+    from hrc_env.agents.recipes import fill_in
     from hrc_env.agents.requests import TrainingRequest
 
-    run = filled(TrainingRequest(task=env_id, algorithm=algorithm))
+    run = fill_in(TrainingRequest(task=env_id, algorithm=algorithm))
     return {name: str(getattr(run, field)) for name, field in RECIPE_FIELDS.items()}
 
 

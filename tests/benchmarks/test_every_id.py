@@ -9,8 +9,8 @@ from benchmarks.speed.contenders import Starts
 from hrc_env.core.errors import ConfigError
 from hrc_env.experiments.impact.episodes import play
 from hrc_env.experiments.impact.experiment import Impact, make_experiment
-from hrc_env.experiments.impact.policies import Policy, maker
-from hrc_env.experiments.setups import REFERENCE, setup_called
+from hrc_env.experiments.impact.policies import Policy, get_maker
+from hrc_env.experiments.setups import REFERENCE, find_setup
 from hrc_env.experiments.stage import Stage
 from hrc_env.tasks.task import find_task
 
@@ -21,7 +21,7 @@ IDS = ("HRCPickPlace-v0", "HRCReachGoal-v0")
 
 @pytest.mark.parametrize("task", IDS)
 def test_impact_plays_it(task, tmp_path):
-    setup, make = setup_called(REFERENCE), maker(Policy("scripted_slowed"), tmp_path / "none")
+    setup, make = find_setup(REFERENCE), get_maker(Policy("scripted_slowed"), tmp_path / "none")
     with closing(Stage(setup, setup.turns, {"task": task})) as stage:
         rows = play(stage, [5, 6], 8, make, 0.0, lambda share: None)
     assert [len(values) for values in rows.values()] == [2] * len(rows)

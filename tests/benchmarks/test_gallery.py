@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks.gallery import motions
 from benchmarks.gallery.gallery import Exhibit, GalleryConfig, run, write_page
-from benchmarks.gallery.motions import FRAMES, STAGED, moments, stage_of
+from benchmarks.gallery.motions import FRAMES, STAGED, make_stage, spread_frames
 from benchmarks.gallery.still import CASTS
 from hrc_env.core.errors import ConfigError
 from hrc_env.motion.repertoire import SCENES
@@ -27,7 +27,7 @@ def test_a_page_shows_every_picture_with_its_words(tmp_path):
 
 
 def test_a_strip_has_evenly_spread_moments_of_all_its_films():
-    chosen = moments([40, 80])
+    chosen = spread_frames([40, 80])
     assert len(chosen) == FRAMES
     assert np.ptp(np.diff([40 * film + row for film, row in chosen])) <= 1
     assert {film for film, _ in chosen} == {0, 1}
@@ -36,7 +36,7 @@ def test_a_strip_has_evenly_spread_moments_of_all_its_films():
 def test_every_stage_and_cast_names_what_there_is():
     assert set(STAGED) <= set(SCENES)
     for name in SCENES:
-        assert stage_of(name).away_m > 1.0
+        assert make_stage(name).away_m > 1.0
     for scene, cast in CASTS.items():
         places = {place.name for place in build(name=scene).grounds.places}
         assert {place for place, *_ in cast} <= places

@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.motion import bench
 from benchmarks.motion.report import inside
-from benchmarks.motion.targets import TARGETS, targets_of
+from benchmarks.motion.targets import TARGETS, list_targets
 from hrc_env.core.errors import ConfigError
 from hrc_env.experiments.runner import run_experiment
 from hrc_env.motion.repertoire import SCENES
@@ -29,13 +29,13 @@ def test_every_number_is_finite_and_every_target_has_one(done):
     _, metrics, _ = done
     assert all(math.isfinite(metric.value) for metric in metrics.values())
     for scene in PLAYED:
-        assert {f"{scene}.{target.statistic}" for target in targets_of(scene)} <= set(metrics)
+        assert {f"{scene}.{target.statistic}" for target in list_targets(scene)} <= set(metrics)
 
 
 def test_the_first_worker_walks_and_saws_like_people(done):
     _, metrics, _ = done
     for scene in ("walk 1.1 m/s", "saw"):
-        for target in targets_of(scene):
+        for target in list_targets(scene):
             if target.statistic not in ("wrist_p95_m_s", "step_width_m"):
                 assert inside(target, metrics[f"{scene}.{target.statistic}"]), target
 

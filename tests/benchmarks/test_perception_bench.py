@@ -8,10 +8,10 @@ import pytest
 
 from benchmarks.perception import speed
 from benchmarks.perception.bench import PerceptionBench
-from benchmarks.perception.episodes import Episode, episode_of, some_steps
-from benchmarks.perception.metrics import EMULATED, NO_FAULT, PIXELS, metrics_of
+from benchmarks.perception.episodes import Episode, read_episode, select_steps
+from benchmarks.perception.metrics import EMULATED, NO_FAULT, PIXELS, compute_metrics
 from benchmarks.perception.report import report
-from benchmarks.perception.views import FAMILIES, FAMILY_OF, View, rows_of
+from benchmarks.perception.views import FAMILIES, FAMILY_OF, View, group_rows
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric
 from hrc_env.experiments.runner import run_experiment
@@ -76,14 +76,14 @@ def test_every_activity_is_in_one_family():
 def test_an_episode_survives_being_written_down():
     one = episode(0.0123)
     one.error_m[2] = np.nan
-    again = episode_of(json.loads(json.dumps(one.to_json())))
+    again = read_episode(json.loads(json.dumps(one.to_json())))
     np.testing.assert_allclose(again.error_m, one.error_m)
     np.testing.assert_array_equal(again.inside95, one.inside95)
-    assert len(some_steps(again, slice(3)).off_px) == 3
+    assert len(select_steps(again, slice(3)).off_px) == 3
 
 
 def test_numbers_say_what_was_found():
-    metrics = metrics_of(found(), 4, 10)
+    metrics = compute_metrics(found(), 4, 10)
     assert metrics["error_m.lab.median"].value == pytest.approx(0.02)
     assert metrics["coverage95.lab"].value == pytest.approx(14 / 15)
     assert metrics["error_ratio.lost"].value == pytest.approx(2.0)
@@ -100,7 +100,7 @@ def test_numbers_say_what_was_found():
 
 
 def test_the_report_has_a_row_for_every_fault_that_was_played(tmp_path):
-    metrics = metrics_of(found(), 4, 10)
+    metrics = compute_metrics(found(), 4, 10)
     report(TINY, found(), metrics, tmp_path / "figures").write(tmp_path, {}, [0], metrics)
     said = (tmp_path / "report.md").read_text()
     assert "| `lost` | 2.00" in said
@@ -110,8 +110,8 @@ def test_the_report_has_a_row_for_every_fault_that_was_played(tmp_path):
 
 
 def test_distances_are_rows_in_order():
-    assert list(rows_of(VIEWS, "distance")) == ["3_4_m", "6_9_m"]
-    assert list(rows_of(VIEWS, "angle")) == ["0_45_deg", "135_180_deg"]
+    assert list(group_rows(VIEWS, "distance")) == ["3_4_m", "6_9_m"]
+    assert list(group_rows(VIEWS, "angle")) == ["0_45_deg", "135_180_deg"]
 
 
 def test_more_faulty_episodes_than_faultless_ones_are_refused():

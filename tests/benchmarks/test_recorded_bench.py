@@ -15,7 +15,7 @@ from recorded_stored import calibration
 from benchmarks.recorded import detections, fetch
 from benchmarks.recorded.bench import FOOTAGE, report
 from benchmarks.recorded.calibration import read_calibration
-from benchmarks.recorded.detections import detections_of
+from benchmarks.recorded.detections import make_detections
 from benchmarks.recorded.films import Films
 from benchmarks.recorded.metrics import NAMES
 from docs import tables
@@ -148,12 +148,12 @@ def test_detections_are_made_once_and_stored_whole(films, tmp_path, monkeypatch)
     cameras = read_calibration(calibration(tmp_path / "c.txt"), [(160, 320)] * 2)
     BlinkingDetector.n_looks, shares = 0, []
     parts = PartCache(tmp_path / "parts", "this code", 1, lambda share, label: shares.append(share))
-    made = detections_of(Films(films), cameras, parts)
+    made = make_detections(Films(films), cameras, parts)
     assert BlinkingDetector.n_looks == N_FRAMES
     assert sum(shares) == pytest.approx(1)
     assert made.px.shape == (N_FRAMES, 2, 15, 2)
     assert made.dt_s == pytest.approx(1 / 60)
-    again = detections_of(Films(films), cameras, parts)
+    again = make_detections(Films(films), cameras, parts)
     assert BlinkingDetector.n_looks == N_FRAMES
     assert np.array_equal(again.px, made.px)
 

@@ -5,7 +5,7 @@ import pytest
 from recorded_stored import calibration
 
 from benchmarks.recorded.calibration import (
-    meeting_point,
+    find_meeting_point,
     read_calibration,
     tracker_config,
 )
@@ -50,7 +50,7 @@ def test_somebody_is_expected_where_the_cameras_look():
     target = np.array([1.0, 2.0, 0.8])
     eyes = ([4.0, 2.0, 2.0], [1.0, 5.0, 2.0], [-2.0, 1.0, 2.0])
     cameras = [pinhole("c", np.array(eye), target, 60, 640, 480) for eye in eyes]
-    assert np.allclose(meeting_point(cameras), target)
+    assert np.allclose(find_meeting_point(cameras), target)
     config = tracker_config(cameras)
     assert np.allclose(config.prior_mean_world, target)
     assert 1.5 < config.prior_std_m < 1.8

@@ -9,15 +9,15 @@ from benchmarks.recorded.metrics import (
     bone_std,
     follow,
     foretell,
-    foretold_metrics,
     jerk,
+    summarize_foretold,
 )
 from hrc_env.core.skeleton import MIRROR
 
 
 def test_a_camera_that_was_held_out_is_foretold_within_the_claimed_region():
     rig, _, detections = recording(n_frames=60)
-    metrics = foretold_metrics(foretell("kalman", rig.P, rig.tracker, detections))
+    metrics = summarize_foretold(foretell("kalman", rig.P, rig.tracker, detections))
     assert metrics["px.median"].value < 4 * SIGMA_PX
     assert metrics["px.median"].low <= metrics["px.median"].value <= metrics["px.median"].high
     assert metrics["coverage95"].value > 0.85
@@ -27,7 +27,7 @@ def test_a_camera_that_was_held_out_is_foretold_within_the_claimed_region():
 def test_sides_that_the_held_out_detector_exchanged_count_only_in_the_plain_measure():
     rig, _, detections = recording(n_frames=60)
     detections.px[30:50, 1] = detections.px[30:50, 1][:, MIRROR]
-    metrics = foretold_metrics(foretell("kalman", rig.P, rig.tracker, detections))
+    metrics = summarize_foretold(foretell("kalman", rig.P, rig.tracker, detections))
     assert metrics["px.p95"].value > 2 * metrics["either_px.p95"].value
 
 

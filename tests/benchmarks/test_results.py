@@ -12,8 +12,8 @@ from rich.console import Console
 from assets.emulator import shelf
 from benchmarks import records, results
 from benchmarks.replays import REPLAYS
-from benchmarks.results import COMMANDS, STUDIES, Arguments, Command, main, why_stale
-from benchmarks.studies import Study, commands_of
+from benchmarks.results import COMMANDS, STUDIES, Arguments, Command, explain_stale, main
+from benchmarks.studies import Study, list_commands
 from docs import tables
 from hrc_env.core.errors import ConfigError
 from hrc_env.experiments.columns import Column
@@ -58,7 +58,7 @@ def desk(tmp_path, monkeypatch):
     monkeypatch.setattr(tables, "RESULTS", tmp_path)
     monkeypatch.setattr(results.generate, "main", lambda: None)
     monkeypatch.setattr(results, "provenance", lambda: {"git": "abc1234"})
-    monkeypatch.setattr(results, "versions_of", lambda names: dict.fromkeys(names, 1))
+    monkeypatch.setattr(results, "select_versions", lambda names: dict.fromkeys(names, 1))
     monkeypatch.setitem(sys.modules, "made_tables", SimpleNamespace(TABLES=[TABLE]))
     tables.declared.cache_clear()
 
@@ -82,7 +82,7 @@ def test_numbers_pictures_and_what_they_depend_on_reach_the_documentation(desk):
     folder = desk()
     assert main(Arguments()) == 0
     result = tables.read("found")
-    assert "| lab | 25 (20 to 30) |" in result.table.markdown(result.metrics)
+    assert "| lab | 25 (20 to 30) |" in result.table.to_markdown(result.metrics)
     assert (result.version, result.machine) == ("0.2.0", "2 cores, no GPU")
     whole = json.loads((folder / "whole" / "one.json").read_text())
     assert result.depends == whole["depends"] == {"env": 1}
@@ -107,19 +107,19 @@ def test_a_summary_of_every_part_of_the_latest_run_is_recorded(desk):
 
 def test_only_what_is_stale_is_run_unless_it_is_named(desk, monkeypatch):
     folder = desk()
-    assert "no record" in why_stale("one")
+    assert "no record" in explain_stale("one")
     main(Arguments())
-    assert why_stale("one") == ""
+    assert explain_stale("one") == ""
     main(Arguments())
     assert n_runs(folder) == 1
     main(Arguments(only=("one",)))
     assert n_runs(folder) == 2
-    monkeypatch.setattr(results, "versions_of", lambda names: dict.fromkeys(names, 2))
-    assert why_stale("one") == "env 1 -> 2"
+    monkeypatch.setattr(results, "select_versions", lambda names: dict.fromkeys(names, 2))
+    assert explain_stale("one") == "env 1 -> 2"
     main(Arguments())
     assert n_runs(folder) == 3
     declare(monkeypatch, replace(COMMANDS["one"], depends=("env", "shield")))
-    assert why_stale("one") == "shield not recorded -> 2"
+    assert explain_stale("one") == "shield not recorded -> 2"
 
 
 def test_another_command_makes_a_study_stale(desk, monkeypatch):
@@ -127,7 +127,7 @@ def test_another_command_makes_a_study_stale(desk, monkeypatch):
     main(Arguments())
     command = COMMANDS["one"]
     declare(monkeypatch, replace(command, command=f"{command.command} --more"))
-    assert why_stale("one") == "another command"
+    assert explain_stale("one") == "another command"
     main(Arguments())
     assert n_runs(folder) == 2
 
@@ -141,18 +141,18 @@ def test_another_value_of_a_setting_makes_a_study_stale_and_another_name_does_no
     config = {"n_seeds": 10, "bench": {"levels": ["truth"], "old_name": 3}}
     path.write_text(json.dumps(json.loads(path.read_text()) | {"config": config}))
     now = {"n_seeds": 10, "bench": {"levels": ["truth"], "new_name": 3}, "added": 1}
-    monkeypatch.setattr(results, "current_settings", lambda name: now)
-    assert why_stale("one") == ""
+    monkeypatch.setattr(results, "read_settings", lambda name: now)
+    assert explain_stale("one") == ""
     now["bench"]["levels"] = ["truth", "none"]
     now["n_seeds"] = 9
-    assert why_stale("one") == 'n_seeds 10 -> 9, levels ["truth"] -> ["truth", "none"]'
+    assert explain_stale("one") == 'n_seeds 10 -> 9, levels ["truth"] -> ["truth", "none"]'
 
 
 def test_the_settings_of_a_command_are_called_as_its_results_call_them():
     for name, command in COMMANDS.items():
         if command.made is None or command.declared_tables:  # results are older than rows in them
             continue
-        recorded, now = results.whole(name).get("config"), results.current_settings(name)
+        recorded, now = results.read_results(name).get("config"), results.read_settings(name)
         assert recorded is None or now.keys() & recorded.keys(), name
 
 
@@ -161,13 +161,13 @@ def test_a_part_that_came_out_otherwise_makes_a_study_stale_and_all_its_parts_an
     main(Arguments())
     record = records.read("one")
     records.save("one", replace(record, spoiled={"lab.1": "x* has mean 2"}))
-    assert why_stale("one") == "replayed, part lab.1 differs: x* has mean 2"
+    assert explain_stale("one") == "replayed, part lab.1 differs: x* has mean 2"
     main(Arguments())
     assert n_runs(folder) == 1  # in a folder that was emptied
-    assert why_stale("one") == ""
+    assert explain_stale("one") == ""
 
 
-def test_a_run_that_is_out_of_time_is_stopped_and_goes_on(desk):
+def test_a_run_that_is_out_of_time_is_stopped_and_resumable(desk):
     folder = desk(60.0)
     main(Arguments(hours=5.0 / 3600))
     assert n_runs(folder) == 1
@@ -179,21 +179,21 @@ def test_a_run_that_is_out_of_time_is_stopped_and_goes_on(desk):
     assert json.loads((folder / "whole" / "one.json").read_text())["minutes"] > spent > 0
 
 
-@pytest.mark.parametrize("goes_on", [True, False])
-def test_how_long_a_study_takes_is_what_it_takes_from_nothing(desk, goes_on):
-    folder = desk(goes_on=goes_on)
+@pytest.mark.parametrize("is_resumable", [True, False])
+def test_how_long_a_study_takes_is_what_it_takes_from_nothing(desk, is_resumable):
+    folder = desk(is_resumable=is_resumable)
     (folder / "whole").mkdir()
     whole = folder / "whole" / "one.json"
     earlier = {"minutes": 42.0, "config": {"asked": 1}}  # parts of that run may be used again
     whole.write_text(json.dumps(earlier))
     main(Arguments())
-    took = results.whole("one")["minutes"]
-    assert took == 42.0 if goes_on else took < 1.0
+    took = results.read_results("one")["minutes"]
+    assert took == 42.0 if is_resumable else took < 1.0
     mark = folder / "out" / "one" / results.MARK
     mark.write_text(json.dumps(json.loads(mark.read_text()) | {"minutes": 60.0}))
     main(Arguments(only=("one",)))
-    took = results.whole("one")["minutes"]
-    assert took > 60.0 if goes_on else took < 1.0
+    took = results.read_results("one")["minutes"]
+    assert took > 60.0 if is_resumable else took < 1.0
 
 
 def test_what_does_not_stop_when_asked_is_killed(desk):
@@ -208,7 +208,7 @@ def test_what_does_not_stop_when_asked_is_killed(desk):
 
 
 def test_what_keeps_nothing_is_not_begun_without_the_time_for_it(desk):
-    folder = desk(goes_on=False, minutes=60)
+    folder = desk(is_resumable=False, minutes=60)
     main(Arguments(hours=0.5))
     assert n_runs(folder) == 0
     main(Arguments(hours=1.5))
@@ -258,18 +258,18 @@ def test_every_table_is_one_studys_and_shows_its_last_run():
     for name, command in COMMANDS.items():
         assert {*command.tables} <= command.declared_tables.keys(), name
         for each in command.tables:
-            assert tables.read(each).command == results.whole(name)["command"], name
+            assert tables.read(each).command == results.read_results(name)["command"], name
     whole = {path.stem for path in (tables.RESULTS / "whole").glob("*.json")}
     assert whole <= COMMANDS.keys()
 
 
 def test_the_plan_names_every_study_and_sums_what_is_stale():
     console = Console(width=120, record=True, file=sys.stderr)
-    console.print(results.plan({"site": "", "impact": "tracker 1 -> 2"}))
+    console.print(results.make_plan({"site": "", "impact": "tracker 1 -> 2"}))
     said = console.export_text()
     assert "stale: tracker 1 -> 2" in said
     assert "fresh" in said
-    assert "20 min for what is stale, 30 min from nothing" in said
+    assert "20 min for stale studies, 30 min for all" in said
 
 
 def test_ten_studies_take_three_and_a_half_hours_without_trainings():
@@ -281,9 +281,9 @@ def test_ten_studies_take_three_and_a_half_hours_without_trainings():
 
 
 def test_a_name_of_a_study_stands_for_all_its_commands():
-    assert commands_of(["perception", "trueness"]) == ("perception", "trueness")
+    assert list_commands(["perception", "trueness"]) == ("perception", "trueness")
     with pytest.raises(ConfigError, match="Unknown study 'fuzz'"):
-        commands_of(["fuzz"])
+        list_commands(["fuzz"])
 
 
 def test_what_is_for_a_release_only_is_left_out(desk):
@@ -299,4 +299,4 @@ def test_other_settings_took_another_time(desk):
     (folder / "whole").mkdir()
     (folder / "whole" / "one.json").write_text(json.dumps({"minutes": 42.0, "config": {}}))
     main(Arguments())
-    assert results.whole("one")["minutes"] < 1.0
+    assert results.read_results("one")["minutes"] < 1.0

@@ -7,13 +7,13 @@ import pytest
 from benchmarks.tracking import bench, sequences
 from benchmarks.tracking.bench import TrackingBench
 from benchmarks.tracking.names import DLT, EVERYTHING, SMOOTHER, Selection
-from hrc_env.cli.estimators import estimators_named
+from hrc_env.cli.estimators import resolve_estimators
 from hrc_env.core.errors import ConfigError
 from hrc_env.engines.local import Serial
 from hrc_env.experiments import runner
 from hrc_env.experiments.cache import PartCache
-from hrc_env.experiments.runner import settings_of
-from hrc_env.experiments.versions import key_of
+from hrc_env.experiments.runner import describe_experiment
+from hrc_env.experiments.versions import make_key
 from hrc_env.tracking.estimators import ESTIMATORS
 
 TINY = TrackingBench(n_seeds=2, n_matched=2, n_smoothed=1, timing_repeats=1)
@@ -78,14 +78,14 @@ def test_parts_are_the_same_whatever_else_is_run(tmp_path, monkeypatch):
     monkeypatch.setattr(bench, "time_estimator", lambda *a: a[-1](1.0) or times)
     whole = PartCache(
         tmp_path / "parts",
-        key_of(settings_of(TINY), TINY.depends),
+        make_key(describe_experiment(TINY), TINY.depends),
         1,
         lambda *a: None,
         engine=Serial(),
     )
     own = replace(TINY, estimators=("ransac",))
     names = own.selection.names_of("clean")
-    whole.parts([bench.cell_of(own, "lab", "clean", name, whole.key) for name in names])
+    whole.make_parts([bench.make_part(own, "lab", "clean", name, whole.key) for name in names])
     made = {path: path.stat().st_mtime_ns for path in (tmp_path / "parts").iterdir()}
     assert {path.name for path in made} == {"lab.clean.particle.json", "lab.clean.ransac.json"}
     some = replace(TINY, estimators=("ransac",), sequences=("lab.clean", "site.matched"))
@@ -118,11 +118,11 @@ def test_a_function_is_registered_by_its_name(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     try:
         for _ in range(2):  # twice the same is once
-            assert estimators_named(["calm_estimators:calm", "ransac"]) == ("calm", "ransac")
-        assert bench.own_key("calm", "key") != "key" == bench.own_key("ransac", "key")
+            assert resolve_estimators(["calm_estimators:calm", "ransac"]) == ("calm", "ransac")
+        assert bench.extend_key("calm", "key") != "key" == bench.extend_key("ransac", "key")
         with pytest.raises(ConfigError, match="must be a function of"):
-            estimators_named(["calm_estimators:broken"])
+            resolve_estimators(["calm_estimators:broken"])
         with pytest.raises(ConfigError, match="There is no estimator 'calm_estimators:gone'"):
-            estimators_named(["calm_estimators:gone"])
+            resolve_estimators(["calm_estimators:gone"])
     finally:
         ESTIMATORS.pop("calm", None)

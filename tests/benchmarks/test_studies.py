@@ -15,7 +15,7 @@ from docs import tables
 from hrc_env.agents import policies
 from hrc_env.core.errors import ConfigError
 from hrc_env.experiments.runner import run_experiment
-from hrc_env.experiments.study import shards_of
+from hrc_env.experiments.study import split_row
 from hrc_env.pipeline.levels import LEVELS
 
 STUDIES = {"shielded": shielded.STUDY, "experts": experts.STUDY, "kept": kept.make_study()}
@@ -30,7 +30,7 @@ def test_every_recorded_part_is_one_that_the_study_makes(name):
     labels = {
         f"{row.replace('/', '.')}.{first}"
         for row, each in study.rows.items()
-        for first, _ in shards_of(each, study.first_seed)
+        for first, _ in split_row(each, study.first_seed)
     }
     assert recorded.keys() == labels
 
@@ -44,7 +44,7 @@ def test_a_study_makes_every_number_of_its_table(name):
 
 def test_every_policy_of_the_package_is_judged_with_and_without_a_shield():
     found = {(row.agent, row.env["shield"]) for row in STUDIES["kept"].rows.values()}
-    assert found == {(name, shield) for name in policies.names() for shield in (None, "qp")}
+    assert found == {(name, shield) for name in policies.list_names() for shield in (None, "qp")}
     assert {agent.split("/")[2] for agent, _ in found} == set(hrc_env.IDS)
 
 
@@ -54,7 +54,7 @@ def test_nobody_hands_over_alone():
 
 
 def test_a_policy_is_judged_at_the_level_it_learnt_at_but_at_pixels(tmp_path):
-    trainings = baselines.trainings_of(baselines.BaselinesArguments(tmp_path))
+    trainings = baselines.make_trainings(baselines.BaselinesArguments(tmp_path))
     assert trainings["pixels", "ppo"] == trainings["keypoints", "ppo"]
     assert trainings["none", "ppo"] == trainings["none", "ppo_safety"]
     assert len({each.folder for each in trainings.values()}) == 5
@@ -116,7 +116,7 @@ def test_what_is_learnt_is_judged_and_not_learnt_again(tmp_path, monkeypatch):
     training.run()
     assert training.score["processor_s"] > 0
     study = learners.make_study({"HRCReach-v0": [training]})
-    found = run_experiment(replace(study, n_quick=2).quick(), tmp_path / "out")
+    found = run_experiment(replace(study, n_quick=2).shorten(), tmp_path / "out")
     assert found["HRCReach-v0.scripted.success"].value > 0.8
     learnt = found["HRCReach-v0.learnt.success"].value
     share = learnt / found["HRCReach-v0.scripted.success"].value

@@ -20,21 +20,21 @@ def lab():
 
 
 def test_who_is_missing_is_said_with_the_command_that_helps(monkeypatch):
-    monkeypatch.setattr(bench, "installed", lambda name: name == "aniposelib")
-    sentence = bench.missing_sentence()
+    monkeypatch.setattr(bench, "is_installed", lambda name: name == "aniposelib")
+    sentence = bench.describe_missing()
     assert "particles, filterpy" in sentence
     assert "pip install" in sentence
     assert "[baselines]" in sentence
-    monkeypatch.setattr(bench, "installed", lambda name: True)
-    assert "All libraries" in bench.missing_sentence()
+    monkeypatch.setattr(bench, "is_installed", lambda name: True)
+    assert "All libraries" in bench.describe_missing()
 
 
 @pytest.mark.parametrize("name", bench.LIBRARIES)
 def test_a_library_follows_a_clean_walk(name, lab):
-    if not bench.installed(name):
+    if not bench.is_installed(name):
         pytest.skip(f"{name} is not installed")
     rig, sequences = lab
-    joints = bench.follow_of(name)(rig.P, sequences.px[:60, 0, :, 0], 0)
+    joints = bench.find_follow(name)(rig.P, sequences.px[:60, 0, :, 0], 0)
     error_m = np.linalg.norm(joints - sequences.joints[:60, 0, 0], axis=-1)
     assert error_m[30:].mean() < 0.04
 
@@ -65,7 +65,7 @@ def test_the_bench_writes_what_ran_and_names_what_did_not(tmp_path, monkeypatch)
     monkeypatch.setattr(bench, "ROWS", ("one_camera", "after_return"))
     monkeypatch.setattr(bench, "RIGS", ("lab",))
     monkeypatch.setattr(bench, "OURS", ("dlt",))  # no kernels to compile
-    monkeypatch.setattr(bench, "installed", lambda name: False)
+    monkeypatch.setattr(bench, "is_installed", lambda name: False)
     shares, config = [], bench.BaselinesBench(n_seeds=2)
     metrics = run_experiment(config, tmp_path, lambda share, _: shares.append(share))
     assert sum(shares) == pytest.approx(1)

@@ -11,14 +11,14 @@ from benchmarks.tracking.matched import (
     advance,
     draw,
     heading,
-    matched_model,
+    make_matched_model,
     transition,
 )
 from benchmarks.tracking.rigs import make_rig
 from benchmarks.tracking.sequences import make_sequences
 from hrc_env.core.skeleton import N_JOINTS
 
-MODEL = matched_model(0.5, 0.05)
+MODEL = make_matched_model(0.5, 0.05)
 SIGMA_PX = 3.0
 
 

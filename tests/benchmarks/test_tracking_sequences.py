@@ -5,10 +5,10 @@ from functools import partial
 import numpy as np
 import pytest
 
-from benchmarks.tracking.arrivals import delivered, in_time
+from benchmarks.tracking.arrivals import deliver, restore_times
 from benchmarks.tracking.athletes import FALLS_S, LIES_S, fall, run, tumble
 from benchmarks.tracking.cells import run_cell
-from benchmarks.tracking.couples import couples, detect_couples, identities
+from benchmarks.tracking.couples import detect_couples, match_identities, walk_couples
 from benchmarks.tracking.detections import CONDITIONS, Damage, detect
 from benchmarks.tracking.dlt import triangulate_frame
 from benchmarks.tracking.env_sequences import make_env_rig
@@ -127,7 +127,7 @@ def test_hard_sequences_lose_views_as_often_as_documented():
 
 
 def test_couples_meet_at_an_arms_length_and_hide_each_other():
-    joints = couples([1, 2, 3], 125)
+    joints = walk_couples([1, 2, 3], 125)
     root = joints[..., TORSO, :2].mean(-2)
     apart = np.linalg.norm(root[:, :, 0] - root[:, :, 1], axis=-1)
     np.testing.assert_allclose(apart.min(0), 0.6, atol=0.1)
@@ -149,13 +149,13 @@ def test_a_couples_names_are_mixed_and_nothing_else():
 
 
 def test_changes_of_identity_are_counted():
-    truth = couples([4, 5], 100)
-    kept, swaps = identities(truth, truth[:, :, ::-1])
+    truth = walk_couples([4, 5], 100)
+    kept, swaps = match_identities(truth, truth[:, :, ::-1])
     np.testing.assert_array_equal(kept, [[1, 0], [1, 0]])
     assert (swaps == 0).all()
     changed = truth.copy()
     changed[75:, 1] = truth[75:, 1, ::-1]
-    _, swaps = identities(truth, changed)
+    _, swaps = match_identities(truth, changed)
     np.testing.assert_array_equal(swaps, [0, 1])
 
 
@@ -181,12 +181,12 @@ def test_the_environments_own_worker_is_recorded_once_for_everybody():
 def test_late_frames_are_those_that_were_taken_and_say_when():
     joints = walk(LAB.walk_m, [5], 100)
     px = detect(LAB.P, joints, Damage(), [5])
-    late, time_s = delivered(px, [5])
+    late, time_s = deliver(px, [5])
     t, _, c = np.nonzero(np.isfinite(time_s))
     taken = np.rint(time_s[t, 0, c] / 0.04).astype(int) - 1
     np.testing.assert_array_equal(late[t, 0, c], px[taken, 0, c])
     assert np.isnan(late[np.isnan(time_s)]).all()
-    restored = in_time(late, time_s)
+    restored = restore_times(late, time_s)
     back = np.isfinite(restored)
     np.testing.assert_array_equal(restored[back], px[back])
     assert back.sum() == np.isfinite(late).sum()

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from benchmarks import records, results, verify
-from benchmarks.replays import Replay, row_of, walk
+from benchmarks.replays import Replay, find_row, walk
 from benchmarks.studies import COMMANDS, Command
-from benchmarks.verify import Arguments, draw, found_share, main
+from benchmarks.verify import Arguments, compute_found_share, draw, main
 from docs import tables
 from hrc_env.core.errors import ConfigError, DownloadError
-from hrc_env.experiments.runner import cache_of
+from hrc_env.experiments.runner import make_cache
 
 ROWS = ("lab", "site")
 SEEDS = range(5)
@@ -42,8 +42,8 @@ class Toy:
                     values = (self.n * values).tolist()
                     return {"t": [float(seed)], "values": values, "row": row}
 
-                found[row, seed] = cache.part(f"{row}.{seed}", make)
-        found["learnt"] = cache.part("training.0", lambda tick: {"sha256": "abc"})
+                found[row, seed] = cache.make_part(f"{row}.{seed}", make)
+        found["learnt"] = cache.make_part("training.0", lambda tick: {"sha256": "abc"})
         return found
 
 
@@ -64,8 +64,8 @@ def toy(tmp_path, monkeypatch):
             lambda given: walk(config, given), trainings=("training.",), **changes
         )
 
-    Toy().play(cache_of(Toy(), tmp_path / "made", lambda share, label: None))
-    versions = results.versions_of(Toy.depends)
+    Toy().play(make_cache(Toy(), tmp_path / "made", lambda share, label: None))
+    versions = results.select_versions(Toy.depends)
     records.write("toy", versions, tmp_path / "made", 0.0)
     (tmp_path / "results" / "whole").mkdir(parents=True)
     whole = {"command": "python -m toy", "depends": versions}
@@ -87,7 +87,7 @@ def test_parts_that_come_out_again_leave_a_study_fresh(toy, tmp_path, capsys):
     assert outcome["n_parts"] == 10  # a training is not played
     assert len(outcome["drawn"]["toy"]) >= 3
     assert outcome["spoiled"] == outcome["skipped"] == outcome["lacking"] == {}
-    assert results.why_stale("toy") == ""
+    assert results.explain_stale("toy") == ""
     assert "0 differ" in capsys.readouterr().out
 
 
@@ -104,7 +104,9 @@ def test_a_spoiled_part_is_found_and_makes_its_study_stale(toy, tmp_path, capsys
     status, outcome = verified(tmp_path, share=1.0)
     assert status == 1
     assert outcome["spoiled"]["toy"].keys() == {"site.3"}
-    assert results.why_stale("toy").startswith("replayed, part site.3 differs: values* has mean")
+    assert results.explain_stale("toy").startswith(
+        "replayed, part site.3 differs: values* has mean"
+    )
     assert "toy is stale: 1 of its parts differ" in capsys.readouterr().out
     status, outcome = verified(tmp_path, share=1.0)
     assert "it is stale already: replayed, part site.3" in outcome["skipped"]["toy"]
@@ -115,8 +117,8 @@ def test_other_behaviour_is_found_by_the_first_part(toy, tmp_path):
     status, outcome = verified(tmp_path, share=0.0)
     assert status == 1
     assert len(outcome["spoiled"]["toy"]) == 2
-    assert "part lab." in results.why_stale("toy")
-    assert "(and 1 more)" in results.why_stale("toy")
+    assert "part lab." in results.explain_stale("toy")
+    assert "(and 1 more)" in results.explain_stale("toy")
 
 
 def test_a_part_with_other_settings_or_that_is_no_longer_made_or_fails_is_found(toy, tmp_path):
@@ -125,7 +127,7 @@ def test_a_part_with_other_settings_or_that_is_no_longer_made_or_fails_is_found(
              "gone.0": record.parts["lab.0"]}  # fmt: skip
     records.save("toy", replace(record, parts=parts))
     _, outcome = verified(tmp_path)
-    assert "other settings" in outcome["spoiled"]["toy"]["lab.0"]
+    assert "its settings are not those of its record" in outcome["spoiled"]["toy"]["lab.0"]
     assert "no longer makes it" in outcome["spoiled"]["toy"]["gone.0"]
     records.save("toy", record)
     toy(Toy("not a number"))
@@ -147,11 +149,11 @@ def test_what_a_machine_lacks_spoils_nothing_and_is_named(toy, tmp_path, monkeyp
 
 
 def test_a_study_without_recorded_parts_is_named_and_fails_only_if_strict(toy, tmp_path, capsys):
-    records.path_of("toy").unlink()
+    records.get_path("toy").unlink()
     status, outcome = verified(tmp_path)
     assert status == 0
     assert "the next `make results` records them" in outcome["skipped"]["toy"]
-    assert "toy: not replayed, no parts of it are recorded" in capsys.readouterr().out
+    assert "toy: not replayed, it has no recorded parts" in capsys.readouterr().out
     assert verified(tmp_path, strict=True)[0] == 1
 
 
@@ -174,9 +176,9 @@ def test_a_draw_is_the_same_for_a_seed_and_covers_the_share():
 
 
 def test_the_share_that_is_found_is_exact():
-    assert found_share(10, 10) == 0.1
-    assert found_share(10, 0) is None
-    share = found_share(100, 10)
+    assert compute_found_share(10, 10) == 0.1
+    assert compute_found_share(10, 0) is None
+    share = compute_found_share(100, 10)
     rng, n_spoiled = np.random.default_rng(0), round(100 * share)
     found = [rng.choice(100, 10, replace=False).min() < n_spoiled for _ in range(4000)]
     assert 0.94 < np.mean(found) < 0.975
@@ -205,7 +207,7 @@ def test_a_summary_forgives_rounding_and_forgets_the_clock():
     now = records.summarize({"episodes": [{"r": float(v + 1e-7), "t": 9.0} for v in values]})
     assert before.keys() == {"episodes*/r"}
     assert records.describe_difference(before, now) == ""
-    assert "no longer there" in records.describe_difference(before, {})
+    assert "is missing" in records.describe_difference(before, {})
     words = records.summarize({"row": "lab"}), records.summarize({"row": "site"})
     assert records.describe_difference(*words)
 
@@ -224,8 +226,8 @@ def test_arguments_that_cannot_work_are_refused_in_words(given, words):
 
 
 def test_rows_are_those_of_the_tables():
-    assert row_of("site", "one_camera.3") == "one_camera"
-    assert row_of("price", "HRCReach-v0.one_camera.fresh.-1980") == "HRCReach-v0.one_camera"
-    assert row_of("kept", "HRCReach-v0.limited.qp.1000000") == "HRCReach-v0.limited.qp"
-    recorded = {row_of("kept", label) for label in records.read("kept").parts}
+    assert find_row("site", "one_camera.3") == "one_camera"
+    assert find_row("price", "HRCReach-v0.one_camera.fresh.-1980") == "HRCReach-v0.one_camera"
+    assert find_row("kept", "HRCReach-v0.limited.qp.1000000") == "HRCReach-v0.limited.qp"
+    recorded = {find_row("kept", label) for label in records.read("kept").parts}
     assert len(recorded) == len(records.read("kept").parts)

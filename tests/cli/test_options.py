@@ -4,7 +4,7 @@ import pytest
 
 from hrc_env.__main__ import COMMANDS, main
 from hrc_env.cli.experiment import Experiment
-from hrc_env.cli.options import understood
+from hrc_env.cli.options import normalize_words
 from hrc_env.cli.play import Play
 from hrc_env.cli.train import Train
 from hrc_env.core.errors import ConfigError
@@ -27,23 +27,23 @@ from hrc_env.core.errors import ConfigError
     ],
 )
 def test_a_switch_is_given_with_its_value_or_without(words, expected):
-    assert understood(Train, words.split(), "train") == expected.split()
+    assert normalize_words(Train, words.split(), "train") == expected.split()
 
 
 def test_a_word_behind_a_switch_that_is_no_value_stays_what_it_is():
-    assert understood(Play, ["--viewer", "HRCReach-v0"], "play") == ["--viewer", "HRCReach-v0"]
+    assert normalize_words(Play, ["--viewer", "HRCReach-v0"], "play") == ["--viewer", "HRCReach-v0"]
 
 
 def test_switches_of_an_experiment_are_found():
     words = ["impact", "--quick", "True", "--robots", "a:b", "c"]
     expected = ["impact", "--quick", "--robots", "a:b", "c"]
-    assert understood(Experiment, words, "experiment") == expected
+    assert normalize_words(Experiment, words, "experiment") == expected
 
 
 @pytest.mark.parametrize("words", [["--film=maybe"], ["--no-film", "True"], ["--no-her=False"]])
 def test_a_switch_with_another_value_says_what_it_takes(words):
-    with pytest.raises(ConfigError, match=r"takes True or False, or nothing: --\w+, --no-\w+; got"):
-        understood(Train, words, "train")
+    with pytest.raises(ConfigError, match=r"takes True, False or no value: --\w+, --no-\w+; got"):
+        normalize_words(Train, words, "train")
 
 
 @pytest.mark.parametrize(

@@ -48,7 +48,7 @@ def test_processes_compute_on_one_core_each_and_what_dies_is_begun_again(tmp_pat
     cache = PartCache(tmp_path, "key", 3, lambda share, label: None, engine=Processes(2))
     flag = tmp_path / "died"
     asked = [Part("one", cores), Part("dies", partial(die_once, flag)), Part("two", cores)]
-    found = cache.parts(asked)
+    found = cache.make_parts(asked)
     assert flag.exists()
     assert [each["cores"] for each in (found[0], found[2])] == [1, 1]
     assert os.getpid() not in {each["pid"] for each in (found[0], found[2])}
@@ -86,7 +86,7 @@ def test_workers_end_with_a_process_that_is_killed(tmp_path):
 def test_a_worker_that_dies_again_and_again_ends_it_and_what_is_done_is_kept(tmp_path):
     cache = PartCache(tmp_path, "key", 2, lambda share, label: None, engine=Processes(1))
     with pytest.raises(HRCError, match=rf"died {ATTEMPTS} times before call 2 of 2"):
-        cache.parts([Part("one", cores), Part("dies", die)])
+        cache.make_parts([Part("one", cores), Part("dies", die)])
     assert (tmp_path / "one.json").exists()
     assert not (tmp_path / "dies.json").exists()
 
@@ -102,8 +102,8 @@ def test_parts_that_are_there_are_not_played_again(tmp_path):
     cache = PartCache(
         tmp_path, "key", 2, lambda share, label: shares.append(share), engine=Serial()
     )
-    first = cache.parts([Part("one", cores)])
-    again = cache.parts([Part("one", fail), Part("two", cores)])
+    first = cache.make_parts([Part("one", cores)])
+    again = cache.make_parts([Part("one", fail), Part("two", cores)])
     assert again[0] == first[0]
     assert sum(shares) == pytest.approx(1.5)
     replaced = replace(cache, key="other")

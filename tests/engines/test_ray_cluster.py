@@ -36,7 +36,7 @@ from hrc_env.engines.registrations import pack
 from hrc_env.evaluation.episodes import play_shards
 from hrc_env.experiments.impact.experiment import Impact
 from hrc_env.experiments.price.experiment import Price
-from hrc_env.experiments.runner import cache_of
+from hrc_env.experiments.runner import make_cache
 from hrc_env.experiments.setups import REFERENCE
 from hrc_env.experiments.site.experiment import Site
 from hrc_env.registration import import_files
@@ -364,6 +364,6 @@ def test_more_workers_than_cores_are_said_and_find_a_place(cluster):
 def test_experiments_have_the_parts_of_one_process(cluster, weights, tmp_path, experiment):
     played = {}
     for name in ("serial", "ray"):
-        cache = cache_of(experiment, tmp_path / name, lambda *_: None, engine_called(name))
+        cache = make_cache(experiment, tmp_path / name, lambda *_: None, engine_called(name))
         played[name] = experiment.play(cache)
     assert played["serial"] == played["ray"]

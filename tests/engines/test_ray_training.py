@@ -73,15 +73,15 @@ def card_of(run: Path, out: Path) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--engine", "ray", "--algorithm", "sac"], "--engine ray learns by ppo"),
+        (["--engine", "ray", "--algorithm", "sac"], "--engine ray trains with ppo only"),
         (
             ["--engine", "ray", "--cost-limit", "3", "--algorithm", "ppo_lagrangian"],
-            "learns by ppo",
+            "trains with ppo only",
         ),
         (["--engine", "ray", "--workers", "0"], "--workers must be 1 or more"),
         (["--engine", "ry"], "Did you mean 'ray'"),
-        (["--workers", "2"], "--workers goes with --engine ray"),
-        (["--address", "auto"], "--address goes with --engine ray"),
+        (["--workers", "2"], "--workers needs --engine ray"),
+        (["--address", "auto"], "--address needs --engine ray"),
         (["--perception", "pixels"], "or --engine ray"),
         (["--engine", "ray", "--address", "nowhere"], "must be auto, HOST:PORT"),
     ],

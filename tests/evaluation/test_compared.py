@@ -4,24 +4,31 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from hrc_env import ConfigError, compare_means, compare_rates, mean_over, rate_of, share_of
+from hrc_env import (
+    ConfigError,
+    compare_means,
+    compare_rates,
+    estimate_mean,
+    estimate_rate,
+    estimate_share,
+)
 
 
 def test_a_rate_has_the_exact_interval_of_a_poisson_count():
-    found = rate_of([2, 0, 3], [1.0, 2.0, 2.0], "1/h")
+    found = estimate_rate([2, 0, 3], [1.0, 2.0, 2.0], "1/h")
     low, high = stats.chi2.ppf([0.025, 0.975], [10, 12]) / 2 / 5  # Garwood
     assert (found.value, found.low, found.high) == pytest.approx((1.0, low, high))
 
 
 def test_a_share_has_the_exact_interval_of_trials():
-    found = share_of(np.array([True, True, False]))
+    found = estimate_share(np.array([True, True, False]))
     expected = stats.beta.ppf([0.025, 0.975], [2, 3], [2, 1])  # Clopper and Pearson
     assert (found.low, found.high) == pytest.approx(tuple(expected))
 
 
 def test_the_intervals_of_means_cover():
     rng = np.random.default_rng(0)
-    drawn = [mean_over(rng.normal(size=40)) for _ in range(200)]
+    drawn = [estimate_mean(rng.normal(size=40)) for _ in range(200)]
     assert 0.88 <= np.mean([each.low <= 0 <= each.high for each in drawn]) <= 0.98
 
 
@@ -60,15 +67,15 @@ def test_rates_are_compared_exactly():
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda: mean_over([[1.0, 2.0]]), r"values must have shape \(n,\).*got \(1, 2\)"),
-        (lambda: mean_over(["a"]), "values must be numbers"),
-        (lambda: rate_of([0.5], 1.0), "counts must be whole numbers"),
-        (lambda: rate_of([-1], 1.0), "counts must be whole numbers"),
-        (lambda: rate_of([np.nan], 1.0), "counts must be whole numbers"),
-        (lambda: rate_of([1], -1.0), "exposure must not be negative"),
-        (lambda: share_of([0.5]), "seen must be true or false"),
-        (lambda: share_of([np.nan]), "seen must be true or false"),
-        (lambda: compare_means([1.0], [1.0, 2.0]), "of the same seeds, got 1 and 2"),
+        (lambda: estimate_mean([[1.0, 2.0]]), r"values must have shape \(n,\).*got \(1, 2\)"),
+        (lambda: estimate_mean(["a"]), "values must be numbers"),
+        (lambda: estimate_rate([0.5], 1.0), "counts must be whole numbers"),
+        (lambda: estimate_rate([-1], 1.0), "counts must be whole numbers"),
+        (lambda: estimate_rate([np.nan], 1.0), "counts must be whole numbers"),
+        (lambda: estimate_rate([1], -1.0), "exposure must not be negative"),
+        (lambda: estimate_share([0.5]), "outcomes must be true or false"),
+        (lambda: estimate_share([np.nan]), "outcomes must be true or false"),
+        (lambda: compare_means([1.0], [1.0, 2.0]), "must have the same seeds, got 1 and 2"),
         (lambda: compare_rates([0.5], [1], 1.0, 1.0), "counts must be whole numbers"),
     ],
 )

@@ -6,7 +6,7 @@ import pytest
 from rich.console import Console
 
 from hrc_env.agents.registry import make_agent
-from hrc_env.cli.play import table
+from hrc_env.cli.play import make_table
 from hrc_env.core.errors import RenderingError
 from hrc_env.evaluation import film
 
@@ -43,7 +43,7 @@ def test_every_value_of_the_table_has_its_unit():
     console = Console(width=80)
     with console.capture() as capture:
         console.print(
-            table(
+            make_table(
                 {
                     "median tracking error [mm]": 15.851,
                     "lost steps [%]": 0.4,
@@ -71,15 +71,15 @@ def test_every_value_of_the_table_has_its_unit():
     ],
 )
 def test_the_closest_encounter_without_a_near_miss_is_filmed(monkeypatch, closest_m, chosen):
-    monkeypatch.setattr(film, "_closest_m", lambda env, make, seed, n_steps: closest_m[seed])
-    assert film.nearest_seed(scripted, list(closest_m), perception="none") == chosen
+    monkeypatch.setattr(film, "_find_closest_m", lambda env, make, seed, n_steps: closest_m[seed])
+    assert film.find_nearest_seed(scripted, list(closest_m), perception="none") == chosen
 
 
 def test_the_same_seed_is_chosen_every_time_and_is_the_closest():
     seeds, kwargs = range(3), {"n_steps": 40, "perception": "truth"}
-    chosen = film.nearest_seed(scripted, seeds, **kwargs)
-    assert film.nearest_seed(scripted, seeds, **kwargs) == chosen
+    chosen = film.find_nearest_seed(scripted, seeds, **kwargs)
+    assert film.find_nearest_seed(scripted, seeds, **kwargs) == chosen
     env = film.HRCEnv(perception="truth")
-    closest_m = {seed: film._closest_m(env, scripted, seed, 40) for seed in seeds}
+    closest_m = {seed: film._find_closest_m(env, scripted, seed, 40) for seed in seeds}
     env.close()
     assert closest_m[chosen] == min(each for each in closest_m.values() if each > film.CLOSE_M)

@@ -16,14 +16,20 @@ from hrc_env.experiments.ablations.ablation import Setting
 from hrc_env.experiments.ablations.experiment import (
     ABLATIONS,
     Ablations,
+    compute_metrics,
     make_experiment,
-    metrics_of,
 )
-from hrc_env.experiments.ablations.handicaps import handicap, lengths_m
-from hrc_env.experiments.ablations.play import matched, pipeline_of, play, walks_of, watch
-from hrc_env.experiments.ablations.questions.rigs import CORNERS, WALLS, spread_over
+from hrc_env.experiments.ablations.handicaps import compute_lengths_m, handicap
+from hrc_env.experiments.ablations.play import (
+    make_setting_pipeline,
+    make_walks,
+    match_tracks,
+    play,
+    watch,
+)
+from hrc_env.experiments.ablations.questions.rigs import CORNERS, WALLS, spread_cameras
 from hrc_env.experiments.report import Report
-from hrc_env.experiments.rigs import DT_S, N_WARM_UP, left_of
+from hrc_env.experiments.rigs import DT_S, N_WARM_UP, make_turns
 from hrc_env.experiments.runner import run_experiment
 from hrc_env.tracking.tree.gaussian import PARENT, ROOT
 
@@ -38,21 +44,21 @@ def silent(share, label):
 
 def sums(setting):
     """What a setting's episodes come to."""
-    walks = walks_of(setting.scene, setting.n_workers, SEEDS, N_STEPS)
+    walks = make_walks(setting.scene, setting.n_workers, SEEDS, N_STEPS)
     return play(setting, walks, SEEDS, lambda share: None)
 
 
 def state_of(setting):
     """A tracker's state after an episode, and the true bones."""
-    walks, turn = walks_of("lab", 1, SEEDS, N_STEPS), setting.turns[0]
-    pipeline, ids = pipeline_of(setting, turn, 1), np.zeros(1, int)
+    walks, turn = make_walks("lab", 1, SEEDS, N_STEPS), setting.turns[0]
+    pipeline, ids = make_setting_pipeline(setting, turn, 1), np.zeros(1, int)
     frames = list(watch(setting, turn, walks, SEEDS, ids))
     rngs = [np.random.default_rng(0)]
     pipeline.tracker.reset(pipeline.state, ids, rngs)
     for _, _, keypoints in frames:
         pipeline.tracker.predict(pipeline.state, DT_S, rngs)
         pipeline.tracker.update(pipeline.state, keypoints, rngs)
-    return pipeline.state, lengths_m(frames[0][1].truth.joints_world)
+    return pipeline.state, compute_lengths_m(frames[0][1].truth.joints_world)
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +78,7 @@ def test_every_number_of_every_setting_is_there_and_finite(end_to_end):
             key = f"{study.name}.{setting.name}"
             assert f"error_m.{key}.median" in metrics
             assert f"error_m.{key}.p95" in metrics
-            is_compared = study.reference(setting) not in ("", setting.name)
+            is_compared = study.find_reference(setting) not in ("", setting.name)
             assert (f"difference.error_m.{key}.median" in metrics) == is_compared
             assert (f"p.error_m.{key}.p95" in metrics) == is_compared
             assert {f"{what}.{key}" for what in ("rmse_m", "coverage95", "lost")} <= metrics.keys()
@@ -91,7 +97,7 @@ def test_names_are_said_once_and_have_no_dots():
 
 def test_settings_are_compared_with_what_was_changed_in_them():
     found = {
-        (study.name, setting.name): study.reference(setting)
+        (study.name, setting.name): study.find_reference(setting)
         for study in ABLATIONS.values()
         for setting in study.settings
     }
@@ -175,7 +181,7 @@ def test_quick_asks_everything():
 
 
 def test_nothing_depends_on_the_number_of_threads(monkeypatch):
-    setting = Setting("x", "x", turns=left_of("lab", ((0,), (1,))))
+    setting = Setting("x", "x", turns=make_turns("lab", ((0,), (1,))))
     found = []
     for n_threads in (1, 3):
         monkeypatch.setattr(playing, "n_cores", lambda n=n_threads: n)
@@ -184,20 +190,22 @@ def test_nothing_depends_on_the_number_of_threads(monkeypatch):
 
 
 def test_joints_are_sorted_by_the_cameras_that_are_left_to_see_them():
-    setting = Setting("lab_x", "x", turns=left_of("lab", ((0,),)), by_sight=True)
+    setting = Setting("lab_x", "x", turns=make_turns("lab", ((0,),)), by_sight=True)
     rows = sums(setting)
     assert sum(sum(rows[f"seen_{k}_joints"]) for k in (2, 3, 4)) == 0
     n_joints = [a + b for a, b in zip(rows["seen_0_joints"], rows["seen_1_joints"], strict=True)]
     assert n_joints == rows["joints"] == [5 * N_JOINTS] * len(SEEDS)
-    metrics = metrics_of({"occlusion": {"lab_x": rows}})
+    metrics = compute_metrics({"occlusion": {"lab_x": rows}})
     assert metrics["rmse_m.occlusion.lab_seen_1"].value > 0
 
 
 def test_cameras_are_spread_round_the_room():
-    four = [{camera.eye_world[:2] for camera in turn.cameras} for turn in spread_over(4)]
+    four = [{camera.eye_world[:2] for camera in turn.cameras} for turn in spread_cameras(4)]
     assert four == [set(CORNERS), set(WALLS)]
-    assert [len(turn.cameras) for n in range(2, 9) for turn in spread_over(n)[:1]] == [*range(2, 9)]
-    one = spread_over(1)
+    assert [len(turn.cameras) for n in range(2, 9) for turn in spread_cameras(n)[:1]] == [
+        *range(2, 9)
+    ]
+    one = spread_cameras(1)
     assert len(one) == 8
     assert all(len(turn.faults[0].cameras) == 3 for turn in one)
 
@@ -206,10 +214,10 @@ def test_tracks_are_compared_with_the_workers_whom_they_fit():
     truth = np.zeros((1, 2, N_JOINTS, 3))
     truth[:, 1, :, 0] = 2.0
     exchanged = truth[:, ::-1]
-    assert matched(exchanged, np.ones((1, 2), bool), truth).tolist() == [[1, 0]]
+    assert match_tracks(exchanged, np.ones((1, 2), bool), truth).tolist() == [[1, 0]]
     one_lost = truth.copy()
     one_lost[:, 1] = [0.1, 0, 0]  # this one is followed, and is the first worker's
-    assert matched(one_lost, np.array([[False, True]]), truth).tolist() == [[1, 0]]
+    assert match_tracks(one_lost, np.array([[False, True]]), truth).tolist() == [[1, 0]]
 
 
 def test_bones_are_given_and_taken_away():

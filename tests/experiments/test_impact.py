@@ -13,22 +13,22 @@ from hrc_env.agents import policies as kept
 from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.core.results import Metric
 from hrc_env.evaluation.counts import GAPS_M, Bins
-from hrc_env.evaluation.intervals import counted_quantile_over
-from hrc_env.experiments.agents import label_of, labels_of
+from hrc_env.evaluation.intervals import estimate_binned_quantile
+from hrc_env.experiments.agents import label_agent, label_agents
 from hrc_env.experiments.cache import PartCache
 from hrc_env.experiments.impact import policies
-from hrc_env.experiments.impact.episodes import STEP, play, sums_of
+from hrc_env.experiments.impact.episodes import STEP, play, sum_episodes
 from hrc_env.experiments.impact.experiment import Impact, check_walks, make_experiment
-from hrc_env.experiments.impact.metrics import COMPARED, margin_needed, metrics_of
-from hrc_env.experiments.impact.policies import Policy, maker, trained
-from hrc_env.experiments.impact.report import has_learnt, report
+from hrc_env.experiments.impact.metrics import COMPARED, compute_metrics, find_margin
+from hrc_env.experiments.impact.policies import Policy, get_maker, train_once
+from hrc_env.experiments.impact.report import has_learnt, make_report
 from hrc_env.experiments.price.experiment import make_experiment as make_price
 from hrc_env.experiments.runner import run_experiment
 from hrc_env.experiments.setups import (
     REFERENCE,
     PerceptionSetup,
-    all_setups,
-    setup_called,
+    find_setup,
+    list_setups,
 )
 from hrc_env.experiments.stage import Stage
 from hrc_env.safety.incidents import KINDS
@@ -56,7 +56,7 @@ def sums(*steps, margin_m=0.0):
     info |= {f"task/goals_{what}": np.zeros(1) for what in ("reached", "missed")}
     info |= {f"safety/contacts_{how}": np.zeros(1) for how in KINDS}
     infos = [info | {"cost": touch} for touch in touching]
-    return {name: value[0] for name, value in sums_of(played, infos, margin_m, 0.04).items()}
+    return {name: value[0] for name, value in sum_episodes(played, infos, margin_m, 0.04).items()}
 
 
 @pytest.fixture(scope="module")
@@ -68,10 +68,10 @@ def end_to_end(tmp_path_factory):
 
 def test_eyes_are_called_what_they_are():
     assert PerceptionSetup(estimator="paper").name == "keypoints_paper_4cam_0ms"
-    assert setup_called("keypoints_particle_1cam_120ms").latency_s == 0.12
-    assert all(setup.name == name for name, setup in all_setups().items())
+    assert find_setup("keypoints_particle_1cam_120ms").latency_s == 0.12
+    assert all(setup.name == name for name, setup in list_setups().items())
     with pytest.raises(ConfigError, match="Did you mean 'keypoints_paper_4cam_0ms'"):
-        setup_called("keypoints_papers_4cam_0ms")
+        find_setup("keypoints_papers_4cam_0ms")
 
 
 def test_cameras_that_are_left_come_after_a_second_of_four():
@@ -96,7 +96,7 @@ def test_only_eyes_that_are_told_their_delay_have_cameras_that_say_it():
     [
         ({"n_seeds": 0}, "--seeds must be at least 1"),
         ({"policies": ("scripted_slow",)}, "Unknown policy"),
-        ({"setups": ("truth",)}, "must hold the reference"),
+        ({"setups": ("truth",)}, "must contain the reference"),
         ({"setups": (REFERENCE, "camera_9")}, "Unknown perception setup"),
     ],
 )
@@ -133,7 +133,7 @@ def test_cost_is_split_by_whether_the_robot_moves_towards_the_worker():
 def test_quantiles_of_bins_are_those_of_the_values():
     rng = np.random.default_rng(0)
     values = rng.normal(0.2, 0.1, (40, 500))
-    found = counted_quantile_over(GAPS_M, GAPS_M.count(values).tolist(), 0.95, "m")
+    found = estimate_binned_quantile(GAPS_M, GAPS_M.count(values).tolist(), 0.95, "m")
     assert found.value == pytest.approx(np.quantile(values, 0.95), abs=0.002)
     assert found.low < found.value < found.high
 
@@ -148,10 +148,10 @@ def test_the_margin_is_where_no_more_stops_are_missed_than_on_time():
     def row(missed):
         return {"missed_stops": [missed] * 5, "called_stops": [10] * 5, "walk": [""] * 5}
 
-    margin = margin_needed([row(6), row(2), row(0)], np.array([0.0, 0.1, 0.2]), row(3))
+    margin = find_margin([row(6), row(2), row(0)], np.array([0.0, 0.1, 0.2]), row(3))
     assert margin.value == pytest.approx(0.075)
-    assert margin_needed([row(2), row(1)], np.array([0.0, 0.1]), row(3)).value == 0.0
-    assert margin_needed([row(6), row(5)], np.array([0.0, 0.1]), row(3)).value == 0.1
+    assert find_margin([row(2), row(1)], np.array([0.0, 0.1]), row(3)).value == 0.0
+    assert find_margin([row(6), row(5)], np.array([0.0, 0.1]), row(3)).value == 0.1
 
 
 def test_every_row_says_everything(end_to_end):
@@ -203,14 +203,14 @@ def test_the_truth_has_no_error_and_lateness_a_tax(end_to_end):
 def test_workers_who_walk_otherwise_are_noticed():
     table = {("scripted", "truth"): {"walk": ["a", "b"]}, ("scripted", "none"): {"walk": ["a"]}}
     check_walks(table)
-    with pytest.raises(HRCError, match="walked otherwise"):
+    with pytest.raises(HRCError, match="moved differently"):
         check_walks(table | {("ppo", "none"): {"walk": ["b"]}})
 
 
 def test_an_environment_that_is_used_again_starts_afresh():
-    setup = setup_called(LATE)
+    setup = find_setup(LATE)
     stage = Stage(setup, setup.turns, {})
-    make = maker(Policy("scripted_slowed"), None)
+    make = get_maker(Policy("scripted_slowed"), None)
     first, again = (play(stage, [5, 6], 10, make, 0.0, lambda share: None) for _ in range(2))
     stage.close()
     assert first == again
@@ -247,10 +247,10 @@ def test_a_policy_is_learnt_once_and_again_only_if_its_file_is_lost(tmp_path, mo
 
     monkeypatch.setattr(policies, "learn_ppo", learn)
     cache, path = PartCache(tmp_path, "here", 1, silent), tmp_path / "ppo.zip"
-    digests = {trained(cache, 1, path, "key") for _ in range(2)}
+    digests = {train_once(cache, 1, path, "key") for _ in range(2)}
     assert len(learnt) == 1
     path.write_bytes(b"half")
-    assert digests == {trained(cache, 1, path, "key")}
+    assert digests == {train_once(cache, 1, path, "key")}
     assert path.read_bytes() == b"policy"
     assert len(learnt) == 2
 
@@ -259,7 +259,7 @@ def test_a_report_is_made_without_the_policy_that_yields(end_to_end, tmp_path):
     _, metrics = end_to_end
     config = replace(TINY, policies=("scripted",), setups=("truth", REFERENCE))
     table = config.play(PartCache(tmp_path / "parts", "", 1, silent))
-    found = report(tmp_path / "figures", table, metrics, {"scripted": "scripted"})
+    found = make_report(tmp_path / "figures", table, metrics, {"scripted": "scripted"})
     assert (tmp_path / "figures" / "tradeoff.png").exists()
     assert "scripted_slowed" not in str(found.parts[1])
 
@@ -298,21 +298,23 @@ def played(goals: dict[str, float], n: int = 3) -> dict[tuple[str, str], dict[st
 
 def test_a_policy_that_did_not_learn_is_left_out_and_named(tmp_path):
     table = played({"scripted": 5.0, "ppo": 0.0})
-    metrics = metrics_of(table, ())
+    metrics = compute_metrics(table, ())
     robots = {"scripted": "scripted", "ppo": "ppo"}
-    found = report(tmp_path / "figures", table, metrics, robots)
-    assert "`ppo` did not learn its task (0.0 goals a minute" in found.asked
+    found = make_report(tmp_path / "figures", table, metrics, robots)
+    assert "`ppo` did not learn its task (0.0 goals a minute" in found.question
     assert not any("| ppo" in part for part in found.parts)
-    alone = report(tmp_path / "figures", played({"ppo": 0.0}), metrics, {"ppo": "ppo"})
+    alone = make_report(tmp_path / "figures", played({"ppo": 0.0}), metrics, {"ppo": "ppo"})
     assert alone.parts == ()
-    learnt = report(tmp_path / "figures", played({"scripted": 5.0, "ppo": 4.0}),
-                    metrics_of(played({"scripted": 5.0, "ppo": 4.0}), ()), robots)  # fmt: skip
-    assert "did not learn" not in learnt.asked
+    learnt = make_report(tmp_path / "figures", played({"scripted": 5.0, "ppo": 4.0}),
+                    compute_metrics(played({"scripted": 5.0, "ppo": 4.0}), ()), robots)  # fmt: skip
+    assert "did not learn" not in learnt.question
 
 
 def test_nothing_empty_is_printed_of_one_setup_and_one_robot(tmp_path):
     table = {key: row for key, row in played({"scripted": 5.0}).items() if key[1] == REFERENCE}
-    found = report(tmp_path / "figures", table, metrics_of(table, ()), {"scripted": "scripted"})
+    found = make_report(
+        tmp_path / "figures", table, compute_metrics(table, ()), {"scripted": "scripted"}
+    )
     assert len(found.parts) == 2
     assert "paired" not in "".join(found.parts[1:])
     assert all(found.parts)
@@ -359,13 +361,13 @@ def test_ones_own_robot_is_played_and_nothing_learns(tmp_path, monkeypatch):
 
 
 def test_robots_by_their_file_act_as_they_learnt_to(tmp_path):
-    name = next(each for each in kept.names() if each.startswith("hrc://HRCReach-v0/"))
+    name = next(each for each in kept.list_names() if each.startswith("hrc://HRCReach-v0/"))
     config = replace(
         make_experiment(quick=True, seeds=1, robots=[name], control="twist"),
         n_steps=4, setups=("none", REFERENCE),
     )  # fmt: skip
     metrics = run_experiment(config, tmp_path, silent)
-    assert f"{label_of(name, {})}.none.cost" in metrics
+    assert f"{label_agent(name, {})}.none.cost" in metrics
 
 
 @pytest.mark.parametrize(
@@ -386,13 +388,13 @@ def test_robots_that_there_are_not_are_refused_before_anything_is_played(robots,
 
 
 def test_names_of_robots_are_told_apart():
-    assert label_of("runs/a/policy.zip", {}) == "runs-a-policy"
-    assert label_of("ppo.zip", {"ppo": ""}) == "own-ppo"
-    assert labels_of(["scripted", "m:f", "m:f"], {"scripted": ""}) == {
+    assert label_agent("runs/a/policy.zip", {}) == "runs-a-policy"
+    assert label_agent("ppo.zip", {"ppo": ""}) == "own-ppo"
+    assert label_agents(["scripted", "m:f", "m:f"], {"scripted": ""}) == {
         "scripted": "scripted", "m-f": "m:f",
     }  # fmt: skip
-    with pytest.raises(ConfigError, match="would both be called 'a-b'"):
-        labels_of(["a/b.zip", "a:b"], {})
+    with pytest.raises(ConfigError, match="would both be named 'a-b'"):
+        label_agents(["a/b.zip", "a:b"], {})
 
 
 def test_a_quick_run_says_so_and_marks_nothing(tmp_path):
@@ -413,19 +415,19 @@ def test_a_quick_run_says_so_and_marks_nothing(tmp_path):
     for name, reached in ((REFERENCE, 1.0), ("truth", 9.0)):
         episode = sums((0.3, 0.3, 0.1, 0.0), (0.2, 0.2, 0.1, 0.0)) | {"walk": "", "goals": reached}
         table["scripted_slowed", name] = {what: [each] * 3 for what, each in episode.items()}
-    metrics = metrics_of(table, ())
+    metrics = compute_metrics(table, ())
     assert metrics["difference.scripted_slowed.truth.goals_per_min"].low > 0
     found = config.report(table, metrics, tmp_path / "figures")
     replace(found, quick=config.quick_note).write(tmp_path, {}, [0], metrics)
     for page in ("report.md", "report.html"):
         text = (tmp_path / page).read_text()
-        assert "This run was quick: 3 episodes of 4 s a row" in text
+        assert "This run was quick: 3 episodes of 4 s per row" in text
         assert "not enough to compare estimators" in text
         assert "●" not in text
         assert "a dot" not in text
         assert text.count("Quick run, 3 seeds of 4 s: too few") == 4  # above, a figure, two tables
     whole = make_experiment().report(table, metrics, tmp_path / "figures")
-    assert "quick" not in whole.title + whole.asked
+    assert "quick" not in whole.title + whole.question
     assert "●" in str(whole.parts)
 
 

@@ -9,9 +9,9 @@ from docs import tables
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import JOINT
 from hrc_env.experiments.lab import experiment
-from hrc_env.experiments.lab.experiment import Lab, laboratory, make_experiment
+from hrc_env.experiments.lab.experiment import Lab, make_experiment, make_laboratory
 from hrc_env.experiments.lab.motions import MOTIONS, play
-from hrc_env.experiments.lab.sides import LEFT, RIGHT, turned_away
+from hrc_env.experiments.lab.sides import LEFT, RIGHT, find_averted_side
 from hrc_env.experiments.recording import replay
 from hrc_env.experiments.report import Report
 from hrc_env.experiments.runner import run_experiment
@@ -66,7 +66,7 @@ def test_what_is_finished_is_used_again(end_to_end, monkeypatch):
 
 @pytest.mark.parametrize("motion", MOTIONS)
 def test_motions_stay_in_the_walkable_area(motion):
-    scene, config = laboratory(200)
+    scene, config = make_laboratory(200)
     for seed in range(4):
         path = play(scene, motion, seed, 250, config.ctrl_dt).position_world[:, 0, 0]
         (x0, x1), (y0, y1) = scene.grounds.walkable_x_m, scene.grounds.walkable_y_m
@@ -79,9 +79,9 @@ def test_the_side_turned_away_is_the_far_one():
     for side, y in (("left", 0.2), ("right", -0.2)):
         for part in ("shoulder", "hip"):
             joints[JOINT[f"{side}_{part}"], 1] = y
-    np.testing.assert_array_equal(turned_away(joints, np.array([0.0, 5.0, 0.0])), RIGHT)
-    np.testing.assert_array_equal(turned_away(joints, np.array([0.0, -5.0, 0.0])), LEFT)
-    assert not turned_away(joints, np.array([5.0, 0.0, 0.0])).any()
+    np.testing.assert_array_equal(find_averted_side(joints, np.array([0.0, 5.0, 0.0])), RIGHT)
+    np.testing.assert_array_equal(find_averted_side(joints, np.array([0.0, -5.0, 0.0])), LEFT)
+    assert not find_averted_side(joints, np.array([5.0, 0.0, 0.0])).any()
 
 
 def test_what_cannot_work_is_explained():
@@ -91,7 +91,7 @@ def test_what_cannot_work_is_explained():
 
 def test_a_replay_with_all_cameras_believes_what_was_believed_when_filming(pixels):
     """The same joints too: those of the body, without the detector's mean offsets."""
-    taken = experiment.taken(TINY, "standing", 3, lambda share: None)
+    taken = experiment.record_film(TINY, "standing", 3, lambda share: None)
     said = replay(taken, experiment.CROPS, range(4), 0, 3)
     assert said.tracked[-1].all()
     np.testing.assert_allclose(said.mean_world, taken.beliefs.mean_world, atol=1e-9)

@@ -16,17 +16,23 @@ from hrc_env.core.typing import Floats
 from hrc_env.engines.local import Processes
 from hrc_env.experiments.cache import PartCache
 from hrc_env.experiments.price import experiment
-from hrc_env.experiments.price.declaration import QUESTIONS
-from hrc_env.experiments.price.episodes import STEP, Driver, Watched, sums_of
+from hrc_env.experiments.price.declaration import CONTRAST_LABELS
+from hrc_env.experiments.price.episodes import STEP, Driver, EpisodeRunner, sum_episodes
 from hrc_env.experiments.price.experiment import (
     Price,
     check_walks,
     make_experiment,
 )
-from hrc_env.experiments.price.eyes import ELSEWHERE, QUICK, all_eyes, eyes_called
-from hrc_env.experiments.price.metrics import CONTRASTS, Row, metrics_of, supposed_m
+from hrc_env.experiments.price.eyes import ELSEWHERE, QUICK, find_eyes, list_eyes
+from hrc_env.experiments.price.metrics import (
+    CONTRASTS,
+    Played,
+    Row,
+    compute_metrics,
+    suppose_margin_m,
+)
 from hrc_env.experiments.price.report import choose_bars
-from hrc_env.experiments.price.search import Tried, draws, run_together, searched
+from hrc_env.experiments.price.search import MarginSearch, draw_seeds, run_together, search
 from hrc_env.experiments.price.shield import Widened
 from hrc_env.experiments.runner import run_experiment
 from hrc_env.experiments.setups import PerceptionSetup
@@ -61,7 +67,7 @@ def tried_by_a_search(rate: Callable[[float], float], *given: Any) -> list[float
     def asked(margin_m: float) -> Generator[float, float, float]:
         return (yield margin_m)
 
-    (found,) = run_together([searched(asked, *given)], lambda margins_m: [*map(rate, margins_m)])
+    (found,) = run_together([search(asked, *given)], lambda margins_m: [*map(rate, margins_m)])
     return found
 
 
@@ -81,7 +87,7 @@ def test_a_search_goes_to_the_end_of_a_bracket_that_lacks_the_level():
 def test_searches_take_their_steps_together():
     rounds: list[list[str]] = []
 
-    def search(name: str, n_steps: int) -> Generator[str, int, int]:
+    def count(name: str, n_steps: int) -> Generator[str, int, int]:
         total = 0
         for k in range(n_steps):
             total += yield f"{name}{k}"
@@ -91,16 +97,16 @@ def test_searches_take_their_steps_together():
         rounds.append(asked)
         return [int(each[1:]) for each in asked]
 
-    assert run_together([search("a", 3), search("b", 0), search("c", 2)], answer) == [3, 0, 1]
+    assert run_together([count("a", 3), count("b", 0), count("c", 2)], answer) == [3, 0, 1]
     assert rounds == [["a0", "c0"], ["a1", "c1"], ["a2"]]
 
 
 def test_a_search_supposes_the_level_between_two_margins():
     tried = {m: {"towards": [contacts_at(m) * 600], "minutes": [600]} for m in (0.05, 0.1, 0.15)}
-    assert supposed_m(tried, 30.0) == pytest.approx(0.11, abs=0.002)
+    assert suppose_margin_m(tried, 30.0) == pytest.approx(0.11, abs=0.002)
 
 
-def tried(rng, n: int = 300, m: int = 1000, fresh_more: float = 1.0) -> Tried:
+def tried(rng, n: int = 300, m: int = 1000, fresh_more: float = 1.0) -> MarginSearch:
     """A search on a synthetic curve: contacts as `contacts_at`, goals 40 - 50 x margin a minute;
     every seed has a number of its own, so that margins differ by what they do."""
     margins_m = np.sort(tried_by_a_search(contacts_at, -0.4, 0.4, 0.18, 4))
@@ -109,7 +115,7 @@ def tried(rng, n: int = 300, m: int = 1000, fresh_more: float = 1.0) -> Tried:
     goals = (40 - 50 * margins_m) / 6.0
     own, fresh_own = rng.normal(0, 1, n), rng.normal(0, 1, m)
     fresh = (fresh_luck < fresh_more * contacts_at(0.1) / 6.0).astype(float)
-    return Tried(
+    return MarginSearch(
         margins_m, (luck < expected[:, None]).astype(float), goals[:, None] + own,
         np.full((len(margins_m), n), 1 / 6), 0.1, fresh, 35 / 6.0 + fresh_own, np.full(m, 1 / 6),
     )  # fmt: skip
@@ -118,7 +124,7 @@ def tried(rng, n: int = 300, m: int = 1000, fresh_more: float = 1.0) -> Tried:
 def test_what_is_found_at_the_level_is_in_its_interval():
     inside = np.zeros(2)
     for seed in range(40):
-        drawn = tried(np.random.default_rng(seed)).at(0.18, *draws(300, 1000, 200))[1:]
+        drawn = tried(np.random.default_rng(seed)).evaluate(0.18, *draw_seeds(300, 1000, 200))[1:]
         low, high = np.quantile(drawn, [0.025, 0.975], axis=0)
         inside += (low <= [0.11, 34.5]) & (high >= [0.11, 34.5])
     assert (inside >= 34).all()
@@ -127,8 +133,9 @@ def test_what_is_found_at_the_level_is_in_its_interval():
 
 def test_fresh_seeds_that_say_otherwise_move_the_margin():
     """Three times the contacts at that margin: it needs a wider one, at fewer goals."""
+    drawn = draw_seeds(300, 1000, 1)
     margins_m = {
-        more: tried(np.random.default_rng(0), fresh_more=more).at(0.18, *draws(300, 1000, 1))[0]
+        more: tried(np.random.default_rng(0), fresh_more=more).evaluate(0.18, *drawn)[0]
         for more in (0.5, 1.0, 3.0)
     }
     assert margins_m[0.5][0] < margins_m[1.0][0] < margins_m[3.0][0]
@@ -136,10 +143,10 @@ def test_fresh_seeds_that_say_otherwise_move_the_margin():
 
 
 def test_draws_are_the_same_for_everybody():
-    first, second = draws(5, 7, 3)
+    first, second = draw_seeds(5, 7, 3)
     assert first[0].tolist() == [1] * 5
     assert (second[1:].sum(1) == 7).all()
-    assert np.array_equal(draws(9, 7, 3)[1], second)
+    assert np.array_equal(draw_seeds(9, 7, 3)[1], second)
 
 
 def played(n_steps: int = 20, **columns: Floats) -> dict[str, float]:
@@ -147,7 +154,7 @@ def played(n_steps: int = 20, **columns: Floats) -> dict[str, float]:
     steps = np.zeros((n_steps, 1), STEP)
     for name, values in columns.items():
         steps[name][:, 0] = values
-    return {name: values[0] for name, values in sums_of(steps, 0.04).items()}
+    return {name: values[0] for name, values in sum_episodes(steps, 0.04).items()}
 
 
 def test_nothing_counts_after_the_end_of_an_episode():
@@ -158,12 +165,12 @@ def test_nothing_counts_after_the_end_of_an_episode():
 
 
 def test_eyes_are_what_their_names_say():
-    known = all_eyes()
+    known = list_eyes()
     assert set(QUICK) <= known.keys()
     assert len(QUICK) == 12
     assert set(ELSEWHERE) <= set(QUICK)
     assert {name for pair in CONTRASTS.values() for name in pair} <= known.keys()
-    assert QUESTIONS.keys() == CONTRASTS.keys()
+    assert CONTRAST_LABELS.keys() == CONTRASTS.keys()
     (turned,) = known["all_turned_1deg"].turns("lab")
     assert turned.faults[0].kind == "wrong_rotation"
     assert turned.faults[0].max_amount == pytest.approx(np.deg2rad(1))
@@ -178,10 +185,13 @@ def test_eyes_are_what_their_names_say():
     ("change", "words"),
     [
         ({"n_seeds": 0}, "--seeds must be at least 1"),
-        ({"eyes": ("one_camara",)}, "Unknown eyes 'one_camara'. Did you mean 'one_camera'"),
-        ({"eyes": ()}, "No eyes to compare"),
+        (
+            {"eyes": ("one_camara",)},
+            "Unknown perception setup 'one_camara'. Did you mean 'one_camera'",
+        ),
+        ({"eyes": ()}, "No perception setup to compare"),
         ({"bracket_m": (0.1, 0.1)}, "bracket_m must be"),
-        ({"level": 0.0}, "level be positive"),
+        ({"level": 0.0}, "level must be positive"),
         ({"task": "HRCReach-v1"}, "Unknown task 'HRCReach-v1'"),
     ],
 )
@@ -192,7 +202,7 @@ def test_what_cannot_be_played_is_refused(change, words):
 
 def test_a_task_that_nobody_has_scripted_is_refused(monkeypatch):
     monkeypatch.delitem(experts.EXPERTS, "HRCHandover-v0")
-    with pytest.raises(ConfigError, match="there is none for HRCHandover-v0; there is for HRCR"):
+    with pytest.raises(ConfigError, match="none for HRCHandover-v0; there is one for HRCR"):
         replace(TINY, task="HRCHandover-v0")
 
 
@@ -213,19 +223,19 @@ def test_what_the_command_asks_for():
     assert make_experiment(seeds=3).n_fresh == 10
     elsewhere = make_experiment(task="HRCHandover-v0")
     assert elsewhere.eyes == ELSEWHERE
-    assert len(elsewhere.seeds_of("HRCHandover-v0", 300)) == 100  # as much time
+    assert len(elsewhere.list_seeds("HRCHandover-v0", 300)) == 100  # as much time
     assert make_experiment(eyes=("truth", "truth")).eyes == ("truth",)
 
 
 def test_a_wider_shield_intervenes_more_and_covariances_are_told():
-    stage = Watched(replace(all_eyes()["truth"]), "HRCReach-v0", 60)
+    stage = EpisodeRunner(replace(list_eyes()["truth"]), "HRCReach-v0", 60)
     seeds = [3_000_000 + k for k in range(8)]
     narrow, wide, again = (stage.play(seeds, m, lambda share: None) for m in (-2.0, 1.0, -2.0))
     stage.close()
     assert narrow == again
     assert sum(wide["achieved"]) < sum(narrow["achieved"])
     assert narrow["walk"] == wide["walk"]
-    alone = Watched(all_eyes()["truth"], "HRCReach-v0", 60, is_shielded=False)
+    alone = EpisodeRunner(list_eyes()["truth"], "HRCReach-v0", 60, is_shielded=False)
     assert alone.play(seeds, 0.0, lambda share: None) == narrow
     alone.close()
 
@@ -315,7 +325,7 @@ def test_eyes_are_compared_draw_by_draw():
     more = {"truth": 1.0, "particle": 0.6, "one_camera": 0.0}
     rows = {name: row(np.random.default_rng(0), goals) for name, goals in more.items()}
     alone = {"HRCReach-v0": rows["truth"].fresh}
-    found = metrics_of({"HRCReach-v0": rows}, alone, {}, 30.0)
+    found = compute_metrics(Played({"HRCReach-v0": rows}, alone, {}), 30.0)
     assert found["HRCReach-v0.ranking"].value == 1.0
     assert 0 < found["worth.truth"].low < found["worth.truth"].high
     shares = [found[f"HRCReach-v0.{name}.share"] for name in ("particle", "one_camera")]
@@ -332,12 +342,13 @@ def test_a_search_goes_on_where_fresh_seeds_say_so(tmp_path, monkeypatch):
         one = {"minutes": 1.0, "achieved": 1.0, "towards": touched, "walk": 0}
         return {name: [value] * len(seeds) for name, value in one.items()}
 
-    monkeypatch.setattr(Watched, "play", play)
+    monkeypatch.setattr(EpisodeRunner, "play", play)
     cache, alone = PartCache(tmp_path, "", 1, silent), {"walk": [0] * TINY.n_fresh}
-    search = experiment.search_margin(TINY, "HRCReach-v0", all_eyes()["truth"], alone)
-    (row,) = run_together([search], cache.parts)
+    (eyes,) = find_eyes(["truth"])
+    margin_search = experiment.search_margin(TINY, "HRCReach-v0", eyes, alone)
+    (row,) = run_together([margin_search], cache.parts)
     assert sorted(row.searched) == pytest.approx([-0.8, -0.4, 0.0, 0.4, 0.45, 0.55, 0.75])
-    assert row.ends_at(row.at(30.0)[0, 0])
+    assert row.ends_at(row.evaluate(30.0)[0, 0])
     assert row.margin_m == pytest.approx(0.75)  # what is achieved at the end is played there
 
 
@@ -345,7 +356,7 @@ def test_workers_who_walk_otherwise_are_noticed_where_nobody_waits():
     one = row(np.random.default_rng(0), 0.0)
     other = {**one.fresh, "walk": [0]}
     check_walks("HRCHandover-v0", other, one)
-    with pytest.raises(HRCError, match="walked otherwise"):
+    with pytest.raises(HRCError, match="moved differently"):
         check_walks("HRCReach-v0", other, one)
 
 
@@ -354,7 +365,7 @@ def test_the_best_eyes_stand_above():
         f"HRCReach-v0.{name}.share": Metric(k / 10, k / 10, k / 10, "share", 1)
         for k, name in enumerate(("truth", "one_camera", "particle"))
     }
-    eyes = eyes_called(["truth", "particle", "one_camera"])
+    eyes = find_eyes(["truth", "particle", "one_camera"])
     shown = choose_bars(metrics, "HRCReach-v0", eyes)
     assert [each.name for each in shown] == ["truth", "one_camera", "particle"]
 
@@ -372,11 +383,11 @@ def test_ones_own_robot_has_a_price(tmp_path):
 
 
 def test_one_robot_has_a_price_at_a_time(tmp_path, monkeypatch):
-    with pytest.raises(ConfigError, match="The price is that of one robot, got --robots random s"):
+    with pytest.raises(ConfigError, match="The study is of one robot, got --robots random s"):
         make_experiment(robots=["random", "scripted"])
     alone = make_experiment(robots=["random"], control="tool", task="HRCHandover-v0")
     assert alone.others == ()
-    assert alone.driver.given == {"control": "tool"}
+    assert alone.driver.env_arguments == {"control": "tool"}
     monkeypatch.delitem(experts.EXPERTS, "HRCHandover-v0")
     make_experiment(robots=["random"], task="HRCHandover-v0")  # nobody has scripted it
 

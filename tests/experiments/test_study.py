@@ -10,7 +10,7 @@ from hrc_env.core.results import Metric
 from hrc_env.evaluation.sums import STATISTICS
 from hrc_env.experiments.columns import (
     Column,
-    less_baseline,
+    difference_from_baseline,
     mean,
     per_minute,
     rate,
@@ -21,7 +21,7 @@ from hrc_env.experiments.columns import (
 from hrc_env.experiments.report import Table
 from hrc_env.experiments.runner import run_experiment
 from hrc_env.experiments.setups import PerceptionSetup
-from hrc_env.experiments.study import Row, Study, shards_of
+from hrc_env.experiments.study import Row, Study, split_row
 from hrc_env.safety.shield import SHIELDS
 from hrc_env.tracking.estimators import ESTIMATORS
 
@@ -63,7 +63,7 @@ def test_numbers_come_from_the_same_episodes():
         "towards": measure(rate("contacts_towards", per="1000 episodes"), own),
         "all": measure(rate(kinds, per="hour"), own),
         "cost": measure(mean("cost"), own),
-        "less": measure(less_baseline("cost"), own, theirs),
+        "less": measure(difference_from_baseline("cost"), own, theirs),
         "success": measure(share_of_episodes("success"), own),
         "tries": measure(share_of_tries(clustered=False), [episode(goals_missed=1.0)]),
     }
@@ -78,13 +78,16 @@ def test_a_pair_tells_a_difference_that_rows_by_themselves_do_not():
     rng = np.random.default_rng(0)
     costs = rng.uniform(0, 100, 20)
     own, theirs = ([episode(cost=each) for each in values] for values in (costs + 1, costs))
-    paired, alone = measure(less_baseline("cost"), own, theirs), measure(mean("cost"), own)
+    paired, alone = (
+        measure(difference_from_baseline("cost"), own, theirs),
+        measure(mean("cost"), own),
+    )
     assert paired.value == pytest.approx(1.0)
     assert paired.high - paired.low < 1e-9 < alone.high - alone.low
 
 
 def test_parts_are_first_seeds_and_counts():
-    assert shards_of(Row("", 5, n_together=2), 100) == [(100, 2), (102, 2), (104, 1)]
+    assert split_row(Row("", 5, n_together=2), 100) == [(100, 2), (102, 2), (104, 1)]
 
 
 def test_a_row_is_played_once_and_again_only_where_it_changed(tmp_path, monkeypatch):
@@ -185,7 +188,7 @@ def test_a_row_that_names_nothing_is_refused_when_it_is_declared(changes, words)
 
 @pytest.mark.parametrize(
     "declare",
-    [mean, per_minute, rate, share_of_episodes, share_of_baseline, less_baseline],
+    [mean, per_minute, rate, share_of_episodes, share_of_baseline, difference_from_baseline],
     ids=lambda declare: declare.__name__,
 )
 def test_an_unknown_statistic_is_refused_when_a_column_is_declared(declare):
@@ -202,4 +205,4 @@ def test_some_rows_are_selected_with_their_baselines():
     assert list(study().select(["qp"]).rows) == ["bare", "qp"]
     with pytest.raises(ConfigError, match=r"Unknown row of 'cheap' 'pq'"):
         study().select(["pq"])
-    assert {row.n_episodes for row in study(n_quick=1).quick().rows.values()} == {1}
+    assert {row.n_episodes for row in study(n_quick=1).shorten().rows.values()} == {1}

@@ -10,10 +10,10 @@ from hrc_env.experiments import versions
 from hrc_env.experiments.versions import (
     SUBSYSTEMS,
     check_subsystems,
-    key_of,
+    hash_source,
+    make_key,
     read_versions,
-    source_digest,
-    versions_of,
+    select_versions,
 )
 from hrc_env.tracking.estimators import find_estimator
 
@@ -34,19 +34,19 @@ def behaviour(tmp_path, monkeypatch):
 
 def test_settings_and_versions_of_the_named_subsystems_are_in_a_key(behaviour):
     behaviour()
-    before = key_of({"n": 1}, ("env", "tracker"))
-    assert key_of({"n": 1}, ("tracker", "env")) == before
-    assert key_of({"n": 2}, ("env", "tracker")) != before
-    assert key_of({"n": 1}, ("env",)) != before
+    before = make_key({"n": 1}, ("env", "tracker"))
+    assert make_key({"n": 1}, ("tracker", "env")) == before
+    assert make_key({"n": 2}, ("env", "tracker")) != before
+    assert make_key({"n": 1}, ("env",)) != before
     behaviour(shield=2)
-    assert key_of({"n": 1}, ("env", "tracker")) == before
+    assert make_key({"n": 1}, ("env", "tracker")) == before
     behaviour(tracker=2)
-    assert key_of({"n": 1}, ("env", "tracker")) != before
+    assert make_key({"n": 1}, ("env", "tracker")) != before
 
 
 def test_the_file_of_this_repository_names_every_subsystem():
     assert tuple(read_versions()) == SUBSYSTEMS
-    assert versions_of(("shield", "env")).keys() == {"env", "shield"}
+    assert select_versions(("shield", "env")).keys() == {"env", "shield"}
 
 
 @pytest.mark.parametrize(
@@ -86,12 +86,12 @@ def test_a_study_that_names_no_subsystem_or_an_unknown_one_is_refused_in_words(d
     with pytest.raises(ConfigError, match=words):
         check_subsystems(depends)
     with pytest.raises(ConfigError, match=words):
-        key_of({}, depends)
+        make_key({}, depends)
 
 
 def test_the_file_of_an_estimator_of_ones_own_counts_and_ours_have_a_version():
     here = Path(__file__).read_bytes()
-    mine = source_digest(test_the_file_of_this_repository_names_every_subsystem)
+    mine = hash_source(test_the_file_of_this_repository_names_every_subsystem)
     assert mine == hashlib.sha256(here).hexdigest()
-    assert source_digest(find_estimator("particle").make) == ""
-    assert source_digest(3) == ""
+    assert hash_source(find_estimator("particle").make) == ""
+    assert hash_source(3) == ""

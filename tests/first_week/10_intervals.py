@@ -10,22 +10,22 @@ hasty = calm + np.array([3.0, 1.5, 4.2, -0.5, 2.2, 3.1, 0.4, 2.8, 1.9, 3.3, 2.0,
 calm_contacts, hasty_contacts = np.zeros(12), np.array([0, 1, 0, 2, 0, 0, 1, 0, 3, 0, 1, 0])
 hours = 12 * 10 / 3600
 
-mean = hrc_env.mean_over(calm)
+mean = hrc_env.estimate_mean(calm)
 print(f"return {mean.value:.1f} ({mean.low:.1f} to {mean.high:.1f}), {mean.n} seeds")
 assert mean.low < calm.mean() < mean.high
 
 # Nothing happened, which does not say that nothing can: at most 3.7 in as much time (Poisson).
-rate = hrc_env.rate_of(calm_contacts, hours, "1/h")
+rate = hrc_env.estimate_rate(calm_contacts, hours, "1/h")
 assert rate.value == rate.low == 0
 assert np.isclose(rate.high * hours, 3.6889, atol=1e-3)
 
 # All of twelve trials: the share may still be as low as .735 (Clopper and Pearson).
-share = hrc_env.share_of(calm_contacts == 0)
+share = hrc_env.estimate_share(calm_contacts == 0)
 assert np.isclose(share.low, 0.7354, atol=1e-3)
 
 # Differences: of means pair by pair, whose seeds are alike; of rates from exact intervals.
 more = hrc_env.compare_means(hasty, calm)
-alone = hrc_env.mean_over(hasty).high - hrc_env.mean_over(hasty).low
+alone = hrc_env.estimate_mean(hasty).high - hrc_env.estimate_mean(hasty).low
 assert more.difference.low > 0
 assert more.p < 0.05
 assert more.difference.high - more.difference.low < alone  # pairing takes the seeds' spread out
@@ -37,7 +37,7 @@ assert often.difference.low > 0
 assert np.isclose(often.p, 2 * 0.5**8)  # eight events, all on one side
 
 for wrong in (
-    lambda: hrc_env.rate_of([0.5], 1.0),
+    lambda: hrc_env.estimate_rate([0.5], 1.0),
     lambda: hrc_env.compare_means([1.0], [1.0, 2.0]),
 ):
     try:

@@ -10,11 +10,11 @@ from benchmarks.motion.statistics import (
     ANKLES,
     HEAD,
     WRISTS,
-    grips,
+    compute_grips,
+    compute_misses,
+    compute_slips,
+    find_arrivals,
     knee_flexion_deg,
-    misses,
-    slips,
-    wholly_there,
 )
 from hrc_env.motion import controls as c
 from hrc_env.motion import state as st
@@ -59,7 +59,7 @@ def each(scene):
 
 def test_hands_are_where_they_work_and_on_what_they_hold(scene):
     for film in each(scene):
-        missed = misses(film)
+        missed = compute_misses(film)
         if missed.size:
             assert np.percentile(missed, 99) < 0.025
             assert (missed > 0.01).mean() < 0.1
@@ -70,7 +70,7 @@ def test_hands_are_where_they_work_and_on_what_they_hold(scene):
 def test_arms_of_every_body_reach_what_they_carry_and_push(name, held):
     me = make_worker(load_body(name))
     films = perform(REPERTOIRE[held], me, np.random.default_rng(0), 0.04)
-    assert (np.concatenate([misses(film) for film in films]) > 0.01).mean() <= 0.02
+    assert (np.concatenate([compute_misses(film) for film in films]) > 0.01).mean() <= 0.02
 
 
 def test_it_begins_and_ends_standing_still(scene):
@@ -105,7 +105,7 @@ def test_one_activity_takes_over_where_the_last_one_ended(scene):
 
 def test_loaded_feet_do_not_slide_and_none_is_in_the_floor(scene):
     for film in each(scene):
-        slip = slips(film)
+        slip = compute_slips(film)
         assert np.percentile(slip, 95) < 0.05
         toes = film.motion.position_world[:, 0, [SEGMENT["left_toes"], SEGMENT["right_toes"]], 2]
         assert toes.min() > toes[0].min() - 0.003
@@ -132,8 +132,8 @@ def test_joints_stay_within_what_people_can_do(scene):
 
 def test_what_is_held_is_in_a_hand(scene):
     for film in each(scene):
-        held, hands = film.motion.held, grips(film)
-        there = wholly_there(film)
+        held, hands = film.motion.held, compute_grips(film)
+        there = find_arrivals(film)
         for kind in np.unique(held.kind):
             if kind == 0 or film.activity in (*st.TAKING, *st.GIVING, st.PUSH, st.CARRY):
                 continue  # loads stand by themselves before and after; boards lie on shoulders

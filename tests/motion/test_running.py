@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from recorded import started
 
-from benchmarks.motion.statistics import ANKLES, HEAD, WRISTS, knee_flexion_deg, slips
+from benchmarks.motion.statistics import ANKLES, HEAD, WRISTS, compute_slips, knee_flexion_deg
 from hrc_env.core.errors import ConfigError
 from hrc_env.motion import generator
 from hrc_env.motion import state as st
@@ -95,7 +95,7 @@ def test_no_foot_is_in_the_floor_and_none_slides(run):
     film, _, _ = run
     toes = film.motion.position_world[:, 0, TOES, 2]
     assert toes.min() > toes[0].min() - 0.003
-    assert np.percentile(slips(film), 95) < 0.12
+    assert np.percentile(compute_slips(film), 95) < 0.12
 
 
 def test_nothing_jumps(run):

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from figures import Figure
 
-from benchmarks.common import CHI2_95_3D, normalised_square
+from benchmarks.common import CHI2_95_3D, compute_normalized_square
 from benchmarks.tracking.rigs import DT_S
 from benchmarks.tracking.tracks import Tracks, follow_env, follow_walkers
 from hrc_env.core.batching import copied
 from hrc_env.core.results import Metric
-from hrc_env.evaluation.intervals import bootstrap, ratio_over
+from hrc_env.evaluation.intervals import bootstrap, estimate_ratio
 
 WARM_UP, EVERY = 25, 2
 SEEDS = list(range(4900, 4932))
@@ -77,10 +77,10 @@ def compare(tracks: Tracks, row: int, horizon_s: float) -> tuple[Metric, Metric]
         np.nansum(np.where(is_tracked, each - then, np.nan) ** 2, (0, 2, 3))
         for each in (mean, moved)
     )
-    inside = normalised_square(error, cov) < CHI2_95_3D
+    inside = compute_normalized_square(error, cov) < CHI2_95_3D
     n = np.isfinite(error[..., 0]).sum((0, 2))
     ratio = bootstrap(lambda w: np.sqrt((w @ ours) / (w @ model)), len(ours), "-")
-    return ratio, ratio_over(inside.sum((0, 2)), n, "share")
+    return ratio, estimate_ratio(inside.sum((0, 2)), n, "share")
 
 
 @pytest.mark.long

@@ -11,7 +11,7 @@ import pytest
 from figures import Figure
 
 import hrc_env  # noqa: F401  registers the ids
-from benchmarks.common import exactly
+from benchmarks.common import make_exact
 from hrc_env.core.typing import Bools
 from hrc_env.safety.incidents import SUMMARY
 from hrc_env.vector.env import HRCVectorEnv
@@ -97,8 +97,8 @@ def test_a_long_run_has_numbers_only_and_takes_no_more_memory(figures):
     n_wrong, resident_mib = soak(640_000, 64, perception="keypoints")
     warm = resident_mib[WARM_UP:]
     figures.hold(
-        Figure("soak: values that are no numbers", exactly(n_wrong, "1"), most=0),
-        Figure("soak: growth of memory", exactly(max(warm) / warm[0] - 1, "share"), most=0.05),
+        Figure("soak: values that are no numbers", make_exact(n_wrong, "1"), most=0),
+        Figure("soak: growth of memory", make_exact(max(warm) / warm[0] - 1, "share"), most=0.05),
     )
 
 

@@ -7,7 +7,7 @@ import pytest
 from figures import Figure
 
 from assets.workers.poses import rest_motion
-from benchmarks.common import exactly
+from benchmarks.common import make_exact
 from hrc_env.core.records import WorkerPath
 from hrc_env.core.results import over
 from hrc_env.core.typing import Floats
@@ -125,7 +125,7 @@ def test_the_tool_follows_the_integral_of_commands(figures):
 @pytest.mark.parametrize("push", [push_into_floor, push_into_worker], ids=["floor", "worker"])
 def test_contacts_are_shallow_and_calm(push, figures, request):
     name = f"substep.contact.{request.node.callspec.id}"
-    depth_mm, pressed_rad_s, away_m = (exactly(each, "") for each in push())
+    depth_mm, pressed_rad_s, away_m = (make_exact(each, "") for each in push())
     figures.hold(
         Figure(f"{name}.depth_mm", depth_mm, least=0.0, most=5.0),
         Figure(f"{name}.pressed_rad_s", pressed_rad_s, most=0.1),

@@ -13,7 +13,7 @@ from figures import Figure, count
 
 from benchmarks.tracking.cells import run_cell
 from benchmarks.tracking.detections import SURPRISES
-from benchmarks.tracking.metrics import STATISTICS, drawn_sums, metric
+from benchmarks.tracking.metrics import STATISTICS, metric, resample_sums
 from benchmarks.tracking.names import DEFAULT, DLT
 from benchmarks.tracking.rigs import RIGS, make_rig
 from benchmarks.tracking.sequences import make_sequences
@@ -44,9 +44,9 @@ def track(rig_name: str, condition: str, seeds: list[int]) -> dict[str, dict[str
     _, coverage = STATISTICS["coverage95"]
     _, deviation = STATISTICS["std_over_rmse"]
     for window, sums in ours.items():
-        drawn = drawn_sums(sums)
+        drawn = resample_sums(sums)
         found[window] = {
-            "over_dlt": metric(rmse(drawn) / rmse(drawn_sums(plain[window])), "-", drawn),
+            "over_dlt": metric(rmse(drawn) / rmse(resample_sums(plain[window])), "-", drawn),
             "coverage": metric(coverage(drawn), "share", drawn),
             "deviation": metric(deviation(drawn), "-", drawn),
             "n_mirrored": int(np.count_nonzero(sums["wrong_way"])),

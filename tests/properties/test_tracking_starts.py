@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from figures import Figure, count
 
-from benchmarks.common import exactly
+from benchmarks.common import make_exact
 from benchmarks.tracking.cells import beliefs, run_cell
 from benchmarks.tracking.detections import Damage, detect
-from benchmarks.tracking.metrics import STATISTICS, drawn_sums, metric
+from benchmarks.tracking.metrics import STATISTICS, metric, resample_sums
 from benchmarks.tracking.rigs import RIGS, Rig, make_rig
 from benchmarks.tracking.sequences import Sequences
 from benchmarks.tracking.walks import walk
@@ -63,7 +63,7 @@ def track_one_view(rig: Rig, start: str, seeds: list[int]) -> dict[str, Metric]:
     given = Sequences(joints[:, :, None], px[:, :, :, None], WINDOWS, rig.tracker)
     metrics = {}
     for window, sums in run_cell("particle", rig, given, seeds, lambda _: None).items():
-        drawn = drawn_sums(sums)
+        drawn = resample_sums(sums)
         for kind in ("rmse_m", "coverage95"):
             unit, statistic = STATISTICS[kind]
             metrics[f"{kind}.{window}"] = metric(statistic(drawn), unit, drawn)
@@ -88,7 +88,7 @@ def test_one_view_is_worse_than_all_and_all_make_it_good():
 def test_algorithm_1_locks_on(rig, design, figures):
     locked, first = find_locks(make_rig(rig), design, SEEDS)
     share = count(int((~locked).sum()), len(SEEDS))
-    most = exactly(float(first.max()), "frames", len(SEEDS))
+    most = make_exact(float(first.max()), "frames", len(SEEDS))
     figures.hold(
         Figure(f"locks.{rig}.{design}.missed", share, most=0.05),
         Figure(f"locks.{rig}.{design}.most_frames", most, most=LOCKED[rig][0]),

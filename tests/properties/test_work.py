@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from hrc_env.agents.env_info import env_info
 from hrc_env.agents.registry import make_agent
 from hrc_env.core.results import Metric
-from hrc_env.evaluation.intervals import ratio_over
+from hrc_env.evaluation.intervals import estimate_ratio
 from hrc_env.geometry import chains
 from hrc_env.geometry.distances import least_separation
 from hrc_env.motion import generator
@@ -62,8 +62,8 @@ def find_shares(looks: NDArray[np.void]) -> tuple[Metric, Metric]:
     """Return the share of time near the robot, and of that the share folded or kneeling."""
     is_near = looks["separation_m"] < NEAR_M
     is_low = looks["posture"] >= POSTURES.index("folded")
-    near = ratio_over(is_near.sum(0), np.ones_like(is_near).sum(0), "share")
-    return near, ratio_over((is_near & is_low).sum(0), is_near.sum(0), "share")
+    near = estimate_ratio(is_near.sum(0), np.ones_like(is_near).sum(0), "share")
+    return near, estimate_ratio((is_near & is_low).sum(0), is_near.sum(0), "share")
 
 
 @pytest.mark.parametrize(("jobs", "least", "most"), [("low_work", 0.05, 0.4), ("framing", 0, 0.02)])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hrc_env.agents.env_info import env_info
-from hrc_env.agents.experts import expert
+from hrc_env.agents.experts import make_expert
 from hrc_env.agents.scripted import Yielding
 from hrc_env.core.errors import ConfigError
 from hrc_env.geometry import chains
@@ -165,12 +165,12 @@ def test_a_sparse_reward_counts_the_delivery_only():
 
 def test_the_expert_delivers_and_its_way_is_the_seeds():
     env = gymnasium.make(ID, perception="truth")
-    agent = expert(env_info(env.unwrapped.simulation))
+    agent = make_expert(env_info(env.unwrapped.simulation))
     for seed in (3_000_000, 3_000_001):
         rewards, info, seen = played(env, agent.act, seed)
         assert info["is_success"]
         assert sum(rewards) > CONFIG.delivered_bonus
-        _, _, again = played(env, expert(env_info(env.unwrapped.simulation)).act, seed)
+        _, _, again = played(env, make_expert(env_info(env.unwrapped.simulation)).act, seed)
         np.testing.assert_array_equal(seen, again)
     env.close()
 
@@ -178,7 +178,7 @@ def test_the_expert_delivers_and_its_way_is_the_seeds():
 def test_who_yields_is_never_faster_and_stops_beside_people():
     env = gymnasium.make(ID, perception="truth", n_workers=1)
     simulation = env.unwrapped.simulation
-    free, yields = (expert(env_info(simulation), each) for each in (None, Yielding()))
+    free, yields = (make_expert(env_info(simulation), each) for each in (None, Yielding()))
     observation, _ = env.reset(seed=3_000_000)
     np.testing.assert_array_equal(free.act(observation), yields.act(observation))
     near = observation.copy()
@@ -313,7 +313,7 @@ def test_a_robot_of_ones_own_may_drive():
 def test_an_experts_action_hangs_on_its_own_observation_only():
     envs = gymnasium.make_vec(ID, num_envs=4, perception="truth", num_threads=1)
     simulation = envs.unwrapped.shards.first
-    agent, few, alone = (expert(env_info(simulation)) for _ in range(3))
+    agent, few, alone = (make_expert(env_info(simulation)) for _ in range(3))
     few._fields = few._fields[:4]  # what is not followed now is forgotten
     observation, _ = envs.reset(seed=1)
     for _ in range(60):

@@ -6,7 +6,7 @@ import pytest
 
 import hrc_env  # noqa: F401  # registers the ids
 from hrc_env.agents.env_info import env_info
-from hrc_env.agents.experts import expert
+from hrc_env.agents.experts import make_expert
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import ObjectState
 from hrc_env.motion import state as st
@@ -94,7 +94,7 @@ def test_a_board_that_moves_while_screws_are_driven_is_spoilt(off_m, spoils):
 def test_the_expert_hangs_the_board():
     env = make()
     observation, _ = env.reset(seed=0)
-    agent = expert(env_info(env.unwrapped.simulation))
+    agent = make_expert(env_info(env.unwrapped.simulation))
     over = False
     while not over:
         observation, _, terminated, truncated, info = env.step(agent.act(observation))
@@ -115,7 +115,7 @@ def test_the_worker_waits_for_the_board_and_halts_when_it_is_taken_away():
     env = make(perception="truth", n_workers=1)
     observation, _ = env.reset(seed=1)
     simulation = env.unwrapped.simulation
-    agent, me = expert(env_info(simulation)), simulation.motion.workers[0, 0]
+    agent, me = make_expert(env_info(simulation)), simulation.motion.workers[0, 0]
     while not simulation.task_state["pressed_s"][0] > 0.0:
         assert me["activity"] != st.SCREW
         observation, *_ = env.step(agent.act(observation))

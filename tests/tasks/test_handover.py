@@ -6,7 +6,7 @@ import pytest
 
 import hrc_env  # noqa: F401  # registers the ids
 from hrc_env.agents.env_info import env_info
-from hrc_env.agents.experts import expert
+from hrc_env.agents.experts import make_expert
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import ObjectState
 from hrc_env.tasks import handover
@@ -105,7 +105,7 @@ def test_a_pull_that_is_not_gentle_is_no_success():
 def test_the_expert_hands_the_tool_over():
     env = make()
     observation, _ = env.reset(seed=1)
-    agent, contacts, over = expert(env_info(env.unwrapped.simulation)), 0.0, False
+    agent, contacts, over = make_expert(env_info(env.unwrapped.simulation)), 0.0, False
     while not over:
         observation, _, terminated, truncated, info = env.step(agent.act(observation))
         contacts += info["cost_contact"]

@@ -6,7 +6,7 @@ import pytest
 
 import hrc_env  # noqa: F401  # registers the ids
 from hrc_env.agents.env_info import env_info
-from hrc_env.agents.experts import expert
+from hrc_env.agents.experts import make_expert
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import ObjectState
 from hrc_env.motion import generator
@@ -81,7 +81,7 @@ def test_pieces_rest_on_the_table_and_are_laid_out_by_the_seed():
 def test_the_expert_lays_all_pieces_into_the_rack():
     env = make()
     observation, _ = env.reset(seed=3)
-    agent = expert(env_info(env.unwrapped.simulation))
+    agent = make_expert(env_info(env.unwrapped.simulation))
     total, over = 0.0, False
     while not over:
         observation, reward, terminated, truncated, info = env.step(agent.act(observation))

@@ -1,1 +1,2 @@
-"""The fit of the emulator: tables of errors from samples, one after the other."""
+"""Fit of the emulator: one module for each group of tables, estimated from samples in this
+order."""

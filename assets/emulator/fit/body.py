@@ -1,4 +1,4 @@
-"""Bodies that a camera sees badly as a whole: a factor that the errors of all joints share."""
+"""Error factor of a whole body: a camera that sees a body badly errs more in all its joints."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from hrc_env.core.typing import Floats
 from hrc_env.perception.calibration import BODY_KNOTS, KINDS
 
 LOG_RAYLEIGH_VAR = np.pi**2 / 24
-"""Of the logarithm of the length of two normal variables of standard deviation 1."""
+"""Variance of the logarithm of the length of two normal variables of standard deviation 1."""
 ENOUGH = 6
 """Least number of joints in an image from which the factor is estimated."""
 _NORMAL = np.array([0.135, 2.275, 15.866, 50.0, 84.134, 97.725, 99.865])
@@ -15,15 +15,16 @@ _NORMAL = np.array([0.135, 2.275, 15.866, 50.0, 84.134, 97.725, 99.865])
 
 
 def bodies_of(s: Cells, left_over: Floats) -> tuple[Floats, Floats, float]:
-    """How much larger than usual all errors of a body are.
+    """Estimate the factor that all errors of a body in one image share.
 
     Args:
         s: the samples.
-        left_over: (L, T, C, J, 2) errors without what they are on average.
+        left_over: (L, T, C, J, 2) errors less their mean.
 
     Returns:
-        (P, Q) quantiles of the factor's logarithm at `BODY_KNOTS`; (L, T, C) that logarithm, NaN
-        where too few joints tell it; the share of the sizes' variance that it is.
+        (P, Q) quantiles of the factor's logarithm at `BODY_KNOTS`;
+        (L, T, C) the logarithm, NaN where there are too few joints;
+        the share of the sizes' variance that the factor explains.
     """
     logs = _log_length(s, left_over)
     body = _bodies(s, logs)
@@ -33,14 +34,16 @@ def bodies_of(s: Cells, left_over: Floats) -> tuple[Floats, Floats, float]:
 
 
 def body_spread(s: Cells) -> Floats:
-    """(P,) standard deviation of the factor's logarithm, with whatever else the errors are."""
+    """Return the standard deviation of the factor's logarithm, (P,), for samples of any other
+    errors."""
     body = _bodies(s, _log_length(s, s.mirrored))
     spread = [float(np.nanstd(body[s.posture[..., 0] == posture])) for posture in range(N_P)]
     return np.array(spread, float)
 
 
 def _bodies(s: Cells, logs: Floats) -> Floats:
-    """(L, T, C) medians over the joints, 0 in the middle; NaN where too few joints tell them."""
+    """Return medians over the joints, (L, T, C), centred at 0; NaN where there are too few
+    joints."""
     enough = np.isfinite(logs).sum(-1) >= ENOUGH
     body = np.full(enough.shape, np.nan)
     body[enough] = np.nanmedian(logs[enough], -1)
@@ -52,7 +55,8 @@ def _bodies(s: Cells, logs: Floats) -> Floats:
 
 
 def _quantiles(s: Cells, body: Floats) -> Floats:
-    """(P, Q) at `BODY_KNOTS`; of upright bodies where there are few folded ones."""
+    """Return quantiles at `BODY_KNOTS`, (P, Q); those of upright bodies where there are few folded
+    ones."""
     table = np.zeros((N_P, len(BODY_KNOTS)))
     for posture in range(N_P):
         mine = np.isfinite(body) & (s.posture[..., 0] == posture)
@@ -61,7 +65,7 @@ def _quantiles(s: Cells, body: Floats) -> Floats:
 
 
 def _log_length(s: Cells, left_over: Floats) -> Floats:
-    """Logarithm of every error's length less its cell's median; NaN where there is none."""
+    """Return the logarithm of every error's length less its cell's median; NaN without an error."""
     length = np.where(s.found, np.linalg.norm(left_over, axis=-1), np.nan)
     logs = np.log(np.maximum(length, 1e-4))
     for posture in range(N_P):

@@ -1,4 +1,4 @@
-"""Samples sorted by what the tables of a calibration distinguish."""
+"""Samples sorted by the dimensions of a calibration's tables."""
 
 import numpy as np
 
@@ -8,22 +8,25 @@ from hrc_env.perception.calibration import HAND, KIND, KINDS, N_VIEWS, POSTURES,
 
 N_K, N_P, N_S = len(KINDS), len(POSTURES), len(SIGHTS)
 FEW = 300
-"""A cell of a table with fewer samples is drawn towards the cell that stands for it."""
+"""Least number of samples of a table's cell that is not shrunk towards the cell that replaces
+it."""
 SHARP = 0.06
-"""Errors below this share of the side are no gross ones: means and correlations are theirs."""
+"""Errors below this share of the window's side are not outliers; means and correlations use only
+them."""
 
 
 CLEAR = 0.5
-"""A body counts as of a class from this share on."""
+"""Least share of a class from which a body counts as of this class."""
 
 
 def class_of(posture: Floats) -> Ints:
-    """(...) which of `POSTURES` shares (..., P) clearly are; -1: none."""
+    """Return the index of the `POSTURES` that shares (..., P) clearly belong to, (...); -1:
+    none."""
     return np.where(posture.max(-1) >= CLEAR, posture.argmax(-1), -1)
 
 
 class Cells:
-    """Samples sorted by kind of joint, left and right together."""
+    """Samples sorted by kind of joint, with left and right joints pooled."""
 
     def __init__(self, samples: Samples) -> None:
         self.mirrored = samples.error * np.stack([HAND, np.ones_like(HAND)], -1)
@@ -35,11 +38,11 @@ class Cells:
         self.view_bin = np.round(view * N_VIEWS / (2 * np.pi)).astype(int) % N_VIEWS
 
     def pick(self, posture: int | None, sight: int, kind: int) -> Bools:
-        """Which samples are of a cell."""
+        """Return a mask of the samples of a cell."""
         found = self.found & (self.sight == sight) & (kind == KIND)
         return found if posture is None else found & (self.posture == posture)
 
 
 def mix(a: float, b: float, part: float) -> float:
-    """From a to b."""
+    """Interpolate linearly from a to b."""
     return a + part * (b - a)

@@ -1,4 +1,4 @@
-"""The network's confidence, and the standard deviation that the tracker gets for it."""
+"""Confidence of the network, and the standard deviation that it stands for in the tracker."""
 
 import math
 
@@ -13,9 +13,9 @@ from hrc_env.perception.detector import STATURE_OF_SIDE
 from hrc_env.perception.sightlines import OUTSIDE
 
 TOLD = 1.2
-"""What is told is larger than what is measured by this, as errors that last and that cameras share
-do not average. Chosen on half of the clips: 1 covers .88, 1.2 .90, 1.4 .91 (upright bodies), and
-the tracker's median error is 20.4, 21.1 and 22.0 mm."""
+"""Reported standard deviation over the measured one, because errors that last and that cameras
+share do not average out. Chosen on half of the clips: coverage is .88 at 1, .90 at 1.2 and .91 at
+1.4 (upright bodies), and the tracker's median error is 20.4, 21.1 and 22.0 mm."""
 
 
 def _logit(p: Floats) -> Floats:
@@ -24,7 +24,7 @@ def _logit(p: Floats) -> Floats:
 
 
 def confidences_of(s: Cells) -> Floats:
-    """(P, S, K, Z) quantiles of the reported visibility."""
+    """Return quantiles of the reported visibility, (P, S, K, Z)."""
     levels = [50 * (1 + math.erf(knot / math.sqrt(2))) for knot in KNOTS]
     table = np.full((N_P, N_S, N_K, len(KNOTS)), 0.5)
     for posture in range(N_P):
@@ -41,7 +41,8 @@ def confidences_of(s: Cells) -> Floats:
 
 
 def follows_of(s: Cells, left_over: Floats, spread: Floats, common: float) -> Floats:
-    """(S, K) correlation of visibility with smallness of the error, apart from its direction's."""
+    """Return the correlation of visibility with small errors, (S, K), apart from that of its
+    direction."""
     follows = np.zeros((N_S, N_K))
     length = np.linalg.norm(left_over, axis=-1)
     for sight in range(N_S):
@@ -60,8 +61,10 @@ def _ranks(values: Floats) -> Floats:
 
 
 def sigma_table(s: Cells, samples: Samples) -> Floats:
-    """(P, K, V) standard deviations by the visibility, a share of the stature; of
-    few samples that of all joints of such bodies, and theirs that of all bodies."""
+    """Return standard deviations by visibility as a share of the stature, (P, K, V).
+
+    A cell of few samples takes those of all joints of such bodies, and these those of all bodies.
+    """
     edges = np.r_[0.0, 0.5 * (VISIBILITY[1:] + VISIBILITY[:-1]), 1.01]
     length = np.linalg.norm(samples.error, axis=-1) / STATURE_OF_SIDE
     found = np.isfinite(length) & samples.counts[..., None, None] & (samples.sight < OUTSIDE)
@@ -77,7 +80,8 @@ def sigma_table(s: Cells, samples: Samples) -> Floats:
 
 
 def _told(length: Floats, otherwise: float) -> float:
-    """A standard deviation from the 90th percentile of lengths; of few, nearly `otherwise`."""
+    """Return a standard deviation from the 90th percentile of lengths, near `otherwise` if they are
+    few."""
     n = length.size
     own = float(np.percentile(length, 90)) / 2.146 if n >= 30 else otherwise
     return mix(otherwise, own, n / (n + FEW))

@@ -1,4 +1,4 @@
-"""What happens now and then, and lasts: left and right exchanged, workers lost."""
+"""Events that occur now and then and last: exchange of left and right, missed workers."""
 
 import numpy as np
 from scipy.optimize import isotonic_regression
@@ -12,19 +12,19 @@ from hrc_env.perception.calibration import N_SEEN, N_VIEWS
 from hrc_env.perception.sightlines import SEEN
 
 LAGS = (5, 12, 25, 40)
-"""Lags at which the event is looked for again, in frames."""
+"""Lags at which the recurrence of an event is measured [frames]."""
 FEW_MISSES = 20
 """Weight of the prior guess, in samples."""
 FEWEST = 30
-"""Least number of moments at which it happens for an estimate."""
+"""Least number of moments with the event for an estimate."""
 SHARED: Floats = np.linspace(0.0, 0.999, 60)
-"""Correlations that are tried."""
+"""Grid of correlations for the fit."""
 QUANTILES: Floats = (np.arange(64) + 0.5) / 64
-"""At which a normal variable in its tail is looked at."""
+"""Quantiles at which a normal variable in its tail is evaluated."""
 
 
 def swaps_of(samples: Samples) -> tuple[Floats, Floats]:
-    """(P, A, 2) shares of time by view, mirror images together; (2,) for how long [s]."""
+    """Return shares of time by view, (P, A, 2), mirror images pooled, and durations [s], (2,)."""
     view = np.round(np.abs(samples.view) * N_VIEWS / (2 * np.pi)).astype(int)
     looked = ~samples.missed & samples.counts[..., None]
     share, found = np.zeros((2, N_P, N_VIEWS, 2))
@@ -46,7 +46,8 @@ def swaps_of(samples: Samples) -> tuple[Floats, Floats]:
 
 
 def misses_of(samples: Samples) -> tuple[Floats, Floats]:
-    """(P, 16) shares of time by the number of joints seen, never more with more; how long [s]."""
+    """Return shares of time by the number of joints in sight, (P, 16), non-increasing, and the
+    duration [s]."""
     n_seen = (samples.sight == SEEN).sum(-1)
     looked = np.broadcast_to(samples.counts[..., None], n_seen.shape)
     share = np.zeros((N_P, N_SEEN))
@@ -64,21 +65,22 @@ def misses_of(samples: Samples) -> tuple[Floats, Floats]:
 
 
 def _class(samples: Samples) -> Ints:
-    """(L, T, C) the posture that each sample is of, if of any; else the first."""
+    """Return the posture of each sample, (L, T, C), the first one if it is of none."""
     class_ = np.maximum(class_of(samples.posture), 0)
     return np.broadcast_to(class_[..., None], samples.missed.shape)
 
 
 def _are(samples: Samples, posture: int) -> Bools:
-    """(L, T, C) which samples are of such bodies."""
+    """Return a mask of samples of bodies of a posture, (L, T, C)."""
     return np.broadcast_to(class_of(samples.posture)[..., None] == posture, samples.missed.shape)
 
 
 def _lasts_s(now: Bools, looked: Bools, share: Floats) -> float:
-    """Time constant of a slow normal variable that is in its lower tail while `now` (L, T, C) [s].
+    """Return the time constant of a slow normal variable that is in its lower tail while `now` (L,
+    T, C) [s].
 
-    From how often it is some frames after it was, among samples that were looked at, beyond what
-    their shares of time (L, T, C) make likely anyway.
+    It follows from the frequency with which the event recurs some frames later, among observed
+    samples, beyond the frequency that their shares of time (L, T, C) explain.
     """
     constants = []
     for lag in LAGS:
@@ -94,8 +96,8 @@ def _lasts_s(now: Bools, looked: Bools, share: Floats) -> float:
 
 
 def _both(shares: Floats, counts: Ints, rho: float) -> float:
-    """Of so many pairs of normal variables with this correlation, how many are expected to be both
-    in their lower tails, of shares (N, 2)."""
+    """Return the expected number of pairs of normal variables of a correlation that are both in
+    their lower tails, of shares (N, 2)."""
     tail = ndtri(np.clip(shares[:, :1] * QUANTILES, 1e-12, 1.0 - 1e-12))  # the first, given it is
     edge = ndtri(np.clip(shares[:, 1:], 1e-12, 1.0 - 1e-12))
     second = ndtr((edge - rho * tail) / np.sqrt(1.0 - rho**2)).mean(1)

@@ -24,12 +24,13 @@ from hrc_env.perception.calibration import Calibration
 
 
 def fit(samples: Samples, known: tuple[Floats, float], between_m: Floats) -> Calibration:
-    """A draft of a calibration that draws errors like these (`matching.matched` finishes it).
+    """Fit a draft of a calibration whose errors resemble the samples (`matching.matched` completes
+    it).
 
     Args:
-        samples: what the network saw.
-        known: poses, and how far others are from them (`novelty.poses_of`).
-        between_m: of the bodies (`bodies.apart`).
+        samples: detections of the network.
+        known: poses of the fit and the median distance of others from them (`novelty.poses_of`).
+        between_m: deviations between the bodies (`bodies.apart`).
     """
     s, (poses, near_m) = Cells(samples), known
     offset = offsets_of(samples)

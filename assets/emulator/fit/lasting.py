@@ -1,4 +1,4 @@
-"""How errors go together: in time, and along limbs."""
+"""Correlations of errors: in time, and along limbs."""
 
 import itertools
 
@@ -14,13 +14,14 @@ from hrc_env.perception.sightlines import HIDDEN, SEEN
 SPEEDS = (0.0, 0.08, 0.2, 0.4, 0.7, 1.1, 3.0)
 """Edges of classes of workers by their joints' mean speed [m/s]."""
 LAGS = (1, 2, 3, 5, 8, 12, 18, 25, 35, 45)
-"""In frames, at which correlations in time are taken."""
+"""Lags at which correlations in time are taken [frames]."""
 
 
 def times_of(
     s: Cells, samples: Samples, unit: Floats, in_space: Floats, size: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """(K, 3) shares of what stays, lasts and is new; how long [s] and how far [m] it lasts."""
+    """Return shares of constant, lasting and new errors, (K, 3), and their duration [s] and range
+    [m]."""
     speed = np.broadcast_to(samples.speed_m_s[:, :, None, None], s.found.shape)
     curves = np.zeros((N_K, len(SPEEDS) - 1, len(LAGS), 2))
     for kind in range(N_K):
@@ -57,8 +58,10 @@ def _mean_within(values: Floats, low: float, high: float) -> float:
 
 
 def _two_parts(curve: Floats, shape: Floats) -> tuple[tuple[float, float], float]:
-    """Non-negative a and b, together at most 1, of products over squares = a + b shape, and the
-    squared miss; each lag counts by its squares."""
+    """Fit a + b shape to a curve with non-negative a and b of sum at most 1.
+
+    Returns a and b, and the squared residual; each lag counts by its sum of squares.
+    """
     weight = curve[..., 1] / max(float(curve[..., 1].sum()), 1e-9)
     found = curve[..., 0] / np.maximum(curve[..., 1], 1e-9)
     best = (np.inf, (0.0, 0.0))
@@ -70,7 +73,8 @@ def _two_parts(curve: Floats, shape: Floats) -> tuple[tuple[float, float], float
 
 
 def limbs_of(s: Cells, unit: Floats) -> Floats:
-    """(K,) correlation of a joint's error with that of the next one towards the trunk."""
+    """Return the correlation of a joint's error with that of the next joint towards the trunk,
+    (K,)."""
     limb = np.zeros(N_K)
     for kind in range(N_K):
         ours = [j for j in range(len(KIND)) if KIND[j] == kind and INNER[j] != j]
@@ -84,7 +88,7 @@ def limbs_of(s: Cells, unit: Floats) -> Floats:
 
 
 def add_lagged(sums: list[Floats], values: Floats) -> None:
-    """Add products of values (L, T, ...) with themselves later, and their squares, at `LAGS`."""
+    """Add the products of values (L, T, ...) at `LAGS`, and their squares."""
     for i, lag in enumerate(LAGS):
         now, then = values[:, lag:], values[:, :-lag]
         both = np.isfinite(now) & np.isfinite(then)

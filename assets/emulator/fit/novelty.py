@@ -1,8 +1,8 @@
-"""Poses that the tables were fitted to, and how much less is known of others.
+"""Poses that the tables were fitted to, and the greater uncertainty of other poses.
 
-A joint's offset is known of the poses of the fit. Where an estimate is far from all of them, either
-the person's pose is new, or the estimate is wrong by about as much: both times the deviation that
-is told must grow with the distance, whatever else is told.
+A joint's offset is known for the poses of the fit. If an estimate is far from all of them, either
+the person's pose is new, or the estimate is wrong by about as much. In both cases the reported
+deviation must grow with the distance.
 """
 
 from collections.abc import Sequence
@@ -21,14 +21,15 @@ from hrc_env.perception.noise import FARTHEST_M, our_joints
 from hrc_env.perception.outline import novelty_m, pose_of
 
 EVERY = 3
-"""Frames of a clip of which one is taken."""
+"""Every such frame of a clip is used."""
 MOST = 20.0
-"""No joint is less certain than by so many times the square of the distance [1/m]."""
+"""Upper limit of the factor on the square of the distance by which a joint's uncertainty grows
+[1/m]."""
 
 
 def poses_of(clips: Sequence[Watched]) -> tuple[Floats, float]:
-    """(J, 3, M) poses that stand for those of clips, mirrored ones with them; how far the true
-    poses are from the nearest, the median [m]."""
+    """Return poses (J, 3, M) that represent those of clips and their mirror images, and the median
+    distance of the true poses from the nearest one [m]."""
     bodies = np.concatenate([clip.joints_world[::EVERY] for clip in clips])
     poses = np.array([pose_of(body) for body in bodies])
     both = np.concatenate([poses, poses[:, MIRROR] * [1.0, -1.0, 1.0]]).reshape(2 * len(poses), -1)
@@ -38,9 +39,12 @@ def poses_of(clips: Sequence[Watched]) -> tuple[Floats, float]:
 
 
 def novel_of(draft: Calibration, clips: Sequence[Watched]) -> Floats:
-    """(K,) the factor on the square of how much further than `near_m` an estimate is from known
-    poses, which is added to deviations [1/m]: with it these are as large as the errors, as root
-    mean squares over the frames that are further away."""
+    """Return the factor on the squared distance beyond `near_m` of an estimate from known poses,
+    (K,) [1/m].
+
+    The product is added to the deviations. With it they equal the root mean square of the errors
+    over the frames that are further away.
+    """
     parts = [_reported(replace(draft, novel=np.zeros(len(KINDS))), clip) for clip in clips]
     squared, variance, new_m = (np.concatenate(each) for each in zip(*parts, strict=True))
     far = new_m > 0.0
@@ -52,14 +56,17 @@ def novel_of(draft: Calibration, clips: Sequence[Watched]) -> Floats:
 
 
 def new_of(bodies: Floats, known: Calibration) -> Floats:
-    """(N,) how much further than `near_m` bodies (N, J, 3) are from known poses [m]."""
+    """Return the distance beyond `near_m` of bodies (N, J, 3) from known poses, (N,) [m]."""
     away_m = np.array([novelty_m(body, known.poses) for body in bodies])
     return np.clip(away_m - known.near_m, 0.0, FARTHEST_M)
 
 
 def _reported(known: Calibration, clip: Watched) -> tuple[Floats, Floats, Floats]:
-    """Of the frames (N) in which somebody was tracked: squares of the joints' errors and reported
-    variances (N, J) [m^2], and how much further than `near_m` the body is from known poses [m]."""
+    """Return errors, variances and distances of the frames (N) with a tracked worker.
+
+    These are the squares of the joints' errors and their reported variances, (N, J) [m^2], and the
+    distance beyond `near_m` of the body from known poses [m].
+    """
     rows = np.flatnonzero(clip.tracked[WARM_UP:]) + WARM_UP
     mean, cov, velocity = (
         each[rows, None]

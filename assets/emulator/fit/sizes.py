@@ -1,4 +1,4 @@
-"""What a camera's own errors are on average, by view, and how large they are."""
+"""Mean of a camera's own errors, by view, and their size."""
 
 import math
 
@@ -14,7 +14,7 @@ _SPREADS = np.linspace(0.0, 2.0, 41)
 
 
 def bias_of(s: Cells, left_over: Floats) -> Floats:
-    """(A, K, 2) mean errors by view; of few samples, less."""
+    """Return mean errors by view, (A, K, 2), shrunk where there are few samples."""
     bias = np.zeros((N_VIEWS, N_K, 2))
     small = np.linalg.norm(left_over, axis=-1) < SHARP
     for kind in range(N_K):
@@ -30,7 +30,7 @@ def bias_of(s: Cells, left_over: Floats) -> Floats:
 
 
 def bias_at(bias: Floats, samples: Samples, s: Cells) -> Floats:
-    """(L, T, C, J, 2) the bias of every sample, between views."""
+    """Return the interpolated bias of every sample, (L, T, C, J, 2)."""
     place = (samples.view[..., None] * HAND) * N_VIEWS / (2 * np.pi)
     low = np.floor(place).astype(int)
     part = (place - low)[..., None]
@@ -39,7 +39,8 @@ def bias_at(bias: Floats, samples: Samples, s: Cells) -> Floats:
 
 
 def _ratios() -> tuple[Floats, Floats]:
-    """Of log-normal times Rayleigh, by its spread: 95 % over median, and the median."""
+    """Return the 95th percentile over the median, and the median, of log-normal times Rayleigh, by
+    spread."""
     rng = np.random.default_rng(0)
     z, rayleigh = rng.standard_normal(40_000), np.sqrt(-2 * np.log(rng.random(40_000)))
     values = np.exp(_SPREADS[:, None] * z) * rayleigh
@@ -48,8 +49,11 @@ def _ratios() -> tuple[Floats, Floats]:
 
 
 def sizes_of(s: Cells, left_over: Floats, body: Floats, in_space: Floats) -> tuple[Floats, Floats]:
-    """(P, S, K) each: geometric mean and spread of a camera's own errors, from the median and the
-    95th percentile, once the logarithm of the body's factor (L, T, C) is taken off."""
+    """Return the geometric mean and the spread of a camera's own errors, each (P, S, K).
+
+    They follow from the median and the 95th percentile after subtraction of the logarithm of the
+    body's factor (L, T, C).
+    """
     ratio, middle = _ratios()
     size, spread = np.zeros((N_P, N_S, N_K)), np.zeros((N_P, N_S, N_K))
     length = np.linalg.norm(left_over, axis=-1) / np.exp(body)[..., None]
@@ -74,7 +78,7 @@ def sizes_of(s: Cells, left_over: Floats, body: Floats, in_space: Floats) -> tup
 
 
 def relative(s: Cells, left_over: Floats, body: Floats, size: Floats) -> Floats:
-    """Errors over the size of their cell and body, gross ones cut; NaN where there is none."""
+    """Return errors over the size of their cell and body, outliers cut; NaN without an error."""
     posture, sight = np.maximum(s.posture, 0), np.minimum(s.sight, N_S - 1)
     scale = size[posture, sight, np.broadcast_to(KIND, sight.shape)]
     scale = scale * np.exp(np.nan_to_num(body))[..., None]

@@ -1,4 +1,4 @@
-"""What all cameras have in common: where in space the detector means a joint to be."""
+"""Error that all cameras share: the offset in space at which the detector places a joint."""
 
 import itertools
 
@@ -10,17 +10,17 @@ from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.perception.calibration import HAND, KIND, NEXT, POSTURES
 
 GROSS = 6.0
-"""Errors beyond this multiple of their median are left out: they are the business of the tails."""
+"""Outliers are errors beyond this multiple of their median; the tails describe them."""
 LEAST_M, TOLD_M = 0.002, 0.005
-"""What varies in space has at least the first standard deviation; from the second on it can be
-told whether it varies together with the next joint's [m]."""
+"""Least standard deviation of an offset in space, and the least one from which its correlation with
+the next joint is estimated [m]."""
 FOLDED_UP = [POSTURES.index(name) for name in ("folded", "kneeling")]
 MOST = 0.95
-"""No correlation is closer to 1 or -1."""
+"""Greatest absolute value of a correlation."""
 
 
 def offsets_of(samples: Samples) -> Floats:
-    """(P, K, 3) offsets in space: medians of those on which cameras agree."""
+    """Return offsets in space, (P, K, 3): medians of those on which cameras agree."""
     offset = np.zeros((N_P, N_K, 3))
     ok = np.isfinite(samples.offset_m[..., 0]) & samples.counts[..., None]
     class_ = np.broadcast_to(class_of(samples.posture)[..., None], ok.shape)
@@ -35,14 +35,14 @@ def offsets_of(samples: Samples) -> Floats:
 
 
 def wander_of(samples: Samples, offset: Floats) -> tuple[Floats, Floats]:
-    """How far offsets vary, and how they go together along limbs.
+    """Estimate the variation of offsets and its correlation along limbs.
 
-    Cameras err on their own, so that on average the product of two cameras' errors is what both
-    have in common.
+    Cameras err independently, so that the mean product of two cameras' errors is the variance of
+    the error that they share.
 
     Returns:
-        (P, K, 3) standard deviations [m]; (K, 3) correlations with the `NEXT` joint, of bodies
-        that are folded up: others hardly vary in space.
+        (P, K, 3) standard deviations [m];
+        (K, 3) correlations with the `NEXT` joint, of folded bodies: others hardly vary in space.
     """
     error = samples.error - np.einsum("ltcjka,ltja->ltcjk", samples.shown, _at(samples, offset))
     length, class_ = np.linalg.norm(error, axis=-1), class_of(samples.posture)
@@ -65,14 +65,16 @@ def wander_of(samples: Samples, offset: Floats) -> tuple[Floats, Floats]:
 
 
 def _told(length: Floats, mine: Bools) -> Bools:
-    """(L, T, C, J) which errors of some samples (L, T) are no gross ones."""
+    """Return a mask of the errors (L, T, C, J) of some samples (L, T) that are not outliers."""
     part = np.where(mine[..., None, None], length, np.nan)
     return part < GROSS * np.nanmedian(part, axis=(0, 1, 2))
 
 
 def _in_common(error: Floats, shown: Floats, told: Bools, first: Ints, second: Ints) -> Floats:
-    """(J, 3) covariance of joints' offsets [m^2], axis by axis: least squares over all products of
-    their errors (L, T, C, J, 2) in two cameras."""
+    """Estimate the covariance of joints' offsets, (J, 3) [m^2], for each axis.
+
+    This is a least-squares fit to all products of their errors (L, T, C, J, 2) in two cameras.
+    """
     covariance = np.zeros((len(first), 3))
     for row, (j, i) in enumerate(zip(first, second, strict=True)):
         normal, product = np.zeros((3, 3)), np.zeros(3)
@@ -91,12 +93,12 @@ def _in_common(error: Floats, shown: Floats, told: Bools, first: Ints, second: I
 
 
 def _by_kind(values: Floats) -> Floats:
-    """(K, 3) means over the joints of a kind."""
+    """Return means over the joints of a kind, (K, 3)."""
     return np.stack([values[kind == KIND].mean(0) for kind in range(N_K)])
 
 
 def _along_limbs(variance: Floats, together: Floats) -> Floats:
-    """(K, 3) correlations from variances (J, 3) and covariances with the next joint."""
+    """Return correlations, (K, 3), from variances (J, 3) and covariances with the next joint."""
     other = np.flatnonzero(np.arange(len(KIND)) != NEXT)
     limb = np.zeros((N_K, 3))
     for kind in np.unique(KIND[other]):
@@ -109,17 +111,17 @@ def _along_limbs(variance: Floats, together: Floats) -> Floats:
 
 
 def projected(samples: Samples, offset: Floats) -> Floats:
-    """(L, T, C, J, 2) what offsets in space (P, K, 3) look like."""
+    """Project offsets in space (P, K, 3) into the images, (L, T, C, J, 2)."""
     shown = np.einsum("ltcjka,ltja->ltcjk", samples.shown, _at(samples, offset))
     return shown * np.stack([HAND, np.ones_like(HAND)], -1)
 
 
 def space_variance(samples: Samples, wander: Floats) -> Floats:
-    """(L, T, C, J) mean variance of a coordinate by what varies in space."""
+    """Return the mean variance of an image coordinate by the variation in space, (L, T, C, J)."""
     at = _at(samples, wander) ** 2
     return 0.5 * np.einsum("ltcjka,ltja->ltcj", samples.shown**2, at)
 
 
 def _at(samples: Samples, table: Floats) -> Floats:
-    """(L, T, J, 3) a table (P, K, 3) for every sample's posture."""
+    """Return a table (P, K, 3) at every sample's posture, (L, T, J, 3)."""
     return np.einsum("ltp,pja->ltja", samples.posture, table[:, KIND])

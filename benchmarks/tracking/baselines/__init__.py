@@ -1,1 +1,1 @@
-"""Other people's code on the sequences of the tracking bench."""
+"""Other libraries on the sequences of the tracking benchmark."""

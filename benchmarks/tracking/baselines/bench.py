@@ -1,15 +1,11 @@
-"""The tracking bench with other people's code, on the same sequences.
+"""The tracking benchmark with other libraries, on the same sequences.
 
-| library | what is run |
-|---|---|
-| `aniposelib` | its optimiser of a whole clip (`optim_points`): smooth, bones of constant length |
-| `particles` | its bootstrap filter, 1000 particles, one for each joint |
-| `filterpy` | its unscented Kalman filter, one for each joint |
+| library | method |
 
-The two filters are what a user of these libraries would write: constant velocity, pixels as
-measurements, and a defence against gross errors (a likelihood with outliers; a gate, and a
-joint that is begun anew when the gate has shut it out). All are given every camera's pixels
-of every frame and the detector's true standard deviation. None can say which side is which.
+The two filters follow the libraries' documentation: constant velocity, pixels as measurements, and
+a defence against outliers (a likelihood with outliers; a gate, with a new start of a joint that the
+gate has excluded). All receive every camera's pixels of every frame and the detector's true
+standard deviation. None can distinguish left from right.
 """
 
 import time
@@ -25,16 +21,16 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.common import cell
+from benchmarks.common import format_number
 from benchmarks.tracking.cells import beliefs
 from benchmarks.tracking.names import DEFAULT, DLT
 from benchmarks.tracking.rigs import RIGS, Rig, make_rig
-from benchmarks.tracking.sequences import Sequences, lasting, make_sequences
+from benchmarks.tracking.sequences import Sequences, find_durations, make_sequences
 from hrc_env.core.results import Metric, over
 from hrc_env.core.typing import Floats, Points2, Points3
 from hrc_env.experiments.cache import PartCache, PartProgress
-from hrc_env.experiments.report import Metrics, Report, quick_words, table
-from hrc_env.experiments.runner import at_least_one
+from hrc_env.experiments.report import Metrics, Report, describe_quick_run, format_table
+from hrc_env.experiments.runner import check_at_least_one
 
 LIBRARIES = ("aniposelib", "particles", "filterpy")
 INSTALL = 'pip install -c constraints.txt -e ".[baselines]"'
@@ -42,86 +38,90 @@ CONDITIONS = ("clean", "occluded", "hard", "one_camera")
 ROWS = (*CONDITIONS, "after_return")
 OURS = (DEFAULT, DLT)
 N_QUICK = 1
-"""Sequences per rig and condition of the short form."""
+"""Number of sequences per rig and condition in the quick form."""
 Played = Mapping[tuple[str, str], list[dict[str, float]]]
-"""(rig and window, name) to what each sequence gave."""
+"""Results of each sequence by rig and window, and name."""
 
 
 @dataclass(frozen=True, slots=True)
 class BaselinesBench:
-    """The experiment, and how much is run."""
+    """The experiment, and the amount of data that is used."""
 
     name = "bench baselines"
     depends = ("tracker",)
     n_seeds: int = 5
-    """Sequences per rig and condition; these libraries take about a minute for each."""
+    """Number of sequences per rig and condition; these libraries take about a minute for each."""
     first_seed: int = 1000
     """Seed of the first sequence."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for numbers that cannot work."""
-        at_least_one(self, "n_seeds")
+        check_at_least_one(self, "n_seeds")
 
     @property
     def seeds(self) -> list[int]:
-        """One a sequence."""
+        """Seeds, one per sequence."""
         return [self.first_seed + k for k in range(self.n_seeds)]
 
     @property
     def n_parts(self) -> int:
-        """Sequences of everybody."""
+        """Number of sequences of all libraries."""
         return len(RIGS) * len(CONDITIONS) * len(names()) * self.n_seeds
 
     @property
     def quick_note(self) -> str:
         """The warning on tables of a short run; "" if it is long enough."""
-        return quick_words(self.n_seeds, lasting()) if self.n_seeds <= N_QUICK else ""
+        return describe_quick_run(self.n_seeds, find_durations()) if self.n_seeds <= N_QUICK else ""
 
     def settings(self) -> dict[str, Any]:
-        """Return what all numbers depend on."""
-        versions = {name: version(name) for name in LIBRARIES if installed(name)}
-        return {"baselines": asdict(self), "versions": versions, "missing": missing()}
+        """Return the settings that all numbers depend on."""
+        versions = {name: version(name) for name in LIBRARIES if is_installed(name)}
+        return {"baselines": asdict(self), "versions": versions, "missing": list_missing()}
 
     def play(self, cache: PartCache) -> Played:
-        """Return what everybody made of every sequence."""
+        """Return the results of all libraries on every sequence."""
         cells: dict[tuple[str, str], list[dict[str, float]]] = {}
         for rig, condition in product(map(make_rig, RIGS), CONDITIONS):
             for seed, name in product(self.seeds, names()):
                 make = partial(_part, name, rig, condition, seed)
-                part = cache.part(f"{rig.name}.{condition}.{name}.{seed}", make)
+                part = cache.make_part(f"{rig.name}.{condition}.{name}.{seed}", make)
                 for window, sums in part.items():
                     cells.setdefault((f"{rig.name}.{window}", name), []).append(sums)
         return cells
 
     def metrics(self, played: Played) -> dict[str, Metric]:
-        """Return every number."""
-        return metrics_of(played)
+        """Return all metrics by name."""
+        return compute_metrics(played)
 
     def report(self, played: Played, metrics: Metrics, figures: Path) -> Report:
-        """Return the table."""
+        """Return the report."""
         return report(metrics)
 
 
-def installed(name: str) -> bool:
-    """Whether a library can be run here."""
+def is_installed(name: str) -> bool:
+    """Return whether a library is installed."""
     return find_spec(name) is not None
 
 
-def follow_of(name: str) -> Callable[[Floats, Points2, int], Points3]:
-    """Joints (T, J, 3) [m] from P (C, 3, 4), px (T, C, J, 2) with NaN, and a seed."""
+def find_follow(name: str) -> Callable[[Floats, Points2, int], Points3]:
+    """Return the function of a library: joints (T, J, 3) [m] from P (C, 3, 4), px (T, C, J, 2), a
+    seed.
+
+    Missing pixels are NaN.
+    """
     return import_module(f"benchmarks.tracking.baselines.{name}").follow
 
 
 def names() -> list[str]:
-    """Who is run."""
-    return [*OURS, *filter(installed, LIBRARIES)]
+    """Return the names of the libraries that run."""
+    return [*OURS, *filter(is_installed, LIBRARIES)]
 
 
 def _part(name: str, rig: Rig, condition: str, seed: int, tick: PartProgress) -> dict[str, Any]:
-    """One sequence: squared errors and time of each window."""
+    """Return squared errors and time of each window of one sequence."""
     sequences = make_sequences(rig, condition, [seed])
     if name in LIBRARIES:
-        follow_of(name)(rig.P, sequences.px[:30, 0, :, 0], seed)  # compiles
+        find_follow(name)(rig.P, sequences.px[:30, 0, :, 0], seed)  # compiles
     started_s = time.perf_counter()
     joints = _joints(name, rig, sequences, seed)
     took_us = 1e6 * (time.perf_counter() - started_s) / len(joints)
@@ -135,14 +135,14 @@ def _part(name: str, rig: Rig, condition: str, seed: int, tick: PartProgress) ->
 
 
 def _joints(name: str, rig: Rig, sequences: Sequences, seed: int) -> Points3:
-    """(T, J, 3) of a sequence with one person."""
+    """Return the joints (T, J, 3) of a sequence with one person."""
     if name in LIBRARIES:
-        return follow_of(name)(rig.P, sequences.px[:, 0, :, 0], seed)
+        return find_follow(name)(rig.P, sequences.px[:, 0, :, 0], seed)
     return np.stack([mean[0, 0] for mean, _ in beliefs(name, rig, sequences, [seed])])
 
 
-def metrics_of(played: Played) -> dict[str, Metric]:
-    """RMSE over all sequences with the best and the worst; microseconds per update."""
+def compute_metrics(played: Played) -> dict[str, Metric]:
+    """Return RMSE over all sequences with the best and the worst; microseconds per update."""
     metrics: dict[str, Metric] = {}
     times: dict[str, list[float]] = {}
     for (row, name), parts in played.items():
@@ -155,28 +155,28 @@ def metrics_of(played: Played) -> dict[str, Metric]:
 
 
 def report(metrics: Metrics) -> Report:
-    """Return the table of errors and times, and who is missing."""
+    """Return the report with errors and times, and the missing libraries."""
     lines = [
-        [row, *(cell(metrics[f"rmse_m.{row}.{name}"], 100) for name in names())]
+        [row, *(format_number(metrics[f"rmse_m.{row}.{name}"], 100) for name in names())]
         for row in (f"{rig}.{window}" for rig in RIGS for window in ROWS)
     ]
-    times = [cell(metrics[f"update_us.{name}.1"], 1, 0) for name in names()]
+    times = [format_number(metrics[f"update_us.{name}.1"], 1, 0) for name in names()]
     header = ["RMSE in cm", *names()]
-    return Report("Other people's code on the same sequences", missing_sentence(), [
-        table(header, [*lines, ["us per update of a worker", *times]]),
+    return Report("Other people's code on the same sequences", describe_missing(), [
+        format_table(header, [*lines, ["us per update of a worker", *times]]),
         "aniposelib is offline: it sees the whole clip at once, frames to come included; its time "
         "is the clip's over its frames. Low and high in results.json are the best and the worst "
         "sequence.",
     ], "the best and the worst sequence")  # fmt: skip
 
 
-def missing() -> list[str]:
-    """Libraries that are not there."""
-    return [name for name in LIBRARIES if not installed(name)]
+def list_missing() -> list[str]:
+    """Return the libraries that are missing."""
+    return [name for name in LIBRARIES if not is_installed(name)]
 
 
-def missing_sentence() -> str:
-    """Which libraries are missing, and how to get them."""
-    if not missing():
+def describe_missing() -> str:
+    """Return a sentence with the missing libraries and their installation."""
+    if not list_missing():
         return "All libraries are installed."
-    return f"Not installed, so not run: {', '.join(missing())}. Get them with: {INSTALL}"
+    return f"Not installed, so not run: {', '.join(list_missing())}. Get them with: {INSTALL}"

@@ -1,4 +1,4 @@
-"""filterpy's unscented Kalman filter, one a joint (R. Labbe, MIT)."""
+"""The unscented Kalman filter of filterpy, one for each joint (R. Labbe, MIT)."""
 
 from importlib import import_module
 from typing import Any
@@ -11,13 +11,13 @@ from benchmarks.tracking.rigs import DT_S, SIGMA_PX
 from hrc_env.core.typing import Bools, Floats, Points2, Points3
 
 GATE_SIGMA = 5.0
-"""Pixels further from the prediction than so many standard deviations are left out."""
+"""Number of standard deviations from the prediction beyond which pixels are ignored."""
 PATIENCE = 3
-"""After so many frames in which views were there and none fitted, a joint is begun anew."""
+"""Number of frames with views of which none fitted, after which a joint is restarted."""
 
 
 def follow(P: Floats, px: Points2, seed: int) -> Points3:
-    """Joints (T, J, 3) from px (T, C, J, 2); nothing is random."""
+    """Return joints (T, J, 3) from px (T, C, J, 2), without randomness."""
     del seed
     start = first_joints(P, px)
     joints = [_one_joint(P, px[:, :, j], start[j]) for j in range(px.shape[2])]
@@ -25,7 +25,7 @@ def follow(P: Floats, px: Points2, seed: int) -> Points3:
 
 
 def _one_joint(P: Floats, px: Points2, start: Points3) -> Points3:
-    """(T, 3) from px (T, C, 2)."""
+    """Return positions (T, 3) of a joint from px (T, C, 2)."""
     ukf, held, lost = _filter(start), start, 0
     track = []
     for frame in px:
@@ -50,7 +50,7 @@ def _one_joint(P: Floats, px: Points2, start: Points3) -> Points3:
 
 
 def _gate(ukf: Any, P: Floats, frame: Points2) -> Bools:
-    """(C,) whether each camera's pixel is one that the prediction allows."""
+    """Return whether the prediction allows each camera's pixel (C,)."""
     kalman = import_module("filterpy.kalman")
     near = np.zeros(len(P), bool)
     for c in range(len(P)):

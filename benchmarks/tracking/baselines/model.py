@@ -1,4 +1,4 @@
-"""What a user of a filter library would write for a joint: constant velocity, pixels."""
+"""The motion and measurement model of a joint for filter libraries: constant velocity, pixels."""
 
 import numpy as np
 
@@ -9,19 +9,19 @@ from hrc_env.core.typing import Floats, Points2, Points3
 ACCELERATION = 10.0
 """Spectral density of a joint's acceleration [m^2/s^3]."""
 START_STD_M, START_STD_M_S = 0.1, 1.0
-"""Of position and velocity in the first frame."""
+"""Standard deviations of position and velocity in the first frame."""
 
 _STEP = np.array([[1.0, DT_S], [0.0, 1.0]])
 _NOISE = ACCELERATION * np.array([[DT_S**3 / 3, DT_S**2 / 2], [DT_S**2 / 2, DT_S]])
 F: Floats = np.asarray(np.kron(_STEP, np.eye(3)), float)
-"""(6, 6) one frame of constant velocity; states are position, then velocity."""
+"""Transition of constant velocity over one frame (6, 6); states are position, then velocity."""
 Q: Floats = np.asarray(np.kron(_NOISE, np.eye(3)), float)
-"""(6, 6) white noise of the acceleration over a frame."""
+"""Process noise of a white acceleration over one frame (6, 6)."""
 START_COV: Floats = np.diag([START_STD_M**2] * 3 + [START_STD_M_S**2] * 3)
 
 
 def first_joints(P: Floats, px: Points2) -> Points3:
-    """(J, 3) triangulated from the first frame that shows each joint to two cameras."""
+    """Return joints (J, 3) triangulated from the first frame in which two cameras see each."""
     joints = np.zeros((px.shape[2], 3))
     for frame in px[::-1]:
         joints = triangulate_frame(P, frame[None], joints[None])[0]
@@ -29,6 +29,6 @@ def first_joints(P: Floats, px: Points2) -> Points3:
 
 
 def pixels(P: Floats, positions: Points3) -> Points2:
-    """(..., 2 C) pixels of positions (..., 3) in the cameras P (C, 3, 4)."""
+    """Return pixels (..., 2 C) of positions (..., 3) in the cameras P (C, 3, 4)."""
     shown = np.einsum("cij,...j->...ci", P[:, :, :3], positions) + P[:, :, 3]
     return (shown[..., :2] / shown[..., 2:]).reshape(*positions.shape[:-1], -1)

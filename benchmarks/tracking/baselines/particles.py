@@ -1,4 +1,4 @@
-"""particles' bootstrap filter, one a joint (N. Chopin, MIT)."""
+"""The bootstrap filter of particles, one for each joint (N. Chopin, MIT)."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,21 +13,23 @@ from hrc_env.core.typing import Floats, Points2, Points3
 
 N_PARTICLES = 1000
 FREEDOM = 3.0
-"""Of the pixels' Student t distribution, whose tails allow for gross errors (particles that are
-all outliers would drift away under a flat density)."""
+"""Degrees of freedom of the pixels' Student t distribution, with tails for gross errors.
+
+With a flat density particles that are all outliers would drift away.
+"""
 
 
 def follow(P: Floats, px: Points2, seed: int) -> Points3:
-    """Joints (T, J, 3) from px (T, C, J, 2)."""
+    """Return joints (T, J, 3) from px (T, C, J, 2)."""
     start = first_joints(P, px)
-    with _seeded(seed):
+    with _seed(seed):
         joints = [_one_joint(P, px[:, :, j], start[j]) for j in range(px.shape[2])]
     return np.stack(joints, axis=1)
 
 
 @contextmanager
-def _seeded(seed: int) -> Iterator[None]:
-    """The library draws from NumPy's global stream alone: seed it, then put it back."""
+def _seed(seed: int) -> Iterator[None]:
+    """Seed NumPy's global stream, from which the library draws, and restore it afterwards."""
     before = np.random.get_state()  # noqa: NPY002
     np.random.seed(seed)  # noqa: NPY002
     try:
@@ -37,7 +39,7 @@ def _seeded(seed: int) -> Iterator[None]:
 
 
 def _one_joint(P: Floats, px: Points2, start: Points3) -> Points3:
-    """(T, 3) from px (T, C, 2)."""
+    """Return positions (T, 3) of a joint from px (T, C, 2)."""
     particles = import_module("particles")
     moments = import_module("particles.collectors").Moments()
     model = import_module("particles.state_space_models").Bootstrap(
@@ -49,12 +51,12 @@ def _one_joint(P: Floats, px: Points2, start: Points3) -> Points3:
 
 
 def _joint_model(P: Floats, start: Points3) -> Any:
-    """The state-space model in the library's terms."""
+    """Return the state-space model as a class of the library."""
     distributions = import_module("particles.distributions")
     models = import_module("particles.state_space_models")
 
     class Pixels(distributions.ProbDist):
-        """Pixels of the cameras that see the joint: Student's t."""
+        """Distribution of the pixels of the cameras that see the joint: Student's t."""
 
         dim = 2 * len(P)
 
@@ -68,7 +70,7 @@ def _joint_model(P: Floats, start: Points3) -> Any:
             return np.where(np.isfinite(density), density, 0.0).sum(-1)
 
     class Joint(models.StateSpaceModel):
-        """Constant velocity."""
+        """Joint with constant velocity."""
 
         def PX0(self) -> Any:  # noqa: N802
             return distributions.MvNormal(loc=np.concatenate([start, np.zeros(3)]), cov=START_COV)

@@ -1,1 +1,1 @@
-"""Ablations of rigs, detections and estimators: what the paper leaves open."""
+"""Ablations of rigs, detections and estimators, for questions that the paper leaves open."""

@@ -11,60 +11,68 @@ from hrc_env.tracking.config import TrackerConfig
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """What is the same in all episodes of a row: who walks where, tracked how."""
+    """The settings that all episodes of a row share: scene, workers, estimator and cameras."""
 
     name: str
-    """As in results.json."""
+    """Name in results.json."""
     words: str
-    """As in tables and figures."""
+    """Description in tables and figures."""
     scene: str = "lab"
+    """Name of the scene."""
     n_workers: int = 1
+    """Number of workers."""
     estimator: str = "particle"
+    """Name of the estimator."""
     tracker: TrackerConfig = field(default_factory=TrackerConfig)
+    """Settings of the estimator."""
     bones: str = "learnt"
-    """One of `handicaps.BONES`."""
+    """Treatment of bone lengths, one of `handicaps.BONES`."""
     motion: str = "model"
-    """One of `handicaps.MOTION`."""
+    """Treatment of velocities, one of `handicaps.MOTION`."""
     turns: tuple[Turn, ...] = (Turn(),)
-    """Episodes take turns in them, so that nothing hangs on one camera's place."""
+    """Choices of cameras over which episodes rotate, so that no result depends on one camera's
+    place."""
     by_sight: bool = False
-    """Whether errors are also kept by how many cameras see the joint."""
+    """Whether errors are also recorded by the number of cameras that see the joint."""
 
     def __post_init__(self) -> None:
-        """Raise `ConfigError` for what cannot be played."""
+        """Raise `ConfigError` if the setting cannot be played."""
         for name, valid in (("bones", BONES), ("motion", MOTION)):
-            given = getattr(self, name)
-            check_names(name, [given], valid)
-            if given != valid[0] and self.estimator not in TREES:
+            value = getattr(self, name)
+            check_names(name, [value], valid)
+            if value != valid[0] and self.estimator not in TREES:
                 raise ConfigError(
-                    f"Setting {self.name!r}: {name}={given!r} is for {' and '.join(TREES)}, which "
-                    f"have a body on a tree; got {self.estimator!r}."
+                    f"Setting {self.name!r}: {name}={value!r} needs {' or '.join(TREES)}, which "
+                    f"model the body as a tree; got {self.estimator!r}."
                 )
 
 
 @dataclass(frozen=True, slots=True)
 class Ablation:
-    """One question."""
+    """One question of the ablations."""
 
     name: str
-    """As in results.json and on the command line."""
+    """Name in results.json and on the command line."""
     title: str
-    asked: str
-    """The question, and what is played for it."""
+    """Title in the report."""
+    question: str
+    """The question, and the episodes that answer it."""
     settings: tuple[Setting, ...]
+    """Settings, one per row."""
     also: Mapping[str, str] = field(default_factory=dict)
-    """What is sorted out of the settings' joints, and its words."""
+    """Groups of joints that are also evaluated, with their descriptions."""
     against: tuple[str, ...] = ()
-    """Settings with which others of their scene are compared: each with the last before it."""
+    """Names of reference settings: each other setting of a scene is compared with the last one
+    before it."""
 
-    def setting(self, name: str) -> Setting:
-        """Return a setting by its name."""
-        known = {each.name: each for each in self.settings}
+    def find_setting(self, name: str) -> Setting:
+        """Return a setting by its name; raise `ConfigError` if there is none."""
+        known = {setting.name: setting for setting in self.settings}
         check_names(f"setting of {self.name!r}", [name], known)
         return known[name]
 
-    def reference(self, setting: Setting) -> str:
-        """What a setting is compared with, walk by walk; "" if with nothing."""
+    def find_reference(self, setting: Setting) -> str:
+        """Return the name of the setting to compare with, walk by walk; "" if there is none."""
         alike = [each for each in self.settings if each.scene == setting.scene]
         known = [k for k, each in enumerate(alike) if each.name in self.against]
         before = [k for k in known if k <= alike.index(setting)]

@@ -1,4 +1,4 @@
-"""The ablations as they are declared: questions, columns and the table of the documentation."""
+"""The declaration of the ablations: questions, columns and the table of the documentation."""
 
 from hrc_env.experiments.ablations.ablation import Ablation
 from hrc_env.experiments.ablations.questions.faults import CALIBRATION, LATENCY
@@ -8,17 +8,17 @@ from hrc_env.experiments.columns import Column
 from hrc_env.experiments.report import Table
 
 TITLE = "Ablations of rigs, detections and estimators"
-ASKED = """\
-What the paper's two experiments leave open. Detections are those of the calibrated emulator
-(`perception="keypoints"`): these are questions about estimators and rigs. The estimator is the
-default, `particle`, unless a setting says otherwise; settings are changed one at a time. Workers of
+QUESTION = """\
+Questions that the paper's two experiments leave open. Detections come from the calibrated emulator
+(`perception="keypoints"`), as these are questions about estimators and rigs. The estimator is the
+default, `particle`, unless a setting names another; settings are changed one at a time. Workers of
 all bodies work beside an arm that rests, on the same walks in every setting of a scene.
 
-Every joint of every frame after the first second counts, also where the track is lost: the last
-word, or the prior, is then the answer. *Coverage*: the share of joints within the reported 95 %
-region; *lost*: the share of time without a track; *switches*: of a worker from one track to
-another, a minute, and *IDF1*: how well workers keep theirs (`hrc_env/tracking/metrics.py`);
-*less*: less the setting that was changed, walk by walk; a dot where the interval leaves out
+Every joint of every frame after the first second counts. If the track is lost, the last estimate,
+or the prior, is evaluated. *Coverage*: the share of joints within the reported 95 % region; *lost*:
+the share of time without a track; *switches*: changes of a worker from one track to another, per
+minute; *IDF1*: how consistently workers keep their tracks (`hrc_env/tracking/metrics.py`);
+*difference*: from the reference setting, walk by walk; a dot marks an interval that excludes
 zero."""
 ABLATIONS: dict[str, Ablation] = {
     ablation.name: ablation
@@ -26,25 +26,25 @@ ABLATIONS: dict[str, Ablation] = {
         CAMERAS, ALGORITHM_1, LATENCY, CALIBRATION, OCCLUSION, WORKERS, FILTER, KINEMATICS,
     )
 }  # fmt: skip
-"""By name, in the order of the report."""
+"""Ablations by name, in the order of the report."""
 COLUMNS = (
     Column("error_m.{}.median", "median [mm]", 1, 1000),
     Column("error_m.{}.p95", "95 % [mm]", 0, 1000),
 )
-"""Of the documentation, and of the report."""
+"""Columns of the documentation and of the report."""
 MORE = (
-    Column("difference.error_m.{}.median", "less, median [mm]", 1, 1000, signed=True),
-    Column("difference.error_m.{}.p95", "less, 95 % [mm]", 0, 1000, signed=True),
+    Column("difference.error_m.{}.median", "difference of median [mm]", 1, 1000, signed=True),
+    Column("difference.error_m.{}.p95", "difference of 95 % [mm]", 0, 1000, signed=True),
     Column("rmse_m.{}", "RMSE [mm]", 0, 1000),
     Column("coverage95.{}", "coverage [%]", 1, 100),
     Column("lost.{}", "lost [%]", 2, 100),
 )
-"""Of the report besides."""
+"""Further columns of the report."""
 OF_SEVERAL = (
     Column("id_switches.{}", "switches [1/min]", 2),
     Column("idf1.{}", "IDF1 [%]", 1, 100),
 )
-"""Of questions with several workers."""
+"""Further columns of questions with several workers."""
 _SHOWN = {
     "cameras": "n1 n2 n3 n4 n8 corners walls low one_side two_neighbours two_opposite two_beside",
     "algorithm1": "n1_m100 n1_m10000 sigma_1cm n1_m1000",
@@ -56,10 +56,10 @@ _SHOWN = {
     "1cam_bones_of_any_length 1cam_no_floor 1cam_velocity_forgotten 1cam_mode_for_mean "
     "1cam_no_turned_body",
 }
-"""Settings of the documentation's table."""
+"""Settings in the table of the documentation, by question."""
 
 
-def shown(seconds: float) -> Table:
+def make_table(seconds: float) -> Table:
     """Return the table of the documentation.
 
     Args:
@@ -69,18 +69,19 @@ def shown(seconds: float) -> Table:
         "ablations",
         "Ablations: error of a joint",
         {
-            f"{study}.{name}": (f"`{study}`", ABLATIONS[study].setting(name).words)
+            f"{study}.{name}": (f"`{study}`", ABLATIONS[study].find_setting(name).words)
             for study, names in _SHOWN.items()
             for name in names.split()
         },
         COLUMNS,
         ("study", "setting"),
-        "Level `keypoints`, estimator `particle` where not said otherwise, "
-        f"{{n[error_m.cameras.n1.median]}} episodes of {seconds:g} s a setting on the same walks.",
+        "Level `keypoints`, estimator `particle` unless stated otherwise, "
+        f"{{n[error_m.cameras.n1.median]}} episodes of {seconds:g} s per setting on the same "
+        "walks.",
     )
 
 
-def columns_of(ablation: Ablation) -> tuple[Column, ...]:
+def list_columns(ablation: Ablation) -> tuple[Column, ...]:
     """Return the columns of a question's table."""
     several = any(setting.n_workers > 1 for setting in ablation.settings)
     return (*COLUMNS, *MORE, *(OF_SEVERAL if several else ()))

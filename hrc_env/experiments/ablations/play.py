@@ -1,6 +1,6 @@
-"""A setting's detections and estimator on walks: what is believed beside what is true.
+"""Episodes of a setting: detections and an estimator on walks, compared with the truth.
 
-Workers walk once, for all settings, before an arm that rests: nobody reacts to it.
+Workers walk once for all settings, beside an arm that rests and to which they do not react.
 """
 
 from collections.abc import Iterator, Sequence
@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import islice, permutations
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from scipy.stats import chi2
@@ -20,7 +20,7 @@ from hrc_env.core.records import Keypoints, PoseEstimate, WorkerMotion
 from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, Points3
 from hrc_env.evaluation.counts import ERRORS_M
 from hrc_env.experiments.ablations.ablation import Setting
-from hrc_env.experiments.ablations.handicaps import handicap, lengths_m
+from hrc_env.experiments.ablations.handicaps import compute_lengths_m, handicap
 from hrc_env.experiments.cache import PartProgress
 from hrc_env.experiments.rigs import N_WARM_UP, Turn
 from hrc_env.motion import generator
@@ -34,28 +34,30 @@ from hrc_env.tracking.metrics import make_identities, measure_errors
 from hrc_env.worker.body import Body, load_bodies, select_bodies, worker_truth
 
 LEVEL = "keypoints"
+"""Perception level."""
 BODIES = "any"
-"""Every episode gives each worker one of the baked bodies."""
+"""Bodies: every episode gives each worker one of the baked bodies."""
 INSIDE_95 = float(chi2.ppf(0.95, 3))
-"""Squares of errors in units of their covariance are below this in 95 % of all cases."""
+"""Squared Mahalanobis distance of the 95 % region of a position."""
 Sums = dict[str, list[Any]]
-"""By name, one an episode."""
+"""Lists of sums by name, one value per episode."""
 
 
 @dataclass(frozen=True, slots=True)
 class Walks:
-    """Episodes of the same length, side by side."""
+    """Walks of workers in episodes of the same length, as one batch."""
 
     bodies: Body
+    """All bodies, stacked."""
     motions: tuple[WorkerMotion, ...]
-    """(T) records of arrays (B, W, ...), a control step apart; the first is the beginning."""
+    """Motions at T control steps, each a record of arrays (B, W, ...); the first is the start."""
     q: JointAngles
-    """(B, N) the arm, which rests [rad]."""
+    """Joint angles (B, N) of the arm, which rests [rad]."""
 
 
 @lru_cache(maxsize=1)
-def walks_of(scene: str, n_workers: int, seeds: tuple[int, ...], n_steps: int) -> Walks:
-    """Episodes of workers at their work, one a seed, each of n_steps."""
+def make_walks(scene: str, n_workers: int, seeds: tuple[int, ...], n_steps: int) -> Walks:
+    """Return the walks of workers at their work, one episode of `n_steps` per seed."""
     config, bodies = HRCConfig(), load_bodies(select_bodies(BODIES))
     place = build(config.scene, scene, n_workers, bodies.names)
     state = generator.make_state(len(seeds), n_workers, bodies, config.motion, place.grounds)
@@ -71,109 +73,157 @@ def walks_of(scene: str, n_workers: int, seeds: tuple[int, ...], n_steps: int) -
 
 
 def play(setting: Setting, walks: Walks, seeds: Sequence[int], tick: PartProgress) -> Sums:
-    """Sums of every episode, in the order of the seeds: of the walks, the detector's errors and the
-    estimator. Episode k has turn k modulo the number of turns."""
-    jobs, found = _jobs(setting.turns, len(seeds)), Sums()
+    """Return the sums of every episode, in the order of the seeds.
 
-    def sums_of(job: tuple[Turn, Ints]) -> Sums:
-        return _episodes(setting, job[0], walks, seeds, job[1])
+    Args:
+        setting: detections and estimator.
+        walks: walks of the workers.
+        seeds: seeds of detector and estimator; episode k has turn k modulo the number of turns.
+        tick: is called with the growth of the completed share.
+    """
+    jobs, found = _split_jobs(setting.turns, len(seeds)), Sums()
+
+    def run(job: Job) -> Sums:
+        return _play_episodes(setting, job.turn, walks, seeds, job.ids)
 
     with ThreadPoolExecutor(n_cores()) as threads:
-        for (_, ids), sums in zip(jobs, threads.map(sums_of, jobs), strict=True):
+        for job, sums in zip(jobs, threads.map(run, jobs), strict=True):
             for name, values in sums.items():
                 row = found.setdefault(name, [None] * len(seeds))
-                for b, value in zip(ids.tolist(), values, strict=True):
+                for b, value in zip(job.ids.tolist(), values, strict=True):
                     row[b] = value
-            tick(len(ids) / len(seeds))
+            tick(len(job.ids) / len(seeds))
     return found
 
 
-def _jobs(turns: Sequence[Turn], n_episodes: int) -> list[tuple[Turn, Ints]]:
-    """Turns and the episodes that are played together; nothing depends on how many."""
+class Job(NamedTuple):
+    """Episodes that are played together."""
+
+    turn: Turn
+    """The cameras."""
+    ids: Ints
+    """Indices of the episodes (B,)."""
+
+
+def _split_jobs(turns: Sequence[Turn], n_episodes: int) -> list[Job]:
+    """Return the jobs of all turns; results do not depend on the number of jobs."""
     jobs = []
     for k, turn in enumerate(turns[:n_episodes]):
-        mine = np.arange(k, n_episodes, len(turns))
-        n_parts = min(n_cores(), len(mine)) if len(turns) < n_cores() else 1
-        jobs += [(turn, part) for part in np.array_split(mine, n_parts)]
+        ids = np.arange(k, n_episodes, len(turns))
+        n_parts = min(n_cores(), len(ids)) if len(turns) < n_cores() else 1
+        jobs += [Job(turn, part) for part in np.array_split(ids, n_parts)]
     return jobs
 
 
-def _episodes(setting: Setting, turn: Turn, walks: Walks, seeds: Sequence[int], ids: Ints) -> Sums:
-    """Sums of some of the episodes, with these cameras, after the warm-up."""
-    errors, inside, lost, seeing, scene = [], [], [], [], scene_of(setting, turn)
+def _play_episodes(
+    setting: Setting, turn: Turn, walks: Walks, seeds: Sequence[int], ids: Ints
+) -> Sums:
+    """Return the sums of some episodes with the cameras of a turn, after the warm-up."""
+    errors, inside, lost, seeing, scene = [], [], [], [], make_scene(setting, turn)
     known, identities = [], make_identities(len(ids), setting.n_workers)
-    for said, now, _ in islice(watch(setting, turn, walks, seeds, ids), N_WARM_UP, None):
-        joints_world = now.truth.joints_world
-        order = matched(said.mean_world, said.tracked, joints_world)
+    for frame in islice(watch(setting, turn, walks, seeds, ids), N_WARM_UP, None):
+        estimate, truth = frame.estimate, frame.truth
+        joints_world = truth.truth.joints_world
+        order = match_tracks(estimate.mean_world, estimate.tracked, joints_world)
         episode = np.arange(len(ids))[:, None]
-        off, cov = said.mean_world[episode, order] - joints_world, said.cov_world[episode, order]
+        off = estimate.mean_world[episode, order] - joints_world
+        cov = estimate.cov_world[episode, order]
         errors.append(np.linalg.norm(off, axis=-1))
         squares = np.einsum("...i,...i->...", off, np.linalg.solve(cov, off[..., None])[..., 0])
         inside.append(squares < INSIDE_95)
-        lost.append(~said.tracked[episode, order])
-        known.append(measure_errors(said, joints_world, now.present, identities))
+        lost.append(~estimate.tracked[episode, order])
+        known.append(measure_errors(estimate, joints_world, truth.present, identities))
         if setting.by_sight:
-            seeing.append(n_seeing(now, scene, turn))
-    error_m, is_inside, is_lost = (np.stack(each, 1) for each in (errors, inside, lost))
-    sums = _sums(error_m, is_inside, np.ones(error_m.shape, bool), "")
+            seeing.append(count_seeing_cameras(truth, scene, turn))
+    error_m, is_inside, is_lost = (np.stack(rows, 1) for rows in (errors, inside, lost))
+    sums = _sum_joints(error_m, is_inside, np.ones(error_m.shape, bool), "")
     sums["lost"] = is_lost.sum((1, 2)).tolist()
     sums["frames"] = [is_lost[0].size] * len(ids)
     if setting.n_workers > 1:
         sums |= {name: known[-1][name].tolist() for name in ("id_switches", "idf1")}
     if seeing:
         for k in range(len(scene.cameras) + 1):
-            sums |= _sums(error_m, is_inside, np.stack(seeing, 1) == k, f"seen_{k}_")
+            sums |= _sum_joints(error_m, is_inside, np.stack(seeing, 1) == k, f"seen_{k}_")
     return sums
 
 
-def _sums(error_m: Floats, inside: Bools, which: Bools, prefix: str) -> Sums:
-    """Of the values (B, T, W, J) that count."""
+def _sum_joints(error_m: Floats, inside: Bools, mask: Bools, prefix: str) -> Sums:
+    """Return sums of the values (B, T, W, J) in a mask, under names that begin with `prefix`."""
     axes = tuple(range(1, error_m.ndim))
     return {
-        f"{prefix}errors": ERRORS_M.count(error_m, which).tolist(),
-        f"{prefix}squares": np.where(which, error_m**2, 0.0).sum(axes).tolist(),
-        f"{prefix}inside": (inside & which).sum(axes).tolist(),
-        f"{prefix}joints": which.sum(axes).tolist(),
+        f"{prefix}errors": ERRORS_M.count(error_m, mask).tolist(),
+        f"{prefix}squares": np.where(mask, error_m**2, 0.0).sum(axes).tolist(),
+        f"{prefix}inside": (inside & mask).sum(axes).tolist(),
+        f"{prefix}joints": mask.sum(axes).tolist(),
     }
+
+
+class WatchedFrame(NamedTuple):
+    """One frame of some episodes."""
+
+    estimate: PoseEstimate
+    """The estimate of the tracker."""
+    truth: TrueSensorInput
+    """The true state."""
+    keypoints: Keypoints
+    """The detections."""
 
 
 def watch(
     setting: Setting, turn: Turn, walks: Walks, seeds: Sequence[int], ids: Ints
-) -> Iterator[tuple[PoseEstimate, TrueSensorInput, Keypoints]]:
-    """Frame by frame of some episodes: what is believed, what is true, what was detected."""
-    pipeline = pipeline_of(setting, turn, len(ids))
+) -> Iterator[WatchedFrame]:
+    """Yield the frames of some episodes of a setting.
+
+    Args:
+        setting: detections and estimator.
+        turn: the cameras.
+        walks: walks of the workers in all episodes.
+        seeds: seeds of all episodes.
+        ids: indices of the episodes to play (B,).
+    """
+    pipeline = make_setting_pipeline(setting, turn, len(ids))
     rngs: list[Generators] = [
         [np.random.default_rng([seeds[b], k]) for b in ids.tolist()] for k in (2, 3)
     ]
-    everyone, present = np.arange(len(ids)), np.ones((len(ids), setting.n_workers), bool)
-    pipeline.reset(everyone, *rngs)
-    lengths = lengths_m(worker_truth(walks.bodies, rows(walks.motions[0], ids)).joints_world)
+    batch, present = np.arange(len(ids)), np.ones((len(ids), setting.n_workers), bool)
+    pipeline.reset(batch, *rngs)
+    lengths = compute_lengths_m(
+        worker_truth(walks.bodies, rows(walks.motions[0], ids)).joints_world
+    )
     for motions in walks.motions:
         motion = rows(motions, ids)
         truth = worker_truth(walks.bodies, motion)
         handicap(pipeline.state, setting.bones, setting.motion, lengths)
-        now = TrueSensorInput(everyone, walks.q[ids], motion, truth, present)
-        pipeline.sensor.expose(now)
-        yield pipeline.perceive(everyone, *rngs), now, pipeline.keypoints
+        sensor_input = TrueSensorInput(batch, walks.q[ids], motion, truth, present)
+        pipeline.sensor.expose(sensor_input)
+        yield WatchedFrame(pipeline.perceive(batch, *rngs), sensor_input, pipeline.keypoints)
     pipeline.close()
 
 
-def pipeline_of(setting: Setting, turn: Turn, batch: int) -> PoseTracking:
-    """The emulator and the estimator of a setting, for so many episodes."""
+def make_setting_pipeline(setting: Setting, turn: Turn, batch: int) -> PoseTracking:
+    """Return the emulator and the estimator of a setting for a batch of episodes."""
     config = HRCConfig(worker=BODIES, tracker=setting.tracker, faults=turn.faults)
-    scene = scene_of(setting, turn)
+    scene = make_scene(setting, turn)
     return cast(PoseTracking, make_pipeline(LEVEL, setting.estimator, scene, batch, config))
 
 
-def scene_of(setting: Setting, turn: Turn) -> Scene:
-    """The scene of a setting with a turn's cameras."""
+def make_scene(setting: Setting, turn: Turn) -> Scene:
+    """Return the scene of a setting with the cameras of a turn."""
     config = replace(HRCConfig().scene, cameras=turn.cameras)
     return build(config, setting.scene, setting.n_workers, BODIES)
 
 
-def matched(mean_world: Points3, tracked: Bools, joints_world: Points3) -> Ints:
-    """(B, W) the track of each worker, both (B, W, J, 3) [m]: those that fit best together, no
-    track twice; those that are `tracked` (B, W) choose first."""
+def match_tracks(mean_world: Points3, tracked: Bools, joints_world: Points3) -> Ints:
+    """Return the index of each worker's track (B, W) in the assignment with the least mean
+    distance.
+
+    Tracks that are not followed cost nothing, so they are assigned last.
+
+    Args:
+        mean_world: estimated joints of the tracks (B, W, J, 3) [m].
+        tracked: which tracks are followed (B, W).
+        joints_world: true joints of the workers (B, W, J, 3) [m].
+    """
     n_workers = tracked.shape[1]
     off = np.linalg.norm(mean_world[:, None] - joints_world[:, :, None], axis=-1).mean(-1)
     cost = np.where(tracked[:, None], off, 0.0)  # (B, worker, track)
@@ -182,10 +232,10 @@ def matched(mean_world: Points3, tracked: Bools, joints_world: Points3) -> Ints:
     return orders[totals.argmin(1)]
 
 
-def n_seeing(now: TrueSensorInput, scene: Scene, turn: Turn) -> Ints:
-    """(B, W, J) cameras that have a free line of sight to each joint and are not lost for good."""
-    surroundings = scene.surroundings(now.qpos, now.motion.held)
-    sight, _ = lines_of_sight(now.truth, surroundings, scene.cameras)
+def count_seeing_cameras(truth: TrueSensorInput, scene: Scene, turn: Turn) -> Ints:
+    """Return the number of working cameras (B, W, J) with a free line of sight to each joint."""
+    surroundings = scene.surroundings(truth.qpos, truth.motion.held)
+    sight, _ = lines_of_sight(truth.truth, surroundings, scene.cameras)
     gone = {name for fault in turn.faults if fault.kind == "lost" for name in fault.cameras}
     left = [camera.name not in gone for camera in scene.cameras]
     return (sight[:, left] == SEEN).sum(1)

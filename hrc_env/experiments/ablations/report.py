@@ -1,4 +1,4 @@
-"""The report: question by question what was asked, a picture and a table."""
+"""The report of the ablations: for each question its text, a figure and a table."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -6,53 +6,59 @@ from pathlib import Path
 import numpy as np
 
 from hrc_env.experiments.ablations.ablation import Ablation
-from hrc_env.experiments.ablations.declaration import ABLATIONS, ASKED, TITLE, columns_of
-from hrc_env.experiments.plots import ends, label, new_figure, plain_log, save
-from hrc_env.experiments.report import Metrics, Report, Table, picture, table_of
+from hrc_env.experiments.ablations.declaration import ABLATIONS, QUESTION, TITLE, list_columns
+from hrc_env.experiments.plots import (
+    compute_error_bars,
+    label_axes,
+    make_figure,
+    save,
+    use_plain_log_ticks,
+)
+from hrc_env.experiments.report import Metrics, Report, Table, format_metrics, format_picture
 
 QUANTILES = {"median": ("median", "o", "#1565c0"), "p95": ("95th percentile", "s", "#e65100")}
 
 
-def report(
+def make_report(
     figures: Path, ablations: Sequence[Ablation], tables: Sequence[Table], metrics: Metrics
 ) -> Report:
-    """Draw a figure for each question; return the tables beside them.
+    """Draw a figure for each question and return the report.
 
     Args:
-        figures: folder.
+        figures: folder of the figures.
         ablations: the questions.
-        tables: of all questions, which come first.
-        metrics: of the study.
+        tables: tables over all questions, which come first.
+        metrics: metrics of the study by name.
     """
     is_whole = len(ablations) == len(ABLATIONS)
-    parts = [each.markdown(metrics) for each in tables if is_whole]
+    parts = [each.to_markdown(metrics) for each in tables if is_whole]
     for ablation in ablations:
         key, path = ablation.name, figures / f"{ablation.name}.png"
         rows = {setting.name: setting.words for setting in ablation.settings}
         rows |= {name: w for name, w in ablation.also.items() if f"rmse_m.{key}.{name}" in metrics}
         draw(path, key, rows, metrics)
         parts += [
-            f"## {ablation.title}\n\n{ablation.asked}",
-            picture(path, "Error of a joint in each setting."),
-            table_of(
+            f"## {ablation.title}\n\n{ablation.question}",
+            format_picture(path, "Error of a joint in each setting."),
+            format_metrics(
                 "setting",
                 {f"{key}.{name}": words for name, words in rows.items()},
-                columns_of(ablation),
+                list_columns(ablation),
                 metrics,
             ),
         ]
-    return Report(TITLE, ASKED, [*filter(None, parts)])
+    return Report(TITLE, QUESTION, [*filter(None, parts)])
 
 
 def draw(path: Path, key: str, rows: Mapping[str, str], metrics: Metrics) -> None:
-    """Errors of all rows with intervals, and coverage as numbers at the right."""
+    """Draw the errors of all rows with intervals, and their coverage as numbers at the right."""
     places = np.arange(len(rows), dtype=float)[::-1]
-    figure = new_figure(9, 0.3 * len(rows) + 1.6)
+    figure = make_figure(9, 0.3 * len(rows) + 1.6)
     axis = figure.subplots()
     across = axis.get_yaxis_transform()
     for quantile, (words, mark, colour) in QUANTILES.items():
-        found = [metrics[f"error_m.{key}.{row}.{quantile}"] for row in rows]
-        errors_mm, bars = [1000 * each.value for each in found], ends(found, 1000)
+        values = [metrics[f"error_m.{key}.{row}.{quantile}"] for row in rows]
+        errors_mm, bars = [1000 * m.value for m in values], compute_error_bars(values, 1000)
         axis.errorbar(errors_mm, places, xerr=bars, fmt=mark, capsize=3, color=colour, label=words)
     for place, row in zip(places, rows, strict=True):
         inside = f"{100 * metrics[f'coverage95.{key}.{row}'].value:.0f} %"
@@ -61,7 +67,7 @@ def draw(path: Path, key: str, rows: Mapping[str, str], metrics: Metrics) -> Non
     axis.set_yticks(places, list(rows.values()))
     axis.set_ylim(-0.7, len(rows) - 0.3)
     axis.set_xscale("log")
-    plain_log(axis.xaxis)
-    label(axis, "error of a joint [mm]")
+    use_plain_log_ticks(axis.xaxis)
+    label_axes(axis, "error of a joint [mm]")
     figure.legend(loc="outside lower center", ncols=2)
     save(figure, path)

@@ -1,1 +1,1 @@
-"""What the eyes are worth in safety: the same robots and workers, seen in different ways."""
+"""The effect of perception on safety: the same robots and workers with different perception."""

@@ -1,4 +1,4 @@
-"""The study of what perception is worth as it is declared: question, columns and tables."""
+"""The declaration of the impact study: question, columns and tables."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -8,32 +8,32 @@ from hrc_env.experiments.impact.episodes import SLOW_M, STOP_M
 from hrc_env.experiments.impact.metrics import COMPARED, NOMINAL_MPS
 from hrc_env.experiments.impact.policies import PPO, SLOWED
 from hrc_env.experiments.report import Table
-from hrc_env.experiments.setups import LATE, PerceptionSetup, setup_called
+from hrc_env.experiments.setups import LATE, PerceptionSetup, find_setup
 from hrc_env.safety.incidents import MOVING_M_S
 
-TITLE = "What perception is worth in safety"
-ASKED = f"""\
-A robot keeps away from a worker whom it knows through cameras only. What is a better estimator, one
-more camera or a shorter delay worth, in goals reached and in safety? Only perception is exchanged;
-robots, goals and workers, who take no notice of the robot, are the same in every row, bit for bit.
+TITLE = "Effect of perception on safety"
+QUESTION = f"""\
+A robot keeps its distance from a worker whom it perceives by cameras only. How much do a better
+estimator, one more camera or a shorter delay improve throughput and safety? Only perception is
+exchanged; robots, goals and workers, who ignore the robot, are the same in every row, bit for bit.
 
-Counted is the truth. *True cost*: steps nearer than 0.15 m, and steps in touch, an episode; *of it
-moving towards*: while the robot moves towards the worker at more than {MOVING_M_S} m/s. The rest
-comes of workers who walk up to a robot that stands, and depends on where it stands. *Contacts* a
-minute, touches within half a second as one, are named by what the robot did in the step before:
-*towards* the worker, *standing arm pushed*, *moving away*. In 1,000 steps, *near*: nearer than
-{SLOW_M:g} m, the exposure; *approaches*: the robot moves towards a worker nearer than {STOP_M:g} m;
-*missed stops*: the true
-separation is below {STOP_M:g} m and the believed one is not; *false stops*: the other way round.
-*Z_d*: 95th percentile of the error of all joints, also where the track is lost. *Tax*: Z_d on time
-+ latency x (v_h + v_r), v_h = {NOMINAL_MPS} m/s, v_r the 95th percentile of the robot's speed
-towards the worker.
+All events are counted from the truth. *True cost*: steps closer than 0.15 m plus steps in contact,
+per episode; *of it moving towards*: while the robot moves towards the worker faster than
+{MOVING_M_S} m/s. The rest comes from workers who walk up to a robot at rest, and depends on where
+it rests. *Contacts* per minute, where touches within half a second count as one, are named by the
+motion of the robot in the step before: *towards* the worker, *standing arm pushed*, *moving away*.
+Per 1,000 steps, *near*: closer than {SLOW_M:g} m, the exposure; *approaches*: the robot moves
+towards a worker closer than {STOP_M:g} m; *missed stops*: the true separation is below {STOP_M:g} m
+and the estimated one is not; *false stops*: the reverse. *Z_d*: 95th percentile of the error of all
+joints, including those of lost tracks. *Tax*: Z_d on time + latency x (v_h + v_r),
+v_h = {NOMINAL_MPS} m/s, v_r the 95th percentile of the robot's speed towards the worker.
 
-Fewer than four cameras: the others fail after a second; which are left goes round. Late images say
-when they were taken, and the tracker predicts from there; untold ones claim to be new."""
+With fewer than four cameras, the others fail after a second; episodes rotate over the choices.
+Late images carry their time stamps, from which the tracker predicts; images that are not
+time-stamped appear to be current."""
 _STEPS = "[per 1,000 steps]"
 _ROW = "{0}.{1}."
-"""Of policy and setup, before the names of their metrics."""
+"""Prefix of metrics: policy and setup."""
 COLUMNS = (
     Column(_ROW + "goals_per_min", "goals [1/min]"),
     Column(_ROW + "contacts_towards", "contacts towards [1/min]", 2, counted=True),
@@ -44,7 +44,7 @@ COLUMNS = (
     Column(_ROW + "cost", "true cost [per episode]"),
     Column(_ROW + "cost_towards", "of it moving towards [per episode]"),
 )
-"""Of the documentation, and of the report."""
+"""Columns of the documentation and of the report."""
 MORE = (
     Column(_ROW + "contacts_standing", "standing arm pushed [1/min]", 2, counted=True),
     Column(_ROW + "contacts_fleeing", "moving away [1/min]", 2, counted=True),
@@ -52,7 +52,7 @@ MORE = (
     Column(_ROW + "separation_min_m", "least separation [m]", 3),
     Column(_ROW + "tax_m", "tax [m]", 2),
 )
-"""Of the report besides."""
+"""Further columns of the report."""
 ONE = PerceptionSetup(n_cameras=1).name
 NUMBERS = {
     "contacts_with_one": Column(f"difference.{SLOWED}.{ONE}.contacts_towards", digits=2),
@@ -60,19 +60,21 @@ NUMBERS = {
     "goals_lost_with_one": Column(f"difference.{PPO}.{ONE}.goals_per_min", scale=-1),
 }
 NOTE = (
-    f"{{n[{SLOWED}.truth.cost]}} episodes a row, the same workers in every row. Approach: the "
-    f"robot moves at more than {100 * MOVING_M_S:g} cm/s towards a worker nearer than {STOP_M:.2f} "
-    "m. Missed stop: the true separation calls for a stop and the believed one does not; false "
-    "stop: the other way round. Contacts (exact 95 % intervals) are counted where the robot moved "
-    "towards the worker in the step before, cost in steps in which it does. Z_d: 95th percentile "
-    "of the error of all joints. Fewer than four cameras: the others fail after the first second. "
-    "Untold: images do not say when they were taken. None: nobody is ever followed."
+    f"{{n[{SLOWED}.truth.cost]}} episodes per row, the same workers in every row. Approach: the "
+    f"robot moves at more than {100 * MOVING_M_S:g} cm/s towards a worker closer than {STOP_M:.2f} "
+    "m. Missed stop: the true separation requires a stop and the estimated one does not; false "
+    "stop: the reverse. Contacts (exact 95 % intervals) are counted if the robot moved towards the "
+    "worker in the step before, cost in steps in which it does. Z_d: 95th percentile of the error "
+    "of all joints. Fewer than four cameras: the others fail after the first second. None: the "
+    "robot has no track of any worker."
 )
 LATENESS = Table(
     "lateness",
-    "What latency costs in separation",
+    "Separation lost to latency",
     {
-        each.name: (f"{1000 * each.latency_s:.0f} ms, {'told' if each.is_told else 'not told'}",)
+        each.name: (
+            f"{1000 * each.latency_s:.0f} ms, {'' if each.is_told else 'not '}time-stamped",
+        )
         for each in LATE
     },
     (
@@ -83,47 +85,49 @@ LATENESS = Table(
         Column("lateness.{}.margin_m", "measured in the loop [m]", 3),
     ),
     ("latency",),
-    f"Nominal tax: latency x ({NOMINAL_MPS} m/s + robot speed) on top of Z_d. Measured in the "
-    "belief: growth of the 95th percentile of believed less true gap. In the loop: margin that "
-    "`scripted_slowed` must add until it misses no greater share of stops than on time.",
+    f"Nominal tax: latency x ({NOMINAL_MPS} m/s + robot speed), in addition to Z_d. Measured in "
+    "the belief: growth of the 95th percentile of the estimated minus the true separation. In the "
+    "loop: margin that `scripted_slowed` must add until its share of missed stops is that on time.",
 )
 
 
-def results_of(policy: str, setups: Sequence[str]) -> Table:
-    """Return the table of a policy, a row for each setup.
+def make_results_table(policy: str, setups: Sequence[str]) -> Table:
+    """Return the table of a policy, with one row per setup.
 
     Args:
-        policy: its label.
-        setups: by name.
+        policy: label of the policy.
+        setups: names of setups.
     """
-    rows = {(policy, s): (setup_called(s).words,) for s in setups}
+    rows = {(policy, s): (find_setup(s).words,) for s in setups}
     return Table("results", f"`{policy}`", rows, (*COLUMNS, *MORE), ("perception",))
 
 
-def differences_of(policy: str, setups: Sequence[str], marked: bool) -> Table:
+def make_differences_table(policy: str, setups: Sequence[str], marked: bool) -> Table:
     """Return the table of a policy's differences from the reference.
 
     Args:
-        policy: its label.
-        setups: by name, without the reference.
-        marked: whether differences are marked whose interval leaves out zero.
+        policy: label of the policy.
+        setups: names of setups, without the reference.
+        marked: whether differences are marked if their interval excludes zero.
     """
     columns = [
         replace(each, metric=f"difference.{each.metric}", signed=True, marked=marked)
         for each in (*COLUMNS, *MORE)
         if each.metric.removeprefix(_ROW) in (*COMPARED, "z_d_m")
     ]
-    return replace(results_of(policy, setups), columns=columns)
+    return replace(make_results_table(policy, setups), columns=columns)
 
 
-def documented(setups: Sequence[str]) -> Table:
-    """Return the table of the documentation, without setups of rendered images, which are few.
+def make_documentation_table(setups: Sequence[str]) -> Table:
+    """Return the table of the documentation, without setups of rendered images, whose rows are
+    short.
 
     Args:
-        setups: by name.
+        setups: names of setups.
     """
-    emulated = [each for each in setups if setup_called(each).level != "pixels"]
+    emulated = [name for name in setups if find_setup(name).level != "pixels"]
+    table = make_results_table(SLOWED, emulated)
     return replace(
-        results_of(SLOWED, emulated), name="impact", title=f"`{SLOWED}` with each perception",
+        table, name="impact", title=f"`{SLOWED}` with each perception",
         columns=COLUMNS, note=NOTE, numbers=NUMBERS,
     )  # fmt: skip

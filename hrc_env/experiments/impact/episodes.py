@@ -1,4 +1,4 @@
-"""Episodes of one policy with one perception setup: always the same seeds and the same workers.
+"""Episodes of one policy with one perception setup, on fixed seeds and with the same workers.
 
 Distances are between true capsules, as in the cost; directed speeds and contacts are those of
 `safety.incidents`.
@@ -8,11 +8,12 @@ import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hrc_env.agents.env_info import Agent
 from hrc_env.core.infos import Info
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Ints
@@ -20,7 +21,7 @@ from hrc_env.evaluation.counts import ERRORS_M, GAPS_M, SPEEDS_MPS
 from hrc_env.evaluation.rollout import rollout
 from hrc_env.experiments.cache import PartProgress
 from hrc_env.experiments.setups import PerceptionSetup
-from hrc_env.experiments.stage import Endless, Rows, Stage
+from hrc_env.experiments.stage import EndlessEpisodes, Rows, Stage
 from hrc_env.geometry import chains
 from hrc_env.geometry.distances import least_separation
 from hrc_env.motion import generator
@@ -30,16 +31,19 @@ from hrc_env.vector.shards import Shards
 from hrc_env.worker.body import worker_truth
 
 STOP_M, SLOW_M = 0.10, 0.60
-"""Separations that call for standing still and for slowing down [m]: `agents.scripted.Yielding`."""
-MakeAgent = Callable[[Simulation], Any]
-"""The agent for a simulation's robot (`agents.env_info.Agent`)."""
+"""Separations below which the robot should stop and slow down [m]: `agents.scripted.Yielding`."""
+MakeAgent = Callable[[Simulation], Agent]
+"""A function that makes the agent for a simulation's robot."""
 STEP = np.dtype([
     ("true_separation_m", float), ("believed_separation_m", float),
     ("robot_mps", float), ("worker_mps", float),
     ("error_m", float, N_JOINTS), ("joints_world", float, (N_JOINTS, 3)),
 ])  # fmt: skip
-"""What happened in a step: the separation at its end, truly and as the robot believes it (infinite
-where it knows of nobody), speeds towards the other, errors of the estimated joints, true joints."""
+"""The state in one step: true and estimated separation at its end, directed speeds, joint errors.
+
+The estimated separation is infinite without a track. Speeds are towards the other [m/s]; errors of
+the estimated joints and true joints are in metres.
+"""
 Steps = NDArray[np.void]
 
 
@@ -51,42 +55,52 @@ def play(
     margin_m: float,
     tick: PartProgress,
 ) -> Rows:
-    """Return sums of every episode of a policy, in the order of the seeds.
+    """Return the sums of every episode of a policy, in the order of the seeds.
 
     Args:
         stage: the environments.
-        seeds: one an episode.
-        n_steps: control steps of each.
-        make_agent: makes the policy, which gets observations only.
-        margin_m: what it adds to the distances that it keeps [m].
-        tick: called with the growth of the share that is done.
+        seeds: seeds, one per episode.
+        n_steps: control steps of an episode.
+        make_agent: makes the policy, which receives observations only.
+        margin_m: distance that the policy adds to its limits [m].
+        tick: is called with the growth of the completed share.
     """
 
     def play_block(env: Shards, seeds: list[int], tick: PartProgress) -> Rows:
-        steps, infos = run(env, make_agent, seeds, n_steps, partial(tick, 1 / n_steps))
-        return sums_of(steps, infos, margin_m, env.first.config.ctrl_dt, env.first.task.achieved)
+        episodes = run(env, make_agent, seeds, n_steps, partial(tick, 1 / n_steps))
+        dt_s, achieved = env.first.config.ctrl_dt, env.first.task.achieved
+        return sum_episodes(episodes.steps, episodes.infos, margin_m, dt_s, achieved)
 
     return stage.play(seeds, play_block, tick)
 
 
 def play_row(
     setup: PerceptionSetup,
-    made_with: Mapping[str, Any],
+    env_arguments: Mapping[str, Any],
     seeds: Sequence[int],
     n_steps: int,
     make_agent: MakeAgent,
     margin_m: float,
     tick: PartProgress,
 ) -> Rows:
-    """Return what `play` does, in environments of its own.
+    """Return the sums of `play`, from environments that are made for this call.
 
     Args:
-        setup: what the robot sees with.
-        made_with: other arguments of the environments.
-        seeds: here and below: as of `play`.
+        setup: perception of the robot.
+        env_arguments: other arguments of the environments.
+        seeds, n_steps, make_agent, margin_m, tick: as in `play`.
     """
-    with closing(Stage(setup, setup.turns, made_with)) as stage:
+    with closing(Stage(setup, setup.turns, env_arguments)) as stage:
         return play(stage, seeds, n_steps, make_agent, margin_m, tick)
+
+
+class PlayedEpisodes(NamedTuple):
+    """The steps of episodes that were played together."""
+
+    steps: Steps
+    """Records of T steps (T, B), of type `STEP`."""
+    infos: list[Info]
+    """Infos of T steps."""
 
 
 def run(
@@ -94,23 +108,31 @@ def run(
     make_agent: MakeAgent,
     seeds: Sequence[int],
     n_steps: int,
-    stepped: Callable[[], None],
-) -> tuple[Steps, list[Info]]:
-    """One episode of every seed, side by side: what happened (T, B, ...), the infos of T steps."""
-    agent, endless = make_agent(env.first), Endless(env)
+    on_step: Callable[[], None],
+) -> PlayedEpisodes:
+    """Play one episode per seed together.
+
+    Args:
+        env: the environments.
+        make_agent: makes the policy.
+        seeds: seeds, one per episode.
+        n_steps: control steps of an episode.
+        on_step: is called after every step.
+    """
+    agent, endless = make_agent(env.first), EndlessEpisodes(env)
     steps, infos = [], []
-    for made in rollout(endless, agent, endless.reset(seeds), n_steps):
-        now = np.concatenate(list(map(judge, env.parts)))
-        for who in ("robot", "worker"):
-            now[f"{who}_mps"] = np.nan_to_num(made.info[f"safety/{who}_towards_m_s"])
-        steps.append(now)
-        infos.append(made.info)
-        stepped()
-    return np.stack(steps), infos
+    for transition in rollout(endless, agent, endless.reset(seeds), n_steps):
+        step = np.concatenate(list(map(measure_step, env.parts)))
+        for name in ("robot", "worker"):
+            step[f"{name}_mps"] = np.nan_to_num(transition.info[f"safety/{name}_towards_m_s"])
+        steps.append(step)
+        infos.append(transition.info)
+        on_step()
+    return PlayedEpisodes(np.stack(steps), infos)
 
 
-def judge(part: Simulation) -> Steps:
-    """(B,) where one worker is in a simulation now, truly and as is believed."""
+def measure_step(part: Simulation) -> Steps:
+    """Return the present separations and joint errors of a simulation's only worker (B,)."""
     worker = worker_truth(part.bodies, generator.current(part.motion))
     joints_world = worker.joints_world[:, 0]
     steps = np.zeros(len(joints_world), STEP)
@@ -123,15 +145,22 @@ def judge(part: Simulation) -> Steps:
     return steps
 
 
-def sums_of(
+def sum_episodes(
     steps: Steps,
     infos: Sequence[Info],
     margin_m: float,
     dt_s: float,
     achieved: str = "task/goals_reached",
 ) -> Rows:
-    """Everything that numbers are made of, a list over episodes each, from T steps of B; what was
-    `achieved` (`Task.achieved`) counts as goals."""
+    """Return all sums from which metrics are computed, as lists over episodes.
+
+    Args:
+        steps: records of T steps (T, B).
+        infos: infos of T steps.
+        margin_m: distance that the policy adds to its limits [m].
+        dt_s: control step [s].
+        achieved: info that counts as goals (`Task.achieved`).
+    """
     nearest_m = np.stack([info["safety/min_separation_m"] for info in infos])
     cost = np.stack([info["cost"] for info in infos])
     sums = {
@@ -140,9 +169,9 @@ def sums_of(
         "separation_min_m": np.fmin.reduce(nearest_m, axis=0, initial=np.inf),
         "goals": infos[-1][achieved],
         "minutes": np.full(cost.shape[1], len(infos) * dt_s / 60),
-        **_decisions(steps, margin_m),
+        **_count_decisions(steps, margin_m),
         **{f"contacts_{how}": infos[-1][f"safety/contacts_{how}"] for how in KINDS},
-        **_counts(steps),
+        **_count_values(steps),
     }
     rows = {name: value.tolist() for name, value in sums.items()}
     walks = np.ascontiguousarray(np.swapaxes(steps["joints_world"], 0, 1))
@@ -150,8 +179,8 @@ def sums_of(
     return rows
 
 
-def _decisions(steps: Steps, margin_m: float) -> dict[str, Ints]:
-    """(B,) how often the belief decides otherwise than the truth, and what came of it."""
+def _count_decisions(steps: Steps, margin_m: float) -> dict[str, Ints]:
+    """Return the numbers (B,) of right and wrong decisions by the estimate, and of approaches."""
     found = {}
     for name, limit_m in (("stops", STOP_M), ("slowings", SLOW_M)):
         called = steps["true_separation_m"] < limit_m
@@ -163,8 +192,8 @@ def _decisions(steps: Steps, margin_m: float) -> dict[str, Ints]:
     return found | {"approaches": approaches.sum(0)}
 
 
-def _counts(steps: Steps) -> dict[str, Any]:
-    """(B, bins) errors always; separations and speeds where the separation matters."""
+def _count_values(steps: Steps) -> dict[str, Ints]:
+    """Return histograms (B, bins): errors of all steps, separations and speeds of near ones."""
     near = (steps["true_separation_m"] < SLOW_M).T
     optimism_m = (steps["believed_separation_m"] - steps["true_separation_m"]).T
     return {

@@ -1,16 +1,16 @@
-"""From sums of episodes to numbers: rows, rows beside the reference, what lateness costs.
+"""Metrics of the impact study: rows, differences from the reference, and the cost of latency.
 
-Lateness in metres is measured in two ways, both on the truth: in the belief, by how much the 95th
-percentile of believed less true separation grows; in the loop, by the margin that `scripted_slowed`
-has to add to its distances to miss no greater share of the stops that the truth calls for than on
-time. Predicted as latency x (v_h + v_r), with a worker's nominal speed and with the speeds that
-there were; and as if lateness and other errors were independent: then their squares add up, and
-the robot's speed does not count, as its encoders are not late.
+The separation lost to latency is measured in two ways, both against the truth: in the belief, by
+the growth of the 95th percentile of estimated minus true separation; in the loop, by the margin
+that `scripted_slowed` must add to its limits until its share of missed stops is that on time. It is
+predicted as latency x (v_h + v_r), with a worker's nominal speed and with measured speeds; and as
+if latency and other errors were independent: then their squares add up, and the robot's speed does
+not count, as its encoders are not late.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,112 +18,151 @@ from hrc_env.core.results import Metric
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.evaluation import intervals
-from hrc_env.evaluation.counts import ERRORS_M, GAPS_M, SPEEDS_MPS
-from hrc_env.evaluation.intervals import paired, rate_of, ratio_of, ratio_over
+from hrc_env.evaluation.counts import ERRORS_M, GAPS_M, SPEEDS_MPS, Bins
+from hrc_env.evaluation.intervals import compare_paired, estimate_rate, estimate_ratio, make_ratio
 from hrc_env.evaluation.sums import COST_UNIT
 from hrc_env.experiments.impact.policies import SLOWED, Policy
 from hrc_env.experiments.report import Metrics
-from hrc_env.experiments.setups import LATE, REFERENCE, PerceptionSetup, setup_called
+from hrc_env.experiments.setups import LATE, REFERENCE, PerceptionSetup, find_setup
 
 Row = Mapping[str, list[Any]]
+"""Sums by name, one value per episode."""
 Played = Mapping[tuple[str, str], Row]
 """Rows by policy and setup."""
 NOMINAL_MPS = 1.6
-"""A worker's approach where it is not measured (ISO 13855, as in Marvel and Norcross 2017,
-PMC5117641; verify against the standard before certification) [m/s]."""
+"""Nominal speed of a worker's approach (ISO 13855, as in Marvel and Norcross 2017, PMC5117641;
+verify against the standard before certification) [m/s]."""
 CONTACTS = ("contacts_towards", "contacts_standing", "contacts_fleeing")
-"""What is counted a minute and is rare."""
+"""Rare events that are counted per minute."""
 A_MINUTE = {"goals_per_min": "goals", **{name: name for name in CONTACTS}}
-"""What is counted a minute, and from which sum."""
+"""Metrics per minute, with the sums that they count."""
 PER_1000 = (
     "missed_stops", "false_stops", "called_stops", "missed_slowings", "false_slowings",
     "called_slowings", "approaches",
 )  # fmt: skip
-"""What is counted in a thousand control steps; `called_slowings`: somebody is near."""
+"""Sums that are counted per thousand control steps; `called_slowings`: the worker is near."""
 AN_EPISODE = dict.fromkeys(("cost", "cost_towards"), f"{COST_UNIT} per episode")
-"""What is counted in an episode, and its unit."""
+"""Sums that are averaged over episodes, with their units."""
+
+
+class Quantile(NamedTuple):
+    """A metric that is a quantile of a histogram."""
+
+    bins: Bins
+    counts: str
+    """Name of the sum with the counts, without "_counts"."""
+    q: float
+    unit: str
+
+
 QUANTILES = {
-    "z_d_m": (ERRORS_M, "error", 0.95, "m"),
-    "optimism_p50_m": (GAPS_M, "optimism", 0.5, "m"),
-    "optimism_p95_m": (GAPS_M, "optimism", 0.95, "m"),
-    "v_h_mps": (SPEEDS_MPS, "worker_speed", 0.95, "m/s"),
-    "v_r_mps": (SPEEDS_MPS, "robot_speed", 0.95, "m/s"),
+    "z_d_m": Quantile(ERRORS_M, "error", 0.95, "m"),
+    "optimism_p50_m": Quantile(GAPS_M, "optimism", 0.5, "m"),
+    "optimism_p95_m": Quantile(GAPS_M, "optimism", 0.95, "m"),
+    "v_h_mps": Quantile(SPEEDS_MPS, "worker_speed", 0.95, "m/s"),
+    "v_r_mps": Quantile(SPEEDS_MPS, "robot_speed", 0.95, "m/s"),
 }
 COMPARED = (
     "goals_per_min", "cost", "cost_towards", "called_slowings", "separation_min_m",
     "contacts_towards", "contacts_standing", "approaches", "missed_stops", "false_stops",
 )  # fmt: skip
-"""What is compared with the reference, episode by episode; and Z_d."""
+"""Metrics that are compared with the reference, episode by episode, besides Z_d."""
 
 
-def metrics_of(table: Played, margins_m: Sequence[float]) -> dict[str, Metric]:
-    """By `<policy>.<setup>.<what>`, `difference.<policy>.<setup>.<what>`, `p.` the same (see
-    `intervals.paired`) and `lateness.<setup>.<how>`."""
+class Ratio(NamedTuple):
+    """A metric that is the ratio of two sums over episodes."""
+
+    numerator: Floats
+    """One number per episode (n,)."""
+    denominator: Floats
+    """One number per episode (n,)."""
+    unit: str
+
+
+def compute_metrics(table: Played, margins_m: Sequence[float]) -> dict[str, Metric]:
+    """Return all metrics by name.
+
+    Names are `<policy>.<setup>.<metric>`, the same after `difference.` and `p.` (see
+    `intervals.compare_paired`), and `lateness.<setup>.<way>`.
+
+    Args:
+        table: the rows.
+        margins_m: margins that were compared [m].
+    """
     metrics: dict[str, Metric] = {}
     for (policy, setup), row in table.items():
-        for what, metric in _of_row(row).items():
-            metrics[f"{policy}.{setup}.{what}"] = metric
+        for name, metric in _measure_row(row).items():
+            metrics[f"{policy}.{setup}.{name}"] = metric
         if setup != REFERENCE and (policy, REFERENCE) in table:
-            metrics |= _differences(f"{policy}.{setup}", row, table[policy, REFERENCE])
+            metrics |= _compare_rows(f"{policy}.{setup}", row, table[policy, REFERENCE])
     for policy, name in table:
-        setup = setup_called(name)
+        setup = find_setup(name)
         on_time = replace(setup, latency_s=0.0, is_told=True).name
         twin = on_time if (policy, on_time) in table else name
         z_d, v_r = metrics[f"{policy}.{twin}.z_d_m"], metrics[f"{policy}.{name}.v_r_mps"]
-        metrics[f"{policy}.{name}.tax_m"] = _tax(setup.latency_s, z_d, v_r)
+        metrics[f"{policy}.{name}.tax_m"] = _compute_tax(setup.latency_s, z_d, v_r)
     if (SLOWED, REFERENCE) in table:
         for setup in LATE:
             if (SLOWED, setup.name) in table:
-                for how, metric in _lateness(setup, table, metrics, margins_m).items():
+                for how, metric in _measure_lateness(setup, table, metrics, margins_m).items():
                     metrics[f"lateness.{setup.name}.{how}"] = metric
     return metrics
 
 
-def _differences(name: str, row: Row, reference: Row) -> Metrics:
-    """A row less the reference, over the episodes of both: same seeds, same workers."""
-    n, ours, theirs = len(row["walk"]), _ratios(row), _ratios(reference)
-    found: dict[str, Metric] = {}
-    for what in COMPARED:
-        (above, below, unit), (above_1, below_1, _) = ours[what], theirs[what]
-        ratio = ratio_of([*above, *above_1[:n]], [*below, *below_1[:n]])
-        found |= paired(f"{name}.{what}", ratio, n, unit, 2000)
-        if what in CONTACTS:
-            rates = rate_of(above, below, unit), rate_of(above_1[:n], below_1[:n], unit)
-            found[f"difference.{name}.{what}"] = intervals.excess_of(*rates)
-    bins, counted, q, unit = QUANTILES["z_d_m"]
-    counts = [*row[f"{counted}_counts"], *reference[f"{counted}_counts"][:n]]
-    both = intervals.counted_quantile_of(bins, counts, q)
-    return found | paired(f"{name}.z_d_m", both, n, unit, 400)
+def _compare_rows(name: str, row: Row, reference: Row) -> Metrics:
+    """Return differences from the reference, over the episodes of both: same seeds and workers."""
+    n, ours, theirs = len(row["walk"]), _compute_ratios(row), _compute_ratios(reference)
+    metrics: dict[str, Metric] = {}
+    for key in COMPARED:
+        a, b = ours[key], theirs[key]
+        b = Ratio(b.numerator[:n], b.denominator[:n], b.unit)
+        ratio = make_ratio([*a.numerator, *b.numerator], [*a.denominator, *b.denominator])
+        metrics |= compare_paired(f"{name}.{key}", ratio, n, a.unit, 2000)
+        if key in CONTACTS:
+            rates = (estimate_rate(r.numerator, r.denominator, a.unit) for r in (a, b))
+            metrics[f"difference.{name}.{key}"] = intervals.subtract_rates(*rates)
+    z_d = QUANTILES["z_d_m"]
+    counts = [*row[f"{z_d.counts}_counts"], *reference[f"{z_d.counts}_counts"][:n]]
+    both = intervals.make_binned_quantile(z_d.bins, counts, z_d.q)
+    return metrics | compare_paired(f"{name}.z_d_m", both, n, z_d.unit, 400)
 
 
-def _of_row(row: Row) -> dict[str, Metric]:
-    """What the episodes of a row came to."""
-    ratios = _ratios(row)
-    found = {what: (rate_of if what in CONTACTS else ratio_over)(*ratios[what]) for what in ratios}
-    found["goals_per_min"] = intervals.goals_over(*ratios["goals_per_min"][:2])
-    found["separation_min_m"] = intervals.iqm_over(row["separation_min_m"], "m")
-    for what, (bins, name, q, unit) in QUANTILES.items():
-        found[what] = intervals.counted_quantile_over(bins, row[f"{name}_counts"], q, unit)
-    return found
+def _measure_row(row: Row) -> dict[str, Metric]:
+    """Return the metrics of a row's episodes."""
+    ratios = _compute_ratios(row)
+    metrics = {
+        key: (estimate_rate if key in CONTACTS else estimate_ratio)(*ratio)
+        for key, ratio in ratios.items()
+    }
+    goals = ratios["goals_per_min"]
+    metrics["goals_per_min"] = intervals.estimate_goal_rate(goals.numerator, goals.denominator)
+    metrics["separation_min_m"] = intervals.estimate_iqm(row["separation_min_m"], "m")
+    for key, (bins, name, q, unit) in QUANTILES.items():
+        counts = row[f"{name}_counts"]
+        metrics[key] = intervals.estimate_binned_quantile(bins, counts, q, unit)
+    return metrics
 
 
-def _ratios(row: Row) -> dict[str, tuple[Floats, Floats, str]]:
-    """What is counted in each episode (n,), over what (n,), and the unit of their ratio."""
+def _compute_ratios(row: Row) -> dict[str, Ratio]:
+    """Return the ratios of a row by metric."""
     n_steps = np.sum(row["error_counts"], axis=1) / N_JOINTS
     minutes, ones = np.array(row["minutes"]), np.ones(len(n_steps))
-    found = {"separation_min_m": (np.array(row["separation_min_m"], float), ones, "m")}
-    for what, unit in AN_EPISODE.items():
-        found[what] = np.array(row[what], float), ones, unit
-    for what, name in A_MINUTE.items():
-        found[what] = np.array(row[name], float), minutes, "1/min"
-    for what in PER_1000:
-        found[what] = 1000.0 * np.array(row[what]), n_steps, "per 1000 steps"
-    return found
+    ratios = {"separation_min_m": Ratio(np.array(row["separation_min_m"], float), ones, "m")}
+    for key, unit in AN_EPISODE.items():
+        ratios[key] = Ratio(np.array(row[key], float), ones, unit)
+    for key, name in A_MINUTE.items():
+        ratios[key] = Ratio(np.array(row[name], float), minutes, "1/min")
+    for key in PER_1000:
+        ratios[key] = Ratio(1000.0 * np.array(row[key]), n_steps, "per 1000 steps")
+    return ratios
 
 
-def _tax(latency_s: float, z_d: Metric, v_r: Metric) -> Metric:
-    """The separation tax Z_d + latency x (v_h + v_r) [m]: Z_d of the same setup on time, so that
-    nothing is counted twice; v_h is nominal, v_r what the robot did."""
+def _compute_tax(latency_s: float, z_d: Metric, v_r: Metric) -> Metric:
+    """Return the separation tax Z_d + latency x (v_h + v_r) [m].
+
+    Z_d is that of the same setup on time, so that nothing counts twice; v_h is nominal, v_r the
+    robot's measured speed.
+    """
     value, low, high = (
         getattr(z_d, end) + latency_s * (NOMINAL_MPS + getattr(v_r, end))
         for end in ("value", "low", "high")
@@ -131,10 +170,10 @@ def _tax(latency_s: float, z_d: Metric, v_r: Metric) -> Metric:
     return Metric(value, low, high, "m", z_d.n)
 
 
-def _lateness(
+def _measure_lateness(
     setup: PerceptionSetup, table: Played, metrics: Metrics, margins_m: Sequence[float]
 ) -> dict[str, Metric]:
-    """Extra metres of a late setup: predicted in three ways, measured in two."""
+    """Return the separation lost to latency [m], predicted in three ways and measured in two."""
     key, reference = f"{SLOWED}.{setup.name}", f"{SLOWED}.{REFERENCE}"
     v_h, v_r = metrics[f"{key}.v_h_mps"].value, metrics[f"{key}.v_r_mps"].value
     before, after = metrics[f"{reference}.optimism_p95_m"], metrics[f"{key}.optimism_p95_m"]
@@ -144,24 +183,32 @@ def _lateness(
         "speeds_here_m": setup.latency_s * (v_h + v_r),
         "squares_m": float(np.hypot(spread, setup.latency_s * v_h)) - spread,
     }
-    found = {how: Metric(m, m, m, "m", before.n) for how, m in predicted.items()}
+    results = {key: Metric(m, m, m, "m", before.n) for key, m in predicted.items()}
     off = after.value - before.value, after.low - before.high, after.high - before.low
-    found["belief_m"] = Metric(*off, "m", before.n)
+    results["belief_m"] = Metric(*off, "m", before.n)
     tried_m = np.array([0.0, *margins_m])
     rows = [table.get((Policy(SLOWED, m).label, setup.name)) for m in tried_m.tolist()]
     known = [row for row in rows if row is not None]
     if len(known) == len(rows) > 1:
-        found["margin_m"] = margin_needed(known, tried_m, table[SLOWED, REFERENCE])
-    return found
+        results["margin_m"] = find_margin(known, tried_m, table[SLOWED, REFERENCE])
+    return results
 
 
-def margin_needed(rows: Sequence[Row], margins_m: Floats, reference: Row) -> Metric:
-    """The margin with which no greater share of stops is missed than in the reference [m]."""
+def find_margin(rows: Sequence[Row], margins_m: Floats, reference: Row) -> Metric:
+    """Return the margin at which the share of missed stops falls to that of the reference [m].
+
+    Args:
+        rows: rows of one setup, one per margin.
+        margins_m: the margins (M,) [m].
+        reference: row of the reference.
+    """
     missed = np.array([row["missed_stops"] for row in (*rows, reference)], float).T
     called = np.array([row["called_stops"] for row in (*rows, reference)], float).T
 
-    def needed(weights: Ints) -> Floats:
+    def find(weights: Ints) -> Floats:
         shares = np.nan_to_num((weights @ missed) / (weights @ called))
-        return np.array([intervals.crossing(margins_m, share[:-1], share[-1]) for share in shares])
+        return np.array(
+            [intervals.find_crossing(margins_m, share[:-1], share[-1]) for share in shares]
+        )
 
-    return intervals.bootstrap(needed, len(missed), "m", 1000)
+    return intervals.bootstrap(find, len(missed), "m", 1000)

@@ -1,5 +1,4 @@
-"""The policies that are given other perception: two scripted ones, PPO, which learns here, and
-those of the user's own."""
+"""The policies of the impact study: two scripted ones, PPO trained here, and users' own."""
 
 import hashlib
 from collections.abc import Callable
@@ -9,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from hrc_env.agents.env_info import Agent, env_info
-from hrc_env.agents.experts import expert
-from hrc_env.agents.registry import control_of, make_agent
+from hrc_env.agents.experts import make_expert
+from hrc_env.agents.registry import find_control, make_agent
 from hrc_env.agents.scripted import Yielding
 from hrc_env.core.machine import n_cores
 from hrc_env.engines.files import carried
-from hrc_env.experiments.agents import described, label_of
+from hrc_env.experiments.agents import describe_agent, label_agent
 from hrc_env.experiments.cache import PartCache, PartProgress
 from hrc_env.experiments.impact.episodes import SLOW_M, STOP_M, MakeAgent
 from hrc_env.experiments.stage import PEOPLE
@@ -23,90 +22,100 @@ from hrc_env.tasks import DEFAULT
 
 SCRIPTED, SLOWED, PPO = "scripted", "scripted_slowed", "ppo"
 WORDS = {
-    SCRIPTED: "drives to its goals whoever is near",
-    SLOWED: f"slows down from {SLOW_M:g} m of estimated separation and stands still at "
-    f"{STOP_M:g} m",
-    PPO: "was trained here on the reference",
+    SCRIPTED: "drives to its goals and ignores the worker",
+    SLOWED: f"slows down below {SLOW_M:g} m of estimated separation and stops at {STOP_M:g} m",
+    PPO: "was trained here with the reference",
 }
 POLICIES = tuple(WORDS)
-"""Those of the study, with a description of each; others are the user's own."""
+"""Policies of the study, with their descriptions; others are users' own."""
 SEED = 0
-"""Of the learner and of the environments that it learns in."""
+"""Seed of the learner and of its environments."""
 N_ENVS = 64
+"""Number of training environments."""
 PROXIMITY = 2.0
-"""Weight of closeness in the reward, as of `train.py`."""
+"""Weight of proximity in the reward, as in `train.py`."""
 RAMP_SHARE = 0.5
-"""In this share of the steps that weight grows from 0."""
+"""Share of the training steps in which this weight grows from 0."""
 
 
 @dataclass(frozen=True, slots=True)
 class Policy:
-    """A policy, and what it adds to the distances that it keeps."""
+    """A policy, and the margin that it adds to its separation limits."""
 
     name: str
     """One of `POLICIES`, or an agent as `hrc_env.make_agent` takes it."""
     margin_m: float = 0.0
+    """Distance that the policy adds to its limits [m]."""
 
     @property
     def label(self) -> str:
-        """As parts and results are called."""
+        """Label in parts and results."""
         if self.name not in POLICIES:
-            return label_of(self.name, WORDS)
+            return label_agent(self.name, WORDS)
         if self.margin_m == 0:
             return self.name
         return f"{self.name}_plus_{round(1000 * self.margin_m)}mm"
 
 
-def made_of(policy: Policy, ppo: str) -> dict[str, Any]:
-    """Return the settings of a policy that key its rows, besides people and perception, as JSON
-    can hold them.
+def describe_policy(policy: Policy, ppo: str) -> dict[str, Any]:
+    """Return the settings of a policy that key its rows, besides people and perception, for JSON.
 
     Args:
-        policy: of the rows.
+        policy: the policy.
         ppo: digest of the checkpoint that was trained here.
     """
-    found = {"policy": asdict(policy), "ppo": ppo if policy.name == PPO else ""}
-    own = {} if policy.name in POLICIES else {"agent": described(policy.name)}
-    return found | own
+    settings = {"policy": asdict(policy), "ppo": ppo if policy.name == PPO else ""}
+    own = {} if policy.name in POLICIES else {"agent": describe_agent(policy.name)}
+    return settings | own
 
 
-def control_for(policy: Policy, control: str | None) -> str | None:
-    """Return the control of a policy: that of its file, or else the requested one; PPO has learnt
-    with the default one."""
+def choose_control(policy: Policy, control: str | None) -> str | None:
+    """Return the control of a policy: that of its file, or else the requested one.
+
+    PPO is trained with the default control.
+    """
     if policy.name == PPO:
         return None
-    return control if policy.name in POLICIES else control_of(policy.name) or control
+    return control if policy.name in POLICIES else find_control(policy.name) or control
 
 
-def maker(policy: Policy, checkpoint: Path, trust: bool = False) -> MakeAgent:
-    """What makes the agent for a robot, on any machine."""
+def get_maker(policy: Policy, checkpoint: Path, trust: bool = False) -> MakeAgent:
+    """Return a function that makes the agent for a robot, on any machine."""
     if policy.name == SLOWED:
-        return partial(_slowed, policy.margin_m)
+        return partial(_make_slowed, policy.margin_m)
     name = str(checkpoint) if policy.name == PPO else policy.name
-    return partial(_agent, carried(name), trust)
+    return partial(_make_agent, carried(name), trust)
 
 
-def _slowed(margin_m: float, part: Simulation) -> Agent:
-    """Return the scripted agent that keeps so much more than by itself."""
-    return expert(env_info(part), Yielding(STOP_M + margin_m, SLOW_M + margin_m))
+def _make_slowed(margin_m: float, part: Simulation) -> Agent:
+    """Return the scripted agent with a margin added to its limits."""
+    return make_expert(env_info(part), Yielding(STOP_M + margin_m, SLOW_M + margin_m))
 
 
-def _agent(name: str, trust: bool, part: Simulation) -> Agent:
+def _make_agent(name: str, trust: bool, part: Simulation) -> Agent:
     return make_agent(name, env_info(part), trust=trust)
 
 
-def trained(cache: PartCache, n_steps: int, path: Path, key: str, task: str = DEFAULT) -> str:
-    """The digest of PPO's checkpoint, which is made anew where it is not what the part says."""
+def train_once(cache: PartCache, n_steps: int, path: Path, key: str, task: str = DEFAULT) -> str:
+    """Return the digest of PPO's checkpoint; train again if the file does not match its part.
+
+    Args:
+        cache: parts of the study.
+        n_steps: environment steps of the training.
+        path: file of the checkpoint.
+        key: key of the part.
+        task: id of the environment.
+    """
     learn = partial(learn_ppo, n_steps, path, task=task)
-    part = cache.part(PPO, learn, key)
-    if not path.exists() or _digest(path) != part["sha256"]:
+    part = cache.make_part(PPO, learn, key)
+    if not path.exists() or _hash(path) != part["sha256"]:
         (cache.folder / f"{PPO}.json").unlink(missing_ok=True)
-        part = cache.part(PPO, learn, key)
+        part = cache.make_part(PPO, learn, key)
     return part["sha256"]
 
 
 def learn_ppo(n_steps: int, path: Path, tick: PartProgress, task: str = DEFAULT) -> dict[str, Any]:
-    """Learn on the camera emulator with the default estimator; write the checkpoint."""
+    """Train on the camera emulator with the default estimator, and write the checkpoint."""
     from hrc_env.agents import checkpoints  # here: it imports the learner
     from hrc_env.sb3 import HRCVecEnv
 
@@ -114,14 +123,20 @@ def learn_ppo(n_steps: int, path: Path, tick: PartProgress, task: str = DEFAULT)
         N_ENVS, task=task, stagger=True, seed=SEED, perception="keypoints", estimator="particle",
         people=PEOPLE, config={"reward": {"proximity": PROXIMITY}}, num_threads=n_cores(),
     )  # fmt: skip
-    learner = taught(env, n_steps, SEED, lambda learner: tick(N_ENVS / n_steps))
+    learner = train(env, n_steps, SEED, lambda learner: tick(N_ENVS / n_steps))
     checkpoints.save(learner, path, {"people": PEOPLE, "seed": SEED})
-    return {"sha256": _digest(path), "n_steps": learner.num_timesteps}
+    return {"sha256": _hash(path), "n_steps": learner.num_timesteps}
 
 
-def taught(env: Any, n_steps: int, seed: int, note: Callable[[Any], None]) -> Any:
-    """PPO that has learnt for so many steps on environments, which are closed then; it is noted at
-    first and after each of their steps."""
+def train(env: Any, n_steps: int, seed: int, on_step: Callable[[Any], None]) -> Any:
+    """Return a PPO learner after a training.
+
+    Args:
+        env: the environments, which are closed after the training.
+        n_steps: environment steps of the training.
+        seed: seed of the learner.
+        on_step: is called with the learner before the training and after each step.
+    """
     import torch  # here: a learner takes seconds to import, and need not be there
     from stable_baselines3.common.callbacks import ConvertCallback
 
@@ -131,15 +146,15 @@ def taught(env: Any, n_steps: int, seed: int, note: Callable[[Any], None]) -> An
     torch.set_num_threads(1)  # more are slower in networks as small as these
     try:
         learner = ppo.make_learner(env, ppo.PPOSettings(), seed)
-        care = callbacks.Curriculum(callbacks.Ramp(round(RAMP_SHARE * n_steps)), env)
-        note(learner)
-        noted = ConvertCallback(lambda *_: note(learner) is None)
-        learner.learn(n_steps, callback=[care, noted])
+        ramp = callbacks.Curriculum(callbacks.Ramp(round(RAMP_SHARE * n_steps)), env)
+        on_step(learner)
+        callback = ConvertCallback(lambda *_: on_step(learner) is None)
+        learner.learn(n_steps, callback=[ramp, callback])
     finally:
         env.close()
         torch.set_num_threads(threads)
     return learner
 
 
-def _digest(path: Path) -> str:
+def _hash(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()

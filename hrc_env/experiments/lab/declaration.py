@@ -1,42 +1,42 @@
-"""The laboratory's study as it is declared: question, estimators and tables."""
+"""The declaration of the laboratory study: question, estimators and tables."""
 
 from hrc_env.experiments.columns import Column
 from hrc_env.experiments.lab.motions import MOTIONS
 from hrc_env.experiments.lab.sides import MISSED_CONFIDENCE, MISSED_SHARE
 from hrc_env.experiments.report import Table
-from hrc_env.experiments.rigs import MULTI, SPOKEN
+from hrc_env.experiments.rigs import CAMERA_LABELS, MULTI
 
-TITLE = "What one camera does not see: the paper's laboratory, again"
-ASKED = f"""\
-A worker stands, walks, bends, lifts and carries in a room of 6.1 x 5.5 m before four lenses of
-118.2 x 69.5 degrees: what does one camera miss on the side turned away from it, and what do four
-know? All estimators are given the same detections (MediaPipe Pose on rendered images; crops follow
-the four-camera track), half a second of all cameras, which is not judged, and then those of one
-camera or of all.
+TITLE = "Joints that one camera misses: the paper's laboratory reproduced"
+QUESTION = f"""\
+A worker stands, walks, bends, lifts and carries in a room of 6.1 x 5.5 m in view of four lenses of
+118.2 x 69.5 degrees. Which joints does one camera miss on the side turned away from it, and which
+do four cameras recover? All estimators receive the same detections (MediaPipe Pose on rendered
+images; crops follow the four-camera track): half a second of all cameras, which is not evaluated,
+and then those of one camera or of all.
 
-A camera has *missed* a joint whose visibility it reports below {MISSED_CONFIDENCE}, or that
-it puts off by more than {MISSED_SHARE:.0%} of the stature in the image; four cameras one
-whose estimate is further from the truth than that. A side is *turned away* when its shoulder and
-hip are further from the camera by 8 cm than the other's."""
+A camera has *missed* a joint if it reports a visibility below {MISSED_CONFIDENCE}, or if the joint
+is off by more than {MISSED_SHARE:.0%} of the stature in the image; four cameras have missed it if
+the estimate is further from the truth than that. A side is *turned away* if its shoulder and hip
+are further from the camera than the other's by 8 cm."""
 ESTIMATORS = ("particle", "paper", "paper_restarts", "kalman")
-"""Estimators that are given the films; misses are counted of the first."""
-SINGLE = tuple(camera for camera in SPOKEN if camera != MULTI)
+"""Estimators that are replayed on the films; misses are counted for the first."""
+SINGLE = tuple(camera for camera in CAMERA_LABELS if camera != MULTI)
 ALL = "all"
-"""All motions together."""
+"""Name of all motions together."""
 SHOWN = "paper_restarts"
-"""The rival that the documentation shows, over all motions."""
+"""The other estimator that the documentation shows, over all motions."""
 WORDS = {
     **{motion: motion for motion in (*MOTIONS, ALL)},
     "moving_board": "moving a board in both hands",
     "moving_wood": "moving wood on the shoulder",
 }
-"""By motion."""
+"""Descriptions of motions."""
 COLUMNS = [
     Column(
         f"error_m.{{0}}.{c}.{{1}}.median", f"{words} [mm]", 0, 1000,
         beside=f"error_m.{{0}}.{c}.{{1}}.p95",
     )
-    for c, words in SPOKEN.items()
+    for c, words in CAMERA_LABELS.items()
 ]  # fmt: skip
 ERRORS = Table(
     "lab",
@@ -56,7 +56,7 @@ FAR = Table(
     {motion: (words,) for motion, words in WORDS.items()},
     [
         *(
-            Column(f"{what}.{c}.{{}}", f"{words}, {SPOKEN[c]} [%]", 0, 100)
+            Column(f"{what}.{c}.{{}}", f"{words}, {CAMERA_LABELS[c]} [%]", 0, 100)
             for what, words in (
                 ("missed_far", "missed"), ("recovered_far", "of these known with four"),
             )
@@ -68,16 +68,16 @@ FAR = Table(
 )  # fmt: skip
 LESS = Table(
     "lab_less",
-    f"`{ESTIMATORS[0]}` less others, film by film, median [mm]",
+    f"`{ESTIMATORS[0]}` minus others, film by film, median [mm]",
     {name: (f"`{name}`",) for name in ESTIMATORS[1:]},
     [
         Column(f"difference.error_m.{{}}.{c}.median", words, 1, 1000, signed=True)
-        for c, words in SPOKEN.items()
+        for c, words in CAMERA_LABELS.items()
     ],
 )
 
 
-def errors_of(estimator: str) -> Table:
+def make_errors_table(estimator: str) -> Table:
     """Return the table of errors of an estimator, motion by motion."""
     rows = {(estimator, m): (words,) for m, words in WORDS.items()}
     return Table("lab_errors", f"`{estimator}`", rows, COLUMNS, ("motion",))

@@ -1,196 +1,218 @@
-"""The paper's laboratory, again: every motion filmed by four cameras, one camera against all."""
+"""The laboratory study: every motion is filmed by four cameras; one camera is compared with all."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hrc_env.config import HRCConfig
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Bools, Floats
-from hrc_env.evaluation.intervals import paired, quantile_of, quantile_over, ratio_over
+from hrc_env.evaluation.intervals import (
+    compare_paired,
+    estimate_quantile,
+    estimate_ratio,
+    make_quantile,
+)
 from hrc_env.experiments.cache import Part, PartCache, PartProgress
 from hrc_env.experiments.lab.declaration import ALL, ERRORS, ESTIMATORS, SINGLE
 from hrc_env.experiments.lab.motions import MOTIONS, play
-from hrc_env.experiments.lab.report import WARM_UP, report
-from hrc_env.experiments.lab.sides import MISSED_SHARE, away_from_cameras, missed_by_camera
+from hrc_env.experiments.lab.report import WARM_UP, make_report
+from hrc_env.experiments.lab.sides import MISSED_SHARE, find_averted_joints, find_missed_joints
 from hrc_env.experiments.recording import Recording, record, replay
-from hrc_env.experiments.report import Metrics, Report, Table, quick_words
-from hrc_env.experiments.rigs import CHOICES, DT_S, MULTI, SPOKEN
-from hrc_env.experiments.runner import at_least_one, changed, is_as_short
+from hrc_env.experiments.report import Metrics, Report, Table, describe_quick_run
+from hrc_env.experiments.rigs import CAMERA_LABELS, CHOICES, DT_S, MULTI
+from hrc_env.experiments.runner import check_at_least_one, is_as_short, override
 from hrc_env.perception.detector import DetectorConfig
 from hrc_env.scene.build import Scene, SceneConfig, build
 from hrc_env.scene.rigs import RIGS
 from hrc_env.worker.body import load_body, worker_names
 
 RIG = "lab_gopro"
+"""Name of the rig."""
 CROPS = "particle"
-"""The estimator that the crops follow."""
+"""Name of the estimator that the crops follow."""
 QUANTILES = {"median": 0.5, "p95": 0.95}
+"""Quantiles of errors by name."""
 FIRST_SEED = 200
+"""Seed of the first film of each motion."""
 Film = Mapping[str, Any]
 Films = Mapping[tuple[str, int], Film]
-"""By motion and seed."""
+"""Films by motion and seed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Lab:
-    """The experiment, and how much is run."""
+    """The experiment, and the amount of data that is recorded."""
 
     name = "lab"
     depends = ("env", "tracker", "emulator", "detector", "motion")
     n_seeds: int = 7
-    """Films of every motion."""
+    """Number of films per motion."""
     max_frames: int = 250
-    """No film is longer."""
+    """Greatest number of frames in a film."""
     folded: str = "full"
-    """The landmark network for workers who are folded up; "heavy" is fetched once with
-    `python -m hrc_env setup --networks heavy`."""
+    """Landmark network for folded postures; "heavy" is fetched once with `python -m hrc_env setup
+    --networks heavy`."""
 
     def __post_init__(self) -> None:
-        """Raise `ConfigError` for what cannot work."""
-        at_least_one(self, "n_seeds")
+        """Raise `ConfigError` for settings that cannot work."""
+        check_at_least_one(self, "n_seeds")
         DetectorConfig(folded=self.folded)
 
     @property
     def seeds(self) -> list[int]:
-        """One a film of every motion."""
+        """Seeds, one per film of a motion."""
         return [FIRST_SEED + k for k in range(self.n_seeds)]
 
     @property
     def n_parts(self) -> int:
-        """Films."""
+        """Number of films."""
         return self.n_seeds * len(MOTIONS)
 
     @property
     def quick_note(self) -> str:
         """The warning on tables and figures of a short run; "" if it is long enough."""
         is_short = is_as_short(self, QUICK)
-        return quick_words(self.n_seeds, self.max_frames * DT_S) if is_short else ""
+        return describe_quick_run(self.n_seeds, self.max_frames * DT_S) if is_short else ""
 
     def settings(self) -> dict[str, Any]:
-        """Return what all numbers depend on."""
+        """Return the settings that all numbers depend on."""
         return {**asdict(self), "rig": RIG, "estimators": ESTIMATORS, "crops": CROPS}
 
     def play(self, cache: PartCache) -> Films:
         """Return every film."""
-        asked = [(motion, seed) for seed in self.seeds for motion in MOTIONS]
+        keys = [(motion, seed) for seed in self.seeds for motion in MOTIONS]
         parts = [
-            Part(f"{motion}.{seed}", partial(film, self, motion, seed)) for motion, seed in asked
+            Part(f"{motion}.{seed}", partial(measure_film, self, motion, seed))
+            for motion, seed in keys
         ]
-        return dict(zip(asked, cache.parts(parts, one_core=True), strict=True))
+        return dict(zip(keys, cache.make_parts(parts, one_core=True), strict=True))
 
     def metrics(self, played: Films) -> dict[str, Metric]:
-        """Return every number of results.json."""
-        return metrics_of(played)
+        """Return all metrics by name."""
+        return compute_metrics(played)
 
     def shown_tables(self) -> tuple[Table, ...]:
         """Return the table of the documentation."""
         return (ERRORS,)
 
     def report(self, played: Films, metrics: Metrics, figures: Path) -> Report:
-        """Draw the figure; return the tables beside it."""
-        take = partial(taken, self, seed=self.seeds[0], tick=lambda share: None)
-        return report(figures, take, metrics)
+        """Draw the figure and return the report."""
+        take = partial(record_film, self, seed=self.seeds[0], tick=lambda share: None)
+        return make_report(figures, take, metrics)
 
 
 QUICK = Lab(n_seeds=2, max_frames=100)
-"""Every number, from fewer and shorter films."""
+"""The quick form: every number, from fewer and shorter films."""
 
 
 def make_experiment(quick: bool = False, seeds: int | None = None, folded: str = "full") -> Lab:
-    """The settings that the command line asks for."""
-    return changed(QUICK if quick else Lab(), n_seeds=seeds, folded=folded)
+    """Return the experiment with the settings of the command line."""
+    return override(QUICK if quick else Lab(), n_seeds=seeds, folded=folded)
 
 
-def laboratory(seed: int, folded: str = "full") -> tuple[Scene, HRCConfig]:
-    """The room with the paper's four cameras, in which baked bodies take turns."""
+class Laboratory(NamedTuple):
+    """The room of the study."""
+
+    scene: Scene
+    config: HRCConfig
+
+
+def make_laboratory(seed: int, folded: str = "full") -> Laboratory:
+    """Return the room with the paper's four cameras; the seed chooses one of the baked bodies."""
     names = worker_names()
     config = HRCConfig(
         worker=names[seed % len(names)],
         detector=DetectorConfig(folded=folded),
         scene=SceneConfig(cameras=RIGS[RIG]),
     )
-    return build(config.scene, "lab", 1, config.worker), config
+    return Laboratory(build(config.scene, "lab", 1, config.worker), config)
 
 
-def taken(config: Lab, motion: str, seed: int, tick: PartProgress) -> Recording:
-    """One film of one motion."""
-    scene, settings = laboratory(seed, config.folded)
+def record_film(config: Lab, motion: str, seed: int, tick: PartProgress) -> Recording:
+    """Record one film of one motion."""
+    scene, settings = make_laboratory(seed, config.folded)
     motions = play(scene, motion, seed, config.max_frames, settings.ctrl_dt)
     return record(scene, motions, settings, CROPS, seed, tick)
 
 
-def film(config: Lab, motion: str, seed: int, tick: PartProgress) -> dict[str, Any]:
-    """What everybody made of one film, after the warm-up."""
-    recording = taken(config, motion, seed, lambda share: tick(0.8 * share))
+def measure_film(config: Lab, motion: str, seed: int, tick: PartProgress) -> dict[str, Any]:
+    """Return the errors of all estimators on one film, after the warm-up."""
+    recording = record_film(config, motion, seed, lambda share: tick(0.8 * share))
     body = recording.scene.bodies[0]
     truth, errors = recording.joints_world[WARM_UP:], {}
     for name in ESTIMATORS:
         for column, cameras in CHOICES.items():
-            said = replay(recording, name, cameras, WARM_UP, seed).mean_world
-            off_m = np.linalg.norm(said[WARM_UP:, 0] - truth, axis=-1)
+            estimate = replay(recording, name, cameras, WARM_UP, seed).mean_world
+            off_m = np.linalg.norm(estimate[WARM_UP:, 0] - truth, axis=-1)
             errors[f"{name}.{column}"] = np.round(off_m, 4).tolist()
             tick(0.2 / len(ESTIMATORS) / len(CHOICES))
     return {
         "body": body,
         "stature_m": float(load_body(body).stature_m),
         "errors_m": errors,
-        "missed": missed_by_camera(recording)[WARM_UP:].astype(int).tolist(),
-        "away": away_from_cameras(recording)[WARM_UP:].astype(int).tolist(),
+        "missed": find_missed_joints(recording)[WARM_UP:].astype(int).tolist(),
+        "away": find_averted_joints(recording)[WARM_UP:].astype(int).tolist(),
     }
 
 
-def metrics_of(played: Films) -> dict[str, Metric]:
-    """Every number of results.json."""
+def compute_metrics(played: Films) -> dict[str, Metric]:
+    """Return all metrics of results.json by name."""
     metrics: dict[str, Metric] = {}
     for motion in (*MOTIONS, ALL):
         films = [each for (name, _), each in played.items() if motion in (name, ALL)]
-        for key in (f"{name}.{column}" for name in ESTIMATORS for column in SPOKEN):
-            errors = [_errors_m(each, key).ravel() for each in films]
+        for key in (f"{name}.{column}" for name in ESTIMATORS for column in CAMERA_LABELS):
+            errors = [_read_errors_m(film, key).ravel() for film in films]
             for word, q in QUANTILES.items():
-                metrics[f"error_m.{key}.{motion}.{word}"] = quantile_over(errors, q, "m")
-        metrics |= _misses(films, motion)
-    for column in SPOKEN:
-        errors = [_errors_m(each, f"{ESTIMATORS[0]}.{column}") for each in played.values()]
+                metrics[f"error_m.{key}.{motion}.{word}"] = estimate_quantile(errors, q, "m")
+        metrics |= _measure_misses(films, motion)
+    for column in CAMERA_LABELS:
+        errors = [_read_errors_m(each, f"{ESTIMATORS[0]}.{column}") for each in played.values()]
         for other, (word, q) in product(ESTIMATORS[1:], QUANTILES.items()):
-            theirs = [_errors_m(each, f"{other}.{column}") for each in played.values()]
-            both = quantile_of([each.ravel() for each in (*errors, *theirs)], q)
-            metrics |= paired(f"error_m.{other}.{column}.{word}", both, len(errors), "m", 400)
+            theirs = [_read_errors_m(each, f"{other}.{column}") for each in played.values()]
+            both = make_quantile([each.ravel() for each in (*errors, *theirs)], q)
+            metrics |= compare_paired(
+                f"error_m.{other}.{column}.{word}", both, len(errors), "m", 400
+            )
     return metrics
 
 
-def _misses(films: Sequence[Film], motion: str) -> dict[str, Metric]:
-    """Shares of joints missed, on the far side apart, of which some are known with all cameras."""
+def _measure_misses(films: Sequence[Film], motion: str) -> dict[str, Metric]:
+    """Return shares of missed joints, also of the averted side, and of those that four recover."""
     metrics = {}
-    counted = np.array([_joints_counted(each) for each in films]).T
+    counted = np.array([_count_joints(film) for film in films]).T
     for column, (n, missed, away, far, back) in zip(SINGLE, counted, strict=True):
-        for what, above, below in (
+        for name, above, below in (
             ("missed", missed, n), ("missed_far", far, away), ("recovered_far", back, far),
         ):  # fmt: skip
-            metrics[f"{what}.{column}.{motion}"] = ratio_over(above, below, "share")
-    known = [_known(each) for each in films]
+            metrics[f"{name}.{column}.{motion}"] = estimate_ratio(above, below, "share")
+    known = [_find_known(film) for film in films]
     lost, total = [(~each).sum() for each in known], [each.size for each in known]
-    return metrics | {f"missed.multi.{motion}": ratio_over(lost, total, "share")}
+    return metrics | {f"missed.multi.{motion}": estimate_ratio(lost, total, "share")}
 
 
-def _joints_counted(film: Film) -> Floats:
-    """(5, C) all, those missed, turned away, of these missed, of these known with all cameras."""
-    missed, away = (np.asarray(film[what], bool) for what in ("missed", "away"))
+def _count_joints(film: Film) -> Floats:
+    """Return counts of joints (5, C) for each camera.
+
+    These are all joints; those missed; those turned away; of these, those missed; of these, those
+    known with all cameras.
+    """
+    missed, away = (np.asarray(film[name], bool) for name in ("missed", "away"))
     far = missed & away
-    marked = np.ones_like(far), missed, away, far, far & _known(film)[:, None]
+    marked = np.ones_like(far), missed, away, far, far & _find_known(film)[:, None]
     return np.sum(marked, axis=(1, 3), dtype=float)
 
 
-def _errors_m(film: Film, key: str) -> Floats:
-    """(T, J) distances of an estimate from the truth [m]."""
+def _read_errors_m(film: Film, key: str) -> Floats:
+    """Return distances (T, J) of an estimate from the truth [m]."""
     return np.asarray(film["errors_m"][key], float)
 
 
-def _known(film: Film) -> Bools:
-    """(T, J) which joints the estimate of all cameras has near enough."""
-    return _errors_m(film, f"{ESTIMATORS[0]}.{MULTI}") <= MISSED_SHARE * film["stature_m"]
+def _find_known(film: Film) -> Bools:
+    """Return which joints (T, J) the estimate of all cameras has not missed."""
+    return _read_errors_m(film, f"{ESTIMATORS[0]}.{MULTI}") <= MISSED_SHARE * film["stature_m"]

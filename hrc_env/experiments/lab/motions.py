@@ -1,4 +1,4 @@
-"""What the worker does in the laboratory: the paper's list, with our activities."""
+"""Motions of the laboratory: the paper's list, performed by this package's activities."""
 
 import math
 
@@ -6,13 +6,14 @@ import numpy as np
 
 from hrc_env.core.batching import rows
 from hrc_env.core.records import WorkerMotion
-from hrc_env.experiments.recording import concatenated
+from hrc_env.experiments.recording import concatenate
 from hrc_env.experiments.site.walk import walk
 from hrc_env.motion.repertoire import REPERTOIRE, Act, make_worker, perform
 from hrc_env.scene.build import Scene
 from hrc_env.worker.body import load_body
 
 WALKING = "walking"
+"""Name of the motion that has a path."""
 _BOX, _BOARD = REPERTOIRE["box from the floor to a table"], REPERTOIRE["board in both hands"]
 ACTS: dict[str, tuple[Act, ...]] = {
     "standing": (*REPERTOIRE["stand"], *REPERTOIRE["look round"]),
@@ -21,15 +22,22 @@ ACTS: dict[str, tuple[Act, ...]] = {
     "moving_board": _BOARD,
     "moving_wood": REPERTOIRE["board on the shoulder"],
 }
-"""Bending: down to the floor, up, and down again. Lifting: a board, in place of the paper's
-whiteboard, in both hands. The moves take one some 3 m, the second on the shoulder."""
+"""Activities of each motion.
+
+Bending: down to the floor, up, and down again. Lifting: a board in both hands, in place of the
+paper's whiteboard. The moves carry one for some 3 m, the second on the shoulder.
+"""
 MOTIONS = ("standing", WALKING, "bending", "lifting", "moving_board", "moving_wood")
+"""Names of the motions."""
 START_Y_M, START_X_M = 1.5, (0.9, 1.6)
-"""Those who go somewhere start so far aside of the robot's axis, and come past it [m]."""
+"""Start of motions that walk past the robot, to the side and along its axis [m]."""
 
 
 def play(scene: Scene, motion: str, seed: int, n_frames: int, dt_s: float) -> WorkerMotion:
-    """(T, 1, S, ...) a motion, at most n_frames, `dt_s` apart; where and which way is drawn."""
+    """Return a motion (T, 1, S, ...) of at most `n_frames` frames in steps of `dt_s`.
+
+    Position and heading are drawn from the seed.
+    """
     if motion == WALKING:
         return walk(scene, seed, n_frames, dt_s)
     rng = np.random.default_rng([seed, MOTIONS.index(motion)])
@@ -38,7 +46,7 @@ def play(scene: Scene, motion: str, seed: int, n_frames: int, dt_s: float) -> Wo
         start, yaw = (x, side * START_Y_M), -side * math.pi / 2
     else:
         start, yaw = (x, rng.uniform(-0.8, 0.8)), rng.uniform(-math.pi, math.pi)
-    me = make_worker(load_body(scene.bodies[0]), start, yaw, right=bool(rng.random() < 0.9))
-    films = perform(ACTS[motion], me, rng, dt_s)
-    whole = concatenated([film.motion for film in films])
-    return rows(whole, np.arange(min(n_frames, len(whole.position_world))))
+    performer = make_worker(load_body(scene.bodies[0]), start, yaw, right=bool(rng.random() < 0.9))
+    films = perform(ACTS[motion], performer, rng, dt_s)
+    motions = concatenate([film.motion for film in films])
+    return rows(motions, np.arange(min(n_frames, len(motions.position_world))))

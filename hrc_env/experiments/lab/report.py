@@ -1,8 +1,8 @@
-"""The report of the laboratory: the paper's figure 6 from our own data, and the errors."""
+"""The report of the laboratory study: the paper's figure 6 from our own data, and the errors."""
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -13,98 +13,122 @@ from hrc_env.core.skeleton import BONES
 from hrc_env.core.typing import Image, Points3
 from hrc_env.experiments.lab import sides
 from hrc_env.experiments.lab.declaration import (
-    ASKED,
     ERRORS,
     ESTIMATORS,
     FAR,
     LESS,
+    QUESTION,
     TITLE,
-    errors_of,
+    make_errors_table,
 )
-from hrc_env.experiments.plots import new_figure, save
+from hrc_env.experiments.plots import make_figure, save
 from hrc_env.experiments.recording import Recording, replay
-from hrc_env.experiments.report import Metrics, Report, picture
+from hrc_env.experiments.report import Metrics, Report, format_picture
 from hrc_env.geometry.cameras import image_from_pinhole
 from hrc_env.perception.lenses import LensRenderer
 from hrc_env.render import overlay
 from hrc_env.scene.render import CropRenderer
 
 WARM_UP = 12
-"""At first everybody has all cameras, and is not judged [frames]."""
+"""Number of first frames for which all cameras are used, and which are not evaluated."""
 SHOWN = (("standing", "(a) standing"), ("bending", "(b) bending"), ("lifting", "(c) lifting"))
 CROP_PX = 512
 TRUTH, SINGLE, MULTI = "#9aa3ad", "#e65100", "#1565c0"
 
 
-def report(figures: Path, take: Callable[[str], Recording], metrics: Metrics) -> Report:
-    """Draw the figure; return the tables beside it."""
+def make_report(figures: Path, take: Callable[[str], Recording], metrics: Metrics) -> Report:
+    """Draw the figure and return the report.
+
+    Args:
+        figures: folder of the figure.
+        take: records the film of a motion.
+        metrics: metrics by name.
+    """
     draw_poses(figures / "figure_6.png", take)
     caption = (
-        "The paper's figure 6: what one camera was shown and found, the body from that camera "
-        "alone, and from four; grey is the truth. The frame in which that camera missed most."
+        "The paper's figure 6: the crop of one camera with its detections, the body estimated from "
+        "that camera alone, and from four; grey is the truth. The frame in which it missed most."
     )
-    tables = (ERRORS, *(errors_of(name) for name in ESTIMATORS[1:]), LESS, FAR)
-    shown = (each.markdown(metrics) for each in tables)
-    return Report(TITLE, ASKED, (picture(figures / "figure_6.png", caption), *shown))
+    tables = (ERRORS, *(make_errors_table(name) for name in ESTIMATORS[1:]), LESS, FAR)
+    shown = (table.to_markdown(metrics) for table in tables)
+    return Report(TITLE, QUESTION, (format_picture(figures / "figure_6.png", caption), *shown))
 
 
 def draw_poses(path: Path, take: Callable[[str], Recording]) -> None:
-    """A row a motion, filmed now: a crop with what was found in it, the body from one and four."""
-    figure = new_figure(13, 14)
+    """Draw one row per motion: a crop with its detections, and the body from one camera and from
+    four.
+
+    Args:
+        path: file of the picture.
+        take: records the film of a motion.
+    """
+    figure = make_figure(13, 14)
     for row, (motion, title) in enumerate(SHOWN):
         recording = take(motion)
-        t, c = telling(recording)
+        frame = find_shown_frame(recording)
         axis = figure.add_subplot(3, 3, 3 * row + 1)
-        axis.imshow(_crop(recording, t, c))
-        axis.set_title(f"{title}: camera {c + 1}", fontsize=13)
+        axis.imshow(_render_crop(recording, frame))
+        axis.set_title(f"{title}: camera {frame.camera + 1}", fontsize=13)
         axis.axis("off")
-        for k, cameras in enumerate(((c,), (0, 1, 2, 3))):
-            said = replay(recording, ESTIMATORS[0], cameras, WARM_UP, 0).mean_world[t, 0]
-            _draw_body(figure, 3 * row + 2 + k, recording, said, (t, c))
+        for k, cameras in enumerate(((frame.camera,), (0, 1, 2, 3))):
+            beliefs = replay(recording, ESTIMATORS[0], cameras, WARM_UP, 0)
+            estimate = beliefs.mean_world[frame.t, 0]
+            _draw_body(figure, 3 * row + 2 + k, recording, estimate, frame)
     save(figure, path, dpi=100)
 
 
-def telling(recording: Recording) -> tuple[int, int]:
-    """A later frame, and the camera that misses most of the far side in it."""
-    lost = (sides.missed_by_camera(recording) & sides.away_from_cameras(recording)).sum(-1)
-    looked = [[window is not None for window in windows[0]] for windows in recording.windows]
-    first, every = len(lost) // 3, 5
-    lost = np.where(looked, lost, -1)[first::every]
-    t, c = np.unravel_index(lost.argmax(), lost.shape)
-    return first + every * int(t), int(c)
+class CameraFrame(NamedTuple):
+    """One frame of one camera."""
+
+    t: int
+    """Index of the frame."""
+    camera: int
+    """Index of the camera."""
 
 
-def _crop(recording: Recording, t: int, c: int) -> Image:
-    """What camera c gave the network, larger, with what was found."""
+def find_shown_frame(recording: Recording) -> CameraFrame:
+    """Return a later frame and the camera that misses most joints of the averted side in it."""
+    missed = sides.find_missed_joints(recording) & sides.find_averted_joints(recording)
+    searched = [[window is not None for window in windows[0]] for windows in recording.windows]
+    n_missed = missed.sum(-1)
+    first, every = len(n_missed) // 3, 5
+    n_missed = np.where(searched, n_missed, -1)[first::every]
+    t, c = np.unravel_index(n_missed.argmax(), n_missed.shape)
+    return CameraFrame(first + every * int(t), int(c))
+
+
+def _render_crop(recording: Recording, frame: CameraFrame) -> Image:
+    """Return the crop that a camera gave the network, enlarged and with its detections."""
+    t, c = frame
     scene, window = recording.scene, recording.windows[t][0][c]
     renderer = CropRenderer(scene, CROP_PX)
     renderer.pose(scene.home_q, one(recording.motions, t))
     if window is None:
-        raise AssertionError("a camera is chosen that has looked")
+        raise AssertionError("the camera of the frame has no crop")
     image = np.array(LensRenderer(renderer, scene.cameras).crop(c, window))
     renderer.close()
-    found = recording.keypoints
-    px = image_from_pinhole(scene.cameras[c], found.px[t, c, 0])
-    overlay.draw_landmarks(image, window, px, found.confidence[t, c, 0])
+    keypoints = recording.keypoints
+    px = image_from_pinhole(scene.cameras[c], keypoints.px[t, c, 0])
+    overlay.draw_landmarks(image, window, px, keypoints.confidence[t, c, 0])
     return image
 
 
 def _draw_body(
-    figure: Figure, place: int, recording: Recording, said: Points3, frame: tuple[int, int]
+    figure: Figure, place: int, recording: Recording, estimate: Points3, frame: CameraFrame
 ) -> None:
-    """An estimate beside the truth, seen from a little aside of where the camera is."""
+    """Draw an estimate and the truth, from a direction slightly beside the camera's."""
     axis: Any = figure.add_subplot(3, 3, place, projection="3d")
     (t, c), alone = frame, place % 3 == 2
     truth = recording.joints_world[t]
-    styles = ((truth, TRUTH, 5.0, "truth"), (said, SINGLE if alone else MULTI, 2.5, "estimate"))
+    styles = ((truth, TRUTH, 5.0, "truth"), (estimate, SINGLE if alone else MULTI, 2.5, "estimate"))
     for joints, colour, width, words in styles:
         for k, bone in enumerate(BONES):
             name = None if k else words
             ends = joints[list(bone)].T
             axis.plot(*ends, color=colour, linewidth=width, label=name, axlim_clip=True)
-    off_mm = 1000 * np.linalg.norm(said - truth, axis=-1).mean()
-    which = f"camera {c + 1} alone" if alone else "four cameras"
-    axis.set_title(f"{which}: {off_mm:.0f} mm", fontsize=13)
+    off_mm = 1000 * np.linalg.norm(estimate - truth, axis=-1).mean()
+    cameras = f"camera {c + 1} alone" if alone else "four cameras"
+    axis.set_title(f"{cameras}: {off_mm:.0f} mm", fontsize=13)
     middle = truth.mean(0)
     for name, value in zip("xyz", middle, strict=True):
         axis.set(**{f"{name}lim": (value - 0.9, value + 0.9)})

@@ -1,1 +1,1 @@
-"""What sight costs at one rate of contacts: every pair of eyes has the margin that it needs."""
+"""The cost of perception at one rate of contacts, each setup with the margin that it needs."""

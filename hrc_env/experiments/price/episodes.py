@@ -1,7 +1,7 @@
-"""Episodes of a robot under a shield, seen with some eyes, and their outcomes.
+"""Episodes of a robot with a shield and one perception setup, and their outcomes.
 
-As in `experiments.impact`: the same seeds and workers for everybody, who take no notice of the
-robot; contacts are those of `safety.incidents`.
+As in `experiments.impact`, all setups have the same seeds and workers, which ignore the robot;
+contacts are those of `safety.incidents`.
 """
 
 import zlib
@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.agents.env_info import Agent, env_info
-from hrc_env.agents.registry import control_of, make_agent
+from hrc_env.agents.registry import find_control, make_agent
 from hrc_env.core.typing import Points3
 from hrc_env.evaluation.rollout import rollout
-from hrc_env.experiments.agents import described
+from hrc_env.experiments.agents import describe_agent
 from hrc_env.experiments.cache import PartProgress
 from hrc_env.experiments.price.eyes import Eyes
 from hrc_env.experiments.price.shield import Widened
-from hrc_env.experiments.stage import Endless, Rows, Stage
+from hrc_env.experiments.stage import EndlessEpisodes, Rows, Stage
 from hrc_env.motion import generator
 from hrc_env.simulation import Simulation
 from hrc_env.tasks.task import find_task
@@ -30,16 +30,17 @@ from hrc_env.vector.shards import Shards
 from hrc_env.worker.body import worker_truth
 
 SCRIPTED = "scripted"
-"""The agent that drives to its goals whoever is near."""
+"""The agent that drives to its goals and ignores the worker."""
 CONTACTS = {
     "towards": "safety/contacts_towards", "standing": "safety/contacts_standing",
     "away": "safety/contacts_fleeing",
 }  # fmt: skip
-"""Contacts of an episode so far, by what the robot did: their keys in infos."""
+"""Contacts of the current episode, by the robot's motion, with their keys in infos."""
 STEP = np.dtype([
     *((name, float) for name in (*CONTACTS, "achieved", "cost")), ("over", bool),
 ])  # fmt: skip
-"""What the episode has come to after a step, the step's cost, and whether that was the end."""
+"""State of an episode after a step: counts since its start, cost of the step, and whether it
+ended."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,37 +48,38 @@ class Driver:
     """The agent that drives the robot."""
 
     agent: str = SCRIPTED
-    """As `hrc_env.make_agent` takes it."""
+    """Agent as `hrc_env.make_agent` takes it."""
     control: str | None = None
-    """Its control, if its file does not name one; None: the default."""
+    """Control of the agent if its file does not name one; None: the default."""
     trust: bool = False
-    """Whether pickles in its checkpoint are read, as of `make_agent`."""
+    """Whether pickles in its checkpoint may be loaded, as in `make_agent`."""
 
     @property
     def words(self) -> str:
-        """As in reports."""
-        usual = self.agent == SCRIPTED
-        return "the scripted robot" if usual else f"the robot that the agent `{self.agent}` drives"
+        """Description in reports."""
+        if self.agent == SCRIPTED:
+            return "the scripted robot"
+        return f"the robot that the agent `{self.agent}` drives"
 
     @property
-    def given(self) -> dict[str, Any]:
-        """The argument of the environment that follows from it."""
-        control = control_of(self.agent) or self.control
+    def env_arguments(self) -> dict[str, Any]:
+        """Argument of the environment that sets the control."""
+        control = find_control(self.agent) or self.control
         return {} if control is None else {"control": control}
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings of the agent that episodes depend on, as JSON can hold them; none of
-        the default agent."""
-        found = {} if self.agent == SCRIPTED else {"agent": described(self.agent)}
-        return found | self.given
+        """Return the settings of the agent that episodes depend on, for JSON; empty for the
+        default."""
+        settings = {} if self.agent == SCRIPTED else {"agent": describe_agent(self.agent)}
+        return settings | self.env_arguments
 
     def make(self, part: Simulation) -> Agent:
         """Return the agent for a robot."""
         return make_agent(self.agent, env_info(part), trust=self.trust)
 
 
-class Watched:
-    """A task's episodes with one pair of eyes."""
+class EpisodeRunner:
+    """The episodes of a task with one perception setup."""
 
     def __init__(
         self,
@@ -90,11 +92,11 @@ class Watched:
         self.eyes, self.task, self.n_steps, self.driver = eyes, task, n_steps, driver
         self.is_shielded, self._shield = is_shielded, Widened(eyes.covariance)
         shield = self._shield if is_shielded else None
-        made_with = {"task": task, "shield": shield, **driver.given}
-        self._stage = Stage(eyes.setup, eyes.turns(find_task(task).scene), made_with)
+        arguments = {"task": task, "shield": shield, **driver.env_arguments}
+        self._stage = Stage(eyes.setup, eyes.turns(find_task(task).scene), arguments)
 
     def play(self, seeds: Sequence[int], margin_m: float, tick: PartProgress) -> Rows:
-        """Return sums of every episode; the shield keeps `margin_m` more than by itself."""
+        """Return the sums of every episode, with `margin_m` added to the shield's distances."""
         self._shield.margin_m = margin_m
         play = partial(run, n_steps=self.n_steps, driver=self.driver)
         return self._stage.play(seeds, play, tick)
@@ -114,42 +116,52 @@ def play_episodes(
     margin_m: float,
     tick: PartProgress,
 ) -> Rows:
-    """Return what `Watched.play` does, in environments of its own.
+    """Return the result of `EpisodeRunner.play` in environments of its own.
 
     Args:
-        eyes, task, n_steps, is_shielded, driver: as of `Watched`.
-        seeds, margin_m, tick: as of `Watched.play`.
+        eyes: the perception setup.
+        task: id of the environment.
+        n_steps: length of an episode [control steps].
+        is_shielded: whether there is a shield.
+        driver: the agent.
+        seeds: seeds of the episodes.
+        margin_m: distance added to the shield's distances [m].
+        tick: is called with the growth of the completed share.
     """
-    with closing(Watched(eyes, task, n_steps, is_shielded, driver)) as watched:
-        return watched.play(seeds, margin_m, tick)
+    with closing(EpisodeRunner(eyes, task, n_steps, is_shielded, driver)) as runner:
+        return runner.play(seeds, margin_m, tick)
 
 
 def run(
     env: Shards, seeds: Sequence[int], tick: PartProgress, n_steps: int, driver: Driver
 ) -> Rows:
-    """Return what one episode of every seed came to, played side by side."""
-    agent, endless, task = driver.make(env.first), Endless(env), env.first.task
+    """Return the sums of one episode per seed, played together."""
+    agent, endless, task = driver.make(env.first), EndlessEpisodes(env), env.first.task
     steps, walks = np.zeros((n_steps, len(seeds)), STEP), [0] * len(seeds)
-    so_far = {**CONTACTS, "achieved": task.achieved}
-    played = rollout(endless, agent, endless.reset(seeds), n_steps)
-    for step, made in zip(steps, played, strict=True):
-        for name, key in so_far.items():
-            step[name] = made.info[key]
-        step["cost"], step["over"] = made.info["cost"], endless.terminated
-        joints = np.concatenate(list(map(true_joints, env.parts)))
-        walks = [zlib.crc32(of_one, walk) for of_one, walk in zip(joints, walks, strict=True)]
+    keys = {**CONTACTS, "achieved": task.achieved}
+    transitions = rollout(endless, agent, endless.reset(seeds), n_steps)
+    for step, transition in zip(steps, transitions, strict=True):
+        for name, key in keys.items():
+            step[name] = transition.info[key]
+        step["cost"], step["over"] = transition.info["cost"], endless.terminated
+        joints = np.concatenate(list(map(read_true_joints, env.parts)))
+        walks = [zlib.crc32(row, walk) for row, walk in zip(joints, walks, strict=True)]
         tick(1 / n_steps)
-    return {**sums_of(steps, env.first.config.ctrl_dt), "walk": walks}
+    return {**sum_episodes(steps, env.first.config.ctrl_dt), "walk": walks}
 
 
-def true_joints(part: Simulation) -> Points3:
-    """(B, W, J, 3) where workers truly are."""
+def read_true_joints(part: Simulation) -> Points3:
+    """Return the true joints of all workers (B, W, J, 3) [m]."""
     return worker_truth(part.bodies, generator.current(part.motion)).joints_world
 
 
-def sums_of(steps: NDArray[np.void], dt_s: float) -> Rows:
-    """What episodes came to, a list over episodes each, from steps (T, B) of `STEP`; what happens
-    after the end of an episode does not count."""
+def sum_episodes(steps: NDArray[np.void], dt_s: float) -> Rows:
+    """Return the sums of episodes, as lists over episodes.
+
+    Args:
+        steps: records (T, B) of `STEP`; steps after the end of an episode do not count.
+        dt_s: control step [s].
+    """
     ended = np.logical_or.accumulate(steps["over"], axis=0)
     counts = np.vstack([np.ones((1, steps.shape[1]), bool), ~ended[:-1]])
     n_steps = counts.sum(0)

@@ -1,4 +1,4 @@
-"""Pairs of eyes: an estimator, cameras, how late images are, and what is wrong with all that."""
+"""Perception setups of the price study: estimator, cameras, latency and errors of all these."""
 
 import math
 from collections.abc import Collection
@@ -12,28 +12,34 @@ from hrc_env.scene.rigs import RIGS
 from hrc_env.tracking.estimators import ESTIMATORS
 
 Faults = tuple[FaultConfig, ...]
+"""Faults of one episode."""
 TRUTH, FOUR, ONE = "truth", "particle", "one_camera"
+"""Names of setups: the truth, four cameras with the default estimator, and one camera."""
 
 
 @dataclass(frozen=True, slots=True)
 class Eyes:
-    """How a robot sees, and how sure it says it is."""
+    """The perception of a robot, and the scale of the covariances that its shield receives."""
 
     name: str
-    """As in results.json."""
+    """Name in results.json."""
     words: str
-    """As in tables and figures."""
+    """Description in tables and figures."""
     group: str
-    """What it is a case of: one of `GROUPS`."""
+    """Group in the figure, one of `GROUPS`."""
     setup: PerceptionSetup
+    """Level, estimator, cameras and latency."""
     wrong: tuple[Faults, ...] = ((),)
-    """What goes wrong with cameras beside what the setup says; episodes take turns in these."""
+    """Further faults of cameras; episodes rotate over these."""
     covariance: float = 1.0
-    """The shield is told so many times the estimator's covariances."""
+    """Factor on the covariances that the shield receives."""
 
     def turns(self, scene: str) -> tuple[Turn, ...]:
-        """Cameras and their faults, in which episodes take turns; in other scenes than the setup's
-        own the scene's cameras, of which as many are left."""
+        """Return cameras and their faults, over which episodes rotate.
+
+        Args:
+            scene: name of the scene; its own cameras are used.
+        """
         turns = self.setup.list_turns(RIGS[scene])
         return tuple(
             Turn(turn.cameras, (*turn.faults, *more)) for turn in turns for more in self.wrong
@@ -43,89 +49,95 @@ class Eyes:
 GROUPS = {
     "truth": "true joints", "estimator": "estimators", "cameras": "fewer cameras",
     "latency": "late images", "calibration": "miscalibrated cameras",
-    "covariance": "covariances that are too small or too large", "fault": "faults",
+    "covariance": "scaled covariances", "fault": "faults",
 }  # fmt: skip
-"""By name, in words."""
+"""Labels of groups in the figure."""
 
 
-def _every(
+def _fail_all(
     kind: str, amount: float | None, from_s: float = 0.0, until_s: float = FOREVER_S
 ) -> tuple[Faults, ...]:
     return ((FaultConfig(kind, (ALL,), amount, from_s, until_s),),)
 
 
-def _each(kind: str, amount: float | None = None, from_s: float = 0.0) -> tuple[Faults, ...]:
+def _fail_each(kind: str, amount: float | None = None, from_s: float = 0.0) -> tuple[Faults, ...]:
     return tuple((FaultConfig(kind, (camera.name,), amount, from_s),) for camera in RIGS["lab"])
 
 
-def _late(latency_s: float, told: bool) -> Eyes:
+def _make_late(latency_s: float, is_told: bool) -> Eyes:
     ms = round(1000 * latency_s)
-    says = "known" if told else "not known"
+    known = "known" if is_told else "not known"
     return Eyes(
-        f"late_{ms}ms{'' if told else '_untold'}", f"images {ms} ms late, {says}",
-        "latency", PerceptionSetup(latency_s=latency_s, is_told=told),
+        f"late_{ms}ms{'' if is_told else '_untold'}", f"images {ms} ms late, {known}",
+        "latency", PerceptionSetup(latency_s=latency_s, is_told=is_told),
     )  # fmt: skip
 
 
-def all_eyes() -> dict[str, Eyes]:
-    """By name, with every estimator that is registered now, each with four cameras."""
+def list_eyes() -> dict[str, Eyes]:
+    """Return the setups by name, with every registered estimator for four cameras."""
     four, one, degree = PerceptionSetup(), PerceptionSetup(n_cameras=1), math.radians(1.0)
     estimators = (
         Eyes(each, f"four cameras, {each}", "estimator", PerceptionSetup(estimator=each))
         for each in ESTIMATORS
     )
     wrong = (
-        ("all_turned_1deg", "all cameras turned by 1 degree", _every("wrong_rotation", degree)),
-        ("all_turned_0_3deg", "all turned by .3 degrees", _every("wrong_rotation", 0.3 * degree)),
-        ("all_moved_10cm", "all cameras moved by 10 cm", _every("wrong_translation", 0.1)),
-        ("one_turned_3deg", "one camera turned by 3 degrees", _each("wrong_rotation", 3 * degree)),
-        ("one_knocked", "one camera knocked over after 2 s", _each("knocked", None, 2.0)),
+        ("all_turned_1deg", "all cameras turned by 1 degree", _fail_all("wrong_rotation", degree)),
+        (
+            "all_turned_0_3deg",
+            "all turned by .3 degrees",
+            _fail_all("wrong_rotation", 0.3 * degree),
+        ),
+        ("all_moved_10cm", "all cameras moved by 10 cm", _fail_all("wrong_translation", 0.1)),
+        (
+            "one_turned_3deg",
+            "one camera turned by 3 degrees",
+            _fail_each("wrong_rotation", 3 * degree),
+        ),
+        ("one_knocked", "one camera knocked over after 2 s", _fail_each("knocked", None, 2.0)),
     )
     faults = (
-        ("dropped_60", "60 % of images missing", _every("dropped", 0.6)),
-        ("one_frozen", "one camera frozen after 2 s", _each("frozen", None, 2.0)),
-        ("blind_3s", "all cameras lost from 3 to 6 s", _every("lost", None, 3.0, 6.0)),
+        ("dropped_60", "60 % of images missing", _fail_all("dropped", 0.6)),
+        ("one_frozen", "one camera frozen after 2 s", _fail_each("frozen", None, 2.0)),
+        ("blind_3s", "all cameras lost from 3 to 6 s", _fail_all("lost", None, 3.0, 6.0)),
     )  # fmt: skip
     scaled = (
-        (f"{name}{key}", f"{words}, reports {says} its variance", setup, factor)
+        (f"{name}{key}", f"{words}, covariances times {factor:g}", setup, factor)
         for name, words, setup in (("", "four cameras", four), ("one_camera_", "one camera", one))
-        for key, says, factor in (
-            ("half_covariance", "half", 0.5),
-            ("twice_covariance", "twice", 2),
-        )
+        for key, factor in (("half_covariance", 0.5), ("twice_covariance", 2))
     )
-    found = (
+    setups = (
         Eyes(TRUTH, "true joints", "truth", PerceptionSetup("truth")),
         *estimators,
         Eyes("three_cameras", "three cameras", "cameras", PerceptionSetup(n_cameras=3)),
         Eyes("two_cameras", "two cameras", "cameras", PerceptionSetup(n_cameras=2)),
         Eyes(ONE, "one camera", "cameras", one),
-        *(_late(s, told) for told in (True, False) for s in LATE_S),
+        *(_make_late(s, is_told) for is_told in (True, False) for s in LATE_S),
         *(Eyes(name, words, "calibration", four, each) for name, words, each in wrong),
         *(Eyes(n, words, "covariance", setup, covariance=k) for n, words, setup, k in scaled),
         *(Eyes(name, words, "fault", four, each) for name, words, each in faults),
     )
-    return {eyes.name: eyes for eyes in found}
+    return {eyes.name: eyes for eyes in setups}
 
 
 QUICK = (
     TRUTH, FOUR, "paper_restarts", "triangulation", "three_cameras", "two_cameras", ONE,
     "late_120ms", "late_200ms", "late_200ms_untold", "all_turned_1deg", "half_covariance",
 )  # fmt: skip
-"""Twelve that answer every question; the picture shows these."""
+"""Twelve setups that answer every question; the figure shows these."""
 ELSEWHERE = (TRUTH, FOUR, ONE)
-"""Of every other task."""
+"""Setups of every other task."""
 ON_REQUEST = ("kalman", "paper")
-"""With four cameras `kalman` equals the default; `paper` takes minutes an episode."""
+"""Setups on request only: with four cameras `kalman` equals the default; `paper` takes minutes an
+episode."""
 
 
-def usual_eyes() -> tuple[str, ...]:
-    """The names of those that are compared if nobody asks for others."""
-    return tuple(name for name in all_eyes() if name not in ON_REQUEST)
+def list_default_eyes() -> tuple[str, ...]:
+    """Return the names of the setups that are compared by default."""
+    return tuple(name for name in list_eyes() if name not in ON_REQUEST)
 
 
-def eyes_called(names: Collection[str]) -> list[Eyes]:
-    """Eyes by name, or a `ConfigError`."""
-    known = all_eyes()
-    check_names("eyes", names, known)
+def find_eyes(names: Collection[str]) -> list[Eyes]:
+    """Return setups by name; raise `ConfigError` for an unknown name."""
+    known = list_eyes()
+    check_names("perception setup", names, known)
     return [known[name] for name in names]

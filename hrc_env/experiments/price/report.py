@@ -1,61 +1,70 @@
-"""The report: bars of the work that is left, the margins behind them, questions."""
+"""The report of the price study: bars of remaining throughput, margins and contrasts."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from matplotlib.axes import Axes
 
-from hrc_env.experiments.plots import ends, label, new_figure, save
+from hrc_env.core.results import Metric
+from hrc_env.experiments.plots import compute_error_bars, label_axes, make_figure, save
 from hrc_env.experiments.price import declaration
-from hrc_env.experiments.price.declaration import MORE, an_hour
-from hrc_env.experiments.price.eyes import FOUR, GROUPS, QUICK, Eyes, all_eyes
+from hrc_env.experiments.price.declaration import MORE, count_per_hour
+from hrc_env.experiments.price.eyes import FOUR, GROUPS, QUICK, Eyes, list_eyes
 from hrc_env.experiments.price.metrics import Played, Row
 from hrc_env.experiments.price.shield import SHIELD
-from hrc_env.experiments.report import Metrics, Report, picture
+from hrc_env.experiments.report import Metrics, Report, format_picture
+
+if TYPE_CHECKING:
+    from hrc_env.experiments.price.experiment import Price
 
 COLOURS = {
     "truth": "0.25", "estimator": "#2f6db3", "cameras": "#3a9a8f", "latency": "#d1793b",
     "calibration": "#b23a48", "covariance": "#8a6bb8", "fault": "#8c7a4f",
 }  # fmt: skip
+"""Colours of groups."""
 
 
-def report(figures: Path, config: Any, played: Played, metrics: Metrics) -> Report:
-    """Draw the figure; return the tables beside it.
+def make_report(figures: Path, config: "Price", played: Played, metrics: Metrics) -> Report:
+    """Draw the figure and return the report.
 
     Args:
-        figures: folder.
-        config: of the study.
-        played: of its episodes.
-        metrics: of the study.
+        figures: folder of the figure.
+        config: settings of the study.
+        played: its episodes.
+        metrics: metrics by name.
     """
     task, table = config.task, played.table
-    eyes = [all_eyes()[name] for name in table[task]]
+    eyes = [list_eyes()[name] for name in table[task]]
     draw_price(figures / "price.png", metrics, task, eyes, config.level)
     parts = [
-        picture(figures / "price.png", "Goals that are left at that rate of contacts, in per cent "
-                "of those of a robot without a shield; whiskers are 95 % intervals."),
-        config.prices(MORE).markdown(metrics),
-        declaration.unshielded(task).markdown(metrics),
-        _open_ended(task, table[task], metrics), declaration.WORTH.markdown(metrics),
+        format_picture(figures / "price.png", "Goals that remain at that rate of contacts, in "
+                       "percent of a robot's without a shield; whiskers are 95 % intervals."),
+        config.make_price_table(MORE).to_markdown(metrics),
+        declaration.make_unshielded_table(task).to_markdown(metrics),
+        _describe_open_ends(task, table[task], metrics),
+        declaration.WORTH.to_markdown(metrics),
     ]  # fmt: skip
     if config.others:
-        parts += ["## Other tasks", declaration.elsewhere(config.tasks).markdown(metrics)]
-        parts += [declaration.prices_in(each).markdown(metrics) for each in config.others]
+        tasks_table = declaration.make_tasks_table(config.tasks)
+        parts += ["## Other tasks", tasks_table.to_markdown(metrics)]
+        tables = map(declaration.make_small_price_table, config.others)
+        parts += [table.to_markdown(metrics) for table in tables]
     if played.pixels:
         parts += [
-            f"## The emulator beside images\n\n{config.n_pixels} episodes with the margin of "
-            f"`{FOUR}`; too few for a bar, the same for both.",
-            declaration.IMAGES.markdown(metrics),
+            f"## Emulator and rendered images\n\n{config.n_pixels} episodes with the margin of "
+            f"`{FOUR}`; the same for both, and too few for a bar.",
+            declaration.IMAGES.to_markdown(metrics),
         ]
-    asked = declaration.ASKED.format(
-        level=config.level, hourly=an_hour(config.level), shield=SHIELD, n_seeds=config.n_seeds,
-        n_fresh=config.n_fresh, robot=config.driver.words,
+    question = declaration.QUESTION.format(
+        level=config.level, hourly=count_per_hour(config.level), shield=SHIELD,
+        n_seeds=config.n_seeds, n_fresh=config.n_fresh, robot=config.driver.words,
     )  # fmt: skip
-    return Report(declaration.TITLE, asked, [*filter(None, parts)])
+    return Report(declaration.TITLE, question, [*filter(None, parts)])
 
 
-def _open_ended(task: str, rows: Mapping[str, Row], metrics: Metrics) -> str:
+def _describe_open_ends(task: str, rows: Mapping[str, Row], metrics: Metrics) -> str:
+    """Return a note on setups with a level beyond the margins tried; "" if there are none."""
     margins_m = {name: metrics[f"{task}.{name}.margin_m"].value for name in rows}
     beyond = [f"`{name}`" for name, row in rows.items() if row.ends_at(margins_m[name])]
     if not beyond:
@@ -65,61 +74,62 @@ def _open_ended(task: str, rows: Mapping[str, Row], metrics: Metrics) -> str:
         for name, row in rows.items()
         if row.ends_at(margins_m[name]) and abs(row.margin_m - margins_m[name]) > 1e-6
     ]
-    elsewhere = (
+    note = (
         f" Fresh seeds of {', '.join(unsure)} were played with that margin, where the search "
-        "supposed the level; they contradict it, and are too few to place it."
+        "placed the level; they contradict it, and are too few to place it."
     )
     return (
-        f"The level lies beyond the margins that were tried for {', '.join(beyond)}: theirs is "
-        f"the last one tried, and their price a bound.{elsewhere if unsure else ''}"
+        f"The level lies beyond the margins that were tried for {', '.join(beyond)}: their margin "
+        f"is the last one tried, and their throughput a bound.{note if unsure else ''}"
     )
 
 
 def choose_bars(metrics: Metrics, task: str, eyes: Sequence[Eyes]) -> list[Eyes]:
-    """Return the eyes that the picture shows, the longest bar last; of many only `QUICK`."""
+    """Return the setups of the figure, in increasing order of throughput; of many only `QUICK`."""
     shown = [each for each in eyes if len(eyes) <= len(QUICK) or each.name in QUICK]
     return sorted(shown, key=lambda each: metrics[f"{task}.{each.name}.share"].value)
 
 
 def draw_price(path: Path, metrics: Metrics, task: str, eyes: Sequence[Eyes], level: float) -> None:
-    """Draw a bar for each pair of eyes, the longest above; of many only `QUICK`.
+    """Draw a bar for each perception setup, the longest on top; of many only `QUICK`.
 
     Args:
         path: file of the picture.
-        metrics: of the study.
+        metrics: metrics by name.
         task: id of the environment.
-        eyes: of which the task has metrics.
-        level: contacts in 1,000 episodes of 10 s at which they are compared.
+        eyes: setups that have metrics in the task.
+        level: contacts in 1,000 episodes of 10 s at which setups are compared.
     """
     shown = choose_bars(metrics, task, eyes)
-    figure = new_figure(9.2, 1.6 + 0.42 * len(shown))
+    figure = make_figure(9.2, 1.6 + 0.42 * len(shown))
     axis = figure.subplots()
-    values = [metrics[f"{task}.{each.name}.share"] for each in shown]
+    values = [metrics[f"{task}.{setup.name}.share"] for setup in shown]
     axis.barh(
-        range(len(shown)), [100 * each.value for each in values], xerr=ends(values, 100.0),
-        color=[COLOURS[each.group] for each in shown], height=0.72, ecolor="0.35", capsize=3,
+        range(len(shown)), [100 * value.value for value in values],
+        xerr=compute_error_bars(values, 100.0),
+        color=[COLOURS[setup.group] for setup in shown], height=0.72, ecolor="0.35", capsize=3,
     )  # fmt: skip
-    _say(axis, shown, values)
-    used = [name for name in GROUPS if name in {each.group for each in shown}]
+    _label_bars(axis, shown, values)
+    used = [name for name in GROUPS if name in {setup.group for setup in shown}]
     bars: list[Any] = [axis.barh(0, 0, color=COLOURS[name]) for name in used]
     words = [GROUPS[name] for name in used]
     figure.legend(bars, words, loc="outside lower center", ncols=2, fontsize=10)
     figure.suptitle(
-        f"Work retained at {an_hour(level):.1f} collisions with people per hour\n"
-        "emulated detections, one body, one shield with the margin adjusted", fontsize=13,
+        f"Throughput at {count_per_hour(level):.1f} contacts towards the worker per hour\n"
+        "emulated detections, one body, margin of one shield", fontsize=13,
     )  # fmt: skip
     save(figure, path)
 
 
-def _say(axis: Axes, shown: Sequence[Eyes], values: Sequence[Any]) -> None:
-    """Words at bars, numbers in them, and what they are per cent of."""
-    axis.set_yticks(range(len(shown)), [each.words for each in shown], fontsize=12)
+def _label_bars(axis: Axes, shown: Sequence[Eyes], values: Sequence[Metric]) -> None:
+    """Write the names of setups beside their bars, and numbers into them."""
+    axis.set_yticks(range(len(shown)), [setup.words for setup in shown], fontsize=12)
     for y, value in enumerate(values):
         if value.value == value.value:
             axis.text(1.2, y, f"{100 * value.value:.0f} %", va="center", color="white",
                       fontsize=12, fontweight="bold")  # fmt: skip
-    label(axis, "work retained [% of a robot without a shield]", grid="x")
-    axis.set_xlim(0, max([100.0, *(100 * each.high for each in values)]))
+    label_axes(axis, "throughput in % of a robot without a shield", grid="x")
+    axis.set_xlim(0, max([100.0, *(100 * value.high for value in values)]))
     for side in ("top", "right", "left"):
         axis.spines[side].set_visible(False)
     axis.tick_params(axis="y", length=0)

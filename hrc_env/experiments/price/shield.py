@@ -1,4 +1,4 @@
-"""A shield whose protective distances can all be made wider or narrower by the same margin."""
+"""A shield with one margin that increases or reduces all of its protective distances."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -8,23 +8,27 @@ from hrc_env.core.typing import Floats, JointVelocities
 from hrc_env.safety.shield import SHIELDS
 
 SHIELD = "qp"
-"""The one whose margin is sought, by its name."""
+"""Name of the shield that gets the margin."""
 
 
 @dataclass(slots=True)
 class Widened:
-    """`SHIELD` for a robot that is thicker by a margin, which may be negative: so much more is
-    kept between any of its capsules and any body. It is told `covariance` times the estimator's
-    covariances; nobody else is."""
+    """`SHIELD` for a robot with capsules that are thicker by a margin, which may be negative.
+
+    The distance between any of its capsules and any body grows by the margin. The shield receives
+    the estimator's covariances times `covariance`.
+    """
 
     covariance: float = 1.0
+    """Factor on the covariances."""
     margin_m: float = 0.0
-    """Whoever plays changes it between episodes."""
+    """Margin [m], which may be changed between episodes."""
 
     def __call__(
-        self, now: Belief, wanted: JointVelocities, dt_s: float
+        self, belief: Belief, wanted: JointVelocities, dt_s: float
     ) -> tuple[JointVelocities, Mapping[str, Floats]]:
-        """What the shield makes of a command (`hrc_env.safety.shield.Shield`)."""
-        thicker = replace(now.robot, capsule_radius_m=now.robot.capsule_radius_m + self.margin_m)
-        told = replace(now.estimate, cov_world=self.covariance * now.estimate.cov_world)
-        return SHIELDS[SHIELD](replace(now, robot=thicker, estimate=told), wanted, dt_s)
+        """Return the shielded command and infos (`hrc_env.safety.shield.Shield`)."""
+        robot, estimate = belief.robot, belief.estimate
+        robot = replace(robot, capsule_radius_m=robot.capsule_radius_m + self.margin_m)
+        estimate = replace(estimate, cov_world=self.covariance * estimate.cov_world)
+        return SHIELDS[SHIELD](replace(belief, robot=robot, estimate=estimate), wanted, dt_s)

@@ -1,10 +1,10 @@
-"""The walk: from workplace to workplace all over the site, behind and past what stands there."""
+"""The walk of the site study: from workplace to workplace, behind and past obstacles."""
 
 import numpy as np
 
 from hrc_env.core.batching import rows
 from hrc_env.core.records import WorkerMotion
-from hrc_env.experiments.recording import concatenated
+from hrc_env.experiments.recording import concatenate
 from hrc_env.motion import generator
 from hrc_env.motion.config import MotionConfig
 from hrc_env.motion.schedule import Job
@@ -20,11 +20,14 @@ PASSING = MotionConfig(
     jobs=tuple(Job(f"pass the {kind}", "stand", kind, (), 1.0) for kind in WORKPLACE_KINDS),
     people=generator.PEOPLE["unaware"],
 )
-"""Workers who go on as soon as they have come anywhere; judgement: the paper says "walked"."""
+"""Motion of workers who leave a workplace as soon as they reach it.
+
+This is a judgement: the paper only writes "walked".
+"""
 
 
 def walk(scene: Scene, seed: int, n_frames: int, dt_s: float) -> WorkerMotion:
-    """(T, 1, S, ...) a worker's walk, `dt_s` apart."""
+    """Return a worker's walk (T, 1, S, ...) in steps of `dt_s`."""
     state = generator.make_state(1, 1, load_body(scene.bodies[0]), PASSING, scene.grounds)
     rngs = [np.random.default_rng(seed)]
     generator.reset(state, np.arange(1), rngs)
@@ -32,4 +35,4 @@ def walk(scene: Scene, seed: int, n_frames: int, dt_s: float) -> WorkerMotion:
     for _ in range(n_frames):
         generator.advance(state, rngs, dt_s, 1)
         frames.append(rows(generator.current(state), np.arange(1)))
-    return concatenated(frames)
+    return concatenate(frames)

@@ -1,1 +1,1 @@
-"""The questions: about rigs, about what goes wrong with cameras, about estimators."""
+"""The questions of the ablations: rigs, faults of cameras, and estimators."""

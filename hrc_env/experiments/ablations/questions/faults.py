@@ -1,28 +1,30 @@
-"""Images that come late, and cameras that hang, look or zoom otherwise than the tracker is told."""
+"""Ablations of late images and of miscalibrated cameras."""
 
 import math
+from typing import NamedTuple
 
 from hrc_env.experiments.ablations.ablation import Ablation, Setting
-from hrc_env.experiments.rigs import Turn, late
+from hrc_env.experiments.rigs import Turn, delay
 from hrc_env.perception.faults.fault import ALL as EVERY
 from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.scene.rigs import RIGS
 
 LATE_MS = (40, 80, 120, 200, 320)
-"""Multiples of the control step, at which images come: 300 ms would be 320 [ms]."""
+"""Latencies that are multiples of the control step, in which images come (320 instead of 300)
+[ms]."""
 LATENCY = Ablation(
     "latency",
     "How late may images be?",
-    "All four cameras of the laboratory give every image so much later. Told: an image says when "
-    "it was taken, is used at that time, and the filter predicts from there. Not told: it claims "
-    "to be new.",
+    "All four cameras of the laboratory deliver every image late by the same time. Time-stamped: "
+    "an image carries its time, is used at that time, and the filter predicts from there. Not "
+    "time-stamped: it appears to be current.",
     (
         Setting("on_time", "on time"),
         *(
             Setting(
                 f"{'told' if told else 'untold'}_{ms}ms",
-                f"{ms} ms late, {'told' if told else 'not told'}",
-                turns=(late(Turn(RIGS["lab"] if told else ()), ms / 1000, told),),
+                f"{ms} ms late, {'' if told else 'not '}time-stamped",
+                turns=(delay(Turn(RIGS["lab"] if told else ()), ms / 1000, told),),
             )
             for told in (True, False)
             for ms in LATE_MS
@@ -31,43 +33,64 @@ LATENCY = Ablation(
     against=("on_time",),
 )
 
+
+class Miscalibration(NamedTuple):
+    """A kind of calibration error, and its amounts."""
+
+    words: str
+    """Description in tables."""
+    unit: str
+    """Unit of amounts in tables."""
+    short: str
+    """Unit of amounts in names."""
+    scale: float
+    """Amount of the fault for one such unit."""
+    amounts: tuple[float, ...]
+    """Amounts, in that unit."""
+
+
 KINDS = {
-    "rotation": ("rotation", "deg", "deg", math.radians(1), (0.1, 0.3, 1.0, 3.0)),
-    "translation": ("translation", "cm", "cm", 0.01, (1.0, 3.0, 10.0, 20.0)),
-    "focal": ("focal length", "%", "pct", 0.01, (0.5, 1.0, 2.0, 5.0)),
+    "rotation": Miscalibration("rotation", "deg", "deg", math.radians(1), (0.1, 0.3, 1.0, 3.0)),
+    "translation": Miscalibration("translation", "cm", "cm", 0.01, (1.0, 3.0, 10.0, 20.0)),
+    "focal": Miscalibration("focal length", "%", "pct", 0.01, (0.5, 1.0, 2.0, 5.0)),
 }
-"""By kind of fault: words, unit, unit in names, a unit in the fault's amount, amounts."""
-WHOSE = {"one": "one camera", "all": "all cameras"}
+"""Kinds of calibration errors by the name of their fault."""
+AFFECTED = {"one": "one camera", "all": "all cameras"}
+"""Labels of the affected cameras."""
 
 
-def _wrong(which: str, kind: str, amount: float, scene: str = "lab") -> Setting:
-    """One camera in turns, or all of them, off by so much."""
-    words, unit, short, scale, _ = KINDS[kind]
-    names = [(camera.name,) for camera in RIGS[scene]] if which == "one" else [(EVERY,)]
-    faults = [FaultConfig(f"wrong_{kind}", each, amount * scale) for each in names]
-    name = f"{which}_{kind}_{f'{amount:g}'.replace('.', '_')}{short}"
-    words = f"{WHOSE[which]}: {words} by {amount:g} {unit}"
+def _miscalibrate(affected: str, name: str, amount: float, scene: str = "lab") -> Setting:
+    """Return a setting in which one camera, in turns, or all of them have a calibration error."""
+    kind = KINDS[name]
+    names = [(camera.name,) for camera in RIGS[scene]] if affected == "one" else [(EVERY,)]
+    faults = [FaultConfig(f"wrong_{name}", cameras, amount * kind.scale) for cameras in names]
+    label = f"{affected}_{name}_{f'{amount:g}'.replace('.', '_')}{kind.short}"
+    words = f"{AFFECTED[affected]}: {kind.words} by {amount:g} {kind.unit}"
     if scene != "lab":
-        name, words = f"{scene}_{name}", f"{scene}, {words}"
-    return Setting(name, words, scene, turns=tuple(Turn(faults=(fault,)) for fault in faults))
+        label, words = f"{scene}_{label}", f"{scene}, {words}"
+    return Setting(label, words, scene, turns=tuple(Turn(faults=(fault,)) for fault in faults))
 
 
 CALIBRATION = Ablation(
     "calibration",
     "How well must cameras be calibrated?",
-    "Cameras look, hang or zoom otherwise than the tracker is told, in a direction that is drawn "
-    "for every episode (a focal length is always too long); one of the four, in turns, or each of "
-    "them by as much.",
+    "The true pose or focal length of cameras differs from their calibration, in a direction that "
+    "is drawn for every episode (a focal length is always too long): for one of the four, in "
+    "turns, or for each of them by the same amount.",
     (
-        Setting("as_told", "as told"),
+        Setting("as_told", "as calibrated"),
         *(
-            _wrong(which, kind, amount)
-            for kind, (*_, amounts) in KINDS.items()
-            for which in WHOSE
-            for amount in amounts
+            _miscalibrate(affected, name, amount)
+            for name, kind in KINDS.items()
+            for affected in AFFECTED
+            for amount in kind.amounts
         ),
-        Setting("site_as_told", "site, as told", "site"),
-        *(_wrong(which, "rotation", amount, "site") for which in WHOSE for amount in (0.3, 1)),
+        Setting("site_as_told", "site, as calibrated", "site"),
+        *(
+            _miscalibrate(affected, "rotation", amount, "site")
+            for affected in AFFECTED
+            for amount in (0.3, 1)
+        ),
     ),
     against=("as_told", "site_as_told"),
 )

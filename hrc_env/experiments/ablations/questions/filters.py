@@ -1,15 +1,15 @@
-"""Algorithm 1, what each part of the default filter contributes, what bodies are worth."""
+"""Ablations of Algorithm 1, of the parts of the default filter, and of its model of the body."""
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from hrc_env.experiments.ablations.ablation import Ablation, Setting
 from hrc_env.experiments.ablations.questions.rigs import PAIRS
-from hrc_env.experiments.rigs import ALL, SINGLE, Rig, left_of
+from hrc_env.experiments.rigs import ALL, SINGLE, Rig, make_turns
 from hrc_env.tracking.config import PaperConfig, ParticleConfig
 
 
-def _paper(name: str, n: int, m: int, sigma_cm: float = 5) -> Setting:
+def _make_paper(name: str, n: int, m: int, sigma_cm: float = 5) -> Setting:
     tracker = PaperConfig(n_iterations=n, n_particles=m, sigma_m=sigma_cm / 100)
     words = f"N = {n}, M = {m:,}, noise {sigma_cm:g} cm"
     return Setting(name, words, estimator="paper", tracker=tracker)
@@ -19,104 +19,136 @@ ALGORITHM_1 = Ablation(
     "algorithm1",
     "N and M of Algorithm 1",
     "The paper gives neither its number of particles M nor of passes N nor the noise of line 7. "
-    "Four cameras in the corners of the laboratory; one joint has M particles.",
+    "Four cameras are in the corners of the laboratory; each joint has M particles.",
     (
-        *(_paper(f"n1_m{m}", 1, m) for m in (30, 100, 300, 1000, 3000, 10_000)),
-        *(_paper(f"n{n}_m1000", n, 1000) for n in (2, 5, 10)),
-        *(_paper(f"sigma_{cm}cm", 1, 1000, cm) for cm in (1, 2, 10)),
+        *(_make_paper(f"n1_m{m}", 1, m) for m in (30, 100, 300, 1000, 3000, 10_000)),
+        *(_make_paper(f"n{n}_m1000", n, 1000) for n in (2, 5, 10)),
+        *(_make_paper(f"sigma_{cm}cm", 1, 1000, cm) for cm in (1, 2, 10)),
         Setting("particle", "the default filter"),
     ),
     against=("particle",),
 )
 
-WITHOUT: dict[str, tuple[str, dict[str, Any]]] = {
-    "all": ("the default filter", {}),
-    "velocity forgotten": ("no motion model (velocity forgotten)", {"motion": "forgotten"}),
-    "bones of any length": ("no bones (any length)", {"bones": "none"}),
-    "no outliers": ("no outliers in the likelihood", {"outlier_weight": 1e-9}),
-    "no swaps": ("no exchanged sides", {"swap_begins": 1e-30, "swap_ends": 1.0 - 1e-16}),
-    "noise as told": ("no learnt noise (as the detector reports)", {"noise_bounds": (1.0, 1.0)}),
-    "mode for mean": ("no step from the mode to the mean", {"mean_correction": 0.0}),
-    "no widening": ("no wider report for one view", {"one_view_inflation": 1.0}),
-    "no floor": ("no floor", {"floor_std_m": math.inf}),
-    "stiff bones": ("stiff bones (no more give than a person's)", {"bone_give": 1.0}),
-    "kalman": ("no mixture (kalman)", {"estimator": "kalman"}),
-    "one hypothesis": ("no mixture (one hypothesis)", {"n_hypotheses": 1}),
-    "no turned body": ("no turned body", {"mirrored_parts": ("limbs",)}),
-    "no limbs": ("no limbs", {"mirrored_parts": ("body",)}),
-    "no anatomy": ("no anatomy", {"anatomy_trust": 0.0}),
-    "no walking direction": ("no walking direction", {"walking_odds": 0.0}),
-    "evidence in full": ("evidence in full", {"evidence_trust": 1.0}),
-    "4 hypotheses": ("4 hypotheses", {"n_hypotheses": 4}),
-    "16 hypotheses": ("16 hypotheses", {"n_hypotheses": 16}),
-    "paper": ("paper: Algorithm 1 as printed", {"estimator": "paper"}),
-    "paper restarts": ("paper_restarts: with restarts", {"estimator": "paper_restarts"}),
-    "ransac": ("ransac: no motion, no body", {"estimator": "ransac"}),
+
+class Variant(NamedTuple):
+    """A variant of the default filter, or another estimator."""
+
+    words: str
+    """Description in tables."""
+    changes: dict[str, Any]
+    """Changed fields of `Setting` or of the tracker's settings."""
+
+
+WITHOUT = {
+    "all": Variant("the default filter", {}),
+    "velocity forgotten": Variant("no motion model (velocity forgotten)", {"motion": "forgotten"}),
+    "bones of any length": Variant("no bones (any length)", {"bones": "none"}),
+    "no outliers": Variant("no outliers in the likelihood", {"outlier_weight": 1e-9}),
+    "no swaps": Variant("no exchanged sides", {"swap_begins": 1e-30, "swap_ends": 1.0 - 1e-16}),
+    "noise as told": Variant("no learnt noise (the detector's)", {"noise_bounds": (1.0, 1.0)}),
+    "mode for mean": Variant("no step from the mode to the mean", {"mean_correction": 0.0}),
+    "no widening": Variant("no wider covariance for one view", {"one_view_inflation": 1.0}),
+    "no floor": Variant("no floor", {"floor_std_m": math.inf}),
+    "stiff bones": Variant("stiff bones (no more variation than in people)", {"bone_give": 1.0}),
+    "kalman": Variant("no mixture (kalman)", {"estimator": "kalman"}),
+    "one hypothesis": Variant("no mixture (one hypothesis)", {"n_hypotheses": 1}),
+    "no turned body": Variant("no turned body", {"mirrored_parts": ("limbs",)}),
+    "no limbs": Variant("no limbs", {"mirrored_parts": ("body",)}),
+    "no anatomy": Variant("no anatomy", {"anatomy_trust": 0.0}),
+    "no walking direction": Variant("no walking direction", {"walking_odds": 0.0}),
+    "evidence in full": Variant("evidence in full", {"evidence_trust": 1.0}),
+    "4 hypotheses": Variant("4 hypotheses", {"n_hypotheses": 4}),
+    "16 hypotheses": Variant("16 hypotheses", {"n_hypotheses": 16}),
+    "paper": Variant("paper: Algorithm 1 as printed", {"estimator": "paper"}),
+    "paper restarts": Variant("paper_restarts: with restarts", {"estimator": "paper_restarts"}),
+    "ransac": Variant("ransac: no motion, no body", {"estimator": "ransac"}),
 }
-"""The default filter without one of its parts, and rivals: words, and what takes the part away,
-fields of `Setting` or of the tracker's settings."""
+"""The default filter without one of its parts, and other estimators, by name."""
 OF_ONE_VIEW = (
     "no widening", "one hypothesis", "no turned body", "no limbs", "no anatomy",
     "no walking direction", "evidence in full", "4 hypotheses", "16 hypotheses",
 )  # fmt: skip
-"""Parts that do nothing while several cameras look."""
-CAMERAS: dict[str, tuple[str, tuple[Rig, ...]]] = {
-    "4cam": ("four cameras", (ALL,)),
-    "2cam": ("two cameras", PAIRS),
-    "1cam": ("one camera", SINGLE),
+"""Variants that differ from the default with one camera only."""
+
+
+class CameraChoice(NamedTuple):
+    """A number of cameras, and the rigs over which episodes rotate."""
+
+    words: str
+    """Description in tables."""
+    rigs: tuple[Rig, ...]
+    """Cameras that work after the warm-up."""
+
+
+CAMERAS = {
+    "4cam": CameraChoice("four cameras", (ALL,)),
+    "2cam": CameraChoice("two cameras", PAIRS),
+    "1cam": CameraChoice("one camera", SINGLE),
 }
+"""Choices of cameras by name."""
 
 
-def _part(cameras: str, name: str) -> Setting:
-    """The default filter without a part, or a rival."""
-    (spoken, rigs), (words, changes) = CAMERAS[cameras], WITHOUT[name]
-    of_setting = {key: value for key, value in changes.items() if key in Setting.__slots__}
-    of_tracker = {key: value for key, value in changes.items() if key not in of_setting}
+def _make_variant(cameras: str, name: str) -> Setting:
+    """Return the setting of a variant of the filter with a choice of cameras."""
+    choice, variant = CAMERAS[cameras], WITHOUT[name]
+    of_setting = {k: value for k, value in variant.changes.items() if k in Setting.__slots__}
+    of_tracker = {k: value for k, value in variant.changes.items() if k not in of_setting}
     return Setting(
         f"{cameras}_{name.replace(' ', '_')}",
-        f"{spoken}: {words}",
+        f"{choice.words}: {variant.words}",
         tracker=ParticleConfig(**of_tracker),
-        turns=left_of("lab", rigs),
+        turns=make_turns("lab", choice.rigs),
         **of_setting,
     )
 
 
 FILTER = Ablation(
     "filter",
-    "What each part of the default filter contributes",
-    "The default filter without one of its parts, and rivals that have fewer, on the same "
-    "detections: with all four cameras of the laboratory, and with one that is left after the "
+    "Contribution of each part of the default filter",
+    "The default filter without one of its parts, and other estimators that have fewer, on the "
+    "same detections: with all four cameras of the laboratory, and with one that remains after the "
     "warm-up.",
     (
-        *(_part("4cam", name) for name in WITHOUT if name not in OF_ONE_VIEW),
-        *(_part("1cam", name) for name in WITHOUT),
+        *(_make_variant("4cam", name) for name in WITHOUT if name not in OF_ONE_VIEW),
+        *(_make_variant("1cam", name) for name in WITHOUT),
     ),
     against=("4cam_all", "1cam_all"),
 )
 
+
+class BodyKnowledge(NamedTuple):
+    """An estimator, and its knowledge of bone lengths."""
+
+    words: str
+    """Description in tables."""
+    estimator: str
+    bones: str
+    """One of `handicaps.BONES`."""
+
+
 KNOWING = {
-    "learnt": ("bone lengths learnt (the default)", "particle", "learnt"),
-    "known": ("bone lengths known", "particle", "known"),
-    "none": ("bones of any length", "particle", "none"),
-    "points": ("points without a body (ransac)", "ransac", "learnt"),
+    "learnt": BodyKnowledge("bone lengths learnt (the default)", "particle", "learnt"),
+    "known": BodyKnowledge("bone lengths known", "particle", "known"),
+    "none": BodyKnowledge("bones of any length", "particle", "none"),
+    "points": BodyKnowledge("points without a body (ransac)", "ransac", "learnt"),
 }
-"""What is known of the body: words, estimator and bones."""
+"""Kinds of knowledge by name."""
 KINEMATICS = Ablation(
     "kinematics",
-    "What it is worth to know the body",
-    "The default filter with the worker's true bone lengths, with lengths that it learns, and "
-    "with none expected (the motion model alone holds joints together); beside an estimator "
+    "Effect of a model of the body",
+    "The default filter with the worker's true bone lengths, with lengths that it learns, and with "
+    "no expectation of lengths (the motion model alone holds joints together); and an estimator "
     "without a body. All four cameras of the laboratory, two or one of them after the warm-up.",
     tuple(
         Setting(
             f"{cameras}_{name}",
-            f"{spoken}: {words}",
-            estimator=estimator,
-            bones=bones,
-            turns=left_of("lab", rigs),
+            f"{choice.words}: {knowledge.words}",
+            estimator=knowledge.estimator,
+            bones=knowledge.bones,
+            turns=make_turns("lab", choice.rigs),
         )
-        for cameras, (spoken, rigs) in CAMERAS.items()
-        for name, (words, estimator, bones) in KNOWING.items()
+        for cameras, choice in CAMERAS.items()
+        for name, knowledge in KNOWING.items()
     ),
     against=tuple(f"{cameras}_learnt" for cameras in CAMERAS),
 )
