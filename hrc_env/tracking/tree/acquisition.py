@@ -248,7 +248,7 @@ def agree_on_sides(frame: Frame, settings: Settings) -> None:
     gain = np.zeros((n_cameras, n_cameras))
     for a in range(n_cameras):
         for b in range(a):
-            gain[a, b] = gain[b, a] = _mirroring_gain(frame, a, b)
+            gain[a, b] = gain[b, a] = _measure_mirroring_gain(frame, a, b)
     other = _find_camp(gain)
     n_other = other.sum()
     if n_other == 0:
@@ -295,7 +295,7 @@ def _find_camp(gain: Floats) -> Bools:
 
 
 @kernel(makes_arrays=True)
-def _mirroring_gain(frame: Frame, a: int, b: int) -> float:
+def _measure_mirroring_gain(frame: Frame, a: int, b: int) -> float:
     """Return the decrease [nat] of the misfit of cameras a and b if one of them is mirrored."""
     direct, exchanged = _measure_misfit(frame, a, b, False), _measure_misfit(frame, a, b, True)
     is_fitting = min(direct.total, exchanged.total) < _FITS * _MOST * direct.n_joints

@@ -128,7 +128,7 @@ def multiply_transposed(a: Floats, b: Floats, out: Floats) -> None:
 
 
 @kernel(fastmath=_REORDER, forceinline=True)
-def inverse_of(a00: float, a10: float, a11: float, a20: float, a21: float, a22: float) -> Inverse3:
+def invert_half(a00: float, a10: float, a11: float, a20: float, a21: float, a22: float) -> Inverse3:
     """Return the inverse of a symmetric 3x3 matrix by its L D L' factors.
 
     Unlike cofactors it loses no digits where a matrix is nearly singular.
@@ -154,7 +154,7 @@ def inverse_of(a00: float, a10: float, a11: float, a20: float, a21: float, a22: 
 @kernel(fastmath=_REORDER, forceinline=True)
 def invert3(a: Floats, out: Floats) -> None:
     """Write the inverse of a symmetric 3x3 matrix, of which the lower triangle is read."""
-    half = inverse_of(a[0, 0], a[1, 0], a[1, 1], a[2, 0], a[2, 1], a[2, 2])
+    half = invert_half(a[0, 0], a[1, 0], a[1, 1], a[2, 0], a[2, 1], a[2, 2])
     out[0, 0], out[1, 1], out[2, 2] = half.a00, half.a11, half.a22
     out[1, 0] = out[0, 1] = half.a10
     out[2, 0] = out[0, 2] = half.a20
@@ -162,7 +162,7 @@ def invert3(a: Floats, out: Floats) -> None:
 
 
 @kernel(fastmath=_REORDER, forceinline=True)
-def _times(half: Inverse3, x: float, y: float, z: float) -> Vector3:
+def _apply(half: Inverse3, x: float, y: float, z: float) -> Vector3:
     """Return the product of an inverse with the vector (x, y, z)."""
     return Vector3(
         half.a00 * x + half.a10 * y + half.a20 * z,
@@ -174,11 +174,11 @@ def _times(half: Inverse3, x: float, y: float, z: float) -> Vector3:
 @kernel(fastmath=_REORDER, forceinline=True)
 def _factor(a: Floats) -> Blocks:
     """Return the factors of a symmetric 6x6 matrix, of which the lower triangle is read."""
-    upper = inverse_of(a[0, 0], a[1, 0], a[1, 1], a[2, 0], a[2, 1], a[2, 2])
-    x = _times(upper, a[3, 0], a[3, 1], a[3, 2])
-    y = _times(upper, a[4, 0], a[4, 1], a[4, 2])
-    z = _times(upper, a[5, 0], a[5, 1], a[5, 2])
-    lower = inverse_of(
+    upper = invert_half(a[0, 0], a[1, 0], a[1, 1], a[2, 0], a[2, 1], a[2, 2])
+    x = _apply(upper, a[3, 0], a[3, 1], a[3, 2])
+    y = _apply(upper, a[4, 0], a[4, 1], a[4, 2])
+    z = _apply(upper, a[5, 0], a[5, 1], a[5, 2])
+    lower = invert_half(
         a[3, 3] - (x.x * a[3, 0] + x.y * a[3, 1] + x.z * a[3, 2]),
         a[4, 3] - (y.x * a[3, 0] + y.y * a[3, 1] + y.z * a[3, 2]),
         a[4, 4] - (y.x * a[4, 0] + y.y * a[4, 1] + y.z * a[4, 2]),
@@ -202,7 +202,7 @@ def invert(a: Floats, out: Floats) -> bool:
     blocks = _factor(a)
     p, x, y, z, v = blocks.upper, blocks.x, blocks.y, blocks.z, blocks.lower
     for k in range(3):
-        f, g, h = _times(v, x[k], y[k], z[k])
+        f, g, h = _apply(v, x[k], y[k], z[k])
         out[3, k], out[4, k], out[5, k] = -f, -g, -h
         out[k, 3], out[k, 4], out[k, 5] = -f, -g, -h
         for i in range(3):

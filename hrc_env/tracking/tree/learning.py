@@ -121,7 +121,7 @@ def learn_from_frame(
         else:
             _add_residuals(view, spread, noise[j], model)
         if n_views > 0:
-            weight = min(_prediction_weight(tree.cov[j], work.predicted[j], spread), 1.0)
+            weight = min(_find_prediction_weight(tree.cov[j], work.predicted[j], spread), 1.0)
             lasting = weight * model.correlation
             persistence[j] = (1.0 + lasting) / (1.0 - lasting)
     _set_factors(noise, persistence, model)
@@ -239,7 +239,7 @@ def _add_residuals(view: Floats, spread: Floats, noise: Records1[Noise], model: 
 
 
 @kernel(fastmath=_REORDER)
-def _prediction_weight(cov: Floats, predicted: Floats, work: Floats) -> float:
+def _find_prediction_weight(cov: Floats, predicted: Floats, work: Floats) -> float:
     """Return the weight of the prediction in a position, tr(cov predicted^-1) / 3.
 
     Args:

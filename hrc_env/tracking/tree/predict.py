@@ -134,13 +134,13 @@ def predict_tree(tree: Tree, model: MotionModel, dt: float, work: Work) -> None:
 
 
 @kernel
-def torso_mean(body: Floats, i: int) -> float:
+def measure_torso(body: Floats, i: int) -> float:
     """Return component i of the mean of the torso's four joints, of a body (J, 3+)."""
     return 0.25 * (body[_LEFT, i] + body[_RIGHT, i] + body[_LEFT_HIP, i] + body[_RIGHT_HIP, i])
 
 
 @kernel
-def trunk_vector(body: Floats, i: int) -> float:
+def measure_trunk(body: Floats, i: int) -> float:
     """Return component i of twice the vector from the middle of the hips to the shoulders'."""
     return body[_LEFT, i] + body[_RIGHT, i] - body[_LEFT_HIP, i] - body[_RIGHT_HIP, i]
 
@@ -150,18 +150,18 @@ def _move_means(tree: Tree, model: MotionModel, dt: float, work: Work) -> None:
     """Move the means of all joints with the torso and towards their places on the body."""
     body, offset, axes, place = tree.body, tree.offset, work.axes, work.place
     root = TorsoState(
-        torso_mean(body, 0),
-        torso_mean(body, 1),
-        torso_mean(body, 2),
-        torso_mean(body, 3),
-        torso_mean(body, 4),
-        torso_mean(body, 5),
+        measure_torso(body, 0),
+        measure_torso(body, 1),
+        measure_torso(body, 2),
+        measure_torso(body, 3),
+        measure_torso(body, 4),
+        measure_torso(body, 5),
     )
     is_known = set_axes(body, root, offset, axes)
     if is_known:
         _learn_offsets(tree, root, axes, dt)
     for j in range(len(body)):
-        joint, F, travel, joint_axes = body[j], model.F[j], model.travel[j], axes[axes_of(j)]
+        joint, F, travel, joint_axes = body[j], model.F[j], model.travel[j], axes[choose_axes(j)]
         for i in range(3):
             place[i] = 0.0
             for k in range(3):
@@ -267,7 +267,7 @@ def _add_noise(noise: Floats, out: Floats) -> None:
 @kernel
 def measure_lean(body: Floats) -> Lean:
     """Return how far the trunk of a body (J, 3+) lies."""
-    x, y, z = trunk_vector(body, 0), trunk_vector(body, 1), trunk_vector(body, 2)
+    x, y, z = measure_trunk(body, 0), measure_trunk(body, 1), measure_trunk(body, 2)
     length = math.sqrt(x * x + y * y + z * z) + 1e-9
     cosine = z / length
     share = (cosine - _UPRIGHT_COSINE) / (_LYING_COSINE - _UPRIGHT_COSINE)
@@ -275,7 +275,7 @@ def measure_lean(body: Floats) -> Lean:
 
 
 @kernel
-def axes_of(j: int) -> int:
+def choose_axes(j: int) -> int:
     """Return the index of the axes that joint j follows: 0 for the trunk's, 1 for the legs'."""
     return 1 if j >= _KNEE else 0
 
@@ -398,7 +398,7 @@ def _learn_offsets(tree: Tree, root: TorsoState, axes: Floats, dt: float) -> Non
             continue
         offset_count[j] += 1.0
         trust = max(1.0 / offset_count[j], dt / _OFFSET_TAU_S)
-        joint_axes = axes[axes_of(j)]
+        joint_axes = axes[choose_axes(j)]
         for k in range(3):
             there = 0.0
             for i in range(3):

@@ -14,7 +14,7 @@ from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
 from hrc_env.tracking.settings import Settings
 from hrc_env.tracking.tracks import EstimateArrays, bound
-from hrc_env.tracking.tree.predict import measure_lean, torso_mean, trunk_vector
+from hrc_env.tracking.tree.predict import measure_lean, measure_torso, measure_trunk
 from hrc_env.tracking.tree.state import Hypotheses, Pace, Tree, WorkerHypotheses
 
 _FORGOTTEN_UPDATES = 8
@@ -116,8 +116,8 @@ def measure_pace(worker: WorkerHypotheses) -> None:
 @kernel
 def update_pace(pace: Pace, body: Floats, dt: float) -> None:
     """Take the present body (J, 6), `dt` [s] after the last one, into the means."""
-    ax, ay = _across(body, 0), _across(body, 1)
-    ux, uy, uz = trunk_vector(body, 0), trunk_vector(body, 1), trunk_vector(body, 2)
+    ax, ay = _measure_width(body, 0), _measure_width(body, 1)
+    ux, uy, uz = measure_trunk(body, 0), measure_trunk(body, 1), measure_trunk(body, 2)
     flat, length = math.hypot(ax, ay) + 1e-9, math.sqrt(ux * ux + uy * uy + uz * uz) + 1e-9
     ax, ay, ux, uy, uz = ax / flat, ay / flat, ux / length, uy / length, uz / length
     if pace.is_known and dt > 0.0:
@@ -125,7 +125,7 @@ def update_pace(pace: Pace, body: Floats, dt: float) -> None:
         turn = abs(math.atan2(sine, pace.across[0] * ax + pace.across[1] * ay))
         cosine = pace.up[0] * ux + pace.up[1] * uy + pace.up[2] * uz
         tip = math.acos(min(max(cosine, -1.0), 1.0))
-        vx, vy, vz = torso_mean(body, 3), torso_mean(body, 4), torso_mean(body, 5)
+        vx, vy, vz = measure_torso(body, 3), measure_torso(body, 4), measure_torso(body, 5)
         keep = math.exp(-dt / _TAU_S)
         pace.turn_rad_s = _fade(pace.turn_rad_s, turn / dt, keep)
         pace.tip_rad_s = _fade(pace.tip_rad_s, tip / dt, keep)
@@ -159,6 +159,6 @@ def _fade(mean: float, rate: float, keep: float) -> float:
 
 
 @kernel
-def _across(body: Floats, i: int) -> float:
+def _measure_width(body: Floats, i: int) -> float:
     """Return component i of twice the vector from right to left, across shoulders and hips."""
     return body[1, i] + body[7, i] - body[2, i] - body[8, i]

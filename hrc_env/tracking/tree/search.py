@@ -98,29 +98,27 @@ def _set_position_prior(j: int, cov: Floats, work: Work) -> None:
     if q < 0:
         invert3(cov[j], precision)
         return
-    edge, follow = work.edge[j], work.position_slope[j]
-    pull, back = work.position_coupling[j], work.position_back[j]
+    edge, slope = work.edge[j], work.position_slope[j]
+    coupling, back = work.position_coupling[j], work.position_back[j]
     above, rest = work.a, work.b
     invert3(cov[q], above)
     for i in range(3):
         for k in range(3):
-            follow[i, k] = edge[i, 0] * above[0, k] + edge[i, 1] * above[1, k]
-            follow[i, k] += edge[i, 2] * above[2, k]
+            slope[i, k] = edge[i, 0] * above[0, k] + edge[i, 1] * above[1, k]
+            slope[i, k] += edge[i, 2] * above[2, k]
     for i in range(3):
         for k in range(i + 1):
-            known = (
-                follow[i, 0] * edge[k, 0] + follow[i, 1] * edge[k, 1] + follow[i, 2] * edge[k, 2]
-            )
+            known = slope[i, 0] * edge[k, 0] + slope[i, 1] * edge[k, 1] + slope[i, 2] * edge[k, 2]
             rest[i, k] = cov[j, i, k] - known
     invert3(rest, precision)
     for i in range(3):
         for k in range(3):
-            pull[i, k] = precision[i, 0] * follow[0, k] + precision[i, 1] * follow[1, k]
-            pull[i, k] += precision[i, 2] * follow[2, k]
+            coupling[i, k] = precision[i, 0] * slope[0, k] + precision[i, 1] * slope[1, k]
+            coupling[i, k] += precision[i, 2] * slope[2, k]
     for i in range(3):
         for k in range(3):
-            back[i, k] = follow[0, i] * pull[0, k] + follow[1, i] * pull[1, k]
-            back[i, k] += follow[2, i] * pull[2, k]
+            back[i, k] = slope[0, i] * coupling[0, k] + slope[1, i] * coupling[1, k]
+            back[i, k] += slope[2, i] * coupling[2, k]
 
 
 @kernel

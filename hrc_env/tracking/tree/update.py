@@ -353,7 +353,8 @@ def shift_to_mean(tree: Tree, frame: Frame, share: float, work: Work) -> None:
             if not (ok[j, c] and belief[j, c] > 0.0):
                 continue
             image = frame.images[c]
-            pull = share * belief[j, c] * _pixel_variance(image, j, tree.cov[j]) / sigma[j, c] ** 2
+            variance = _find_pixel_variance(image, j, tree.cov[j])
+            pull = share * belief[j, c] * variance / sigma[j, c] ** 2
             pull *= min(image[NEARNESS, j], 1.0 / _NEAREST_M)
             for i in range(3):
                 work.gradient[j, i] += pull * frame.P[c, 2, i]
@@ -361,7 +362,7 @@ def shift_to_mean(tree: Tree, frame: Frame, share: float, work: Work) -> None:
 
 
 @kernel(fastmath=_REORDER)
-def _pixel_variance(image: Floats, j: int, cov: Floats) -> float:
+def _find_pixel_variance(image: Floats, j: int, cov: Floats) -> float:
     """Return the sum of the variances of both coordinates of a joint's pixel [px^2].
 
     Args:
