@@ -204,7 +204,7 @@ def _cover_people(people: _People) -> list[Roi]:
 
     Windows around each person are candidates; the one that covers the most people comes first.
     """
-    middle_px, height_px = people
+    middle_px, height_px = people.middle_px, people.height_px
     side_px = ROOM * height_px
     fits = side_px[:, None] / height_px
     off_px = np.abs(middle_px[:, None] - middle_px).max(-1)

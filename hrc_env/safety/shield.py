@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.belief import Belief, lent_belief
+from hrc_env.belief import Belief, lend_belief
 from hrc_env.core.brought import check_arguments, described, numbers_of
 from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.core.lending import called, is_of_user
@@ -78,7 +78,7 @@ def shielded(
     if shield is None:
         return command, {}
     if is_of_user(shield):
-        given = called("A shield", shield, lent_belief(now), command.copy(), dt_s)
+        given = called("A shield", shield, lend_belief(now), command.copy(), dt_s)
     else:
         given = shield(now, command.copy(), dt_s)
     if not (isinstance(given, tuple) and len(given) == 2 and isinstance(given[1], Mapping)):

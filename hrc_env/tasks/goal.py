@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hrc_env.belief import Belief, lent_belief
+from hrc_env.belief import Belief, lend_belief
 from hrc_env.core.brought import check_arguments
 from hrc_env.core.errors import ConfigError, check_shape
 from hrc_env.core.lending import called, is_of_user, read_only
@@ -83,7 +83,7 @@ def parts(goal: Goal, now: Belief) -> dict[str, Tensor]:
 
 def _asked(what: str, function: Callable[[Belief], Floats], now: Belief) -> Floats:
     """The value (B, size) of a function; one of users is given a read-only belief."""
-    return called(what, function, lent_belief(now)) if is_of_user(function) else function(now)
+    return called(what, function, lend_belief(now)) if is_of_user(function) else function(now)
 
 
 def reward_terms(goal: Goal | None) -> tuple[RewardTerm, ...]:
