@@ -250,8 +250,8 @@ def _write_gram(J: Floats, squared_damping: float, gram: Floats) -> None:
 def _factorise(gram: Floats) -> None:
     """Replace a matrix (M, M) by its factors in L D L^T.
 
-    D is on the diagonal, L below it, with ones on its own diagonal. A column whose pivot is not
-    positive is 0 below it.
+    D is on the diagonal, L below it, with ones on its own diagonal. A column with a pivot that is
+    not positive is 0 below it.
     """
     for j in range(len(gram)):
         pivot = gram[j, j]

@@ -198,7 +198,7 @@ ROBOT_TERMS: tuple[ObservationTerm, ...] = (
         frame="tool",
         bound=0.2,
         scale=0.05,
-        doc="How far each finger is from the middle.",
+        doc="Distance of each finger from the middle.",
         function=lambda belief: _hand(belief).opening_m,
     ),
     ObservationTerm(
@@ -208,7 +208,7 @@ ROBOT_TERMS: tuple[ObservationTerm, ...] = (
         frame="tool",
         bound=300.0,
         scale=100.0,
-        doc="With which the fingers press together, negative: apart; or what hangs on the cups.",
+        doc="Force with which the fingers press together, negative: apart; or the load on the cups.",
         function=lambda belief: _hand(belief).force_n,
     ),
     ObservationTerm(
@@ -238,7 +238,7 @@ ROBOT_TERMS: tuple[ObservationTerm, ...] = (
         frame="-",
         bound=1.0,
         scale=1.0,
-        doc="1 for an object that the fingers hold.",
+        doc="1 for an object that is held.",
         function=lambda belief: _objects(belief).held.astype(float),
     ),
 )
@@ -252,7 +252,7 @@ SLIDE_TERMS: tuple[ObservationTerm, ...] = (
         frame="world",
         bound=10.0,
         scale=5.0,
-        doc="Where each slide is: of a base that drives, x and y of its middle.",
+        doc="Position of each slide: for a mobile base, x and y of its middle.",
         function=lambda belief: _slides(belief, belief.robot.q),
     ),
     ObservationTerm(
@@ -276,7 +276,7 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
         frame="-",
         bound=1.0,
         scale=1.0,
-        doc="The action of the previous step, as it was wanted, whatever a shield made of it.",
+        doc="The agent's action of the previous step, before any shield.",
         function=lambda belief: belief.action,
     ),
     ObservationTerm(
@@ -336,7 +336,7 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
         frame="-",
         bound=1.0,
         scale=1.0,
-        doc="1 while somebody without a track may be near: lost, or on floor not seen empty.",
+        doc="1 while a person without a track may be near: lost, or on floor not seen empty.",
         function=lambda belief: belief.estimate.unknown.astype(float),
     ),
     ObservationTerm(
@@ -346,7 +346,7 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
         frame="-",
         bound=5.0,
         scale=2.5,
-        doc="Time since cameras last saw the worker, or that nobody is there.",
+        doc="Time since cameras last saw the worker, or that the place is empty.",
         function=lambda belief: belief.estimate.blind_s,
     ),
     ObservationTerm(
@@ -376,7 +376,7 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
         frame="world",
         bound=6.0,
         scale=1.0,
-        doc="From the tool point now to where each joint will be, for each of `forecast_s`.",
+        doc="From the present tool point to each joint's forecast, for each of `forecast_s`.",
         function=_joints_forecast,
     ),
     ObservationTerm(
@@ -386,7 +386,7 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
         frame="world",
         bound=1.0,
         scale=0.25,
-        doc="Standard deviation of each of these (root mean over the axes).",
+        doc="Standard deviation of each of these forecasts (root mean over the axes).",
         function=lambda belief: np.stack(
             [standard_deviation_m(later) for later in belief.forecast], axis=2
         ),
@@ -422,7 +422,7 @@ SHIELD_TERMS: tuple[ObservationTerm, ...] = (
         frame="base",
         bound=4.0,
         scale=1.0,
-        doc="Joint velocities that the shield gave in the previous step, less those asked for.",
+        doc="Joint velocities of the shield in the previous step, less those of the agent.",
         function=lambda belief: needed(belief.shield_change, "What the shield changed"),
     ),
 )

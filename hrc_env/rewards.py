@@ -33,7 +33,7 @@ class RewardConfig:
     smoothness: float = 0.02
     """Weight of the penalty on the mean squared change of the action."""
     proximity: float = 2.0
-    """Weight of the penalty on closeness to the *estimated* body, whose shape is in [0, 2.25]. With
+    """Weight of the penalty on closeness to the *estimated* body, a shape in [0, 2.25]. With
     6 from the first step PPO (one seed) reached no goal of `HRCReach-v0` in the last 64 episodes
     before step 135,000; with 0 it reached 5.7 in each."""
     proximity_reach_m: float = 0.3

@@ -1,7 +1,7 @@
 """Cameras that differ from episode to episode, by pipelines for single environments.
 
-A pipeline has one rig, one list of faults and one appearance. An environment whose episode has
-others gets a pipeline of its own. As no result depends on the size of a batch, its results are
+A pipeline has one rig, one list of faults and one appearance. An environment with others in its
+episode gets a pipeline of its own. As no result depends on the size of a batch, its results are
 those of a single environment with that rig, bit for bit.
 """
 
