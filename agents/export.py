@@ -34,6 +34,8 @@ with learner():
     import torch
     from stable_baselines3 import SAC
 
+LEFT_OUT = {*ONLY_OF_A_RUN} - {"timesteps", "engine", "workers"}
+"""Arguments that a policy does not depend on."""
 ACTIVATIONS = {torch.nn.Tanh: "tanh", torch.nn.ReLU: "relu"}
 
 
@@ -49,13 +51,15 @@ def run(asked: ExportRequest) -> int:
         raise CheckpointError(f"{path} is there already; give another --name, or delete it.")
     console, kwargs = Console(), arguments.keywords()
     make_ready(console, arguments.perception)
-    env = HRCVecEnv(1, **kwargs)
+    env = HRCVecEnv(1, **arguments.batched_keywords())
     try:
         here = env_info(env.simulation)
     finally:
         env.close()
     trained = checkpoints.load(asked.run_folder / "policy.zip", here).learner
-    arguments = replace(arguments, timesteps=trained.num_timesteps)
+    n_workers = checkpoints.describe(asked.run_folder / "policy.zip").get("workers")
+    engine = {} if n_workers is None else {"engine": "ray", "workers": n_workers}
+    arguments = replace(arguments, timesteps=trained.num_timesteps, **engine)
     tensors, architecture = taken(trained)
     network = Network(tensors, architecture)
     content = _packed(tensors)
@@ -107,7 +111,7 @@ def command(arguments: TrainingRequest) -> str:
     words = ["python", "-m", "hrc_env", "train"]
     for each in fields(TrainingRequest):
         value = getattr(arguments, each.name)
-        if value == each.default or (each.name in ONLY_OF_A_RUN and each.name != "timesteps"):
+        if value == each.default or each.name in LEFT_OUT:
             continue
         several = isinstance(value, tuple | list)
         option = f"--{each.name.replace('_', '-')}"

@@ -68,7 +68,13 @@ class TrainingRequest(EnvironmentArguments):
         given = super().keywords()
         safety = {} if self.proximity is None else {"reward": {"proximity": self.proximity}}
         config = merge(safety, given.get("config", {}))
-        return {**given, "config": config, "num_threads": self.threads}
+        threads = {} if self.perception == "pixels" else {"num_threads": self.threads}
+        return {**given, "config": config, **threads}
+
+    def batched_keywords(self) -> dict[str, Any]:
+        """Keyword arguments of a batch with the same spaces: level pixels has no batched form."""
+        given = self.keywords()
+        return {**given, "perception": "keypoints"} if self.perception == "pixels" else given
 
 
 @dataclass(frozen=True, kw_only=True)

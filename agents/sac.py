@@ -8,7 +8,7 @@ from typing import Any
 
 from hrc_env.core.errors import learner
 from hrc_env.sb3 import HRCVecEnv
-from hrc_env.tasks.task import goal_of
+from hrc_env.tasks.task import require_goal
 
 from .learner_settings import SACSettings as SACSettings
 
@@ -35,7 +35,7 @@ def make_learner(
     hindsight = task.goal is not None if her is None else her
     buffer = {}
     if hindsight:
-        goal_of(task)
+        require_goal(task)
         kept = {"n_sampled_goal": settings.relabelled, "copy_info_dict": True}
         buffer = {"replay_buffer_class": HerReplayBuffer, "replay_buffer_kwargs": kept}
     return SAC(

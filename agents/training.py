@@ -207,12 +207,8 @@ def train(arguments: Run, folder: Path, console: Console) -> tuple[Curve, dict[s
 def _vector(arguments: Run) -> HRCVecEnv:
     """The environments of this process: those that are learnt in, or with another engine, whose
     workers have their own, those in which the agent that is imitated is seen."""
-    keywords, n = arguments.keywords(), arguments.num_envs
-    if arguments.engine == "ray":
-        n = n if arguments.demonstrations else 1
-        if arguments.perception == "pixels":
-            keywords["perception"] = "keypoints"  # of the same spaces
-    return HRCVecEnv(n, stagger=True, seed=arguments.seed, **keywords)
+    n = 1 if arguments.engine == "ray" and not arguments.demonstrations else arguments.num_envs
+    return HRCVecEnv(n, stagger=True, seed=arguments.seed, **arguments.batched_keywords())
 
 
 def _learn(arguments: Run, env: HRCVecEnv, log: TrainingLog, interrupt: Interrupt) -> None:
@@ -269,7 +265,7 @@ def film(folder: Path, arguments: TrainingRequest, console: Console) -> bool:
         return checkpoints.load(folder / "policy.zip", env_info)
 
     kwargs = arguments.keywords()
-    del kwargs["num_threads"]
+    kwargs.pop("num_threads", None)
     try:
         seeds = range(arguments.seed, arguments.seed + FILM_SEEDS)
         seed = nearest_seed(make, seeds, **kwargs)

@@ -48,7 +48,9 @@ STUDY = Study(
         ),
         "blind": _row("all cameras lost from 3 to 6 s", 500, faults=BLIND),
         "blind_stop": _row(
-            "the same, `unknown_m_s=0`", 500, shield={"kind": "qp", "unknown_m_s": 0.0},
+            "the same, `unknown_speed_limit_m_s=0`",
+            500,
+            shield={"kind": "qp", "unknown_speed_limit_m_s": 0.0},
             faults=BLIND,
         ),
         "nobody_bare": _row("", 250, shield=None, n_workers=0),

@@ -497,8 +497,8 @@ def shields() -> str:
     heads = ("region", "clamped [N]", "hit [N]", "stiffness [N/mm]", "mass [kg]", "speed [m/s]")
     return SHIELDS.format(
         notice=NOTICE,
-        rows=_doc("hrc_env.safety.rows"),
-        guard=_doc("hrc_env.safety.guard"),
+        rows=_doc("hrc_env.safety.constraints"),
+        guard=_doc("hrc_env.safety.built_in"),
         settings=_fields_of(ShieldConfig, "`ShieldConfig`"),
         separation=f"`hrc_env.safety.separation`: {_doc('hrc_env.safety.separation')}",
         contact=f"`hrc_env.safety.contact`: {_doc('hrc_env.safety.contact')}",

@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from hrc_env.control import ControlConfig
 from hrc_env.core.errors import ConfigError, check_names
@@ -34,59 +34,60 @@ from hrc_env.scene.build import SceneConfig
 from hrc_env.scene.domain_randomization import APPEARANCES, AppearanceConfig
 from hrc_env.scene.handling import ObjectsConfig
 from hrc_env.tasks.task import TaskType
-from hrc_env.tracking.config import ParticleConfig, TrackerConfig, of_kind
+from hrc_env.tracking.config import ParticleConfig, TrackerConfig, cast_config
 from hrc_env.tracking.estimators import EstimatorSpec
 from hrc_env.tracking.forecast import LONGEST_S
 from hrc_env.tracking.people.association import AssociationConfig
-from hrc_env.worker.body import pool
+from hrc_env.worker.body import select_bodies
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class HRCConfig:
-    """Everything about an environment that is not one of its keyword arguments."""
+    """All settings of an environment that are not among its keyword arguments."""
 
     ctrl_dt: float = 0.04
-    """Time between actions [s]; a multiple of `scene.sim_dt`. 0.04 s is 25 Hz."""
+    """Duration of a control step [s], a multiple of `scene.sim_dt`; 0.04 s is 25 Hz."""
     start_spread_rad: tuple[float, ...] = ()
-    """At reset each joint is drawn within so much of its home angle [rad]; none: the robot's."""
+    """Largest distance of joints from their home angles at a reset [rad]; empty for the robot's."""
     forecast_s: tuple[float, ...] = ()
-    """Times ahead at which the observation also holds where the workers' joints are expected,
-    each in (0, 1] [s]; none by default. (0.2, 0.4) adds 120 entries a worker."""
+    """Horizons of the forecast of the workers' joints in the observation, each in (0, 1] [s]; none
+    by default. (0.2, 0.4) adds 120 entries a worker."""
     uncertainty: tuple[str, ...] = ()
-    """What the observation holds of each joint's covariance beside its root mean: "towards_robot",
-    the deviation along the line to the robot; "factor", all of it as 6 numbers; or both."""
+    """Further entries of the observation about each joint's covariance, beside its root mean:
+    "towards_robot", the deviation along the line to the robot; "factor", all of it as 6 numbers; or
+    both."""
     observe_shield: bool = False
-    """Whether the observation also holds what the shield made of the last command."""
+    """Whether the observation also has the shield's change of the last command."""
     worker: str | tuple[str, ...] = "worker_1"
-    """Which baked body the workers have: a name; several, or "any" for all that there are: then
-    every episode gives each worker one of them, no two the same as long as there are others."""
+    """Baked body of the workers: a name, several names, or "any" for all bodies. Of several bodies,
+    each worker has one in every episode, different from each other as far as possible."""
     scene: SceneConfig = field(default_factory=SceneConfig)
-    """Room, cameras, physics."""
+    """Scene, cameras and physics."""
     motion: MotionConfig = field(default_factory=MotionConfig)
-    """How the workers move."""
+    """Motion of the workers."""
     detector: DetectorConfig = field(default_factory=DetectorConfig)
-    """The camera pipeline (`perception="pixels"`)."""
+    """Pose detector (`perception="pixels"`)."""
     emulator: EmulatorConfig = field(default_factory=EmulatorConfig)
-    """Its emulator (`perception="keypoints"`)."""
+    """Emulator of the pose detector (`perception="keypoints"`)."""
     faults: tuple[FaultConfig, ...] = ()
-    """What goes wrong with the cameras, and when (docs/perception_and_estimators.md)."""
+    """Faults of the cameras, and their times (docs/perception_and_estimators.md)."""
     appearance: AppearanceConfig = field(default_factory=AppearanceConfig)
-    """How scene and workers look, drawn for every episode (`perception="pixels"`)."""
+    """Appearance of scene and workers, drawn for every episode (`perception="pixels"`)."""
     tracker: TrackerConfig = field(default_factory=ParticleConfig)
-    """The estimator; what may be set is its own (`EstimatorSpec.config`)."""
+    """Settings of the estimator, of the type of `EstimatorSpec.config`."""
     association: AssociationConfig = field(default_factory=AssociationConfig)
-    """Which detection is of whom, where there are several workers."""
+    """Association of detections with several workers."""
     control: ControlConfig = field(default_factory=ControlConfig)
-    """What an action means."""
+    """Scaling and limits of actions."""
     objects: ObjectsConfig = field(default_factory=ObjectsConfig)
-    """How well the robot knows the task's loose objects."""
+    """Noise of the robot's measurement of the task's loose objects."""
     task: Any = None
-    """The task's own settings (`Task.config_type`); None: its defaults."""
+    """Settings of the task (`Task.config_type`); None for its defaults."""
     reward: RewardConfig = field(default_factory=RewardConfig)
     """Weights of the reward's terms."""
     cost: CostConfig = field(default_factory=CostConfig)
-    """What counts as unsafe."""
+    """Parts of the safety cost."""
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.ctrl_dt) and self.ctrl_dt > 0):
@@ -98,7 +99,7 @@ class HRCConfig:
                 f"forecast_s must be in (0, {LONGEST_S:g}] s each, got {self.forecast_s}."
             )
         check_names("uncertainty", self.uncertainty, UNCERTAINTY)
-        pool(self.worker)
+        select_bodies(self.worker)
         substeps = self.ctrl_dt / self.scene.sim_dt
         if substeps < 0.5 or abs(substeps - round(substeps)) > 1e-6:
             near = max(round(substeps), 1) * self.scene.sim_dt
@@ -109,30 +110,39 @@ class HRCConfig:
 
     @property
     def n_substeps(self) -> int:
-        """Physics steps in a control step."""
+        """Number of physics substeps in a control step."""
         return round(self.ctrl_dt / self.scene.sim_dt)
 
 
-ConfigChoice = HRCConfig | Mapping[str, Any] | str | Path | None
+ConfigChoice: TypeAlias = HRCConfig | Mapping[str, Any] | str | Path | None
+"""Values of `config=`."""
 PRESETS.update({AppearanceConfig: APPEARANCES, PeopleConfig: PEOPLE, tuple[Job, ...]: WORK})
 
 
 def resolve(config: ConfigChoice, task: TaskType, estimator: EstimatorSpec) -> HRCConfig:
-    """A config from what a user gave: itself, a (nested) mapping of changes, a TOML file, nothing;
-    `ConfigError` for a field that does not exist, a bad value, or the settings of another task."""
+    """Return the configuration for a value of `config=`.
+
+    Args:
+        config: a configuration, a (nested) mapping of changes, the path of a TOML file, or None.
+        task: class of the task.
+        estimator: the estimator.
+
+    Raises:
+        ConfigError: an unknown field, an invalid value, or the settings of another task.
+    """
     if isinstance(config, str | Path):
         config = read_toml(config)
     if config is None or isinstance(config, Mapping):
-        said = merge(task.defaults, config or {})
-        said = {name: value for name, value in said.items() if (name, value) != ("task", None)}
+        values = merge(task.defaults, config or {})
+        values = {name: value for name, value in values.items() if (name, value) != ("task", None)}
         kinds = {"task": task.config_type, "tracker": estimator.config}
-        config = from_mapping(HRCConfig, said, kinds=kinds)
+        config = from_mapping(HRCConfig, values, kinds=kinds)
     if not isinstance(config, HRCConfig):
         raise ConfigError(
             "config must be an HRCConfig, a mapping, a TOML file's path or None, "
             f"got {type(config).__name__}."
         )
-    config = replace(config, tracker=of_kind(config.tracker, estimator.config))
+    config = replace(config, tracker=cast_config(config.tracker, estimator.config))
     if config.task is None:
         return replace(config, task=task.config_type())
     if not isinstance(config.task, task.config_type):
@@ -147,7 +157,7 @@ def save_config(config: HRCConfig, path: str | Path) -> None:
     """Write every setting to a TOML file, which `config=` and `--config` take.
 
     Raises:
-        ConfigError: `motion.motions` holds a clip in memory, which has no such form.
+        ConfigError: `motion.motions` has a clip in memory, which a file cannot hold.
     """
     for motion in config.motion.motions:
         if not isinstance(motion, str):

@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from inspect import Parameter
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import gymnasium
 import numpy as np
@@ -36,93 +36,99 @@ from hrc_env.settings import Settings, settle
 from hrc_env.simulation import Simulation
 from hrc_env.step_result import Observation
 from hrc_env.tasks import DEFAULT, goal
-from hrc_env.tasks.task import TaskType, goal_of
+from hrc_env.tasks.task import TaskType, require_goal
 
 RENDER_MODES = ("rgb_array", "depth_array")
+"""Render modes of an environment."""
 ENDLESS = 2**62
-"""Steps that are left where nobody said otherwise; time limits are gymnasium's `TimeLimit`."""
+"""Number of remaining steps without a limit; time limits are gymnasium's `TimeLimit`."""
 
 
 class EnvBase(HasSpec, Stateful):
-    """What a single and a vector environment have in common: states, pictures' form, `spec`."""
+    """Base of single and vector environments: states, the form of pictures, `spec`."""
 
     closed = False
+    """Whether the environment has been closed."""
     PICTURES: ClassVar[tuple[str, ...]] = RENDER_MODES
-    """The render modes that are taken."""
+    """Valid render modes."""
 
     def _open(self, settings: Settings) -> None:
-        """Keep settings, and a form of pictures once it is known to be one."""
+        """Store the settings, and check the form of pictures."""
         asked = settings.asked
         check_render_mode(asked.render_mode, self.PICTURES)
         share()
         self._size = picture_size(asked.width, asked.height)
-        self._shown = shown_beside(asked.render_markers, asked.overlay)
+        self._shown = parse_overlays(asked.render_markers, asked.overlay)
         if asked.overlay is not None and not str(asked.render_mode).startswith("rgb_array"):
             warnings.warn(
                 f"overlay={asked.overlay!r} is drawn in pictures of render_mode='rgb_array' only, "
-                f"got render_mode={asked.render_mode!r}.", stacklevel=4,
-            )  # fmt: skip
-        self.render_mode, self.config, self._task = (
-            asked.render_mode,
-            settings.config,
-            settings.task,
-        )
+                f"got render_mode={asked.render_mode!r}.",
+                stacklevel=4,
+            )
+        self.render_mode = asked.render_mode
+        self.config, self._task = settings.config, settings.task
         fps = round(1 / self.config.ctrl_dt)
         self.metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": fps}
 
     @property
     def compute_reward(self) -> Callable[[Any, Any, Any], Any]:
-        """(achieved_goal, desired_goal, info) -> reward: of one pair (n,) and the info of its step,
-        or of many (B, n) with a list of infos, or a vector's; see `hrc_env.tasks.goal.judged`.
+        """Function of (achieved_goal, desired_goal, info) that returns the reward.
 
-        With the info of a step it is the step's reward, bit for bit: the goal's term and those that
-        every task shares. Of infos that do not hold these, as HER's own, it is the goal's alone.
+        It takes one pair of goals (n,) and the info of its step, or many (B, n) with a list of
+        infos or the infos of a vector environment. With the info of a step it returns the step's
+        reward, bit for bit: the goal's term and those that every task shares. With infos that do
+        not have these, as those of hindsight replay, it returns the goal's term alone.
 
         Raises:
-            NoGoalError: the task has no goals apart from its observation; it is an `AttributeError`
-                too, so that `hasattr` tells who has.
+            NoGoalError: the task has no goals apart from its observation. It is an
+                `AttributeError`, too, so that `hasattr` returns False.
         """
-        apart, others = goal_of(self._task), [term.name for term in rewards.SHARED_TERMS]
-        others = [term.name for term in self._task.rewards] + others
-        factor = self._reward_factor(goal.TERM)
-        return partial(goal.judged, apart, config=self.config.task, others=others, factor=factor)
+        separate_goal, terms = require_goal(self._task), rewards.SHARED_TERMS
+        return partial(
+            goal.compute_reward,
+            separate_goal,
+            config=self.config.task,
+            others=[term.name for term in (*self._task.rewards, *terms)],
+            factor=self._reward_factor(goal.TERM),
+        )
 
     @property
     def compute_terminated(self) -> Callable[[Any, Any, Any], Any]:
-        """(achieved_goal, desired_goal, info) -> whether the episode ended in the step of that
-        info, or of many as `compute_reward` takes them.
+        """Function of (achieved_goal, desired_goal, info) that returns whether the episode ended.
 
-        No goal ends an episode: a contact does, if `config.cost.contact_terminates`.
+        It takes the arguments of `compute_reward`. No goal ends an episode, but a contact does if
+        `config.cost.contact_terminates` is true.
 
         Raises:
-            NoGoalError: as of `compute_reward`.
+            NoGoalError: the task has no goals apart from its observation.
             NoAttributeError: the task ends episodes itself, by `Task.is_terminal`.
         """
-        apart = goal_of(self._task)
+        separate_goal = require_goal(self._task)
         if self._task.can_end:
             raise NoAttributeError(
                 f"{self._task.id} ends episodes itself (Task.is_terminal), which does not follow "
                 "from goals and infos: read `terminated` of `step`."
             )
         entries = ("cost_contact",) if self.config.cost.contact_terminates else ()
-        return partial(goal.ended, apart, entries=entries)
+        return partial(goal.compute_terminated, separate_goal, entries=entries)
 
     @property
     def compute_truncated(self) -> Callable[[Any, Any, Any], Any]:
-        """(achieved_goal, desired_goal, info) -> False, for many (B,): what cuts an episode off is
-        its time limit.
+        """Function of (achieved_goal, desired_goal, info) that returns False, for many (B,).
+
+        Only the time limit truncates an episode.
 
         Raises:
-            NoGoalError: as of `compute_reward`.
+            NoGoalError: the task has no goals apart from its observation.
         """
-        return partial(goal.ended, goal_of(self._task))
+        return partial(goal.compute_terminated, require_goal(self._task))
 
     def _reward_factor(self, term: str) -> float:
-        """The factor on a term of the reward (`set_reward`)."""
+        """Return the factor on a term of the reward (`set_reward`)."""
         raise NotImplementedError
 
     def refuse_closed(self) -> None:
-        """Raise a `ConfigError` once the environment is closed."""
+        """Raise `ConfigError` if the environment has been closed."""
         if self.closed:
             raise ConfigError("This environment is closed; make a new one.")
 
@@ -130,20 +136,25 @@ class EnvBase(HasSpec, Stateful):
 class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
     EnvBase, gymnasium.Env[Observation, NDArray[np.float32]]
 ):
-    """A robot works beside people whom it knows through cameras only.
+    """A Gymnasium environment: a robot works beside people that it knows through cameras only.
 
     Args:
-        task: what it has to do, an id or a subclass of `Task`.
-        arguments: the other fields of `EnvConfig`, which documents them all.
+        task: the robot's task, an id or a subclass of `Task`.
+        arguments: the other fields of `EnvConfig`, where all of them are documented.
 
     Raises:
-        ConfigError: a name, index or value that is not valid, with those that are.
+        ConfigError: a name, index or value is not valid; the error names the valid ones.
     """
 
     CHANGES = (
-        "simulation", "_np_random", "_np_random_seed", "_begun", "_steps_left", "_options",
+        "simulation",
+        "_np_random",
+        "_np_random_seed",
+        "_begun",
+        "_steps_left",
+        "_options",
         "_next_options",
-    )  # fmt: skip
+    )
     metadata = {"render_modes": list(RENDER_MODES), "render_fps": 25}  # noqa: RUF012
 
     __signature__ = signature_of_env(
@@ -156,8 +167,8 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         rehearse(settings)
         self.simulation = Simulation(1, settings)
         self.views = Views(self.simulation)
-        """Pictures of the scene for people, at any time and of any size."""
-        self.observation_space, self.action_space = spaces(self.simulation)
+        """Pictures of the scene at any time and of any size."""
+        self.observation_space, self.action_space = make_spaces(self.simulation)
         self._begun = False
         self._steps_left = ENDLESS
         self._options: dict[str, Any] = {}
@@ -169,12 +180,15 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         """Start an episode.
 
         Args:
-            seed: of its random stream; with None the stream goes on.
-            options: what of the episode is fixed, in place of what `set_options` says: fields of
+            seed: seed of its random stream; with None the stream continues.
+            options: fixed parts of the episode, which replace those of `set_options`: fields of
                 `ResetOptions` by name, such as {"goal": (0.4, 0.3, 1.1), "n_workers": 0}.
 
+        Returns:
+            The observation and the info.
+
         Raises:
-            ConfigError: an option that cannot be; nothing has begun then.
+            ConfigError: an option is invalid; the previous episode then continues.
         """
         self.refuse_closed()
         given = self._with_lasting(options)
@@ -189,7 +203,15 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
     def step(
         self, action: NDArray[np.float32]
     ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Act for one control step (1 / 25 s); the walk itself is `Simulation.step`."""
+        """Advance the environment by one control step, 1 / 25 s by default.
+
+        Args:
+            action: (A,) the action, in [-1, 1].
+
+        Returns:
+            Observation, reward, whether the episode is terminated, whether it is truncated, and
+            info.
+        """
         self.refuse_closed()
         if not self._begun:
             raise ConfigError("Call reset() before step().")
@@ -205,28 +227,31 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         )
 
     def words(self, info: Mapping[str, Any]) -> Words:
-        """Return in words what an info says of workers, contacts and cameras: `infos.worded`."""
+        """Return the indices of an info in words: activities, bodies, contacts and cameras.
+
+        Args:
+            info: an info of `reset` or `step`.
+        """
         return worded(info, words_of(self.body_names))
 
     @property
     def body_names(self) -> tuple[str, ...]:
-        """The bodies that `worker_N/body` of infos counts."""
+        """Names of the bodies by their index `worker_N/body` in infos."""
         return self.simulation.bodies.names
 
     @property
     def rig(self) -> tuple[CameraConfig, ...]:
-        """The cameras of this episode, as the estimator knows them."""
+        """Calibration of this episode's cameras, as the estimator has it."""
         return self.simulation.rig_of(0)
 
     @property
     def faults(self) -> tuple[FaultConfig, ...]:
-        """The faults of this episode's cameras, each with the amount that was drawn; no robot knows
-        them."""
+        """Faults of this episode's cameras, each with its drawn amount; no robot knows them."""
         return self.simulation.cameras.faults_of(0)
 
     @property
     def options(self) -> dict[str, Any]:
-        """Options of `set_options`, by name."""
+        """Options of all episodes to come by name (`set_options`)."""
         return dict(self._options)
 
     @options.setter
@@ -235,8 +260,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
 
     @property
     def next_options(self) -> dict[str, Any]:
-        """Options of the next reset alone, besides those it is given; vector environments of
-        processes set them."""
+        """Options of the next reset alone, set by vector environments of processes."""
         return dict(self._next_options)
 
     @next_options.setter
@@ -244,16 +268,16 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         self._next_options = named_options(options)
 
     def set_options(self, options: Mapping[str, Any] | ResetOptions | None = None) -> None:
-        """Fix something of all episodes to come, until this is called again: a curriculum.
+        """Fix parts of all episodes to come, until the next call: a curriculum.
 
-        `get_state` holds it, so that a state goes on with the same episodes.
+        They are part of `get_state`, so that a restored state continues with the same episodes.
 
         Args:
-            options: as of `reset`, in place of those before; what `reset` is given goes before
-                them. None: nothing is fixed any more.
+            options: options of `reset`, which replace the previous ones; those that `reset` is
+                given have precedence. None fixes nothing.
 
         Raises:
-            ConfigError: an option that cannot be, or is of one reset.
+            ConfigError: an option is invalid, or for a single reset only.
         """
         given = lasting_options(options)
         self.simulation.fix(given)
@@ -262,14 +286,14 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
     def check_options(
         self, options: Mapping[str, Any] | ResetOptions | None = None, lasting: bool = False
     ) -> None:
-        """Raise the error that `reset` with these options would raise; nothing begins.
+        """Raise the error that `reset` with these options would raise, without a reset.
 
         Args:
-            options: as of `reset`.
-            lasting: they are meant for `set_options`, in place of those before.
+            options: options of `reset`.
+            lasting: whether they are meant for `set_options`.
 
         Raises:
-            ConfigError: an option that cannot be.
+            ConfigError: an option is invalid.
         """
         with warnings.catch_warnings():  # the reset itself warns
             warnings.simplefilter("ignore")
@@ -281,15 +305,14 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
                 self.simulation.fix(given)
 
     def attempt(self, method: str, *args: Any, **kwargs: Any) -> Any:
-        """Call a method, and return its `ConfigError` where it raises one.
+        """Call a method, and return its `ConfigError` instead of raising it.
 
-        A process that raises is closed by its vector environment; this lets the error reach the
-        user.
+        A vector environment closes a process that raises; a returned error reaches the user.
 
         Args:
-            method: its name.
-            args: of the method.
-            kwargs: of the method.
+            method: name of the method.
+            args: arguments of the method.
+            kwargs: keyword arguments of the method.
 
         Returns:
             The result of the method, or the error.
@@ -302,24 +325,24 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
     def set_reward(
         self, weights: RewardConfig | None = None, factors: Mapping[str, float] | None = None
     ) -> None:
-        """Weigh the reward's terms so from the next step on.
+        """Set the weights of the reward's terms from the next step on.
 
         Args:
-            weights: of the terms that all tasks share; None: as they are.
-            factors: on any terms by name, also the task's own: {"goal": 2.0}; terms that are not
-                named have the factor 1. None: as they are.
+            weights: weights of the terms that all tasks share; None keeps them.
+            factors: factors on any terms by name, the task's own included: {"goal": 2.0}. Other
+                terms have the factor 1. None keeps the factors.
 
         Raises:
-            ConfigError: an unknown term, or a factor that is no finite number.
+            ConfigError: a term is unknown, or a factor is no finite number.
         """
         self.simulation.set_reward(weights, factors)
 
     def render(self, camera: CameraChoice = None) -> NDArray[Any] | None:  # type: ignore[override]
-        """Return a picture of the scene, (H, W, 3) of uint8 or (H, W) metres of depth.
+        """Return a picture of the scene, (H, W, 3) of uint8 or (H, W) depths [m].
 
         Args:
-            camera: through which: an index or a name of the rig's, a viewpoint such as "room" or
-                "top", or a `CameraConfig`; None: from where the task is seen best.
+            camera: index or name of a camera of the rig, a viewpoint such as "room" or "top", or a
+                `CameraConfig`; None for the task's viewpoint.
 
         Raises:
             ConfigError: there is no such camera.
@@ -331,19 +354,23 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         return self.views.picture(is_depth, size=self._size, camera=camera, **self._shown)
 
     def mosaic(self) -> NDArray[np.uint8]:
-        """Return the images of the cameras with crops, keypoints and the estimated skeleton."""
+        """Return the cameras' images with crops, keypoints and estimated skeletons, tiled."""
         self.refuse_closed()
         return self.views.mosaic()
 
     def split_observation(self, observation: Observation) -> dict[str, Floats]:
-        """Return an observation's terms by name, in metres, seconds and radians, goals too."""
+        """Return the terms of an observation by name, in metres, seconds and radians.
+
+        Args:
+            observation: an observation of `reset` or `step`; goals are terms, too.
+        """
         return observations.split(observation, self.simulation.layout)
 
     def _reward_factor(self, term: str) -> float:
         return self.simulation.reward_factors.get(term, 1.0)
 
     def _with_lasting(self, options: Mapping[str, Any] | ResetOptions | None) -> dict[str, Any]:
-        """Options of a reset by name, with those that were set before."""
+        """Return the options of a reset by name, with those that were set before."""
         return {**self._options, **self._next_options, **_named(options)}
 
     def close(self) -> None:
@@ -354,7 +381,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
 
 
 def _named(options: Mapping[str, Any] | ResetOptions | None) -> dict[str, Any]:
-    """Options of one environment's reset by name; `ConfigError` for those of a vector."""
+    """Return the options of a reset by name, or raise `ConfigError` for those of a vector."""
     for name in options if isinstance(options, Mapping) else ():
         if name == "elapsed_steps":
             raise ConfigError(
@@ -366,12 +393,12 @@ def _named(options: Mapping[str, Any] | ResetOptions | None) -> dict[str, Any]:
 
 
 def _steps_left(options: Mapping[str, Any]) -> int:
-    """What the options of a reset say."""
+    """Return the number of remaining steps in the options of a reset."""
     return whole('options["steps_left"]', options.get("steps_left", ENDLESS), 1, ENDLESS)
 
 
 def check_render_mode(render_mode: str | None, valid: Sequence[str] = RENDER_MODES) -> None:
-    """Raise a `ConfigError` for a render mode that is not `valid`, with those that are."""
+    """Raise `ConfigError` for a render mode that is not among the valid ones."""
     if render_mode == "human":
         raise ConfigError(
             "render_mode='human' is a window round an environment that draws: gymnasium.make("
@@ -382,11 +409,11 @@ def check_render_mode(render_mode: str | None, valid: Sequence[str] = RENDER_MOD
         raise unknown("render_mode", render_mode, valid)
 
 
-def shown_beside(markers: Any, overlay: Any) -> dict[str, bool]:
+def parse_overlays(markers: object, overlay: object) -> dict[str, bool]:
     """Return the arguments of `Views.picture` for `render_markers` and `overlay`.
 
     Raises:
-        ConfigError: values that they cannot have.
+        ConfigError: a value is invalid.
     """
     if not isinstance(markers, bool):
         raise ConfigError(f"render_markers must be True or False, got {markers!r}.")
@@ -395,19 +422,28 @@ def shown_beside(markers: Any, overlay: Any) -> dict[str, bool]:
     return {"markers": markers, "capsules": overlay == "capsules"}
 
 
-def spaces(simulation: Simulation) -> tuple[Any, Any]:
-    """The spaces of one environment's observations, a `Box` or with goals or images a `Dict`, and
-    actions, a `Box`."""
-    where, apart, images = simulation.layout, simulation.task.goal, simulation.images
-    seen = Box(where.low, where.high, dtype=np.float32)
+class Spaces(NamedTuple):
+    """Spaces of one environment."""
+
+    observation: Any
+    """Space of observations: a `Box`, or a `Dict` with goals or images."""
+    action: Any
+    """Space of actions, a `Box`."""
+
+
+def make_spaces(simulation: Simulation) -> Spaces:
+    """Return the spaces of one environment's observations and actions."""
+    layout, separate_goal, images = simulation.layout, simulation.task.goal, simulation.images
+    flat = Box(layout.low, layout.high, dtype=np.float32)
     actions = Box(-1.0, 1.0, (simulation.n_actions,), np.float32)
-    vars(actions)["control"] = simulation.control  # files of Stable-Baselines3 hold it, too
-    if apart is None and images is None:
-        return seen, actions
-    parts: dict[str, Any] = {observations.FLAT: seen}
-    if apart is not None:
-        goals = Box(-apart.bound, apart.bound, (apart.size,), np.float32)
+    vars(actions)["control"] = simulation.control  # it is part of files of Stable-Baselines3
+    if separate_goal is None and images is None:
+        return Spaces(flat, actions)
+    parts: dict[str, Any] = {observations.FLAT: flat}
+    if separate_goal is not None:
+        bound = separate_goal.bound
+        goals = Box(-bound, bound, (separate_goal.size,), np.float32)
         parts |= {goal.ACHIEVED: goals, goal.DESIRED: goals}
     if images is not None:
         parts |= {name: Box(0, 255, images.shape, np.uint8) for name in images.names}
-    return Dict(parts), actions
+    return Spaces(Dict(parts), actions)

@@ -1,6 +1,6 @@
-"""The cameras of every environment's episode, and the draws that they come from.
+"""The cameras of every environment's episode, and the draws of their rigs, faults and looks.
 
-Most environments share one pipeline; one whose episode has cameras of its own gets another
+Most environments share one pipeline; an environment with cameras of its own has another one
 (`pipeline.episodic`).
 """
 
@@ -31,9 +31,11 @@ from hrc_env.scene.rig_distribution import draw_rig
 from hrc_env.settings import Settings
 
 ALL_DRAWN = Fixed()
+"""An episode without fixed parts."""
 NOTHING_GIVEN: Mapping[int, Fixed] = MappingProxyType({})
+"""Fixed parts of no episode."""
 NEUTRAL = {"darkness": 1.0}
-"""The amounts that are as good as no fault, where that is not 0."""
+"""Amounts of faults without effect, if that is not 0."""
 
 
 class EpisodeCameras:
@@ -41,8 +43,8 @@ class EpisodeCameras:
 
     Args:
         batch: number of environments.
-        settings: of all of them.
-        scene: with the rig that they are made with.
+        settings: settings of all of them.
+        scene: the scene with their common rig.
     """
 
     def __init__(self, batch: int, settings: Settings, scene: Scene) -> None:
@@ -61,50 +63,50 @@ class EpisodeCameras:
             )
         bends = settings.rigs is not None and settings.rigs.bends
         self.images = None if images is None else ObservedImages(scene, images, bends)
-        """Draws the images of observations; None: they hold none."""
+        """Renderer of the images in observations; None without images."""
         self._looks: dict[int, tuple[np.random.Generator, Look]] = {}
         self._rigs = settings.rigs if has_cameras else None
         if settings.rigs is not None:
             settings.rigs.counts(len(scene.cameras))
-        if self._rigs is not None:  # refused here rather than at the first reset
+        if self._rigs is not None:  # to raise its errors here
             draw_rig(self._rigs, scene, np.random.default_rng(0))
         known = [k for k, each in KINDS.items() if each.group != IMAGE or k in EMULATED]
         self._kinds = tuple(known if level == "keypoints" else KINDS)
         names = (N_CAMERAS, MOVED, TURNED, DELAY, LIGHT, *(f"{FAULT}{k}" for k in self._kinds))
         self._drawn = {name: np.zeros(batch) for name in names} if has_cameras else {}
 
-    def hang(self, ids: Ints, given: Mapping[int, Fixed], sensor_rngs: Generators) -> None:
-        """Give environments `ids` the cameras of the episodes that begin.
+    def assign(self, ids: Ints, given: Mapping[int, Fixed], sensor_rngs: Generators) -> None:
+        """Assign the cameras of new episodes to environments `ids`.
 
         Args:
-            ids: the environments.
-            given: the fixed parts of each one's episode.
+            ids: the environments in question.
+            given: fixed parts of their episodes by environment.
             sensor_rngs: a generator for each environment of the batch.
         """
         differ = self._rigs is not None or any(each.changes_cameras for each in given.values())
         if not differ and not isinstance(self.pipeline, EpisodicPipeline):
             return
-        pipeline = self._let_differ()
+        pipeline = self._make_episodic()
         for b in ids.tolist():
             setup = self._setup_of_episode(given.get(b, ALL_DRAWN), sensor_rngs[b])
             pipeline.assign(b, setup)
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
-        """Forget the images of environments `ids`, and note the draws of their episodes."""
+        """Reset the perception of environments `ids`, and record the draws of their episodes."""
         self.pipeline.reset(ids, sensor_rngs, tracker_rngs)
-        self._note(ids)
+        self._record(ids)
 
     def info(self, ids: Ints) -> Info:
-        """Return the draws of the episodes of environments `ids`; none without cameras."""
+        """Return the draws of the episodes of environments `ids` by name; empty without cameras."""
         return {name: values[ids] for name, values in self._drawn.items()}
 
     def rig_of(self, b: int) -> tuple[CameraConfig, ...]:
-        """Return the cameras of environment b in its episode."""
+        """Return the rig of environment b's episode."""
         own = self._own(b)
         return self.scene.rig if own is None else own.rig
 
     def cameras_of(self, b: int) -> tuple[PinholeCamera, ...]:
-        """Return the same with their matrices."""
+        """Return the cameras of environment b's episode with their matrices."""
         rig = self.rig_of(b)
         return self.scene.cameras if rig == self.scene.rig else make_cameras(rig)
 
@@ -114,8 +116,10 @@ class EpisodeCameras:
         return self._rigs is not None
 
     def projections(self) -> Floats:
-        """Return (B, C, 3, 4) the projections of every environment's episode, from the world [m]
-        to pixels; NaN of a camera that does not hang in it."""
+        """Return (B, C, 3, 4) the projections of every environment's episode.
+
+        They are from the world [m] to pixels; NaN for cameras that are not in the episode's rig.
+        """
         batch = len(self._drawn[N_CAMERAS])
         P = np.full((batch, len(self.names), 3, 4), np.nan)
         for b in range(batch):
@@ -129,34 +133,34 @@ class EpisodeCameras:
         return () if schedule is None else schedule.faults
 
     def draw_images(self, sensor_rngs: Generators) -> Images:
-        """Return the images of the moment that the sensors were shown last."""
+        """Return the observed images of the sensors' last moment."""
         if self.images is None:
             return {}
-        now = self.pipeline.sensor.now
-        ids = now.ids.tolist()
+        moment = self.pipeline.sensor.now
+        ids = moment.ids.tolist()
         rigs = [self.cameras_of(b) for b in ids]
-        return self.images.draw(now, [self.look_of(b, sensor_rngs[b]) for b in ids], rigs)
+        return self.images.draw(moment, [self.look_of(b, sensor_rngs[b]) for b in ids], rigs)
 
     def look_of(self, b: int, sensor_rng: np.random.Generator) -> Look | None:
-        """How environment `b` looks in its episode (for images); None: as it was built."""
-        worn, appearance = self.pipeline.look_of(b), self._appearance_of(b)
-        if worn is not None or appearance == AS_BUILT:
-            return worn
-        if b not in self._looks or self._looks[b][0] is not sensor_rng:  # it follows from this
+        """Return the look of environment `b` in its episode; None for the scene as built."""
+        look, appearance = self.pipeline.look_of(b), self._appearance_of(b)
+        if look is not None or appearance == AS_BUILT:
+            return look
+        if b not in self._looks or self._looks[b][0] is not sensor_rng:  # a new episode
             self._looks[b] = sensor_rng, draw_look(appearance, self.scene.n_workers, sensor_rng)
         return self._looks[b][1]
 
     def get_state(self) -> Any:
-        """A copy of everything that changes."""
+        """Return a copy of the state of the pipelines."""
         return self.pipeline.get_state()
 
     def set_state(self, state: Any) -> None:
-        """Continue from a state, also of environments with cameras of their own."""
+        """Restore a state, those of environments with cameras of their own included."""
         if isinstance(state, EpisodicState):
-            self._let_differ()
+            self._make_episodic()
         self.pipeline.set_state(state)
         if self._drawn:
-            self._note(np.arange(len(self._drawn[N_CAMERAS])))
+            self._record(np.arange(len(self._drawn[N_CAMERAS])))
 
     def close(self) -> None:
         """Release threads and graphics contexts."""
@@ -165,15 +169,16 @@ class EpisodeCameras:
             self.images.close()
 
     def _own(self, b: int) -> CameraSetup | None:
-        """The cameras of environment b's episode; None: those that all were made with."""
+        """Return the cameras of environment b's episode; None for the common ones."""
         return self.pipeline.setup_of(b) if isinstance(self.pipeline, EpisodicPipeline) else None
 
     def _appearance_of(self, b: int) -> AppearanceConfig:
+        """Return the appearance settings of environment b's episode."""
         own = self._own(b)
         return self.config.appearance if own is None else own.appearance
 
-    def _let_differ(self) -> EpisodicPipeline:
-        """Let environments have cameras of their own, if they cannot yet."""
+    def _make_episodic(self) -> EpisodicPipeline:
+        """Return a pipeline in which environments can have cameras of their own."""
         if not isinstance(self.pipeline, EpisodicPipeline):
             level, estimator = self._settings.asked.perception, self._settings.estimator
             made = level, estimator, self.scene, self.config
@@ -184,7 +189,7 @@ class EpisodeCameras:
     def _setup_of_episode(
         self, fixed: Fixed, sensor_rng: np.random.Generator
     ) -> CameraSetup | None:
-        """The cameras of an environment's next episode; None: those it was made with."""
+        """Return the cameras of an environment's next episode; None for the common ones."""
         rigs = self._rigs if fixed.rig is None else fixed.rigs
         if not fixed.changes_cameras and rigs is None:
             return None
@@ -198,8 +203,8 @@ class EpisodeCameras:
             config.appearance if fixed.appearance is None else fixed.appearance,
         )
 
-    def _note(self, ids: Ints) -> None:
-        """Write down the draws of the episodes of environments `ids`."""
+    def _record(self, ids: Ints) -> None:
+        """Record the draws of the episodes of environments `ids`."""
         if not self._drawn:
             return
         for b in ids.tolist():
@@ -216,21 +221,22 @@ class EpisodeCameras:
 def _difference(
     rig: tuple[CameraConfig, ...], usual: tuple[CameraConfig, ...]
 ) -> Mapping[str, float]:
-    """How many cameras a rig has, and how far they hang and look from those of another."""
+    """Return the number of cameras of a rig, and their largest shift and turn from another rig."""
     if rig == usual:
         return {N_CAMERAS: len(rig), MOVED: 0.0, TURNED: 0.0}
     named, moved_m, turned_rad = {camera.name: camera for camera in usual}, 0.0, 0.0
     for camera in rig:
-        was = named[camera.name]
-        moved_m = max(moved_m, float(np.linalg.norm(np.subtract(camera.eye_world, was.eye_world))))
-        R = axes_of(was).T @ axes_of(camera)
+        nominal = named[camera.name]
+        shift = np.subtract(camera.eye_world, nominal.eye_world)
+        moved_m = max(moved_m, float(np.linalg.norm(shift)))
+        R = axes_of(nominal).T @ axes_of(camera)
         turned_rad = max(turned_rad, float(np.arccos(np.clip((np.trace(R) - 1) / 2, -1, 1))))
     return {N_CAMERAS: len(rig), MOVED: moved_m, TURNED: turned_rad}
 
 
 @lru_cache(maxsize=256)
 def _amounts(faults: tuple[FaultConfig, ...], kinds: tuple[str, ...]) -> Mapping[str, float]:
-    """The amount of each kind of fault, of several the one that changes most."""
+    """Return the amount of each kind of fault; of several, the one with the largest effect."""
     most = {kind: NEUTRAL.get(kind, 0.0) for kind in kinds}
     for fault in faults:
         none = NEUTRAL.get(fault.kind, 0.0)

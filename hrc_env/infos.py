@@ -1,28 +1,34 @@
-"""The infos of a step or a reset: cost, incidents, tracking, workers and cameras, by name."""
+"""Infos of a step or a reset by name: cost, incidents, tracking, workers and cameras."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
+from hrc_env.core.declared import Records2
 from hrc_env.core.infos import MISCALIBRATED, MORE_PEOPLE, Info, of_workers
 from hrc_env.core.records import PoseEstimate, RobotState, WorkerTruth
-from hrc_env.core.typing import Bools, Ints, Records
+from hrc_env.core.typing import Bools, Ints
 from hrc_env.core.vacancy import Vacancy
 from hrc_env.geometry.distances import least_separation
 from hrc_env.motion import generator
 from hrc_env.rewards import RewardTerm
-from hrc_env.safety import cost as costs
 from hrc_env.safety import incidents
-from hrc_env.safety.cost import Cost, CostConfig
-from hrc_env.safety.incidents import IncidentMonitor
+from hrc_env.safety.cost import Cost, CostConfig, split_cost, sum_cost
+from hrc_env.safety.incidents import Incident, IncidentMonitor
 from hrc_env.tracking import metrics
 
 
-def cost_info(cost: Cost, happened: Records, present: Bools, config: CostConfig) -> Info:
-    """The cost by the names that safe-RL libraries read, with its parts, and the separation from
-    who is there."""
-    parts = costs.parts(cost, happened, config)
-    total = costs.total(parts, config)
+def cost_info(cost: Cost, happened: Records2[Incident], present: Bools, config: CostConfig) -> Info:
+    """Return the cost under the names that safe-RL libraries read, its parts, and the separation.
+
+    Args:
+        cost: the cost of the step.
+        happened: (B, W) incidents of the step, `incidents.INCIDENT`.
+        present: (B, W) whether each worker is in the scene.
+        config: parts of the cost.
+    """
+    parts = split_cost(cost, happened, config)
+    total = sum_cost(parts, config)
     return {
         "cost": total,
         "cost_sum": total,
@@ -32,16 +38,27 @@ def cost_info(cost: Cost, happened: Records, present: Bools, config: CostConfig)
 
 
 def reset_info(
-    robot: RobotState, truth: WorkerTruth, present: Bools, terms: Sequence[RewardTerm],
+    robot: RobotState,
+    truth: WorkerTruth,
+    present: Bools,
+    terms: Sequence[RewardTerm],
     config: CostConfig,
-) -> Info:  # fmt: skip
-    """What resets say of reward, cost and incidents: nothing but the separation of first poses."""
+) -> Info:
+    """Return the infos of a reset about reward, cost and incidents: zeros, and the separation.
+
+    Args:
+        robot: state of the robots.
+        truth: true poses of the workers.
+        present: (B, W) whether each worker is in the scene.
+        terms: terms of the reward.
+        config: parts of the cost.
+    """
     n = len(present)
     capsules = robot.capsules_world, robot.capsule_radius_m
     gaps_m = least_separation(*capsules, truth.capsules_world, truth.capsule_radius_m).distance_m
     names = ("", "_sum", *(f"_{name}" for name in ("proximity", "contact", *config.components)))
     happened = dict.fromkeys(incidents.SUMMARY.names or (), 0.0)
-    happened |= dict.fromkeys(incidents.AT_TIMES, np.nan)
+    happened |= dict.fromkeys(incidents.NOT_ALWAYS_MEASURED, np.nan)
     nearest_m = gaps_m.min(1, initial=np.inf, where=present)
     return {
         **{f"reward/{term.name}": np.zeros(n) for term in terms},
@@ -52,27 +69,46 @@ def reset_info(
     }
 
 
-def incident_info(happened: Records, monitor: IncidentMonitor, robot: RobotState) -> Info:
-    """What happened to people in a step, (B, W) `incidents.INCIDENT`, and in its episode."""
-    told = incidents.summed_up(happened, monitor.known)
+def incident_info(
+    happened: Records2[Incident], monitor: IncidentMonitor, robot: RobotState
+) -> Info:
+    """Return the incidents of a step.
+
+    Args:
+        happened: (B, W) incidents of the step, `incidents.INCIDENT`.
+        monitor: monitor of the episodes' incidents.
+        robot: state of the robots.
+    """
+    summary = incidents.summarize(happened, monitor.history)
     return {
-        **{f"safety/{name}": told[name] for name in incidents.SUMMARY.names or ()},
-        "safety/time_to_stop_s": monitor.stop_s(robot),
+        **{f"safety/{name}": summary[name] for name in incidents.SUMMARY.names or ()},
+        "safety/time_to_stop_s": monitor.find_stop_time(robot),
     }
 
 
 def tracking_info(
     estimate: PoseEstimate, truth: WorkerTruth, present: Bools, identities: metrics.Identities
 ) -> Info:
-    """How far the belief is from the truth, and whether it takes one worker for another; no error
-    is given where nobody is tracked."""
-    found = metrics.tracking_error(estimate, truth.joints_world, present, identities)
-    return {f"tracking/{name}": found[name] for name in metrics.TRACKING.names or ()}
+    """Return errors of the tracks, and changes of their identities; NaN without a track.
+
+    Args:
+        estimate: the belief about the workers.
+        truth: their true poses.
+        present: (B, W) whether each worker is in the scene.
+        identities: assignment of tracks to workers so far, which is updated.
+    """
+    errors = metrics.measure_errors(estimate, truth.joints_world, present, identities)
+    return {f"tracking/{name}": errors[name] for name in metrics.TRACKING.names or ()}
 
 
-def worker_info(activity: Ints, body: Ints, happened: Records | None) -> Info:
-    """What each worker (B, W) does, which body they have, and the contacts that begin: of a step,
-    or none in a reset."""
+def worker_info(activity: Ints, body: Ints, happened: Records2[Incident] | None) -> Info:
+    """Return each worker's activity and body, and the contacts that begin.
+
+    Args:
+        activity: (B, W) index of the activity.
+        body: (B, W) index of the body.
+        happened: (B, W) incidents of a step; None in a reset.
+    """
     none = np.full(activity.shape, -1)
     kind, region = (none, none) if happened is None else (happened["kind"], happened["region"])
     worn = np.where(activity == generator.ABSENT, -1, body)
@@ -80,8 +116,13 @@ def worker_info(activity: Ints, body: Ints, happened: Records | None) -> Info:
 
 
 def perception_info(cameras: tuple[str, ...], suspected: Bools, vacancy: Vacancy | None) -> Info:
-    """The cameras (B, C) that contradict the others, and whether there are more people than slots;
-    nothing without cameras."""
+    """Return the cameras that contradict the others, and whether there are more people than slots.
+
+    Args:
+        cameras: names of the C cameras.
+        suspected: (B, C) whether each camera contradicts the others.
+        vacancy: search of the floor; None without cameras, for which there are no infos.
+    """
     if vacancy is None:
         return {}
     flags = suspected.astype(float)
@@ -93,7 +134,11 @@ def perception_info(cameras: tuple[str, ...], suspected: Bools, vacancy: Vacancy
 
 
 def words_of(bodies: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
-    """Return the words for the indices in infos; `bodies` are the names of baked bodies."""
+    """Return the words of each kind of index in infos.
+
+    Args:
+        bodies: names of the workers' bodies.
+    """
     return {
         "activity": generator.activity_names,
         "body": bodies,

@@ -1,9 +1,9 @@
-"""Bring your own: a task, an estimator and more, by a name that works wherever one is asked for.
+"""Registration of a user's own tasks, estimators, robots, detectors and shields by name.
 
-What is registered by a file of yours is known to the command line, too:
-`python -m hrc_env --import my_file.py play MyTask-v0`, or the environment variable
-`HRC_ENV_IMPORT`. Registrations reach every process that is started on this machine, as soon as it
-imports this package. The files in `examples/bring_your_own/` show one of each.
+The command line knows the registrations of a file, too:
+`python -m hrc_env --import my_file.py play MyTask-v0`, or by the environment variable
+`HRC_ENV_IMPORT`. Registrations reach every process that this one starts, when it imports this
+package. The files in `examples/bring_your_own/` have an example of each.
 """
 
 import os
@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypeVar
 
 from gymnasium.envs.registration import EnvSpec, register, registry
 
@@ -29,19 +29,24 @@ if TYPE_CHECKING:
     from hrc_env.tasks.task import TaskType
     from hrc_env.tracking.estimators import EstimatorSpec
 
+EntryT = TypeVar("EntryT")
 IMPORT = "HRC_ENV_IMPORT"
-"""Environment variable: Python files that are imported with this package, as PATH has folders."""
+"""Environment variable of Python files that are imported with this package, separated as in PATH.
+"""
 IDS: list[str] = []
-"""The environments that are registered."""
+"""Ids of the registered environments."""
 
 
 def register_task(task: "TaskType") -> None:
-    """Make a task an environment: its id works in `gymnasium.make`, `make_vec` and `play`.
+    """Register a task: its id works in `gymnasium.make`, `make_vec` and `play`.
+
+    Args:
+        task: a subclass of `Task`.
 
     Raises:
-        ConfigError: here and below: the name is taken, or something is missing or of a wrong kind.
+        ConfigError: the id is taken, or a part of the task is missing or wrong.
     """
-    from hrc_env.rehearsal import play_briefly  # in functions: kernels take time to import
+    from hrc_env.rehearsal import play_briefly  # here, as kernels take time to import
     from hrc_env.settings import settle
     from hrc_env.tasks.check import check_task
     from hrc_env.tasks.task import TASKS
@@ -56,9 +61,12 @@ def register_task(task: "TaskType") -> None:
 
 
 def register_estimator(spec: "EstimatorSpec") -> None:
-    """Make an estimator known by its name, wherever `estimator=` or `--estimator` is taken.
+    """Register an estimator under its name for `estimator=` and `--estimator`.
 
-    Its estimates must be finite and of the shapes of `PoseEstimate`.
+    Its estimates must be finite and have the shapes of `PoseEstimate`.
+
+    Raises:
+        ConfigError: the name is taken, or a part of the estimator is missing or wrong.
     """
     from hrc_env.tracking.estimators import ESTIMATORS, check_estimator
 
@@ -67,32 +75,38 @@ def register_estimator(spec: "EstimatorSpec") -> None:
 
 
 def register_robot(robot: "Robot") -> None:
-    """Make a robot known by its name, wherever `robot=` or `--robot` is taken.
+    """Register a robot under its name for `robot=` and `--robot`.
 
-    A warning says where its looks, which cameras see, reach out of its capsules, which distances
-    count.
+    A warning names visual geoms, which cameras see, that differ from the capsules, from which
+    distances are computed.
+
+    Raises:
+        ConfigError: the name is taken, or a part of the robot is missing or wrong.
     """
-    from hrc_env.scene.robot import ROBOTS, Robot, robot_called
-    from hrc_env.scene.robot_looks import warn_of_looks
+    from hrc_env.scene.robot import ROBOTS, Robot, find_robot
+    from hrc_env.scene.robot_looks import warn_of_mismatch
 
     if not isinstance(robot, Robot):
         raise ConfigError(f"A robot must be a Robot, got {type(robot).__name__}.")
-    robot = robot_called(robot)
-    warn_of_looks(robot)
-    if not str(robot.mjcf).lstrip().startswith("<"):  # other processes may work elsewhere
+    robot = find_robot(robot)
+    warn_of_mismatch(robot)
+    if not str(robot.mjcf).lstrip().startswith("<"):  # other processes may have another folder
         robot = replace(robot, mjcf=str(Path(robot.mjcf).resolve()))
     _add(ROBOTS, robot.name, robot)
 
 
 def register_detector(name: str, make: "Callable[[], KeypointFunction]") -> None:
-    """Make a pose detector known: `config={"detector": {"keypoints": name}}`, level "pixels".
+    """Register a pose detector for `config={"detector": {"keypoints": name}}` at "pixels".
 
     Args:
-        name: of the detector.
-        make: called once for each thread that detects. It returns a function of a crop
-            (256, 256, 3), RGB of uint8, that returns (15, 3): x, y [px] from the crop's corner and
-            confidence in [0, 1] of `JOINTS`, NaN, NaN, 0 of one that was not found; or None where
-            nobody is.
+        name: name of the detector.
+        make: function without arguments that is called once for each thread of detection. It
+            returns a function of a crop (256, 256, 3), RGB of uint8, that returns (15, 3): x, y
+            [px] from the crop's corner and confidence in [0, 1] of each of `JOINTS`, and NaN, NaN,
+            0 for a joint without detection; or None if no person is detected.
+
+    Raises:
+        ConfigError: the name is taken, or `make` is no such function.
     """
     from hrc_env.core.brought import check_arguments
     from hrc_env.perception.detector import DETECTORS
@@ -103,7 +117,15 @@ def register_detector(name: str, make: "Callable[[], KeypointFunction]") -> None
 
 
 def register_shield(name: str, shield: "Shield") -> None:
-    """Make a shield, a function as `hrc_env.Shield`, known: `shield=name` of every environment."""
+    """Register a shield under a name for `shield=` and `--shield`.
+
+    Args:
+        name: name of the shield.
+        shield: the shield, a function as `hrc_env.Shield`.
+
+    Raises:
+        ConfigError: the name is taken, or the shield is no such function.
+    """
     from hrc_env.safety.shield import SHIELDS, check_shield
 
     if callable(shield):
@@ -112,8 +134,8 @@ def register_shield(name: str, shield: "Shield") -> None:
 
 
 def register_environment(task_id: str, max_episode_steps: int = EPISODE_STEPS) -> None:
-    """Tell Gymnasium about the environment of a task."""
-    if task_id in IDS:  # inherited: registered anew in this process
+    """Register the environment of a task with Gymnasium."""
+    if task_id in IDS:  # inherited from another process
         registry.pop(task_id, None)
         IDS.remove(task_id)
     register(
@@ -127,11 +149,11 @@ def register_environment(task_id: str, max_episode_steps: int = EPISODE_STEPS) -
 
 
 def import_files(paths: str | Path | Sequence[str | Path] | None = None) -> None:
-    """Import Python files that register things, each once, here and in child processes.
+    """Import Python files with registrations, each once, here and in child processes.
 
     Args:
-        paths: one, several, or a text of several, separated as in PATH; None: those of the
-            environment variable `HRC_ENV_IMPORT`.
+        paths: a path, a list of paths, or a text of several, separated as in PATH; None for those
+            of the environment variable `HRC_ENV_IMPORT`.
 
     Raises:
         ConfigError: there is no such file.
@@ -146,26 +168,29 @@ def import_files(paths: str | Path | Sequence[str | Path] | None = None) -> None
 
 
 def adopt() -> None:
-    """Make the registrations of the process that started this one known; those of this process
-    have precedence. The error of a file is kept for lookups of names that it registers."""
+    """Adopt the registrations of the process that started this one.
+
+    Those of this process have precedence. The error of a file is stored for lookups of names that
+    it would have registered.
+    """
     if not reserve():
         return
     from hrc_env.core.registry import FILES
     from hrc_env.core.snapshot import inherited
 
-    found = inherited()
-    for path in found.files:
+    parent = inherited()
+    for path in parent.files:
         try:
             _import_file(Path(path), recorded=False)
-        except Exception as error:  # of somebody's file, which may not be needed here
+        except Exception as error:  # the file may not be needed here
             FILES[path] = f"{type(error).__name__}: {error}"
-    for task_id, entry in found.entries.get("task", {}).items():
+    for task_id, entry in parent.entries.get("task", {}).items():
         if task_id not in IDS:
             register_environment(task_id, entry.max_episode_steps)
 
 
 def _import_file(path: Path, recorded: bool) -> None:
-    """Import a file unless it is already; `recorded`: child processes do so, too."""
+    """Import a file unless it has been; if it is `recorded`, child processes do so, too."""
     from hrc_env.core.registry import FILES, importing, share
 
     name = f"hrc_env_import_{path.stem}"
@@ -190,13 +215,23 @@ def _import_file(path: Path, recorded: bool) -> None:
         share()
 
 
-def _add(table: "Registry[Any]", name: str, thing: Any, is_function: bool = False) -> None:
-    """Keep a thing in the registry in which things of its kind are looked up by name."""
-    if is_function and not callable(thing):
-        raise ConfigError(f"{name}: a {table.kind} must be a function, got {thing!r}.")
+def _add(table: "Registry[EntryT]", name: str, entry: EntryT, is_function: bool = False) -> None:
+    """Add an entry to a registry.
+
+    Args:
+        table: the registry.
+        name: name of the entry.
+        entry: the entry.
+        is_function: whether it must be a function.
+
+    Raises:
+        ConfigError: the name is taken, or the entry is no function.
+    """
+    if is_function and not callable(entry):
+        raise ConfigError(f"{name}: a {table.kind} must be a function, got {entry!r}.")
     if name in BUILT_IN:
         raise ConfigError(f"There is the {table.kind} {name!r} already; choose another name.")
-    table.register(name, thing)
+    table.register(name, entry)
 
 
 ADVICE = {
@@ -204,28 +239,29 @@ ADVICE = {
     "estimator": "Register an estimator (hrc_env.register_estimator) and give its name.",
     "shield": "Register the shield (hrc_env.register_shield) and give its name.",
 }
-"""For arguments that JSON cannot hold, by name."""
+"""Advice for arguments that JSON cannot hold, by name."""
 OTHERWISE = (
     "Give text, numbers, lists, records or mappings of these; of a clip in memory the path of its "
     "file (hrc_env.save_clip writes one)."
 )
-"""The advice for other arguments."""
+"""Advice for other arguments."""
 
 
 class Spec(EnvSpec):
-    """A spec whose JSON holds every argument: `gymnasium.make` makes the same environment of it."""
+    """A spec with all arguments in its JSON, so that `gymnasium.make` makes the same
+    environment."""
 
     def to_json(self) -> str:
-        """Return the spec as JSON; `ConfigError` for an argument that has no such form."""
+        """Return the spec as JSON, or raise `ConfigError` for an argument that JSON cannot hold."""
         from hrc_env.config import HRCConfig, resolve
         from hrc_env.core.mapping import for_json
         from hrc_env.tasks.task import find_task
-        from hrc_env.tracking.estimators import estimator_called
+        from hrc_env.tracking.estimators import find_estimator
 
         given = {**self.kwargs}
         if isinstance(given.get("config"), HRCConfig):  # its tracker is of the estimator's kind
             task = find_task(given.get("task", DEFAULT))
-            estimator = estimator_called(given.get("estimator", "particle"))
+            estimator = find_estimator(given.get("estimator", "particle"))
             given["config"] = resolve(given["config"], task, estimator)
         for name, value in given.items():
             try:
@@ -240,8 +276,8 @@ class Spec(EnvSpec):
     __hash__ = None  # type: ignore[assignment]  # as of EnvSpec
 
 
-def spec_of(spec: EnvSpec) -> Spec:
-    """Return a spec with plain arguments, in which registered objects are their names."""
+def make_spec(spec: EnvSpec) -> Spec:
+    """Return a spec with plain arguments, in which names stand for registered objects."""
     from hrc_env.core.mapping import plain
     from hrc_env.safety.shield import SHIELDS
     from hrc_env.tasks.task import TASKS
@@ -256,15 +292,15 @@ def spec_of(spec: EnvSpec) -> Spec:
 
 
 class HasSpec:
-    """An environment that can be made again from its `spec`."""
+    """Base of environments that can be made again from their `spec`."""
 
     _spec: Spec | None = None
 
     @property
     def spec(self) -> EnvSpec | None:
-        """What `gymnasium.make` made this from; its arguments are as JSON has them."""
+        """Specification from which `gymnasium.make` made this environment, with plain arguments."""
         return self._spec
 
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
-        self._spec = spec and spec_of(spec)
+        self._spec = spec and make_spec(spec)

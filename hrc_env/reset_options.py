@@ -1,10 +1,10 @@
-"""Options of `reset` and `set_options`: parts of an episode that a user fixes, checked in words."""
+"""Options of `reset` and `set_options`: the parts of an episode that a user fixes."""
 
 import dataclasses
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,8 +15,8 @@ from hrc_env.core.typing import Floats, JointAngles
 from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.geometry.chains import SerialChain
 from hrc_env.geometry.reach import check_reach
-from hrc_env.motion.config import PeopleConfig, numbers
-from hrc_env.motion.decision import ANY_ACTIVITY, BehaviourParams, Cast, jobs_by_activity
+from hrc_env.motion.config import PeopleConfig, make_hand_params
+from hrc_env.motion.decision import ANY_ACTIVITY, BehaviourParams, Cast, group_jobs
 from hrc_env.motion.state import ACTIVITY_NAMES
 from hrc_env.perception.faults.fault import FaultConfig, check_cameras
 from hrc_env.pipeline.levels import CAMERA_LEVELS, check_supported
@@ -25,62 +25,68 @@ from hrc_env.scene.build import Scene, with_rig
 from hrc_env.scene.domain_randomization import AppearanceConfig
 from hrc_env.scene.rig import select
 from hrc_env.scene.rig_distribution import RigDistribution, draw_rig
-from hrc_env.scene.rigs import findings
+from hrc_env.scene.rigs import describe_defects
 from hrc_env.settings import rig_of
-from hrc_env.tasks.hooks import check_places
-from hrc_env.tasks.task import Task
+from hrc_env.tasks.hooks import check_targets
+from hrc_env.tasks.task import AnyTask
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ResetOptions:
-    """Parts of an episode that are fixed: the names that `reset(options={...})` takes.
+    """Fixed parts of an episode: the names that `reset(options={...})` takes.
 
-    The record itself may be given, too. Other parts are drawn as they are without options, from
-    the same random streams. A vector environment takes one value for all environments; of `goal`,
-    `start_q`, `n_workers` and `steps_left` also an array with a row for each; and of any of them
-    "each", a list of a mapping (or None) for each. `set_options` takes the same but `steps_left`:
-    for all resets to come, also those after the end of an episode.
+    The record itself may be given, too. The other parts are drawn as without options, from the same
+    random streams. A vector environment takes one value for all environments; for `goal`,
+    `start_q`, `n_workers` and `steps_left` also an array with a row for each environment; and for
+    all fields "each", a list of a mapping (or None) for each environment. `set_options` takes all
+    fields except `steps_left`, for all resets to come, those after the end of an episode included.
     """
 
     goal: ArrayLike | None = None
-    """The task's goal: in `HRCReach-v0`, whose first it is, and `HRCReachGoal-v0` a place (x, y, z)
-    [m, world]. Other tasks take none; one of yours may (`Task.set_goal`)."""
+    """Goal of the task: in `HRCReachGoal-v0`, and as the first one in `HRCReach-v0`, a place
+    (x, y, z) [m, world]. Other tasks take none; a user's own may (`Task.set_goal`)."""
     n_workers: int | None = None
-    """How many workers there are, up to as many as the environment was made for."""
+    """Number of workers, at most that for which the environment was made."""
     bodies: str | Sequence[str] | None = None
-    """Whose body each worker has: a name for all, or one for each; among `config.worker`."""
+    """Body of all workers, or of each, by names among `config.worker`."""
     people: "str | PeopleConfig | Mapping[str, Any] | None" = None
-    """How workers are with the robot, as the environment's `people`."""
+    """Behaviour of workers towards the robot, as for `EnvConfig.people`."""
     activity: "str | Sequence[str | None] | None" = None
-    """The first activity of workers, "hammer" for example: one for all, or one for
-    each (None: drawn). They go on as usual."""
+    """First activity of all workers, such as "hammer", or of each (None for a drawn one); further
+    activities are drawn as usual."""
     start_q: ArrayLike | None = None
-    """(N,) the joint angles with which the robot starts [rad, m of slides]."""
+    """(N,) joint angles with which the robot starts [rad], of slides [m]."""
     cameras: Any = None
-    """The rig, as the environment's `cameras`; its cameras are called as those of the environment,
-    and may be fewer. A `RigDistribution`: drawn."""
+    """Rig, as for `EnvConfig.cameras`; its cameras have names of the environment's cameras, and may
+    be fewer. From a `RigDistribution` the rig is drawn."""
     faults: "Sequence[FaultConfig | Mapping[str, Any]] | None" = None
-    """Faults of cameras, in place of the environment's `faults`."""
+    """Faults of cameras, which replace the environment's `faults`."""
     appearance: "str | AppearanceConfig | Mapping[str, Any] | None" = None
-    """How scene and workers look, in place of the environment's `appearance`."""
+    """Appearance of scene and workers, which replaces the environment's `appearance`."""
     steps_left: int | None = None
-    """After so many steps this episode is truncated, if its time limit does not end it before."""
+    """Number of steps after which the episode is truncated, unless its time limit ends it before.
+    """
 
 
 NAMES = tuple(each.name for each in dataclasses.fields(ResetOptions))
+"""Names of the options."""
 OF_SEVERAL = ("reset_mask", "each")
 """Options that only vector environments have."""
 ONE_RESET = ("steps_left",)
-"""Options that are of one reset only."""
-Options = Mapping[str, Any]
+"""Options for a single reset only."""
+Options: TypeAlias = Mapping[str, Any]
+"""Options by name."""
 
 
 def named_options(options: Options | ResetOptions | None, *more: str) -> dict[str, Any]:
     """Return options by name, without those that are None.
 
+    Args:
+        options: options as a record or a mapping.
+        more: further valid names.
+
     Raises:
-        ConfigError: a name that is no option, with the nearest; `more` are names that are valid
-            here besides.
+        ConfigError: a name is no option; the error has the most similar one.
     """
     if isinstance(options, ResetOptions):
         options = {name: getattr(options, name) for name in NAMES}
@@ -98,8 +104,15 @@ def named_options(options: Options | ResetOptions | None, *more: str) -> dict[st
 
 
 def lasting_options(options: Options | ResetOptions | None, *more: str) -> dict[str, Any]:
-    """Return options that are to hold for all resets to come; `ConfigError` as of `named_options`,
-    and for what is of one reset."""
+    """Return options for all resets to come by name.
+
+    Args:
+        options: options as a record or a mapping.
+        more: further valid names.
+
+    Raises:
+        ConfigError: a name is no option, or an option for a single reset.
+    """
     given = named_options(options, *more)
     for name in (*ONE_RESET, *more):
         if name in given and name != "each":
@@ -112,21 +125,29 @@ def lasting_options(options: Options | ResetOptions | None, *more: str) -> dict[
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fixed:
-    """Parts of one environment's episode that are not drawn, checked; None: drawn, or as it was
-    made."""
+    """Checked parts of one environment's episode that are fixed.
+
+    A part that is None is drawn, or the environment's own.
+    """
 
     goal: Floats | None = None
+    """Goal of the task."""
     cast: Cast | None = None
+    """Number, bodies, first activities and behaviour of the workers."""
     start_q: JointAngles | None = None
+    """(N,) joint angles with which the robot starts [rad], of slides [m]."""
     rig: tuple[CameraConfig, ...] | None = None
+    """The rig, or the nominal rig of `rigs`."""
     rigs: RigDistribution | None = None
-    """From which the rig is drawn, and that in its middle is `rig`."""
+    """Distribution from which the rig is drawn."""
     faults: tuple[FaultConfig, ...] | None = None
+    """Faults of cameras."""
     appearance: AppearanceConfig | None = None
+    """Appearance of scene and workers."""
 
     @property
     def changes_cameras(self) -> bool:
-        """Whether the cameras are others than those with which the environment was made."""
+        """Whether the cameras differ from those with which the environment was made."""
         return any(each is not None for each in (self.rig, self.rigs, self.faults, self.appearance))
 
 
@@ -134,29 +155,48 @@ class Fixed:
 class Room:
     """Settings of an environment against which options are checked."""
 
-    task: Task[Any, Any]
+    task: AnyTask
+    """The task."""
     scene: Scene
+    """The scene with the environment's rig."""
     chain: SerialChain
+    """Kinematics of the robot."""
     level: str
+    """Perception level."""
     faults: tuple[FaultConfig, ...]
+    """Faults of the environment's cameras."""
     appearance: AppearanceConfig
+    """Appearance of the environment's scene and workers."""
     bodies: tuple[str, ...]
+    """Names of the bodies that workers can have."""
     mind: BehaviourParams
-    """The workers' parameters of decision."""
-    touched_at: Callable[[JointAngles], str | None]
-    """Returns the name of an obstacle at joint angles; None: none is touched."""
+    """Parameters of the workers' decisions."""
+    find_contact: Callable[[JointAngles], str | None]
+    """Function that returns the names of two geoms that touch at joint angles, or None."""
     images: ObservedImages | None = None
-    """Draws the images of observations; None: they hold none."""
+    """Renderer of the images in observations; None without images."""
     wants_pairs: str = ""
-    """The name of an estimator that needs two cameras; "": it does not."""
+    """Name of the estimator if it needs two cameras, else ""."""
+
+
+class ChosenRig(NamedTuple):
+    """Value of the option `cameras`."""
+
+    rig: tuple[CameraConfig, ...] | None = None
+    """The rig, or the nominal rig of the distribution; None without the option."""
+    distribution: RigDistribution | None = None
+    """Distribution from which the rig is drawn; None for a fixed rig."""
 
 
 def fix(options: Options, room: Room) -> Fixed:
-    """Return the fixed parts of one environment's episode.
+    """Return the fixed parts of one environment's episode, before any other part is drawn.
+
+    Args:
+        options: options by name.
+        room: settings of the environment.
 
     Raises:
-        ConfigError: an option that cannot be, or two that exclude each other; before anything of
-            the episode is drawn.
+        ConfigError: an option is invalid, or two exclude each other.
     """
     given = named_options(options)
     rig, rigs = _rig(given.get("cameras"), room)
@@ -191,6 +231,7 @@ def fix(options: Options, room: Room) -> Fixed:
 
 
 def _goal(goal: Any, room: Room) -> Floats | None:
+    """Return a goal, or raise `ConfigError` if it is invalid or out of reach."""
     if goal is None:
         return None
     try:
@@ -200,12 +241,13 @@ def _goal(goal: Any, room: Room) -> Floats | None:
     if not np.isfinite(place).all():
         raise ConfigError(f'options["goal"] must be finite numbers, got {goal!r}.')
     targets = room.task.goal_targets(place)
-    check_places(f"{room.task.id}: goal_targets", targets)
+    check_targets(f"{room.task.id}: goal_targets", targets)
     check_reach(room.task.id, room.scene.robot.name, room.chain, targets)
     return place
 
 
 def _start_q(start_q: Any, room: Room) -> JointAngles | None:
+    """Return joint angles, or raise `ConfigError` if they are invalid or in contact."""
     if start_q is None:
         return None
     name, joints = 'options["start_q"]', room.scene.robot.joints
@@ -219,13 +261,13 @@ def _start_q(start_q: Any, room: Room) -> JointAngles | None:
             raise ConfigError(
                 f"{name}: joint {joint!r} must be from {low:.3f} to {high:.3f}, got {value:.3f}."
             )
-    if touched := room.touched_at(q):
+    if touched := room.find_contact(q):
         raise ConfigError(f"{name}: with these angles {touched} touch; choose others.")
     return q
 
 
 def _cast(given: Options, room: Room) -> Cast | None:
-    """Return the people who are there, their first activities, and their behaviour."""
+    """Return number, bodies, first activities and behaviour of the workers."""
     if not {"n_workers", "bodies", "people", "activity"} & set(given):
         return None
     most, n = room.scene.n_workers, None
@@ -238,12 +280,12 @@ def _cast(given: Options, room: Room) -> Cast | None:
                 "n_workers=(fewest, most) for more."
             ) from error
     count = most if n is None else n
-    bodies = _of_each("bodies", given.get("bodies"), count)
+    bodies = _one_each("bodies", given.get("bodies"), count)
     if bodies is not None:
         check_names("body (config.worker)", bodies, room.bodies)
-    activities = _of_each("activity", given.get("activity"), count)
+    activities = _one_each("activity", given.get("activity"), count)
     if activities is not None:
-        valid = sorted(jobs_by_activity(room.mind.schedule))
+        valid = sorted(group_jobs(room.mind.schedule))
         check_names(
             f"activity to begin with in {room.scene.name!r}:",
             [each for each in activities if each is not None],
@@ -261,8 +303,8 @@ def _activity_index(name: str | None) -> int:
     return ANY_ACTIVITY if name is None else ACTIVITY_NAMES.index(name)
 
 
-def _of_each(name: str, value: Any, n_workers: int) -> list[Any] | None:
-    """One value for each worker, from one for all or a list."""
+def _one_each(name: str, value: Any, n_workers: int) -> list[Any] | None:
+    """Return one value for each worker, from one for all or a list."""
     if value is None:
         return None
     if isinstance(value, str):
@@ -276,18 +318,19 @@ def _of_each(name: str, value: Any, n_workers: int) -> list[Any] | None:
 
 
 def _mind(people: Any, mind: BehaviourParams) -> BehaviourParams | None:
+    """Return the parameters of decisions with another behaviour; None for the environment's."""
     if people is None:
         return None
     config = replace(mind.config, people=restored(PeopleConfig, people, "people"))
-    return replace(mind, config=config, numbers=numbers(config, mind.plan.grounds.robot_xy_m))
+    return replace(
+        mind, config=config, hand_params=make_hand_params(config, mind.hand_params.robot_xy_m)
+    )
 
 
-def _rig(
-    cameras: Any, room: Room
-) -> tuple[tuple[CameraConfig, ...] | None, RigDistribution | None]:
-    """The rig, and the distribution of which it is the middle."""
+def _rig(cameras: Any, room: Room) -> ChosenRig:
+    """Return the rig of an episode, or raise `ConfigError` if it is invalid."""
     if cameras is None:
-        return None, None
+        return ChosenRig()
     if isinstance(cameras, np.ndarray):
         cameras = cameras.tolist()
     rigs = None
@@ -295,7 +338,7 @@ def _rig(
         rigs = restored(RigDistribution, cameras, "cameras")
         rig = rigs.rig or room.scene.rig
         rigs.counts(len(rig))
-        if room.level in CAMERA_LEVELS:  # refused before anything is drawn
+        if room.level in CAMERA_LEVELS:  # to raise its errors here
             draw_rig(rigs, with_rig(room.scene, rig), np.random.default_rng(0))
     else:
         own = rig_of(cameras)
@@ -309,12 +352,13 @@ def _rig(
                 f"{camera.name!r}. Make the environment with cameras= of all of them."
             )
     if rigs is None and room.level in CAMERA_LEVELS:
-        for finding in findings(with_rig(room.scene, rig), room.wants_pairs):
-            warnings.warn(finding, stacklevel=5)
-    return rig, rigs
+        for defect in describe_defects(with_rig(room.scene, rig), room.wants_pairs):
+            warnings.warn(defect, stacklevel=5)
+    return ChosenRig(rig, rigs)
 
 
 def _faults(given: Options, room: Room) -> tuple[FaultConfig, ...] | None:
+    """Return the faults among options; None if there are none."""
     if "faults" not in given:
         return None
     faults: tuple[FaultConfig, ...] = restored(tuple[FaultConfig, ...], given["faults"], "faults")
@@ -322,6 +366,7 @@ def _faults(given: Options, room: Room) -> tuple[FaultConfig, ...] | None:
 
 
 def _appearance(given: Options, room: Room) -> AppearanceConfig | None:
+    """Return the appearance among options; None if there is none."""
     if "appearance" not in given:
         return None
     appearance: AppearanceConfig = restored(AppearanceConfig, given["appearance"], "appearance")
@@ -331,11 +376,17 @@ def _appearance(given: Options, room: Room) -> AppearanceConfig | None:
 def faults_of(
     faults: Sequence[FaultConfig], names: Sequence[str], rig: Sequence[CameraConfig]
 ) -> tuple[FaultConfig, ...]:
-    """Return the faults of those cameras that are in a rig, of a longer one with these `names`."""
-    there, kept = {camera.name for camera in rig}, []
+    """Return the faults of the cameras in an episode's rig.
+
+    Args:
+        faults: faults of the environment's cameras.
+        names: names of these cameras.
+        rig: the episode's rig, with some of them.
+    """
+    in_rig, kept = {camera.name for camera in rig}, list[FaultConfig]()
     for fault in faults:
-        called = [each if isinstance(each, str) else names[each] for each in fault.cameras]
-        cameras = tuple(each for each in called if each in there or each not in names)
+        chosen = [each if isinstance(each, str) else names[each] for each in fault.cameras]
+        cameras = tuple(each for each in chosen if each in in_rig or each not in names)
         if cameras:
             kept.append(replace(fault, cameras=cameras))
     return tuple(kept)

@@ -1,4 +1,4 @@
-"""For Stable-Baselines3: the vector environment as a `VecEnv`.
+"""The vector environment as a `VecEnv` of Stable-Baselines3.
 
 from hrc_env import HRCVecEnv
 PPO("MlpPolicy", HRCVecEnv(64, stagger=True, perception="keypoints"))
@@ -26,42 +26,42 @@ from hrc_env.simulation import Simulation
 from hrc_env.step_result import Observation
 from hrc_env.tasks.goal import TERM
 from hrc_env.vector.env import HRCVectorEnv
-from hrc_env.vector.infos import chosen_infos
-from hrc_env.vector.make import REFUSING, without_refusal
+from hrc_env.vector.infos import choose_infos
+from hrc_env.vector.make import REFUSING, raise_first_error
 from hrc_env.vector.member import TOGETHER, Member, info_of
-from hrc_env.vector.options import ALONE, steps_behind
+from hrc_env.vector.options import ALONE, count_elapsed_steps
 
 with learner():
     from stable_baselines3.common.monitor import Monitor
     from stable_baselines3.common.vec_env import SubprocVecEnv, VecEnv
 
 REPLACED = (Monitor, OrderEnforcing)
-"""Wrappers of one environment that this `VecEnv` replaces, with a time limit `TimeLimit` too."""
+"""Wrappers of one environment that this `VecEnv` replaces, beside `TimeLimit`."""
 
 
 class HRCVecEnv(VecEnv):
-    """An `HRCVectorEnv` as SB3 expects environments, with episode statistics.
+    """An `HRCVectorEnv` in the form of SB3's `VecEnv`, with the statistics of episodes.
 
-    Environment k of `seed(s)` and then `reset()` is the single environment after
-    `reset(seed=s + k)`. The info of a step holds its "cost" only (with goals also the rest of the
-    reward, for HER with `copy_info_dict`), but where an episode ended the whole, with
-    "terminal_observation", "TimeLimit.truncated" and the statistics, "episode": `Monitor`'s work is
-    done. `infos=` adds others to every step, for wrappers that shape the reward or count: those of
-    "reward/..." are of the belief, "cost", "safety/...", "tracking/..." and "worker_N/..." of the
-    truth, which no robot knows (docs/reference/infos.md). Attributes and methods of one
-    environment are those of `hrc_env.vector.member.Member`.
+    Environment k after `seed(s)` and `reset()` is the single environment after `reset(seed=s + k)`.
+
+    The info of a step has only its "cost"; with goals also the other terms of the reward, for HER
+    with `copy_info_dict`. At the end of an episode it has all infos, "terminal_observation",
+    "TimeLimit.truncated" and the statistics "episode", so that no `Monitor` is needed. `infos=`
+    adds infos to every step, for wrappers that shape the reward or count. Infos "reward/..." follow
+    from the belief; "cost", "safety/...", "tracking/..." and "worker_N/..." follow from the truth,
+    which no robot knows (docs/reference/infos.md). Attributes and methods of one environment are
+    those of `hrc_env.vector.member.Member`.
 
     Args:
-        num_envs: how many environments step together.
-        stagger: after a `seed()`, let each environment's first episode end early at a random
-            time, so that a short rollout sees all phases of an episode. Not for evaluation.
-        seed: of the first reset.
-        infos: names of infos that every step has, too, or patterns of such: "safety/*".
-        kwargs: as of `HRCVectorEnv`.
+        num_envs: number of environments.
+        stagger: whether, after a `seed()`, the first episode of each environment ends early at a
+            random time, so that a short rollout has all phases of an episode; not for evaluation.
+        seed: seed of the first reset.
+        infos: names of infos that every step has, or patterns such as "safety/*".
+        kwargs: arguments of `HRCVectorEnv`.
 
     Raises:
-        ConfigError: a pattern of infos that none matches, with the nearest; and as of
-            `HRCVectorEnv`.
+        ConfigError: no info matches a pattern, or an argument is invalid.
     """
 
     def __init__(
@@ -74,8 +74,8 @@ class HRCVecEnv(VecEnv):
         **kwargs: Any,
     ) -> None:
         check_keywords(HRCVecEnv, kwargs, HRCVectorEnv)
-        self.info_names = chosen_infos(infos, kwargs)
-        """Names of infos that were chosen for every step."""
+        self.info_names = choose_infos(infos, kwargs)
+        """Names of the infos that were chosen for every step."""
         self.env = HRCVectorEnv(num_envs, autoreset_mode=AutoresetMode.SAME_STEP, **kwargs)
         space, actions = self.env.single_observation_space, self.env.single_action_space
         self._past: list[list[Past]] = [[] for _ in range(num_envs)]
@@ -85,18 +85,18 @@ class HRCVecEnv(VecEnv):
         self.stagger, self.started_s = stagger, time.time()
         self.seed(seed)
         self.costs: Floats = np.zeros(num_envs)
-        """(num_envs,) the cost of the last step [control steps]; 0 after a reset."""
+        """(num_envs,) cost of the last step [control steps]; 0 after a reset."""
         self._action = np.zeros((num_envs, *(actions.shape or ())), np.float32)
         self._sums = EpisodeSums(num_envs)
 
     @property
     def simulation(self) -> Simulation:
-        """The environments' simulation; of several, the first."""
+        """Simulation of the environments; of several, the first."""
         return self.env.shards.first
 
     @property
     def spec(self) -> EnvSpec | None:
-        """Specification of one environment for `gymnasium.make`; None of an unregistered task."""
+        """Specification of one environment for `gymnasium.make`; None for an unregistered task."""
         return self._member(0).spec
 
     def seed(self, seed: int | None = None) -> list[int | None]:  # type: ignore[override]
@@ -106,17 +106,16 @@ class HRCVecEnv(VecEnv):
         return seeds
 
     def set_options(self, options: Any = None) -> None:
-        """Take options for the next reset.
+        """Set the options of the next reset.
 
-        For all resets to come: `env_method("set_options", options)`.
+        `env_method("set_options", options)` sets them for all resets to come.
 
         Args:
-            options: as of `HRCVectorEnv.reset`, of one environment each; one mapping for all
-                environments or a list of them.
+            options: options of one environment, as for `HRCVectorEnv.reset`: a mapping for all
+                environments, or a list with one for each.
 
         Raises:
-            ConfigError: an unknown option, a value that cannot work, or a list of another
-                length.
+            ConfigError: an option is unknown or invalid, or the list has another length.
         """
         each = _one_each(options, self.num_envs)
         for k, one in enumerate(each):
@@ -124,7 +123,8 @@ class HRCVecEnv(VecEnv):
         super().set_options([dict(named_options(one, *ALONE)) for one in each])
 
     def reset(self) -> Observation:  # type: ignore[override]
-        """Start every environment: from its seed the first time, then on with its stream."""
+        """Start an episode of every environment, the first from its seed, others from its
+        stream."""
         limit = self.env.max_episode_steps
         elapsed = np.zeros(self.num_envs, int)
         if self._phases is not None:
@@ -132,7 +132,7 @@ class HRCVecEnv(VecEnv):
         each = [dict(options or {}) for options in self._options]
         for k, options in enumerate(each):
             steps = {name: options.pop(name) for name in ALONE if name in options}
-            elapsed[k] = steps_behind(steps, limit) if steps else elapsed[k]
+            elapsed[k] = count_elapsed_steps(steps, limit) if steps else elapsed[k]
         given = {"each": each} if any(each) else {}
         options = {"elapsed_steps": elapsed, **given}
         observation, infos = self.env.reset(seed=self._seeds, options=options)
@@ -144,13 +144,13 @@ class HRCVecEnv(VecEnv):
         return observation
 
     def step_async(self, actions: NDArray[Any]) -> None:
-        """Keep the actions for `step_wait`."""
+        """Store the actions for `step_wait`."""
         self._action = actions
 
     def step_wait(
         self,
     ) -> tuple[Observation, NDArray[np.float32], Bools, list[dict[str, Any]]]:
-        """Step everyone; whoever is done starts anew, as SB3 expects."""
+        """Advance every environment by one control step, and reset those with an ended episode."""
         observation, reward, terminated, truncated, fresh = self.env.step(self._action)
         self._n_steps += 1
         self.costs = self._sums.add(reward, fresh)
@@ -168,7 +168,7 @@ class HRCVecEnv(VecEnv):
         return observation, reward.astype(np.float32), done, infos
 
     def _infos(self, fresh: Mapping[str, Any]) -> list[dict[str, Any]]:
-        """Of every step: its cost, what `compute_reward` adds to a goal's term, what was chosen."""
+        """Return the infos of every step: cost, terms beside the goal's, and the chosen infos."""
         columns = {"cost": self.costs}
         for term in self.simulation.task.reward_terms if self.simulation.task.goal else ():
             if term.name != TERM:
@@ -181,7 +181,7 @@ class HRCVecEnv(VecEnv):
     def set_reward(
         self, weights: RewardConfig | None = None, factors: Mapping[str, float] | None = None
     ) -> None:
-        """Weigh the reward's terms so from the next step on, in all environments (`HRCEnv`)."""
+        """Set the weights of the reward's terms in all environments, as `HRCEnv.set_reward`."""
         self.env.set_reward(weights, factors)
 
     def close(self) -> None:
@@ -191,27 +191,29 @@ class HRCVecEnv(VecEnv):
     def get_images(self) -> list[NDArray[np.uint8] | None]:
         """Return a picture of every environment.
 
-        None of each, with a warning, unless the render mode is "rgb_array".
+        Without the render mode "rgb_array" it warns, and returns None for each.
         """
         if self.render_mode != "rgb_array":
-            said = f"Images take render_mode='rgb_array', this one is {self.render_mode!r}."
-            warnings.warn(said, stacklevel=2)
+            warnings.warn(
+                f"Images take render_mode='rgb_array', this one is {self.render_mode!r}.",
+                stacklevel=2,
+            )
             return [None] * self.num_envs
         return list(self.env.render() or ())
 
     def _episode(self, b: int, info: Mapping[str, Any]) -> dict[str, float]:
-        """Return the statistics of an episode under the names of SB3's Monitor, and ours."""
+        """Return the statistics of an episode, those of SB3's Monitor under its names."""
         task, dt_s = self.simulation.task, self.env.config.ctrl_dt
         episode = self._sums.summarize(b, info, task, dt_s)
         return {**episode, "t": time.time() - self.started_s}
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """Return the attribute of each environment."""
-        return [getattr(self._member(k), attr_name) for k in self._chosen(indices)]
+        """Return an attribute of each of the environments."""
+        return [getattr(self._member(k), attr_name) for k in self._choose(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Set `np_random` or an attribute of your own; `ConfigError` for a setting."""
-        for k in self._chosen(indices):
+        """Set `np_random` or a user's own attribute, or raise `ConfigError` for a setting."""
+        for k in self._choose(indices):
             setattr(self._member(k), attr_name, value)
 
     def env_method(
@@ -221,9 +223,9 @@ class HRCVecEnv(VecEnv):
 
         Raises:
             NoAttributeError: there is no such method.
-            ConfigError: it must not be called for some environments only.
+            ConfigError: it is a method for all environments together only.
         """
-        chosen = self._chosen(indices)
+        chosen = self._choose(indices)
         if method_name not in TOGETHER:
             methods = [getattr(self._member(k), method_name) for k in chosen]
             return [method(*method_args, **method_kwargs) for method in methods]
@@ -234,18 +236,19 @@ class HRCVecEnv(VecEnv):
         return [getattr(self.env, method_name)(*method_args, **method_kwargs)] * len(chosen)
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
-        """Return whether this wrapper is replaced (`REPLACED`), for each environment."""
+        """Return whether a wrapper is among the replaced ones, for each environment."""
         limited = self.env.max_episode_steps != ENDLESS
         done = (*REPLACED, TimeLimit) if limited else REPLACED
         wrapped = any(issubclass(each, wrapper_class) for each in done)
-        return [wrapped] * len(self._chosen(indices))
+        return [wrapped] * len(self._choose(indices))
 
-    def _chosen(self, indices: Any) -> list[int]:
-        """Return the numbers of the chosen environments; -1 is the last, as in a list."""
+    def _choose(self, indices: Any) -> list[int]:
+        """Return the indices of the chosen environments; -1 is the last, as in a list."""
         n = self.num_envs
         return [whole("indices", k, -n, n - 1) % n for k in self._get_indices(indices)]
 
     def _member(self, k: int) -> "MonitoredMember":
+        """Return environment `k` alone."""
         return MonitoredMember(self, k)
 
     def past_of(self, k: int) -> list["Past"]:
@@ -253,36 +256,37 @@ class HRCVecEnv(VecEnv):
         return self._past[k]
 
     def count_steps(self, k: int) -> int:
-        """Return the steps of environment `k` since it was made."""
+        """Return the number of steps of environment `k` since it was made."""
         return int(self._n_steps[k])
 
     def begin_alone(self, k: int, info: dict[str, Any]) -> None:
-        """Begin the statistics of environment `k`, which has started alone, with this info."""
+        """Begin the statistics of environment `k`, which was reset alone, with this info."""
         self._sums.begin(np.array([k]))
         self.costs = np.where(np.arange(self.num_envs) == k, 0.0, self.costs)
         self.reset_infos[k] = info
 
 
 class HRCSubprocVecEnv(SubprocVecEnv):
-    """SB3's `SubprocVecEnv`, in which errors of options are raised here and processes go on.
+    """SB3's `SubprocVecEnv`, in which errors of options are raised and all processes continue.
 
     PPO("MlpPolicy", make_vec_env("HRCReach-v0", 4, env_kwargs={"perception": "pixels"},
         vec_env_cls=HRCSubprocVecEnv))
 
-    For perception="pixels", which cannot be batched; `HRCVecEnv` is faster at other levels. Of
-    SB3's own class the process would end, and the error be an `EOFError`.
+    It is for perception="pixels", which cannot be batched; `HRCVecEnv` is faster at other levels.
+    With SB3's own class, the process of the environment ends, and the error is an `EOFError`.
     """
 
     def set_options(self, options: Any = None) -> None:
-        """Take options for the next reset.
+        """Set the options of the next reset.
 
-        For all resets to come: `env_method("set_options", options)`.
+        `env_method("set_options", options)` sets them for all resets to come.
 
         Args:
-            options: of one environment each; one mapping for all environments or a list of them.
+            options: options of one environment: a mapping for all environments, or a list with one
+                for each.
 
         Raises:
-            ConfigError: an option that cannot be, or a list of another length.
+            ConfigError: an option is invalid, or the list has another length.
         """
         each = [named_options(one) for one in _one_each(options, self.num_envs)]
         for k, one in enumerate(each):
@@ -290,12 +294,13 @@ class HRCSubprocVecEnv(SubprocVecEnv):
         super().set_options(each)
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Set an attribute, as SB3 does, of the outermost wrapper.
+        """Set an attribute of the outermost wrapper, as SB3 does.
 
         Args:
-            attr_name: of the attribute; "options", of all resets to come, are the environment's.
-            value: of it.
-            indices: of the environments; None: all.
+            attr_name: name of the attribute; "options", of all resets to come, is set in the
+                environment itself.
+            value: value of the attribute.
+            indices: indices of the environments; None for all.
         """
         if attr_name == "options":
             self.env_method("set_options", value, indices=indices)
@@ -308,30 +313,40 @@ class HRCSubprocVecEnv(SubprocVecEnv):
         """Call a method of each environment and return the results.
 
         Raises:
-            ConfigError: an environment refuses the arguments.
+            ConfigError: the arguments are invalid for an environment.
         """
         attempt = ("attempt",) if method_name in REFUSING else ()
         name, *args = *attempt, method_name, *method_args
-        return [*without_refusal(super().env_method(name, *args, indices=indices, **method_kwargs))]
+        return [
+            *raise_first_error(super().env_method(name, *args, indices=indices, **method_kwargs))
+        ]
 
 
 def _one_each(options: Any, num_envs: int) -> Sequence[Any]:
-    """Options of each environment, from one for all or a list."""
+    """Return the options of each environment, from one mapping for all or a list."""
     each = options if isinstance(options, (list, tuple)) else [options] * num_envs
     check_shape("options", (len(each),), (num_envs,), "a mapping for each environment")
     return each
 
 
 class Past(NamedTuple):
-    """A finished episode, as `Monitor` keeps it."""
+    """Statistics of a finished episode, as `Monitor` has them."""
 
     reward: float
+    """Return of the episode."""
     length: int
+    """Length of the episode [control steps]."""
     since_start_s: float
+    """Time of its end since the environments were made [s]."""
 
 
 class MonitoredMember(Member):
-    """Environment `k` of an `HRCVecEnv`, with the statistics of a `Monitor`."""
+    """Environment `k` of an `HRCVecEnv`, with the statistics of a `Monitor`.
+
+    Args:
+        many: the environments.
+        k: index of the environment.
+    """
 
     def __init__(self, many: HRCVecEnv, k: int) -> None:
         super().__init__(many.env, k)
@@ -346,7 +361,7 @@ class MonitoredMember(Member):
         return observation, info
 
     def get_total_steps(self) -> int:
-        """Return the steps since the environment was made."""
+        """Return the number of steps since the environment was made."""
         return self._many.count_steps(self._k)
 
     def get_episode_rewards(self) -> list[float]:

@@ -1,9 +1,9 @@
-"""What a simulation is made from: an environment's arguments, resolved and checked."""
+"""Resolved and checked arguments of an environment, from which a simulation is made."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any, NamedTuple, TypeVar, get_type_hints
 
 import numpy as np
 
@@ -12,58 +12,85 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.mapping import restored
 from hrc_env.env_config import EnvConfig
 from hrc_env.geometry.camera_config import CameraConfig, parse_camera, read_rig
-from hrc_env.safety.shield import Shield, shield_called
+from hrc_env.safety.shield import Shield, find_shield
 from hrc_env.scene.build import Scene
-from hrc_env.scene.camera_images import ImageConfig, images_called
+from hrc_env.scene.camera_images import ImageConfig, parse_images
 from hrc_env.scene.rig_distribution import RigDistribution
 from hrc_env.scene.rigs import RIGS
 from hrc_env.scene.robot import DEFAULT as DEFAULT_ROBOT
-from hrc_env.scene.robot import ROBOTS, Robot, robot_called
+from hrc_env.scene.robot import ROBOTS, Robot, find_robot
 from hrc_env.tasks.check import check_parts
-from hrc_env.tasks.hooks import lent
-from hrc_env.tasks.task import Task, find_task, is_known
-from hrc_env.tracking.estimators import EstimatorSpec, estimator_called
+from hrc_env.tasks.hooks import protect_arrays
+from hrc_env.tasks.task import AnyTask, find_task, is_known
+from hrc_env.tracking.estimators import EstimatorSpec, find_estimator
 
+RecordT = TypeVar("RecordT")
 PARTS = {
     "people": "motion.people",
     "motions": "motion.motions",
     "faults": "faults",
     "appearance": "appearance",
 }
-"""Arguments of an environment that are parts of the config: chosen often."""
+"""Arguments of an environment that stand for parts of `config`, by their paths in it."""
+
+
+class WorkerCounts(NamedTuple):
+    """Bounds on the number of workers of an episode."""
+
+    fewest: int
+    """Least number of workers."""
+    most: int
+    """Greatest number of workers."""
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Everything that a simulation is made from, whole and checked."""
+    """Checked settings of a simulation."""
 
     asked: EnvConfig
-    """The arguments, as they were given."""
-    task: Task[Any, Any]
+    """Arguments of the environment, as they were given."""
+    task: AnyTask
+    """The task with its settings."""
     estimator: EstimatorSpec
+    """The estimator."""
     cameras: Any
-    """Names and indices of the scene's cameras that are used; None: all."""
+    """Names and indices of the scene's cameras in use; None for all."""
     scene: str
+    """Name of the scene."""
     robot: Robot
-    n_workers: tuple[int, int]
-    """The fewest and the most of an episode."""
+    """The robot."""
+    n_workers: WorkerCounts
+    """Bounds on the number of workers of an episode."""
     shield: Shield | None
+    """The shield; None without one."""
     config: HRCConfig
+    """All other settings."""
     images: ImageConfig | None = None
-    """Images of cameras in the observation; None: there are none."""
+    """Images of cameras in the observation; None without images."""
     rigs: RigDistribution | None = None
-    """From which every episode's rig is drawn; None: all have the same."""
+    """Distribution from which every episode's rig is drawn; None for the same rig in all."""
 
-    def recorded(self, batch: int, scene: Scene) -> dict[str, Any]:
-        """What a state must have been taken with to be set."""
+    def describe(self, batch: int, scene: Scene) -> dict[str, Any]:
+        """Return the settings that a state and the simulation that takes it must share.
+
+        Args:
+            batch: number of environments.
+            scene: the scene.
+        """
         fewest, most = self.n_workers
         return {
-            "batch": batch, "task": self.task.id, "perception": self.asked.perception,
-            "estimator": self.estimator.name, "scene": self.scene, "robot": self.robot.name,
+            "batch": batch,
+            "task": self.task.id,
+            "perception": self.asked.perception,
+            "estimator": self.estimator.name,
+            "scene": self.scene,
+            "robot": self.robot.name,
             "cameras": tuple(camera.name for camera in scene.cameras),
-            "n_workers": (fewest, most) if fewest < most else most, "control": self.asked.control,
-            "config": self.config, **({} if self.rigs is None else {"rigs": self.rigs}),
-        }  # fmt: skip
+            "n_workers": (fewest, most) if fewest < most else most,
+            "control": self.asked.control,
+            "config": self.config,
+            **({} if self.rigs is None else {"rigs": self.rigs}),
+        }
 
 
 def settle(**arguments: Any) -> Settings:
@@ -72,12 +99,15 @@ def settle(**arguments: Any) -> Settings:
 
 
 def make_settings(asked: EnvConfig) -> Settings:
-    """Return everything that a simulation is made from, given an environment's arguments.
+    """Return the checked settings of a simulation.
+
+    Args:
+        asked: arguments of the environment.
 
     Raises:
-        ConfigError: a value that cannot be, with those that can.
+        ConfigError: a value is invalid; the error names the valid ones.
     """
-    task, estimator = find_task(asked.task), estimator_called(asked.estimator)
+    task, estimator = find_task(asked.task), find_estimator(asked.estimator)
     if not is_known(task):
         check_parts(task)
     config, cameras = resolve(asked.config, task, estimator), asked.cameras
@@ -92,8 +122,8 @@ def make_settings(asked: EnvConfig) -> Settings:
     for name, path in PARTS.items():
         if (part := getattr(asked, name)) is not None:
             config = _with_part(config, path, part, name)
-    named = task.robot if asked.robot is None else asked.robot
-    robot = robot_called(DEFAULT_ROBOT if named is None else named)
+    choice = task.robot if asked.robot is None else asked.robot
+    robot = find_robot(DEFAULT_ROBOT if choice is None else choice)
     if task.needs_gripper and not robot.grips:
         able = [name for name, each in ROBOTS.items() if each.grips]
         raise ConfigError(
@@ -110,14 +140,22 @@ def make_settings(asked: EnvConfig) -> Settings:
     scene = task.scene if asked.scene is None else asked.scene
     n_workers = task.n_workers if asked.n_workers is None else asked.n_workers
     return Settings(
-        asked, lent(task(config.task)), estimator, cameras, scene,
-        robot, _worker_counts(n_workers),
-        shield_called(asked.shield), config, images_called(asked.observe_images), rigs,
-    )  # fmt: skip
+        asked=asked,
+        task=protect_arrays(task(config.task)),
+        estimator=estimator,
+        cameras=cameras,
+        scene=scene,
+        robot=robot,
+        n_workers=_parse_worker_counts(n_workers),
+        shield=find_shield(asked.shield),
+        config=config,
+        images=parse_images(asked.observe_images),
+        rigs=rigs,
+    )
 
 
 def rig_of(cameras: Any) -> tuple[CameraConfig, ...] | None:
-    """The rig that `cameras=` says (`HRCEnv`); None if it chooses among the scene's cameras."""
+    """Return the rig for a value of `cameras=`; None if it selects cameras of the scene."""
     if isinstance(cameras, str | Path):
         if str(cameras).endswith(".toml"):
             return read_rig(cameras)
@@ -134,6 +172,7 @@ def rig_of(cameras: Any) -> tuple[CameraConfig, ...] | None:
 
 
 def _camera(given: Any, index: int) -> CameraConfig:
+    """Return a camera of a rig, from a record, a mapping or a place, or raise `ConfigError`."""
     if isinstance(given, CameraConfig):
         return given
     if isinstance(given, Mapping):
@@ -148,23 +187,30 @@ def _camera(given: Any, index: int) -> CameraConfig:
     return CameraConfig(f"camera_{index + 1}", (x, y, z))
 
 
-def _worker_counts(n_workers: int | tuple[int, int]) -> tuple[int, int]:
-    """The fewest and the most workers of an episode, from one number or from both."""
+def _parse_worker_counts(n_workers: int | tuple[int, int]) -> WorkerCounts:
+    """Return the bounds on the number of workers, from one number or from both."""
     pair = tuple(n_workers) if isinstance(n_workers, Sequence) else (n_workers, n_workers)
-    whole = all(isinstance(k, int | np.integer) and not isinstance(k, bool) for k in pair)
-    if not whole or len(pair) != 2 or not 0 <= pair[0] <= pair[1]:
+    are_whole = all(isinstance(k, int | np.integer) and not isinstance(k, bool) for k in pair)
+    if not are_whole or len(pair) != 2 or not 0 <= pair[0] <= pair[1]:
         raise ConfigError(
             "n_workers must be a whole number, 0 or more, or (fewest, most), from which each "
             f"episode's number is drawn, got {n_workers!r}."
         )
-    return int(pair[0]), int(pair[1])
+    return WorkerCounts(int(pair[0]), int(pair[1]))
 
 
-def _with_part(record: Any, path: str, value: Any, where: str) -> Any:
-    """A record with another value of a field "a.b"; `where` is what the user calls it."""
+def _with_part(record: RecordT, path: str, value: object, argument: str) -> RecordT:
+    """Return a record with another value of a field.
+
+    Args:
+        record: the record.
+        path: path of the field, such as "motion.people".
+        value: the new value, as a user gives it.
+        argument: name of the argument, for errors.
+    """
     name, _, rest = path.partition(".")
     if rest:
-        new = _with_part(getattr(record, name), rest, value, where)
+        new = _with_part(getattr(record, name), rest, value, argument)
     else:
-        new = restored(get_type_hints(type(record))[name], value, where)
-    return replace(record, **{name: new})
+        new = restored(get_type_hints(type(record))[name], value, argument)
+    return replace(record, **{name: new})  # type: ignore[type-var]

@@ -1,7 +1,7 @@
-"""The closed loop for a batch of environments: act, move, perceive, judge.
+"""The closed loop of a batch of environments: act, move, perceive, judge.
 
-`HRCEnv` is a simulation of one. A result of environment b depends on its own random
-streams only, never on the size of the batch.
+`HRCEnv` is a simulation of one. Results of environment b depend on its own random streams only,
+never on the size of the batch.
 """
 
 import warnings
@@ -16,11 +16,12 @@ from hrc_env import infos, observations, rewards
 from hrc_env.belief import Belief, drop_distant_unknown, estimated_separation, find_unseen_floor
 from hrc_env.control import joint_command, max_command, n_actions
 from hrc_env.core.batching import State, Stateful, picked, rows, write_rows
+from hrc_env.core.declared import Records2
 from hrc_env.core.errors import ConfigError, check_shape, needed
 from hrc_env.core.infos import Info
 from hrc_env.core.records import PoseEstimate, WorkerMotion, WorkerTruth
 from hrc_env.core.streams import children
-from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, JointVelocities, Points3, Records
+from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, JointVelocities, Points3
 from hrc_env.episode_cameras import NOTHING_GIVEN, EpisodeCameras
 from hrc_env.geometry import chains
 from hrc_env.geometry.camera_config import CameraConfig
@@ -34,69 +35,87 @@ from hrc_env.pipeline.sensor_input import SensorInput, TrueSensorInput
 from hrc_env.pipeline.tracking import PerceptionPipeline
 from hrc_env.reset_options import Fixed, Options, Room, fix
 from hrc_env.rewards import RewardConfig
-from hrc_env.safety import cost as costs
 from hrc_env.safety import incidents
-from hrc_env.safety.incidents import IncidentMonitor, Paths
-from hrc_env.safety.shield import shielded
+from hrc_env.safety.cost import measure_cost
+from hrc_env.safety.incidents import Incident, IncidentMonitor, Paths
+from hrc_env.safety.shield import apply_shield
 from hrc_env.scene import handling
 from hrc_env.scene.build import Scene, all_grounds, build
 from hrc_env.scene.domain_randomization import Look
 from hrc_env.scene.limits import object_targets, robot_model
 from hrc_env.scene.physics import Physics
-from hrc_env.scene.rigs import findings
+from hrc_env.scene.rigs import describe_defects
 from hrc_env.settings import Settings
-from hrc_env.step_result import Observation, StepResult, agreed
+from hrc_env.step_result import Observation, StepResult, check_keys
 from hrc_env.tasks import goal
 from hrc_env.tracking import metrics, oracle
-from hrc_env.worker.body import pool, stack, worker_capsules, worker_truth
+from hrc_env.worker.body import load_bodies, select_bodies, worker_capsules, worker_truth
 from hrc_env.world import WorkerProgress, World
 
 CLOSING_M_S = 8.0
-"""Arm and worker never come nearer to each other than so fast [m/s]; 3.4 was the most in some
-290,000 steps of arms that were driven to and fro as hard as they can be."""
+"""Upper bound on the speed at which robot and worker approach each other [m/s]; the greatest in
+some 290,000 steps of robots that were driven to and fro at their limits was 3.4."""
 STREAMS = ("robot", "motion", "sensor", "tracker", "task")
-"""Who draws numbers, each from a generator of its own, in the order in which these are handed out:
-the worker's walk does not depend on who looks at it."""
+"""Random streams of an environment, in the order in which their generators are spawned; the
+workers' motion does not depend on their perception."""
 MEASURING = "objects"
-"""And who measures loose objects, where there are any: from a child of the task's."""
+"""Random stream of the measurement of loose objects, spawned from that of the task."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Command:
-    """What the robots are to do in a step, and how it came about."""
+    """Command of the robots in a step."""
 
     velocities: JointVelocities
-    """(B, N) [rad/s], of slides [m/s]."""
+    """(B, N) joint velocities after the shield [rad/s], of slides [m/s]."""
     previous_action: Floats
-    """(B, A) of the step before."""
+    """(B, A) action of the step before."""
     shield_info: Info
-    """What the shield says of the command; empty without a shield."""
+    """Infos of the shield; empty without a shield."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Truth:
-    """The world as it is: for sensors, the task's judgement, cost and metrics, for no belief."""
+    """The true state of the world, for sensors, task, cost and metrics; no belief reads it."""
 
     ids: Ints
-    """(B,) environments of the batch that these rows are."""
+    """(B,) environments of the rows."""
     world: World
     """Robots with their loads, and objects."""
     motion: WorkerMotion
+    """Poses and velocities of the workers' bodies."""
     workers: WorkerTruth
+    """Joints and capsules of the workers."""
     paths: Paths | None = None
-    """How robots and workers went in a step; None: an episode begins."""
+    """Paths of robots and workers in a step; None at the start of an episode."""
     task_step: Any = None
-    """What the step brought for the task (`Task.advance`)."""
+    """Results of the step for the task (`Task.advance`)."""
 
 
 class Simulation(Stateful):
-    """`batch` environments of the same settings that step together."""
+    """Environments with the same settings that step together.
+
+    Args:
+        batch: number of environments, B.
+        settings: settings of all of them.
+    """
 
     CHANGES = (
-        "physics", "cameras", "motion", "task_state", "streams", "action", "episode_cost",
-        "monitor", "separation_m", "estimates", "reward_weights", "identities", "measured",
+        "physics",
+        "cameras",
+        "motion",
+        "task_state",
+        "streams",
+        "action",
+        "episode_cost",
+        "monitor",
+        "separation_m",
+        "estimates",
+        "reward_weights",
+        "identities",
+        "measured",
         "shield_change",
-    )  # fmt: skip
+    )
 
     def __init__(self, batch: int, settings: Settings) -> None:
         config, perception = settings.config, settings.asked.perception
@@ -104,14 +123,14 @@ class Simulation(Stateful):
         self.batch, self.config, self.control = batch, config, settings.asked.control
         self.perception, self.shield, self.task = perception, settings.shield, settings.task
         self._wants_pairs = settings.estimator.wants_pairs
-        self.bodies = stack(pool(config.worker))
+        self.bodies = load_bodies(select_bodies(config.worker))
         self._make_people_and_scene(settings)
         if perception in CAMERA_LEVELS:
             n, rigs = len(self.scene.cameras), settings.rigs
-            fewest = n if rigs is None else rigs.counts(n)[0]
-            for finding in findings(self.scene, self._wants_pairs, fewest):
-                warnings.warn(finding, stacklevel=3)
-        self.settings = settings.recorded(batch, self.scene)
+            fewest = n if rigs is None else rigs.counts(n).fewest
+            for defect in describe_defects(self.scene, self._wants_pairs, fewest):
+                warnings.warn(defect, stacklevel=3)
+        self.settings = settings.describe(batch, self.scene)
         self.chain, n_joints = self.scene.chain, self.scene.chain.n_joints
         targets = [*self.task.reach_targets(), *object_targets(self.scene)]
         check_reach(self.task.id, self.scene.robot.name, self.chain, targets)
@@ -122,10 +141,16 @@ class Simulation(Stateful):
         n_slides = int(self.chain.slides.sum())
         self.place = self.task.survey(self.scene.map)
         sizes = observations.Sizes(
-            n_joints - n_slides, self.n_actions, self.scene.n_workers, len(config.forecast_s),
-            config.uncertainty, int(self._grips), int(settings.robot.hand is not None),
-            len(self.scene.objects.names), n_slides,
-        )  # fmt: skip
+            n_joints - n_slides,
+            self.n_actions,
+            self.scene.n_workers,
+            len(config.forecast_s),
+            config.uncertainty,
+            int(self._grips),
+            int(settings.robot.hand is not None),
+            len(self.scene.objects.names),
+            n_slides,
+        )
         self.layout = observations.make_layout(self.terms, sizes)
         self.model = robot_model(self.scene, max_command(self.control, self.chain, config.control))
         self.monitor = IncidentMonitor(
@@ -133,65 +158,87 @@ class Simulation(Stateful):
         )
         self.physics = Physics(self.scene, batch)
         self.cameras = EpisodeCameras(batch, settings, self.scene)
-        """Of every environment's episode."""
+        """Cameras of every environment's episode."""
         self.task_state = self.task.make_state(batch)
         self._everyone, self.reward_weights = np.arange(batch), config.reward
         self.reward_factors: dict[str, float] = {}
-        """On terms of the reward by name; 1 on those that are not named."""
+        """Factors on terms of the reward by name; other terms have the factor 1."""
         self.action, self.shield_change = (np.zeros((batch, n)) for n in (self.n_actions, n_joints))
         self.episode_cost, self.separation_m = np.zeros(batch), np.zeros(batch)
         made = (batch, self.scene.n_workers, config.tracker)
-        self.estimates = tuple(oracle.prior(*made) for _ in (0.0, *config.forecast_s))
-        """What is believed of the workers now, and expected at each of `forecast_s`."""
-        self.identities, self.keys = metrics.no_identities(batch, self.scene.n_workers), list[str]()
+        self.estimates = tuple(oracle.estimate_prior(*made) for _ in (0.0, *config.forecast_s))
+        """The belief about the workers now, and its forecast for each of `forecast_s`."""
+        self.identities = metrics.make_identities(batch, self.scene.n_workers)
+        self.keys: list[str] = []
         robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
-        self.measured = handling.world_of(self.physics, self._everyone, robot).objects
-        """The task's loose objects as they were measured last; None: there are none."""
+        self.measured = handling.make_world(self.physics, self._everyone, robot).objects
+        """The last measurement of the task's loose objects; None for a task without."""
         self.streams = {name: [np.random.default_rng(0)] * batch for name in (*STREAMS, MEASURING)}
 
     def reset(
         self, ids: Ints, rngs: Sequence[np.random.Generator], fixed: Sequence[Fixed | None] = ()
     ) -> StepResult:
-        """Start environments `ids` anew, one generator each; their rows of a result.
+        """Begin new episodes of environments `ids`.
 
-        `fixed` is what of each one's episode is not drawn; none: all is.
+        Args:
+            ids: (n,) the environments in question, sorted.
+            rngs: n generators, one for each.
+            fixed: fixed parts of each episode; empty for none.
+
+        Returns:
+            The result of these environments, n rows.
         """
         given = {b: each for b, each in zip(ids.tolist(), fixed, strict=False) if each is not None}
-        self._hand_out(ids, rngs)
-        self.cameras.hang(ids, given, self.streams["sensor"])
+        self._spawn_streams(ids, rngs)
+        self.cameras.assign(ids, given, self.streams["sensor"])
         truth = self._begin(ids, given)
         belief = self._perceive(truth)
         return self._open(truth, belief)
 
     def step(self, action: Floats) -> StepResult:
-        """Advance every environment by one control step; action (B, A) in [-1, 1]."""
+        """Advance every environment by one control step.
+
+        Args:
+            action: (B, A) actions in [-1, 1].
+        """
         command = self._act(action)
         truth = self._move(command)
         belief = self._perceive(truth)
         return self._judge(command, truth, belief)
 
     def fix(self, options: Options) -> Fixed:
-        """Return the parts of one environment's episode that options fix, checked; `ConfigError` as
-        of `reset_options.fix`."""
-        camera_sees = self.config.faults, self.config.appearance
+        """Return the fixed parts of one environment's episode.
+
+        Raises:
+            ConfigError: an option is invalid, or two exclude each other.
+        """
         room = Room(
-            self.task, self.scene, self.chain, self.perception, *camera_sees, self.bodies.names,
-            self.motion.mind, self.physics.touched_at, self.images, self._wants_pairs,
-        )  # fmt: skip
+            task=self.task,
+            scene=self.scene,
+            chain=self.chain,
+            level=self.perception,
+            faults=self.config.faults,
+            appearance=self.config.appearance,
+            bodies=self.bodies.names,
+            mind=self.motion.mind,
+            find_contact=self.physics.find_contact,
+            images=self.images,
+            wants_pairs=self._wants_pairs,
+        )
         return fix(options, room)
 
     def set_reward(
         self, weights: RewardConfig | None = None, factors: Mapping[str, float] | None = None
     ) -> None:
-        """Weigh the reward's terms so from the next step on.
+        """Set the weights of the reward's terms from the next step on.
 
         Args:
-            weights: of the terms that all tasks share; None: as they are.
-            factors: on any terms by name, the task's own among them; 1 on the others. None: as they
-                are.
+            weights: weights of the terms that all tasks share; None keeps them.
+            factors: factors on any terms by name, the task's own included; other terms have the
+                factor 1. None keeps the factors.
 
         Raises:
-            ConfigError: an unknown term, or a factor that is no finite number.
+            ConfigError: a term is unknown, or a factor is no finite number.
         """
         if not isinstance(weights, RewardConfig | None):
             raise ConfigError(
@@ -205,20 +252,20 @@ class Simulation(Stateful):
         self.reward_factors = self.reward_factors if checked is None else checked
 
     def rig_of(self, b: int) -> tuple[CameraConfig, ...]:
-        """Return the cameras of environment b in its episode."""
+        """Return the rig of environment b's episode."""
         return self.cameras.rig_of(b)
 
     def cameras_of(self, b: int) -> tuple[PinholeCamera, ...]:
-        """Return the same with their matrices."""
+        """Return the cameras of environment b's episode with their matrices."""
         return self.cameras.cameras_of(b)
 
     def get_state(self) -> State:
-        """A copy of everything that changes, generators included, and the settings."""
+        """Return a copy of the whole state, generators and settings included."""
         factors = {"reward_factors": self.reward_factors} if self.reward_factors else {}
         return {"settings": self.settings, **super().get_state(), **factors}
 
     def set_state(self, state: State) -> None:
-        """Continue from a state that was taken with the same settings, bit for bit."""
+        """Restore a state that was taken with the same settings, bit for bit."""
         for name in {**self.settings, **state["settings"]}:
             taken, value = state["settings"].get(name), self.settings.get(name)
             if taken != value:
@@ -230,11 +277,11 @@ class Simulation(Stateful):
         self.reward_factors = dict(state.get("reward_factors", {}))
 
     def draw_images(self) -> Images:
-        """Return the images of the moment that the sensors were shown last."""
+        """Return the observed images of the sensors' last moment."""
         return self.cameras.draw_images(self.streams["sensor"])
 
     def look_of(self, b: int) -> Look | None:
-        """How environment `b` looks in its episode (for images); None: as it was built."""
+        """Return the look of environment `b` in its episode; None for the scene as built."""
         return self.cameras.look_of(b, self.streams["sensor"][b])
 
     def close(self) -> None:
@@ -248,58 +295,69 @@ class Simulation(Stateful):
 
     @property
     def images(self) -> ObservedImages | None:
-        """Draws the images of observations; None: they hold none."""
+        """Renderer of the images in observations; None without images."""
         return self.cameras.images
 
     @property
     def estimate(self) -> PoseEstimate:
-        """What is believed of the workers now."""
+        """The belief about the workers now."""
         return self.estimates[0]
 
     @property
     def terms(self) -> tuple[observations.ObservationTerm, ...]:
-        """Of the observation, in their order."""
+        """Terms of the observation in their order."""
         more = observations.SHIELD_TERMS if self.config.observe_shield else ()
         return (*self.task.observation_terms, *more)
 
     @property
     def present(self) -> Bools:
-        """(B, W) who is in the episode."""
+        """(B, W) whether each worker is in the scene."""
         return generator.activity(self.motion) != generator.ABSENT
 
     @property
     def belief(self) -> Belief:
-        """What every robot believes now."""
+        """The belief of every robot now."""
         robot = chains.robot_state(self.chain, self.physics.q, self.physics.qd)
-        world = handling.world_of(self.physics, self._everyone, robot)
+        world = handling.make_world(self.physics, self._everyone, robot)
         return self._believe(self._everyone, self._load(world), self.estimates)
 
     def markers(self, b: int) -> Points3:
-        """(M, 3) what the task of environment `b` has to show [m]."""
+        """Return (M, 3) the markers of environment `b`'s task [m, world]."""
         view = self.task.view(self.task_state, np.array([b]))
         return self.task.markers(view)[0]
 
     def _make_people_and_scene(self, settings: Settings) -> None:
+        """Make the workers and the scene, or raise `ConfigError` if they do not fit."""
         config, (fewest, most) = settings.config, settings.n_workers
-        scene_for = partial(
-            build, config.scene, settings.scene,
-            bodies=self.bodies.names, cameras=settings.cameras, robot=settings.robot,
+        build_scene = partial(
+            build,
+            config.scene,
+            settings.scene,
+            bodies=self.bodies.names,
+            cameras=settings.cameras,
+            robot=settings.robot,
             task_scene=self.task.make_scene(),
-        )  # fmt: skip
-        try:  # first, as it knows how many workers and which clips there is room for
+        )
+        grounds = build_scene(n_workers=0).grounds
+        try:  # before the scene, as this checks the room for workers and clips
             self.motion = generator.make_state(
-                self.batch, most, self.bodies, config.motion, scene_for(n_workers=0).grounds,
-                fewest, settings.robot.girth_m,
-            )  # fmt: skip
+                self.batch,
+                most,
+                self.bodies,
+                config.motion,
+                grounds,
+                fewest,
+                settings.robot.girth_m,
+            )
         except NoRoomError as error:
-            grounds = all_grounds(config.scene)
-            played = fit.played_s(error.clip, grounds, config.worker, config.motion)
-            where = fit.describe_fit(error.clip, played)
-            raise ConfigError(f"{error} {where}") from None
-        self.scene: Scene = scene_for(n_workers=most)
+            scenes = all_grounds(config.scene)
+            played = fit.measure_played_s(error.clip, scenes, config.worker, config.motion)
+            fitting = fit.describe_fit(error.clip, played)
+            raise ConfigError(f"{error} {fitting}") from None
+        self.scene: Scene = build_scene(n_workers=most)
 
-    def _hand_out(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> None:
-        """Give each part of environments `ids` a random stream of its own."""
+    def _spawn_streams(self, ids: Ints, rngs: Sequence[np.random.Generator]) -> None:
+        """Spawn the random streams of environments `ids`."""
         for b, rng in zip(ids, rngs, strict=True):
             for name, stream in zip(STREAMS, children(rng, len(STREAMS)), strict=True):
                 self.streams[name][b] = stream
@@ -307,21 +365,26 @@ class Simulation(Stateful):
                 self.streams[MEASURING][b] = self.streams["task"][b].spawn(1)[0]
 
     def _begin(self, ids: Ints, given: Mapping[int, Fixed]) -> Truth:
-        """Put workers, robots and objects of environments `ids` where episodes begin."""
+        """Reset workers, robots, objects and the task of environments `ids`.
+
+        Args:
+            ids: (n,) the environments in question.
+            given: fixed parts of their episodes by environment.
+        """
         self.action[ids], self.episode_cost[ids], self.separation_m[ids] = 0.0, 0.0, 0.0
         self.shield_change[ids] = 0.0
         self.monitor.reset(ids)
         people, task_rngs = (self.motion, self.streams["motion"]), self.streams["task"]
         casts = {b: each.cast for b, each in given.items() if each.cast is not None}
         draw = partial(self._draw_starts, given=given) if given else self._draw_starts
-        q = starts.apart(ids, draw, *people, self.chain, self.bodies, casts)
+        q = starts.begin_apart(ids, draw, *people, self.chain, self.bodies, casts)
         robot = chains.robot_state(self.chain, q, np.zeros_like(q))
         self.task.reset(self.task_state, ids, task_rngs, World(robot, place=self.place))
         for b, each in given.items():
             if each.goal is not None:
-                its_q = q[ids == b]
-                its_robot = chains.robot_state(self.chain, its_q, np.zeros_like(its_q))
-                world = World(its_robot, place=self.place)
+                q_b = q[ids == b]
+                robot_b = chains.robot_state(self.chain, q_b, np.zeros_like(q_b))
+                world = World(robot_b, place=self.place)
                 self.task.set_goal(self.task_state, np.array([b]), each.goal[None], world)
         poses = self.task.object_poses(self.task_state, ids)
         if poses is not None:
@@ -331,25 +394,29 @@ class Simulation(Stateful):
             )
         self.physics.reset(ids, q, self.motion.workers["body"][ids], poses)
         self.cameras.reset(ids, self.streams["sensor"], self.streams["tracker"])
-        world = handling.world_of(self.physics, ids, robot)
+        world = handling.make_world(self.physics, ids, robot)
         motion = generator.current(self.motion, ids)
         return Truth(ids, world, motion, worker_truth(self.bodies, motion))
 
     def _act(self, action: Floats) -> Command:
-        """Turn actions into joint velocities, which the shield may change: it reads the belief."""
+        """Return the joint velocities for actions; the shield may change them, given the belief."""
         previous, self.action = self.action, np.array(action, float)
         command = joint_command(
-            self.control, self.action[:, : self.n_actions - self._grips], self.physics.q,
-            self.chain, self.scene.home_q, self.config.control,
-        )  # fmt: skip
+            self.control,
+            self.action[:, : self.n_actions - self._grips],
+            self.physics.q,
+            self.chain,
+            self.scene.home_q,
+            self.config.control,
+        )
         if self.shield is None:
             return Command(command, previous, {})
-        allowed, info = shielded(self.shield, self.belief, command, self.config.ctrl_dt)
+        allowed, info = apply_shield(self.shield, self.belief, command, self.config.ctrl_dt)
         self.shield_change = allowed - command
-        return Command(allowed, previous, info)
+        return Command(allowed, previous, dict(info))
 
     def _move(self, command: Command) -> Truth:
-        """Let workers, robots and the task go on by a control step."""
+        """Advance workers, robots and the task by a control step."""
         config, task = self.config, self.task
         path, motion = generator.advance(
             self.motion, self.streams["motion"], config.scene.sim_dt, config.n_substeps
@@ -361,26 +428,27 @@ class Simulation(Stateful):
         workers = worker_truth(self.bodies, motion)
         n = self.chain.n_joints
         robot, arm = chains.robot_path(self.chain, q_path[..., :n], self.physics.qd)
-        world = handling.world_of(self.physics, self._everyone, robot)
-        world, arm = handling.loaded(self.scene, world, arm, q_path, task.is_load(self.task_state))
+        world = handling.make_world(self.physics, self._everyone, robot)
+        world, arm = handling.attach_load(
+            self.scene, world, arm, q_path, task.is_load(self.task_state)
+        )
         progress = self._show_workers(world, motion)
         around = worker_capsules(self.bodies, path, motion.body), workers.capsule_radius_m
-        paths = incidents.measured(arm, world.robot.capsule_radius_m, *around)
+        paths = incidents.measure_paths(arm, world.robot.capsule_radius_m, *around)
         touched = paths.gaps_m.min((1, 2), initial=np.inf) <= 0.0
         world = replace(world, workers=progress, touched=touched, place=self.place)
         task_step = task.advance(self.task_state, self.streams["task"], world, config.ctrl_dt)
         return Truth(self._everyone, world, motion, workers, paths, task_step)
 
     def _show_workers(self, world: World, motion: WorkerMotion) -> WorkerProgress | None:
-        """Let workers see where the robot is and what the task signals to them; return what those
-        have done who wait for signals."""
+        """Show robot and signals to the workers; return their progress if they wait for signals."""
         seen_world = world.robot.capsules_world[:, self.scene.watched, 1]
         signal = self.task.signal(self.task_state)
         generator.watch(self.motion, seen_world, motion, self.config.ctrl_dt, signal)
         return None if signal is None else generator.progress(self.motion, motion)
 
     def _perceive(self, truth: Truth) -> Belief:
-        """Expose the cameras, update the estimates and measure objects: what robots believe."""
+        """Expose the cameras, update the estimates, measure objects, and return the belief."""
         ids, everyone = truth.ids, truth.ids is self._everyone
         self._expose(truth)
         sensor, tracker = (picked(self.streams[name], ids) for name in ("sensor", "tracker"))
@@ -394,22 +462,27 @@ class Simulation(Stateful):
                 write_rows(whole, ids, part)
         if truth.world.objects is not None:
             rngs = picked(self.streams[MEASURING], ids)
-            measured = handling.measured(truth.world.objects, rngs, self.config.objects)
+            measured = handling.measure_objects(truth.world.objects, rngs, self.config.objects)
             write_rows(self.measured, ids, measured)
         return self._believe(ids, truth.world, estimates)
 
     def _expose(self, truth: Truth) -> None:
-        """Show the world to the sensor, which alone sees it."""
+        """Expose the sensor to the world, which no other part of the perception sees."""
         ids, sensor = truth.ids, self.pipeline.sensor
         now = SensorInput(ids, self.physics.qpos[ids], truth.motion)
         if sensor.NEEDS_TRUTH:
-            present = self.motion.workers["present"][ids]
+            present = self.motion.workers["is_present"][ids]
             now = TrueSensorInput(ids, now.qpos, now.motion, truth.workers, present)
         sensor.expose(now)
 
     def _believe(self, ids: Ints, world: World, estimates: tuple[PoseEstimate, ...]) -> Belief:
-        """Return what the robots of environments `ids` believe; `world` is of them only, and of it
-        the belief holds what encoders and grippers feel."""
+        """Return the belief of the robots of environments `ids`.
+
+        Args:
+            ids: (n,) the environments in question.
+            world: of these only; the belief takes the readings of encoders and grippers from it.
+            estimates: the belief about the workers, and its forecasts.
+        """
         estimate = estimates[0]
         unseen = find_unseen_floor(world.robot, estimate, self.pipeline.vacancy(ids))
         belief = Belief(
@@ -432,22 +505,22 @@ class Simulation(Stateful):
         """Return observations and infos of episodes that begin."""
         ids, task, world = truth.ids, self.task, truth.world
         present, nothing = self.present[ids], np.zeros(len(ids))
-        identities = metrics.no_identities(*present.shape)
+        identities = metrics.make_identities(*present.shape)
         terms = (*task.own_rewards, *rewards.SHARED_TERMS)
         still = np.zeros((len(ids), self.chain.n_joints))
-        info = agreed(self.keys, {
+        info = check_keys(self.keys, {
             **infos.reset_info(world.robot, truth.workers, present, terms, self.config.cost),
             **infos.tracking_info(rows(self.estimate, ids), truth.workers, present, identities),
-            **shielded(self.shield, belief, still, self.config.ctrl_dt)[1],
+            **apply_shield(self.shield, belief, still, self.config.ctrl_dt)[1],
             **self._episode_info(ids, generator.activity(self.motion), None),
         })  # fmt: skip
         write_rows(self.identities, ids, identities)
         return StepResult(self._observe(belief), nothing, nothing > 0, info)
 
     def _judge(self, command: Command, truth: Truth, belief: Belief) -> StepResult:
-        """Count cost and metrics on the truth; reward and observation read the belief."""
+        """Compute cost and metrics from the truth, reward and observation from the belief."""
         config, paths = self.config, needed(truth.paths, "A step's paths")
-        cost = costs.cost(paths.gaps_m, config.cost)
+        cost = measure_cost(paths.gaps_m, config.cost)
         happened = self.monitor.step(truth.world, paths)
         terms = self._reward_terms(command, truth, belief)
         activity = generator.activity(self.motion)
@@ -455,7 +528,7 @@ class Simulation(Stateful):
         counted = infos.cost_info(cost, happened, present, config.cost)
         self.episode_cost += counted["cost"]
         self.separation_m = cost.min_separation_m
-        info = agreed(self.keys, {
+        info = check_keys(self.keys, {
             **{f"reward/{name}": value for name, value in terms.items()},
             **counted,
             **infos.incident_info(happened, self.monitor, truth.world.robot),
@@ -468,6 +541,7 @@ class Simulation(Stateful):
         return StepResult(self._observe(belief), rewards.sum_terms(terms, self.batch), over, info)
 
     def _is_terminal(self, task_step: Any) -> Bools:
+        """Return (B,) whether the task is over after a step."""
         over = np.asarray(self.task.is_terminal(task_step))
         if over.ndim:
             name = f"{self.task.id}: is_terminal"
@@ -475,7 +549,7 @@ class Simulation(Stateful):
         return over.astype(bool)
 
     def _draw_starts(self, ids: Ints, given: Mapping[int, Fixed] = NOTHING_GIVEN) -> JointAngles:
-        """Draw the angles (len(ids), N) with which robots start, or take those that are given."""
+        """Return (n, N) the drawn or given joint angles with which robots `ids` (n,) start."""
         rngs = picked(self.streams["robot"], ids)
         q = self.task.draw_start(rngs, self.place, self.scene.home_q, self._spread_rad)
         expected = (len(ids), self.chain.n_joints)
@@ -487,16 +561,19 @@ class Simulation(Stateful):
         return q
 
     def _load(self, world: World) -> World:
-        """Return the world in which loads are parts of robots."""
+        """Return the world with loads as parts of the robots."""
         arm, qpos = world.robot.capsules_world[:, None], self.physics.qpos[:, None]
-        return handling.loaded(self.scene, world, arm, qpos, self.task.is_load(self.task_state))[0]
+        return handling.attach_load(
+            self.scene, world, arm, qpos, self.task.is_load(self.task_state)
+        ).world
 
     def _observe(self, belief: Belief) -> Observation:
-        """Return what robots see: with goals that the task sets apart, and images, by name."""
-        flat, apart = observations.observe(belief, self.layout, self.terms), self.task.goal
-        if apart is None and self.images is None:
+        """Return the observations, by name if there are goals or images."""
+        flat = observations.observe(belief, self.layout, self.terms)
+        separate_goal = self.task.goal
+        if separate_goal is None and self.images is None:
             return flat
-        goals = {} if apart is None else goal.parts(apart, belief)
+        goals = {} if separate_goal is None else goal.observe_goal(separate_goal, belief)
         return {
             **goals,
             **self.cameras.draw_images(self.streams["sensor"]),
@@ -504,7 +581,7 @@ class Simulation(Stateful):
         }
 
     def _reward_terms(self, command: Command, truth: Truth, belief: Belief) -> dict[str, Floats]:
-        """Return every term (B,) of the reward: the task's, then those that all tasks share."""
+        """Return the terms (B,) of the reward by name: the task's, then those of all tasks."""
         own, shared = self.task.own_rewards, rewards.SHARED_TERMS
         step = truth.task_step, command.previous_action
         terms = {
@@ -515,8 +592,14 @@ class Simulation(Stateful):
             terms[name] = factor * np.asarray(terms[name])
         return terms
 
-    def _episode_info(self, ids: Ints, activity: Ints, happened: Records | None) -> Info:
-        """Return what the episodes of environments `ids` have come to, and who is there."""
+    def _episode_info(self, ids: Ints, activity: Ints, happened: Records2[Incident] | None) -> Info:
+        """Return the infos of the episodes of environments `ids` up to now.
+
+        Args:
+            ids: (n,) the environments in question.
+            activity: (B, W) index of each worker's activity.
+            happened: (B, W) incidents of the step; None in a reset.
+        """
         tally = {"episode_cost": self.episode_cost, **self.task.info(self.task_state)}
         body, cameras, seen = self.motion.workers["body"], self.settings["cameras"], self.pipeline
         return {

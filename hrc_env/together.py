@@ -1,5 +1,4 @@
-"""A task with several environments together and with each alone: both must give the same, as no
-environment depends on others, or on anything outside its state."""
+"""Check that environments of a task depend neither on each other nor on an outside state."""
 
 import warnings
 from collections.abc import Iterator, Sequence
@@ -14,9 +13,9 @@ from hrc_env.simulation import Simulation
 from hrc_env.step_result import StepResult
 
 SEEDS = (0, 1)
-"""Of the environments, one each; their later episodes have others."""
+"""Seed of the first episode of each environment."""
 N_STEPS = 4
-"""Control steps before something else is tried."""
+"""Number of control steps after a reset or a restored state."""
 RULE = (
     "All methods work on rows: of environment b draw from rngs[b], write and return the rows of "
     "`ids` only, and take no sum, mean or greatest value over the first axis."
@@ -26,29 +25,29 @@ Numbers = dict[str, Any]
 
 
 def check_rows(settings: Settings) -> None:
-    """Play a task with two environments together, with each alone, and from a state again.
+    """Play a task with two environments together, with each alone, and from a restored state.
 
     Raises:
-        ConfigError: an environment gives something else beside others, or after `set_state`; it
-            names the first difference.
+        ConfigError: results of an environment are different beside others, or after `set_state`;
+            the error names the first difference.
     """
-    together = _whole(settings, SEEDS)
+    together = _collect(settings, SEEDS)
     for row, seed in enumerate(SEEDS):
-        for one, several in zip(_whole(settings, (seed,)), together, strict=True):
-            mine = {name: value[row] for name, value in several.items()}
-            if wrong := _different({name: value[0] for name, value in one.items()}, mine):
+        for alone, several in zip(_collect(settings, (seed,)), together, strict=True):
+            beside = {name: value[row] for name, value in several.items()}
+            if wrong := _find_difference({name: value[0] for name, value in alone.items()}, beside):
                 raise ConfigError(
                     f"{settings.task.id}: {wrong} of an environment is another one beside others "
                     f"than alone. {RULE}"
                 )
 
 
-def _whole(settings: Settings, seeds: Sequence[int]) -> list[Numbers]:
-    """Return all results of `_played`, without warnings: they come when an environment is made."""
+def _collect(settings: Settings, seeds: Sequence[int]) -> list[Numbers]:
+    """Return all results of `_play` without warnings, which come when an environment is made."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
-            return list(_played(settings, seeds))
+            return list(_play(settings, seeds))
         except (ValueError, IndexError, TypeError) as error:
             raise ConfigError(
                 f"{settings.task.id} fails with {len(seeds)} of its environments, or at the reset "
@@ -56,8 +55,8 @@ def _whole(settings: Settings, seeds: Sequence[int]) -> list[Numbers]:
             ) from error
 
 
-def _played(settings: Settings, seeds: Sequence[int]) -> Iterator[Numbers]:
-    """Yield the results of resets and steps, some of them again from a state."""
+def _play(settings: Settings, seeds: Sequence[int]) -> Iterator[Numbers]:
+    """Yield the results of resets and steps, some of them repeated from a restored state."""
     batch = len(seeds)
     with closing(Simulation(batch, settings)) as simulation:
         everyone = np.arange(batch)
@@ -77,7 +76,7 @@ def _played(settings: Settings, seeds: Sequence[int]) -> Iterator[Numbers]:
         for each, before in zip(draws, drawn, strict=True):
             each.bit_generator.state = before
         for before, after in zip(first, steps(), strict=True):
-            if wrong := _different(before, after):
+            if wrong := _find_difference(before, after):
                 raise ConfigError(
                     f"{settings.task.id}: {wrong} is another one when an environment goes on from "
                     "a state again. All that changes must be in the state that make_state "
@@ -93,15 +92,15 @@ def _played(settings: Settings, seeds: Sequence[int]) -> Iterator[Numbers]:
 
 
 def _numbers(result: StepResult) -> Numbers:
-    """A result by name of its parts."""
-    seen = result.observation
-    parts = dict(seen) if isinstance(seen, dict) else {"observation": seen}
+    """Return the arrays of a result by name."""
+    observation = result.observation
+    parts = dict(observation) if isinstance(observation, dict) else {"observation": observation}
     named = {"the reward": result.reward, "the end": result.terminated}
     named |= {f"info[{name!r}]": value for name, value in result.info.items()}
     return named | {f"{name!r}": value for name, value in parts.items()}
 
 
-def _different(one: Numbers, other: Numbers) -> str:
+def _find_difference(one: Numbers, other: Numbers) -> str:
     """Return the name of the first array that differs by more than rounding; "" if none does."""
     for name, value in one.items():
         x, y = np.asarray(value, float), np.asarray(other[name], float)

@@ -1,6 +1,6 @@
-"""What scene, workers and tasks exchange: places of work, the task's objects, signals, the world.
+"""Records that scene, workers and tasks exchange: workplaces, objects, signals and the true world.
 
-A task reads and writes these records; nothing here is part of a belief.
+A task reads and writes these records; none of them is part of a belief.
 """
 
 from collections.abc import Mapping
@@ -15,9 +15,9 @@ from hrc_env.core.typing import Bools, Floats, Ints, Points3, Velocities3
 
 FOOT_M = (-0.75, 0.0, 0.75)
 FOOT_WORLD = np.array(FOOT_M)
-"""The foot of robots that do not drive, in every scene [m]."""
+"""Place of the foot of robots that do not drive, in every scene [m]."""
 AWAY_M = 0.43
-"""How far ahead of who stands there loads lie on the floor or a table [m]."""
+"""Distance of loads on the floor or a table ahead of the worker at a workplace [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,134 +25,146 @@ class Workplace:
     """A place where a worker stands and works."""
 
     name: str
-    """Unique in its scene."""
+    """Name of the place, unique in its scene."""
     kind: str
-    """One of `WORKPLACE_KINDS`."""
+    """Kind of work, one of `WORKPLACE_KINDS`."""
     xy_m: tuple[float, float]
-    """Where the worker stands [m]."""
+    """Place where the worker stands, x and y in the world [m]."""
     yaw_rad: float
-    """Which way the worker looks, from world +x [rad]."""
+    """Direction in which the worker looks, from world +x [rad]."""
     height_m: float
-    """How high above the floor the work is [m]: where hands work, on what loads lie, or how
-    high a step is; 0 where there is nothing."""
+    """Height of the work above the floor [m]: of the hands, of the surface with the loads, or of
+    a step; 0 if there is none."""
     ahead_m: float = AWAY_M
-    """How far ahead of who stands there loads lie, a cart's handles or a wall are [m]."""
+    """Distance of loads, a cart's handles or a wall ahead of the worker [m]."""
     loads: tuple[str, ...] = ()
-    """What lies there at first to be taken up, from the bottom up: names of `props.PROPS`."""
+    """Props that lie there at the start, from the bottom up: names of `props.PROPS`."""
 
 
 WORKPLACE_KINDS = (
-    "robot", "bench", "floor", "wall", "overhead", "pile", "cart", "step", "open", "task",
-)  # fmt: skip
-"""Beside the robot, hands in its workspace; at a table; kneeling; at a wall; above the head; at
-materials to lift; where a cart is taken or left; before a tread 0.3 m ahead; nothing there; at what
-a task has put there."""
+    "robot",
+    "bench",
+    "floor",
+    "wall",
+    "overhead",
+    "pile",
+    "cart",
+    "step",
+    "open",
+    "task",
+)
+"""Kinds of workplaces: beside the robot, with the hands in its workspace; at a table; kneeling; at
+a wall; above the head; at materials to lift; at a place where a cart is taken or left; before a
+tread 0.3 m ahead; on open floor; at an object of the task."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Grounds:
-    """Where people can stand, walk and work in a scene."""
+    """The floor plan of a scene: the area where people stand, walk and work."""
 
     walkable_x_m: tuple[float, float]
-    """Where workers stand and walk, least and greatest x [m]."""
+    """Least and greatest x of the area where workers stand and walk [m]."""
     walkable_y_m: tuple[float, float]
-    """The same along y [m]."""
+    """Least and greatest y of that area [m]."""
     blocked: Floats
-    """(N, 5) footprints of what stands on the floor, the robot's pedestal left out: middle x
-    and y, half length and half width [m], yaw of the length from world +x [rad]."""
+    """(N, 5) footprints of obstacles on the floor without the robot's pedestal: middle x and y,
+    half length and half width [m], yaw of the length from world +x [rad]."""
     places: tuple[Workplace, ...]
-    """Where there is work, all of them inside the walkable area and outside `blocked`."""
+    """Workplaces, all of them inside the walkable area and outside of `blocked`."""
     robot_xy_m: tuple[float, float]
-    """The axis of the robot's first joint [m]; its front looks to world +x."""
+    """Axis of the robot's first joint, x and y in the world [m]; its front looks to world +x."""
     robot_clearance_m: float
-    """Paths keep so far from that axis [m]: a pedestal's radius and half a person."""
+    """Distance that workers' paths keep from that axis [m]: a pedestal's radius and half a person.
+    """
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class Weld:
-    """Two sites that can be held together, as wide as they are apart; off at first."""
+    """A connection of two sites that keeps their distance while it is on; at first it is off."""
 
     name: str
-    """By which `Effects.welded` knows it."""
+    """Name of the weld in `Effects.welded`."""
     sites: tuple[str, str]
-    """By their names in the scene: "robot/...", "task/...", "worker_1/..."."""
+    """Names of the two sites in the scene: "robot/...", "task/...", "worker_1/..."."""
     solref: tuple[float, float] = (0.02, 1.0)
-    """How stiff it is, as MuJoCo has it."""
+    """Stiffness and damping of the constraint: MuJoCo's `solref`."""
     turns: bool = True
-    """Whether it holds their turns, too."""
+    """Whether the sites' relative rotation is held, too."""
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class TaskScene:
-    """What a task puts into a scene, from the middle of the robot's foot on [m]."""
+    """A task's part of a scene, in the frame of the robot's foot [m]."""
 
     mjcf: str = ""
-    """Bodies of boxes, loose with a free joint and contype 16, fixed with contype 1."""
+    """MJCF with bodies of boxes: loose with a free joint and contype 16, fixed with contype 1."""
     welds: tuple[Weld, ...] = ()
-    """What can be held together."""
+    """Connections of sites that the task switches on and off."""
     places: tuple[Workplace, ...] = ()
-    """Where workers work at them; kind "task"."""
+    """Workplaces at the task's objects, of the kind "task"."""
 
 
 NOTHING = TaskScene()
+"""The part of a task that adds nothing to a scene."""
 
 
 @dataclass(frozen=True, slots=True)
 class WorkerProgress:
-    """What workers have done for a task in what they are at."""
+    """Progress of workers in their part of a task."""
 
     present: Bools
-    """(B, W) who is there."""
+    """(B, W) whether each worker is in the scene."""
     screws: Ints
-    """(B, W) how many they have driven,"""
+    """(B, W) number of screws that each worker has driven."""
     boring: Bools
-    """(B, W) and whether they drive one,"""
+    """(B, W) whether each worker drives a screw now."""
     takes: Bools
-    """(B, W) whether they put out a hand for what is brought."""
+    """(B, W) whether each worker puts out a hand for an object that the robot brings."""
     grip_world: Points3
-    """(B, W, 3) where the hand that they use grips [m],"""
+    """(B, W, 3) place of the grip of each worker's active hand [m]."""
     grip_velocity_world: Velocities3
-    """(B, W, 3) and how fast it is [m/s]."""
+    """(B, W, 3) velocity of that grip [m/s]."""
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class WorkerSignal:
-    """What a task says to workers who wait for it."""
+    """A task's signal to workers that wait for it."""
 
     stage: Ints
-    """(B,) how far it has come: 0 not yet, 1 there, 2 theirs."""
+    """(B,) stage of the task: 0 while workers wait, 1 from when they may begin, 2 from when an
+    object is theirs."""
     offered_world: Points3
-    """(B, 3) where it is offered [m]; not a number: nowhere."""
+    """(B, 3) place where an object is offered [m]; NaN if none is."""
 
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """What a task judges, and what the robot feels; rows are the environments in question."""
+    """The true state of robot and objects, from which a task is judged; a row an environment."""
 
     robot: RobotState
     """Joints and tool, by the robot's own encoders."""
     hand: HandState | None = None
-    """Of an arm with a gripper."""
+    """State of the gripper; None for an arm without."""
     objects: ObjectState | None = None
-    """The task's loose objects as they are."""
+    """True poses and velocities of the task's loose objects; None for a task without."""
     workers: WorkerProgress | None = None
-    """What workers have done who wait for signals (`Task.signal`); None: nobody waits, or an
-    episode begins."""
+    """Progress of workers that wait for signals (`Task.signal`); None if no worker waits, and at
+    the start of an episode."""
     touched: Bools | None = None
-    """(B,) whether the robot touched a worker in this step: true, so for success only, and for no
-    reward or observation."""
+    """(B,) whether the robot touched a worker in this step. It is the truth: use it for the
+    success of an episode, not for a reward or an observation."""
     place: Any = None
-    """What the task made of the place (`Task.survey`)."""
+    """The task's own map of the place, as `Task.survey` returned it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Effects:
-    """What a task does to its loose objects in a step."""
+    """Welds and external forces of a task on its loose objects in a step."""
 
     welded: Mapping[str, Bools]
-    """(B,) whether each of its welds holds, by name."""
+    """(B,) whether each of the task's welds is on, by its name."""
     push_world: Floats
-    """(B, O, 6) force [N] and torque [Nm] at the middle of each."""
+    """(B, O, 6) force [N] and torque [Nm] at the middle of each object, in the world frame."""

@@ -6,8 +6,9 @@ import numpy as np
 
 from hrc_env.motion import generator
 from hrc_env.motion import state as st
-from hrc_env.motion.blending import settle
+from hrc_env.motion.blending import place_standing
 from hrc_env.motion.paths import lay_path
+from hrc_env.motion.points import Point
 from hrc_env.motion.walk import plan_walk
 from hrc_env.worker.body import load_body
 
@@ -40,7 +41,7 @@ def standing(state, x_m=0.0, yaw_rad=0.0):
     """The first worker at a point of the x axis, with nothing planned."""
     me = state.workers[0, 0]
     me["load_prop"] = me["step_count"] = me["undo_at"] = 0
-    settle(x_m, 0.0, yaw_rad, me)
+    place_standing(x_m, 0.0, yaw_rad, me)
     return me
 
 
@@ -53,7 +54,7 @@ def walk_straight(speed_m_s, length_m=6.0, dt_s=0.005):
     """A walk along +x, alone: its plan, footprints and motion."""
     state, rngs = started(1)
     me = standing(state)
-    lay_path((0.0, 0.0), np.zeros((0, 3)), (length_m, 0.0), me)
+    lay_path(Point(0.0, 0.0), np.zeros((0, 3)), Point(length_m, 0.0), me)
     begin(me, st.WALK, plan_walk(0.0, speed_m_s, me))
     motion = watched(state, rngs, dt_s, int(me["duration_s"] / dt_s) - 1)
-    return SimpleNamespace(motion=motion, plan=me, prints=me["prints"], dt_s=dt_s)
+    return SimpleNamespace(motion=motion, plan=me, prints=me["footprints"], dt_s=dt_s)

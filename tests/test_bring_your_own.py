@@ -27,7 +27,7 @@ from hrc_env.scene.build import build
 from hrc_env.scene.render import PictureRenderer
 from hrc_env.scene.robot import ROBOTS
 from hrc_env.tasks.task import TASKS
-from hrc_env.tracking.config import ParticleConfig, of_kind
+from hrc_env.tracking.config import ParticleConfig, cast_config
 from hrc_env.tracking.estimators import ESTIMATORS
 from hrc_env.tracking.particle import ParticleEstimator
 from hrc_env.vector.env import HRCVectorEnv
@@ -238,7 +238,7 @@ class Wrong(ParticleEstimator):
     """The default one, whose means are something else."""
 
     def __init__(self, P, dt_s, config, mean):
-        super().__init__(P, dt_s, of_kind(config, ParticleConfig))
+        super().__init__(P, dt_s, cast_config(config, ParticleConfig))
         object.__setattr__(self, "mean", mean)
 
     def estimate(self, state):

@@ -326,7 +326,7 @@ def test_code_that_reaches_deeper_is_found(code):
 
 @pytest.mark.parametrize(
     "text",
-    ["See `hrc_env.tracking.smoother.smooth(P, clip)`.", "It is hrc_env.motion.fit.played_s.",
+    ["See `hrc_env.tracking.smoother.smooth(P, clip)`.", "It is hrc_env.motion.fit.describe_fit.",
      "```bash\npython -c 'import hrc_env.core.machine'\n```\n", "[`hrc_env.belief`](belief.md)",
      "- in a list\n\n  ```python\n  from hrc_env.config import HRCConfig\n  ```\n"],
 )  # fmt: skip

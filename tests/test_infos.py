@@ -54,7 +54,7 @@ def test_keys_are_the_same_from_the_reset_on_and_values_numbers(task, settings):
         assert all(isinstance(value, np.number) for value in info.values())
         assert not any(np.isnan(value) for value in info.values())
         far = {name for name, value in info.items() if np.isinf(value)}
-        assert far <= {"safety/min_separation_m", "shield/least_m"}
+        assert far <= {"safety/min_separation_m", "shield/clearance_m"}
     env.close()
 
 

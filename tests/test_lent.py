@@ -146,7 +146,7 @@ def test_an_estimator_gets_keypoints_of_its_own():
 def test_goals_of_others_are_only_read():
     wrong = replace(WITH_GOAL.goal, reward=lambda a, d, config: zero(a))
     with pytest.raises(hrc_env.ConfigError, match=r"Goal\.reward writes"):
-        hrc_env.tasks.goal.judged(wrong, np.zeros((4, 3)), np.zeros((4, 3)), None, None)
+        hrc_env.tasks.goal.compute_reward(wrong, np.zeros((4, 3)), np.zeros((4, 3)), None, None)
 
 
 @dataclass(frozen=True)

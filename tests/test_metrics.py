@@ -6,8 +6,8 @@ import pytest
 from hrc_env.core.records import PoseEstimate, WorkerTruth
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.safety import incidents
-from hrc_env.safety.cost import Cost, CostConfig, cost
-from hrc_env.tracking.metrics import no_identities, tracking_error
+from hrc_env.safety.cost import Cost, CostConfig, measure_cost
+from hrc_env.tracking.metrics import make_identities, measure_errors
 
 
 def costs(distance_m: list[float], n_workers: int = 1) -> Cost:
@@ -17,7 +17,8 @@ def costs(distance_m: list[float], n_workers: int = 1) -> Cost:
     workers = np.repeat(robot[:, :, None], n_workers, axis=2)
     workers[..., 0] = np.array(distance_m)[:, None, None, None]
     radius_m = np.full((1, n_workers, 1), 0.1)
-    return cost(incidents.measured(robot, np.array([0.05]), workers, radius_m).gaps_m, CostConfig())
+    paths = incidents.measure_paths(robot, np.array([0.05]), workers, radius_m)
+    return measure_cost(paths.gaps_m, CostConfig())
 
 
 @pytest.mark.parametrize(
@@ -66,12 +67,12 @@ def errors(steps, present=None):
     """What each step is told, of (people [m], tracks [m], which slots have one) in turn."""
     n_workers = len(steps[0][0])
     there = np.array([[True] * n_workers if present is None else present])
-    identities, found = no_identities(1, n_workers), []
+    identities, found = make_identities(1, n_workers), []
     for people, tracks, tracked in steps:
         joints = bodies_at(people)
         truth = WorkerTruth(joints, joints, np.zeros((1, n_workers, 1, 2, 3)), np.ones(1))
         found.append(
-            tracking_error(estimate(tracks, tracked), truth.joints_world, there, identities)[0]
+            measure_errors(estimate(tracks, tracked), truth.joints_world, there, identities)[0]
         )
     return found
 

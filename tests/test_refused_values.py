@@ -16,16 +16,16 @@ from hrc_env.pipeline.levels import LEVELS, make_pipeline
 from hrc_env.pipeline.sensor_input import SensorInput, TrueSensorInput, require_truth
 from hrc_env.rewards import check_kind, sum_terms
 from hrc_env.safety.config import ShieldConfig
-from hrc_env.safety.contact import contact_force, effective_mass, region_called
+from hrc_env.safety.contact import contact_force, effective_mass, find_region
 from hrc_env.safety.cost import COMPONENTS, CostConfig
 from hrc_env.safety.separation import protective_distance
-from hrc_env.safety.shield import SHIELDS, shield_called, shielded
+from hrc_env.safety.shield import SHIELDS, apply_shield, find_shield
 from hrc_env.scene.build import build
 from hrc_env.scene.domain_randomization import AppearanceConfig
-from hrc_env.scene.robot import ROBOTS, chain_of
+from hrc_env.scene.robot import ROBOTS, make_chain
 from hrc_env.settings import settle
 
-ARM, BASE = (chain_of(ROBOTS[name], (0.0, 0.0, 0.0)) for name in ("ur10e_like", "mobile_base"))
+ARM, BASE = (make_chain(ROBOTS[name], (0.0, 0.0, 0.0)) for name in ("ur10e_like", "mobile_base"))
 
 
 @pytest.mark.parametrize(
@@ -239,19 +239,19 @@ def test_masses_are_positive_and_loads_not_negative():
         with pytest.raises(ConfigError, match="robot_kg must be a positive mass"):
             contact_force("chest", 1.0, mass)
     with pytest.raises(ConfigError, match="Unknown region of the body"):
-        region_called("tail")
+        find_region("tail")
 
 
 def test_a_shield_is_called_by_name_settings_function_or_not_at_all():
     for name, shield in SHIELDS.items():
-        assert shield_called(name) is shield
-    assert shield_called(print) is print
-    assert shield_called(None) is None
+        assert find_shield(name) is shield
+    assert find_shield(print) is print
+    assert find_shield(None) is None
     for settings in (ShieldConfig("ssm"), {"kind": "ssm"}):
-        assert shield_called(settings).keywords["config"] == ShieldConfig("ssm")
+        assert find_shield(settings).keywords["config"] == ShieldConfig("ssm")
     for wrong, said in ((3, "must be a name"), ("ssn", "Unknown shield"), ((), "must be a name")):
         with pytest.raises(ConfigError, match=said):
-            shield_called(wrong)
+            find_shield(wrong)
 
 
 @pytest.mark.parametrize(
@@ -260,12 +260,16 @@ def test_a_shield_is_called_by_name_settings_function_or_not_at_all():
         (np.zeros((2, 5)), {}, r"velocities must have shape \(2, 6\)"),
         (np.where(np.arange(12).reshape(2, 6) == 11, np.nan, 0.0), {}, "velocities must be finite"),
         (np.where(np.arange(12).reshape(2, 6) == 0, np.inf, 0.0), {}, "velocities must be finite"),
-        (np.zeros((2, 6)), {"near": np.zeros(2), "far": np.zeros(3)}, "'far' must have shape"),
+        (
+            np.zeros((2, 6)),
+            {"near": np.zeros(2), "far": np.zeros(3)},
+            "'far' of a shield must have shape",
+        ),
     ],
 )
 def test_a_shield_in_which_one_thing_is_wrong_is_refused(allowed, said, expected):
     with pytest.raises(ConfigError, match=expected):
-        shielded(lambda *given: (allowed, said), None, np.zeros((2, 6)), 0.04)
+        apply_shield(lambda *given: (allowed, said), None, np.zeros((2, 6)), 0.04)
 
 
 def test_a_shield_is_asked_about_a_copy_of_the_command_and_the_step():
@@ -275,14 +279,14 @@ def test_a_shield_is_asked_about_a_copy_of_the_command_and_the_step():
         asked *= 0.5
         return asked, {"step_s": np.full(2, dt_s)}
 
-    allowed, said = shielded(halved, SimpleNamespace(model=None), command, 0.04)
+    allowed, said = apply_shield(halved, SimpleNamespace(model=None), command, 0.04)
     assert (allowed == 0.5).all()
     assert (command == 1.0).all()
     assert said["shield/step_s"].tolist() == [0.04, 0.04]
     assert said["shield/scale"].tolist() == [0.5, 0.5]
 
 
-@pytest.mark.parametrize("name", ["margin_m", "gain_hz", "deceleration_m_s2", "still_m_s"])
+@pytest.mark.parametrize("name", ["margin_m", "retreat_gain_hz", "deceleration_m_s2", "creep_m_s"])
 def test_settings_of_shields_are_finite(name):
     for wrong in (np.nan, np.inf):
         with pytest.raises(ConfigError, match=f"{name} must be a finite number"):

@@ -174,7 +174,7 @@ def test_people_of_one_episode_do_not_look_out_for_the_robot() -> None:
         env.reset(seed=1, options=options)
         for _ in range(200):
             env.step(np.zeros(6, np.float32))
-            told += float((env.simulation.motion.workers["acts_at"] < np.inf).any())
+            told += float((env.simulation.motion.workers["reacts_at_s"] < np.inf).any())
         return told
 
     assert reactions(None) > 0.0

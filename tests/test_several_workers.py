@@ -13,7 +13,7 @@ from hrc_env.core.records import WorkerTruth
 from hrc_env.env import HRCEnv
 from hrc_env.motion.generator import PeopleConfig, activity_names, current
 from hrc_env.sb3 import HRCVecEnv
-from hrc_env.tracking.metrics import no_identities, tracking_error
+from hrc_env.tracking.metrics import make_identities, measure_errors
 from hrc_env.tracking.oracle import estimate_from_truth
 from hrc_env.worker.body import worker_truth
 
@@ -128,14 +128,14 @@ def test_errors_do_not_depend_on_which_worker_is_called_the_first():
     truth = HRCEnv(perception="truth", n_workers=3)
     truth.reset(seed=0)
     seen = truth.simulation.estimate.mean_world
-    all_there, unknown = np.ones((1, 3), bool), no_identities(1, 3)
+    all_there, unknown = np.ones((1, 3), bool), make_identities(1, 3)
     reordered = WorkerTruth(seen[:, [2, 0, 1]], seen, np.zeros((1, 3, 1, 2, 3)), np.ones(1))
-    found = tracking_error(truth.simulation.estimate, reordered.joints_world, all_there, unknown)
+    found = measure_errors(truth.simulation.estimate, reordered.joints_world, all_there, unknown)
     assert found["mpjpe_m"] == found["lost"] == [0.0]
     doubled = estimate_from_truth(
         WorkerTruth(seen[:, [0, 0, 1]], seen, np.zeros((1, 3, 1, 2, 3)), np.ones(1))
     )
-    found = tracking_error(doubled, reordered.joints_world, all_there, unknown)
+    found = measure_errors(doubled, reordered.joints_world, all_there, unknown)
     assert found["mpjpe_m"] > 0.1  # two tracks on one person
 
 

@@ -14,7 +14,7 @@ from hrc_env.config import HRCConfig
 from hrc_env.core.errors import ConfigError
 from hrc_env.geometry.camera_config import CameraConfig, write_rig
 from hrc_env.motion import controls as c
-from hrc_env.motion.anatomy import STAND_Z, anatomies
+from hrc_env.motion.anatomy import STAND_Z, measure_bodies
 from hrc_env.motion.clip import Clip, save_clip
 from hrc_env.motion.config import MotionConfig, PeopleConfig
 from hrc_env.perception.faults.fault import FaultConfig
@@ -75,7 +75,7 @@ def test_every_argument_survives_the_spec(kwargs):
 
 def standing() -> Clip:
     """A worker who stands for two seconds."""
-    size = anatomies(load_body()).size[0]
+    size = measure_bodies(load_body()).lengths[0]
     controls = np.zeros((100, c.N_CONTROLS))
     controls[:, c.PELVIS_Z] = size[STAND_Z]
     return Clip(controls, 50.0, np.ones((100, 2), bool), size, "standing")

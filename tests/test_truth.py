@@ -17,8 +17,8 @@ from hrc_env.pipeline.emulated import EmulatorPipeline
 from hrc_env.pipeline.levels import NoPerception
 from hrc_env.pipeline.rendered import PixelPipeline
 from hrc_env.pipeline.tracking import PoseTracking
+from hrc_env.safety.built_in import limit_command
 from hrc_env.safety.config import ShieldConfig
-from hrc_env.safety.guard import guarded
 from hrc_env.sb3 import HRCVecEnv
 from hrc_env.simulation import Simulation
 from hrc_env.tasks import BUILT_IN, DEFAULT
@@ -120,7 +120,7 @@ def test_the_hand_that_a_tool_is_brought_to_is_the_estimated_one():
         if len(velocities) == 1:  # the two environments that are played at make are of no interest
             taken.append(bool(now.task.taken[0]))
             welcome.append(now.allowed_contact)
-        return guarded(now, velocities, dt_s, ShieldConfig())
+        return limit_command(now, velocities, dt_s, ShieldConfig())
 
     make = partial(of, "HRCHandover-v0", shield=watching, config=None)
     moved = differences(make, displaced(shifted), agent="scripted", n_steps=n_steps)

@@ -13,13 +13,13 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import WorkerMotion, WorkerPath
 from hrc_env.core.skeleton import MIRROR, N_JOINTS
 from hrc_env.motion import generator
-from hrc_env.motion.anatomy import anatomies, anatomy
+from hrc_env.motion.anatomy import measure_bodies, measure_body
 from hrc_env.worker.body import (
     N_SEGMENTS,
     SEGMENT,
     assets_dir,
+    load_bodies,
     load_body,
-    stack,
     worker_capsules,
     worker_names,
     worker_truth,
@@ -163,7 +163,7 @@ WHICH = np.array([[0, 2, 1], [2, 0, 0]])
 
 
 def test_in_a_stack_every_worker_is_as_if_alone():
-    bodies, motion = stack(worker_names()[:3]), shaken(0, 1)
+    bodies, motion = load_bodies(worker_names()[:3]), shaken(0, 1)
     truth = worker_truth(bodies, dataclasses.replace(motion, body=WHICH))
     for b, w in np.ndindex(WHICH.shape):
         body = load_body(bodies.names[WHICH[b, w]])
@@ -175,7 +175,7 @@ def test_in_a_stack_every_worker_is_as_if_alone():
 
 
 def test_a_path_of_a_stack_has_each_workers_own_capsules_at_all_times():
-    bodies, motion = stack(worker_names()[:3]), shaken(4, 2)
+    bodies, motion = load_bodies(worker_names()[:3]), shaken(4, 2)
     path = WorkerPath(motion.position_world, motion.quaternion_wxyz)
     capsules = worker_capsules(bodies, path, WHICH)
     for b, w in np.ndindex(WHICH.shape):
@@ -184,20 +184,20 @@ def test_a_path_of_a_stack_has_each_workers_own_capsules_at_all_times():
 
 
 def test_anatomies_of_a_stack_are_those_of_its_bodies():
-    together = anatomies(stack(worker_names()))
+    together = measure_bodies(load_bodies(worker_names()))
     for row, name in enumerate(worker_names()):
-        alone = anatomy(load_body(name))
+        alone = measure_body(load_body(name))
         np.testing.assert_array_equal(together.offset[row], alone.offset)
         np.testing.assert_array_equal(together.frame[row], alone.frame)
-        np.testing.assert_array_equal(together.size[row], alone.size)
+        np.testing.assert_array_equal(together.lengths[row], alone.lengths)
 
 
 @pytest.mark.parametrize("which", [np.full((2, 3), 3), np.full((2, 3), -1)])
 def test_rows_that_a_stack_does_not_have_are_refused(which):
     with pytest.raises(ConfigError, match="rows 0 to 2"):
-        worker_truth(stack(worker_names()[:3]), dataclasses.replace(shaken(0, 1), body=which))
+        worker_truth(load_bodies(worker_names()[:3]), dataclasses.replace(shaken(0, 1), body=which))
 
 
 def test_a_stack_of_nobody_is_refused():
     with pytest.raises(ConfigError, match="at least one"):
-        stack(())
+        load_bodies(())

@@ -19,12 +19,13 @@ from ray.tune import register_env
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
+from hrc_env.core.errors import HRCError
 from hrc_env.engines import cluster
 from hrc_env.engines.registrations import Registrations
 
 from ..learner_settings import PPOSettings
 from .policy_module import PolicyModule
-from .runner_env import RunnerEnv, make_envs
+from .runner_env import RunnerEnv, make_envs, reported_errors
 
 ENVIRONMENT = "hrc_env"
 """Name of our environments in RLlib."""
@@ -87,10 +88,10 @@ class RLlibPPO:
 
     def __init__(self, policy: PPO, settings: PPOSettings, runners: RunnerSettings) -> None:
         self.policy, self.runners = policy, runners
-        self._errors = LastError()
-        self._told: Any = ray.remote(Told).options(num_cpus=0).remote()
+        self._log = LastError()
+        self._errors: Any = ray.remote(WorkerErrors).options(num_cpus=0).remote()
         self._handlers = _LOGGER.handlers
-        _LOGGER.handlers = [self._errors]
+        _LOGGER.handlers = [self._log]
         n, num_envs = runners.n, runners.num_envs
         register_env(ENVIRONMENT, make_runner_env)
         made = settings.keywords()
@@ -102,7 +103,7 @@ class RLlibPPO:
                     "keywords": dict(runners.keywords),
                     "gamma": settings.gamma,
                     "registrations": runners.registrations,
-                    "errors": self._told,
+                    "errors": self._errors,
                 },
             )
             .env_runners(
@@ -143,8 +144,18 @@ class RLlibPPO:
         )
         # Actions are learnt as they are given to the environment, but for the clipping.
         config.normalize_actions, config.clip_actions = False, True
-        self.algorithm: Any = config.build_algo()  # whose annotations are looser than what it does
+        self.algorithm = self._build(config)
         self.push()
+
+    def _build(self, config: PPOConfig) -> Any:
+        """Start the runners; `HRCError` if none can make its environments."""
+        try:
+            return config.build_algo()
+        except Exception as error:  # of RLlib, which has no runner to ask for spaces
+            _LOGGER.handlers = self._handlers
+            if reason := self._reason():
+                raise HRCError(f"No worker could make its environments: {reason}") from error
+            raise
 
     def push(self) -> None:
         """Give learner and runners the policy's network, Adam's moments and scale of rewards."""
@@ -211,8 +222,14 @@ class RLlibPPO:
         )
 
     def last_error(self) -> str:
-        """Return the last error of a worker: its own, or RLlib's message of its death."""
-        return ray.get(self._told.last.remote()) or self._errors.said or "none was said"
+        """Return the last error of a worker: its own, or what RLlib reports of its end."""
+        if reason := self._reason():
+            return reason
+        return f"a process that was killed, or ran out of memory ({self._log.message})"
+
+    def _reason(self) -> str:
+        """Return the last error that a worker has raised itself; "" if there is none."""
+        return ray.get(self._errors.last.remote())
 
     def close(self) -> None:
         """Stop the runners."""
@@ -224,9 +241,15 @@ def make_runner_env(context: Mapping[str, Any]) -> RunnerEnv:
     """Return the environments of a runner; RLlib adds how many."""
     cluster.one_core()
     torch.set_num_threads(1)
-    context["registrations"].unpack()
-    envs, errors = make_envs(context["num_envs"], context["keywords"]), context["errors"]
-    return RunnerEnv(envs, context["gamma"], lambda said: ray.get(errors.tell.remote(said)))
+    errors = context["errors"]
+
+    def report(error: str) -> None:
+        ray.get(errors.report.remote(error))
+
+    with reported_errors(report):
+        context["registrations"].unpack()
+        envs = make_envs(context["num_envs"], context["keywords"])
+    return RunnerEnv(envs, context["gamma"], report)
 
 
 def envs_of(runner: EnvRunner) -> RunnerEnv:
@@ -258,19 +281,19 @@ class GoOn(RLlibCallback):
         )  # fmt: skip
 
 
-class Told:
-    """Last words of workers that fail; an actor of Ray."""
+class WorkerErrors:
+    """The last error that a worker has raised; an actor of Ray."""
 
     def __init__(self) -> None:
-        self.said = ""
+        self._last = ""
 
-    def tell(self, said: str) -> None:
-        """Keep it."""
-        self.said = said
+    def report(self, error: str) -> None:
+        """Keep an error in words."""
+        self._last = error
 
     def last(self) -> str:
-        """Return the last message; "" if there is none."""
-        return self.said
+        """Return the last one; "" if there is none."""
+        return self._last
 
 
 class LastError(logging.Handler):
@@ -278,10 +301,10 @@ class LastError(logging.Handler):
 
     def __init__(self) -> None:
         super().__init__(logging.ERROR)
-        self.said = ""
+        self.message = "no error was logged"
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Keep it."""
-        said = [line.strip() for line in record.getMessage().splitlines() if line.strip()]
-        if said and said[-1] != "NoneType: None":  # of `logger.exception` without one
-            self.said = said[-1][:400]
+        """Keep its last line."""
+        lines = [line.strip() for line in record.getMessage().splitlines() if line.strip()]
+        if lines and lines[-1] != "NoneType: None":  # of `logger.exception` without one
+            self.message = lines[-1].rstrip(".")[:400]

@@ -1,7 +1,7 @@
 """The environments of one of RLlib's runners: in all phases of an episode, rewards scaled."""
 
-from collections.abc import Callable, Mapping
-from contextlib import closing
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from typing import Any
 
@@ -11,6 +11,7 @@ from gymnasium.vector import VectorEnv, VectorWrapper
 from gymnasium.wrappers.utils import RunningMeanStd
 from numpy.typing import NDArray
 
+from hrc_env.core.errors import HRCError
 from hrc_env.core.typing import Floats
 from hrc_env.evaluation.sums import EpisodeSums
 from hrc_env.simulation import Simulation
@@ -44,6 +45,18 @@ def try_environment(keywords: Mapping[str, Any]) -> None:
         env.step(env.action_space.sample())
 
 
+@contextmanager
+def reported_errors(report: Callable[[str], object]) -> Iterator[None]:
+    """Report the error of a block in words, also of a user's own task or estimator; it is raised
+    again."""
+    try:
+        yield
+    except Exception as error:
+        text = str(error).rstrip(".")
+        report(text if isinstance(error, HRCError) else f"{type(error).__name__}: {text}")
+        raise
+
+
 class RunnerEnv(VectorWrapper[Any, Any, Any, Any, Any]):
     """Environments with scaled rewards and without infos, which keep finished episodes.
 
@@ -54,17 +67,17 @@ class RunnerEnv(VectorWrapper[Any, Any, Any, Any, Any]):
     Args:
         env: starts environments anew in the step after an episode's end.
         gamma: discount per step.
-        tell: receives the error of a step in words, before it is raised.
+        report: receives the error of a reset or a step in words, before it is raised.
     """
 
     def __init__(
         self,
         env: VectorEnv[Any, Any, Any],
         gamma: float,
-        tell: Callable[[str], object] = lambda said: None,
+        report: Callable[[str], object] = lambda error: None,
     ) -> None:
         super().__init__(env)
-        self.gamma, self.tell = gamma, tell
+        self.gamma, self._report = gamma, report
         self.scale = RunningMeanStd()
         """Of discounted returns so far."""
         self.proximity: float | None = None
@@ -93,18 +106,16 @@ class RunnerEnv(VectorWrapper[Any, Any, Any, Any, Any]):
         if isinstance(self.env, HRCVectorEnv):
             limit, phases = self.env.max_episode_steps, np.random.default_rng(first_seed)
             options = {"elapsed_steps": phases.integers(limit, size=self.num_envs)}
-        observation, _ = self.env.reset(seed=first_seed, options=options)
+        with reported_errors(self._report):
+            observation, _ = self.env.reset(seed=first_seed, options=options)
         self._ended[:], self._returns[:] = False, 0.0
         self._sums.begin(np.arange(self.num_envs))
         return observation, {}
 
     def step(self, actions: NDArray[Any]) -> tuple[Any, Floats, Any, Any, dict[str, Any]]:
         """Step all environments; those that had ended start anew instead."""
-        try:
+        with reported_errors(self._report):
             observation, reward, terminated, truncated, infos = self.env.step(actions)
-        except Exception as error:  # also of somebody's task or estimator
-            self.tell(f"{type(error).__name__}: {error}")
-            raise
         self._sums.add(reward, infos)
         self._sums.begin(np.flatnonzero(self._ended))
         self._returns = np.where(self._ended, 0.0, self._returns * self.gamma + reward)

@@ -52,6 +52,7 @@ def learn(
     with cluster.connected(run.address, note, dashboard=True) as machines:
         cluster.check_machines(machines, partial(try_environment, keywords), note)
         n = run.workers or max(int(sum(each.n_cores for each in machines)), 1)
+        log.facts["workers"] = n
         runners = RunnerSettings(
             keywords, n, run.num_envs, run.seed, cluster.share_of(n, machines, note), pack()
         )

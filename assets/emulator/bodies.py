@@ -7,7 +7,7 @@ import numpy as np
 
 from hrc_env.core.typing import Floats, Points3
 from hrc_env.perception.calibration import KIND, KINDS
-from hrc_env.worker.body import Body, baked_path, load_body
+from hrc_env.worker.body import Body, find_baked, load_body
 
 
 def anatomical(body: Body) -> Body:
@@ -35,5 +35,5 @@ def _moved(names: Sequence[str]) -> Floats:
 
 def _landmarks(name: str) -> Points3:
     """(J, 3) in the frames of the segments that carry the joints [m]."""
-    with np.load(baked_path(name)) as baked:
+    with np.load(find_baked(name)) as baked:
         return baked["joint_anatomical_offset"].astype(float)

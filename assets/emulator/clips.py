@@ -13,8 +13,8 @@ from hrc_env.core.batching import rows
 from hrc_env.core.records import Held, WorkerMotion
 from hrc_env.core.typing import Floats, JointAngles
 from hrc_env.geometry.camera_config import CameraConfig
-from hrc_env.motion.floorplan import BODY_M, STAND_M, floorplan, slack_at
-from hrc_env.motion.repertoire import REPERTOIRE, Film, alone, perform
+from hrc_env.motion.floorplan import BODY_M, STAND_M, make_floorplan, read_slack
+from hrc_env.motion.repertoire import REPERTOIRE, Film, make_worker, perform
 from hrc_env.scene.build import SCENES, Scene, SceneConfig, build
 from hrc_env.worker.body import Body, load_body, worker_names
 
@@ -185,7 +185,7 @@ def _played(
     """A whole scene of the repertoire, or a recording (T, 1, ...), begun at a place."""
     if name not in REPERTOIRE:
         return perform_clip(recording(name), body, DT_S, xy_m, yaw_rad, N_FRAMES * DT_S)
-    me = alone(body, xy_m, yaw_rad, right=seed % 5 > 0)
+    me = make_worker(body, xy_m, yaw_rad, right=seed % 5 > 0)
     films = perform(REPERTOIRE[name], me, np.random.default_rng(seed), DT_S)
     return _joined(films)
 
@@ -211,7 +211,7 @@ def _place(
     path: Floats, scene: Scene, rng: np.random.Generator
 ) -> tuple[tuple[float, float], float, int]:
     """Where to begin so that these frames of a path (T, 2) [m] have room: place, yaw, frame."""
-    plan, grounds = floorplan(scene.grounds), scene.grounds
+    plan, grounds = make_floorplan(scene.grounds), scene.grounds
     last = max(len(path) - N_FRAMES, 0)
     middle_of_work = HRCConfig().tracker.prior_mean_world[:2]
     corners = np.array([grounds.walkable_x_m, grounds.walkable_y_m]).T
@@ -222,7 +222,7 @@ def _place(
         turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
         part = path[first : first + N_FRAMES : 10] @ turn.T
         begin = middle - part.mean(0)
-        room = min(slack_at(x, y, plan.slack, plan.origin) for x, y in part + begin)
+        room = min(read_slack(x, y, plan.grid) for x, y in part + begin)
         room = min(room, NEAR_M - float(np.hypot(*(part + begin - middle_of_work).T).max()))
         if room > most:
             best, most = ((float(begin[0]), float(begin[1])), yaw, first), room

@@ -8,10 +8,10 @@ from assets.recordings.clips import CLIPS, Role, clips_of
 from assets.recordings.synthetic import STYLES, made_of
 from hrc_env.core.records import WorkerMotion
 from hrc_env.core.typing import Floats
-from hrc_env.mocap.poses import posed
+from hrc_env.mocap.poses import pose_segments
 from hrc_env.motion import controls as c
-from hrc_env.motion.anatomy import anatomy
-from hrc_env.motion.clip import Clip, fitted_to
+from hrc_env.motion.anatomy import measure_body
+from hrc_env.motion.clip import Clip, scale_clip
 from hrc_env.worker.body import Body
 
 RECORDINGS: dict[str, Role] = {each.name: each.role for each in (*CLIPS, *STYLES)}
@@ -44,12 +44,12 @@ def perform_clip(
 
     One that is shorter than `least_s` goes forth and back, nowhere faster than it was recorded.
     """
-    bones = anatomy(body)
-    q = _placed(fitted_to(clip, bones.size), xy_m, yaw_rad)
+    bones = measure_body(body)
+    q = _placed(scale_clip(clip, bones.lengths), xy_m, yaw_rad)
     moments_s = _moments(len(q) / clip.fps, least_s, dt_s)
     frames = np.minimum(moments_s * clip.fps, len(q) - 1.0)
     q = np.stack([np.interp(frames, np.arange(len(q)), column) for column in q.T], -1)
-    position, turn, _ = posed(q, bones)
+    position, turn, _ = pose_segments(q, bones)
     velocity = np.gradient(position, dt_s, axis=0)
     still = np.zeros_like(velocity)
     return WorkerMotion(position[:, None], turn[:, None], velocity[:, None], still[:, None])

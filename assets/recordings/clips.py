@@ -20,7 +20,7 @@ from assets.recordings.synthetic import made_of
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.typing import Points3
 from hrc_env.geometry.rotations import about_axis
-from hrc_env.mocap.person import across
+from hrc_env.mocap.person import span
 from hrc_env.mocap.read import read_recording
 from hrc_env.mocap.record import Capture
 from hrc_env.mocap.retarget import RetargetError, retarget
@@ -111,7 +111,7 @@ def repeated(joints: Points3, times: int, fps: float) -> Points3:
     done = joints
     for _ in range(times - 1):
         ends, begins = (
-            across(pose, "hip") + across(pose, "shoulder") for pose in (done[-1], joints[0])
+            span(pose, "hip") + span(pose, "shoulder") for pose in (done[-1], joints[0])
         )
         turn = about_axis("z", np.arctan2(ends[1], ends[0]) - np.arctan2(begins[1], begins[0]))
         again = (joints - joints[0].mean(0)) @ turn.T
@@ -125,7 +125,7 @@ def repeated(joints: Points3, times: int, fps: float) -> Points3:
 
 def _heading(pose: Points3) -> float:
     """Which way hips and shoulders (15, 3) stand [rad]."""
-    way = across(pose, "hip") + across(pose, "shoulder")
+    way = span(pose, "hip") + span(pose, "shoulder")
     return float(np.arctan2(way[1], way[0]))
 
 

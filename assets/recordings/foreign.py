@@ -14,7 +14,7 @@ from assets.rotations import matrix_from_quaternion
 from hrc_env.core.skeleton import JOINTS
 from hrc_env.core.typing import Floats, Points3
 from hrc_env.geometry.rotations import about_axis
-from hrc_env.mocap.record import forward
+from hrc_env.mocap.record import compose_tree
 
 _NOSE_M, _TOE_M = (0.11, 0.0, 0.175), (0.13, 0.0, -0.03)
 """From a physics humanoid's neck and ankles, forward and up, to its nose and foot tips [m]: the
@@ -90,7 +90,7 @@ def _quaternions(path: Path) -> tuple[Points3, float]:
     offset = np.repeat(np.array([way for _, _, way in _TREE])[None], len(rows), axis=0)
     offset[:, 0] = rows[:, 1:4]
     parent = np.array([above for _, above, _ in _TREE])
-    position, _ = forward(parent, offset, _rotations(rows[:, 4:]))
+    position, _ = compose_tree(parent, offset, _rotations(rows[:, 4:]))
     order = [[name for name, _, _ in _TREE].index(joint) for joint in JOINTS]
     return position[:, order], float(1.0 / np.median(rows[:-1, 0]))
 

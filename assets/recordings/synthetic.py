@@ -16,10 +16,10 @@ from assets.rotations import matrix_from_quaternion
 from hrc_env.core.typing import Floats, Points3, Rotations
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.mocap.read import read_recording
-from hrc_env.mocap.record import forward
+from hrc_env.mocap.record import compose_tree
 from hrc_env.mocap.retarget import RetargetError, retarget
 from hrc_env.motion.clip import Clip
-from hrc_env.motion.repertoire import REPERTOIRE, alone, perform
+from hrc_env.motion.repertoire import REPERTOIRE, make_worker, perform
 from hrc_env.worker.body import PARENT, SEGMENT, SEGMENTS, Body, load_body
 
 FPS, LONGEST_S = 50.0, 8.0
@@ -83,7 +83,9 @@ def made_of(
 def write(style: Style, folder: Path, number: int) -> Path:
     """The file of a style; formats, units, axes and orders of angles vary with the number."""
     body = load_body(style.body)
-    films = perform(REPERTOIRE[style.motion], alone(body), np.random.default_rng(number), 1 / FPS)
+    films = perform(
+        REPERTOIRE[style.motion], make_worker(body), np.random.default_rng(number), 1 / FPS
+    )
     motions = [film.motion for film in films]
     places = np.concatenate([motion.position_world[:, 0] for motion in motions])
     turns = np.concatenate([motion.quaternion_wxyz[:, 0] for motion in motions])
@@ -115,7 +117,7 @@ def restyled(
         local[:, arm] = about_axis("x", sign * style.apart_rad) @ local[:, arm]
     moving = np.repeat(offset[None], len(position), axis=0)
     moving[:, 0] = position[:, 0] * style.legs
-    placed, turned = forward(PARENT, moving, local)
+    placed, turned = compose_tree(PARENT, moving, local)
     rest = _summed(offset, body.rest_position[0] * style.legs)
     return placed, turned, replace(body, rest_position=rest)
 

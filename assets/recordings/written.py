@@ -8,7 +8,7 @@ import numpy as np
 
 from hrc_env.core.typing import Floats, Points3, Rotations
 from hrc_env.geometry.rotations import about_axis
-from hrc_env.mocap.poses import marks_of
+from hrc_env.mocap.poses import make_marks
 from hrc_env.worker.body import PARENT, SEGMENT, SEGMENTS, Body, load_body
 
 AXES = "xyz"
@@ -163,7 +163,7 @@ def _bones(body: Body) -> list[tuple[str, str, int, Floats]]:
 def _tip(s: int, body: Body) -> Floats:
     """(3,) end of a segment that carries no other [m]."""
     if SEGMENTS[s].endswith("toes"):
-        marks = marks_of(body, landmarks=True)
+        marks = make_marks(body, landmarks=True)
         return marks.offset[13 if SEGMENTS[s].startswith("left") else 14]
     return np.array([0.0, 0.0, 0.2]) if SEGMENTS[s] == "head" else np.array([0.08, 0.0, 0.0])
 

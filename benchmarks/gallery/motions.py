@@ -8,7 +8,7 @@ import numpy as np
 from benchmarks.gallery.still import camera_at
 from hrc_env.core.batching import one
 from hrc_env.core.typing import Image
-from hrc_env.motion.repertoire import SCENES, alone, perform
+from hrc_env.motion.repertoire import SCENES, make_worker, perform
 from hrc_env.render import overlay
 from hrc_env.scene.build import build
 from hrc_env.scene.render import PictureRenderer
@@ -58,7 +58,7 @@ def strip(name: str, body_name: str, seed: int = 0) -> Image:
     """A scene of the repertoire played by a worker, (420, about 1800, 3)."""
     scene = build(name="site", n_workers=1, bodies=body_name)
     stage = stage_of(name)
-    me = alone(load_body(body_name), stage.xy_m, stage.yaw_rad)
+    me = make_worker(load_body(body_name), stage.xy_m, stage.yaw_rad)
     films = perform(SCENES[name], me, np.random.default_rng(seed), DT_S)
     renderer = PictureRenderer(scene, *FRAME_PX)
     frames, turn = [], stage.yaw_rad + stage.aside_rad

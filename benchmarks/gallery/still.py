@@ -9,7 +9,7 @@ from hrc_env.core.batching import one
 from hrc_env.core.records import Held, WorkerMotion
 from hrc_env.core.typing import Image, Points3
 from hrc_env.geometry.cameras import PinholeCamera, pinhole
-from hrc_env.motion.repertoire import REPERTOIRE, alone, perform
+from hrc_env.motion.repertoire import REPERTOIRE, make_worker, perform
 from hrc_env.scene.build import Scene, build
 from hrc_env.scene.render import PictureRenderer
 from hrc_env.worker.body import load_body
@@ -47,7 +47,7 @@ def portrait(body_name: str, seed: int = 1) -> Image:
     """A worker on the laboratory's floor, from before and a little aside."""
     scene = build(n_workers=1, bodies=body_name)
     x, y, yaw = SITTING
-    me = alone(load_body(body_name), (x, y), yaw)
+    me = make_worker(load_body(body_name), (x, y), yaw)
     film = perform(REPERTOIRE["stand"], me, np.random.default_rng(seed), 0.1)[0]
     camera = camera_at(np.array([x, y, 1.0]), yaw + 0.4, 2.1, 40.5, PORTRAIT_PX)
     renderer = PictureRenderer(scene, *PORTRAIT_PX)
@@ -75,7 +75,7 @@ def _at_work(
 ) -> WorkerMotion:
     """One worker, arrays (1, ...), at a share of what they do at a place."""
     place: Workplace = next(p for p in scene.grounds.places if p.name == place_name)
-    me = alone(load_body(body_name), place.xy_m, place.yaw_rad)
+    me = make_worker(load_body(body_name), place.xy_m, place.yaw_rad)
     films = perform(REPERTOIRE[doing], me, np.random.default_rng(2), 0.05)
     rows = films[0].motion
     return one(rows, int(share * len(rows.position_world)))

@@ -15,7 +15,7 @@ from hrc_env.experiments.cache import PartCache
 from hrc_env.experiments.report import Metrics, Report, quick_words
 from hrc_env.experiments.runner import at_least_one, is_as_short
 from hrc_env.motion import state as st
-from hrc_env.motion.repertoire import SCENES, Film, alone, perform
+from hrc_env.motion.repertoire import SCENES, Film, make_worker, perform
 from hrc_env.worker.body import Body, load_body, worker_names
 
 DT_S = 0.01
@@ -94,7 +94,7 @@ def _measure(scene: str, config: MotionBench) -> dict[str, Metric]:
 
 def _play(scene: str, seed: int, body: Body) -> Sequence[Film]:
     """A scene's films."""
-    me = alone(body, right=seed % 2 == 0)
+    me = make_worker(body, right=seed % 2 == 0)
     return perform(SCENES[scene], me, np.random.default_rng([17, seed]), DT_S)
 
 

@@ -65,7 +65,7 @@ def _accelerations(film: Film, which: list[int]) -> Floats:
 
 def slips(film: Film) -> Floats:
     """Speeds over the floor of balls of feet that bear weight [m/s]."""
-    grounds = np.unique(np.round([0.0, *film.worker.prints[:, 4]], 4))
+    grounds = np.unique(np.round([0.0, *film.worker.footprints[:, 4]], 4))
     found = []
     for side in SIDES:
         ball = SEGMENT[f"{side}_toes"]

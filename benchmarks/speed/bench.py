@@ -24,7 +24,7 @@ from hrc_env.core.results import Metric, over
 from hrc_env.experiments.cache import PartCache, Progress
 from hrc_env.experiments.report import Metrics, Report, Table, quick_words
 from hrc_env.experiments.runner import at_least_one, is_as_short
-from hrc_env.safety.shield import shield_called
+from hrc_env.safety.shield import find_shield
 from hrc_env.tasks.task import find_task
 
 EVERY = "every"
@@ -72,7 +72,7 @@ class SpeedBench:
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for numbers that cannot work."""
-        shield_called(self.shield)
+        find_shield(self.shield)
         if self.task != EVERY:
             find_task(self.task)
         at_least_one(self, "n_rounds", "least_steps", "n_resets", "task_steps")

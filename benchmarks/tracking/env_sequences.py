@@ -20,7 +20,7 @@ from hrc_env.motion import generator
 from hrc_env.perception import emulator
 from hrc_env.settings import settle
 from hrc_env.simulation import Simulation
-from hrc_env.tracking.config import ParticleConfig, of_kind
+from hrc_env.tracking.config import ParticleConfig, cast_config
 from hrc_env.worker.body import worker_truth
 
 ENV = "env"
@@ -38,7 +38,7 @@ def make_env_rig() -> Rig:
     simulation = simulate(1)
     P = projections(simulation.scene.cameras)
     simulation.close()
-    return Rig(ENV, P, (np.nan, np.nan), of_kind(HRCConfig().tracker, ParticleConfig))
+    return Rig(ENV, P, (np.nan, np.nan), cast_config(HRCConfig().tracker, ParticleConfig))
 
 
 def record(condition: str, seeds: list[int]) -> tuple[Points3, Keypoints]:

@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks.tracking.rigs import DT_S
 from hrc_env.core.skeleton import N_JOINTS, TORSO
 from hrc_env.core.typing import Floats, Points3
-from hrc_env.tracking.tree.predict import damped_joints
+from hrc_env.tracking.tree.predict import discretise_joints
 from hrc_env.tracking.tree.state import STANDING_M
 
 N_STATES = 6 * N_JOINTS
@@ -42,7 +42,7 @@ class MatchedModel:
 def matched_model(damping: float, root_acceleration: float) -> MatchedModel:
     """The motion model of `tracking.tree.predict` as one of the whole body at 25 Hz; the settings
     are those of `ParticleConfig`."""
-    F, own = damped_joints(DT_S, damping, 0.0)
+    F, own = discretise_joints(DT_S, damping, 0.0)
     average = np.zeros((N_JOINTS, N_JOINTS))
     average[:, TORSO] = 1 / len(TORSO)
     # what of the root's (position, velocity) a joint takes along; the rest is its own

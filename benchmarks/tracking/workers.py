@@ -9,9 +9,10 @@ from benchmarks.tracking.rigs import DT_S
 from hrc_env.core.typing import Floats, Points3
 from hrc_env.motion import state as st
 from hrc_env.motion.activities.falling import plan_fall
-from hrc_env.motion.activities.running import fastest, plan_run
+from hrc_env.motion.activities.running import limit_run_speed, plan_run
 from hrc_env.motion.paths import lay_path
-from hrc_env.motion.repertoire import OPEN, REPERTOIRE, Act, alone, perform
+from hrc_env.motion.points import Point
+from hrc_env.motion.repertoire import OPEN, REPERTOIRE, Act, make_worker, perform
 from hrc_env.motion.state import Worker
 from hrc_env.worker.body import load_body, worker_names, worker_truth
 
@@ -24,9 +25,9 @@ def run_to_and_fro(walk_m: tuple[float, float], seeds: list[int], n_frames: int)
 
     def run(draws: Floats, height_m: float, me: Worker) -> float:
         yaw = _across(me)
-        return plan_run(yaw, fastest(_FASTEST_M_S, me), me)
+        return plan_run(yaw, limit_run_speed(_FASTEST_M_S, me), me)
 
-    return _played((st.RUN, run, 0.0), walk_m, seeds, n_frames)
+    return _played(Act(st.RUN, run, 0.0), walk_m, seeds, n_frames)
 
 
 def fall_and_get_up(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
@@ -35,16 +36,16 @@ def fall_and_get_up(walk_m: tuple[float, float], seeds: list[int], n_frames: int
     def fall(draws: Floats, height_m: float, me: Worker) -> float:
         yaw = _across(me, _WAY_M)
         lies_s = _LIES_S[0] + draws.item(4) * (_LIES_S[1] - _LIES_S[0])
-        return plan_fall(draws, yaw, _WALK_M_S, lies_s, *OPEN, me)
+        return plan_fall(draws, yaw, _WALK_M_S, lies_s, OPEN, me)
 
-    return _played((st.FALL, fall, 0.0), walk_m, seeds, n_frames)
+    return _played(Act(st.FALL, fall, 0.0), walk_m, seeds, n_frames)
 
 
 def _across(me: Worker, most_m: float = np.inf) -> float:
     """Lay a path past the middle, as far as it is to there; its direction [rad]."""
-    x, y = float(me["start_x"]), float(me["start_y"])
+    x, y = float(me.start_x), float(me.start_y)
     share = min(2.0, most_m / np.hypot(x, y))
-    lay_path((x, y), np.zeros((0, 3)), (x - share * x, y - share * y), me)
+    lay_path(Point(x, y), np.zeros((0, 3)), Point(x - share * x, y - share * y), me)
     return float(np.arctan2(-y, -x))
 
 
@@ -55,7 +56,7 @@ def _played(act: Act, walk_m: tuple[float, float], seeds: list[int], n_frames: i
         rng = np.random.default_rng([seed, 11])
         body = load_body(worker_names()[seed % len(worker_names())])
         corner = rng.choice([-1.0, 1.0], 2) * rng.uniform(0.9, 1.0, 2) * walk_m
-        me = alone(body, (corner[0], corner[1]), float(rng.uniform(-np.pi, np.pi)))
+        me = make_worker(body, (corner[0], corner[1]), float(rng.uniform(-np.pi, np.pi)))
         joints = []
         while sum(map(len, joints)) < n_frames:
             for film in perform((act, *REPERTOIRE["look round"]), me, rng, DT_S):

@@ -16,12 +16,12 @@ def estimators_named(words: Sequence[str]) -> tuple[str, ...]:
 def _registered(word: str) -> str:
     from hrc_env.core.brought import function_called  # here: --help imports no simulator
     from hrc_env.registration import register_estimator
-    from hrc_env.tracking.estimators import ESTIMATORS, estimator_called
+    from hrc_env.tracking.estimators import ESTIMATORS, find_estimator
 
     made = function_called(
         "estimator", word, "a function of (P, ctrl_dt, config) or an EstimatorSpec"
     )
-    spec = estimator_called(made)
+    spec = find_estimator(made)
     if spec.name not in ESTIMATORS or ESTIMATORS[spec.name].make is not spec.make:
         register_estimator(spec)
     return spec.name

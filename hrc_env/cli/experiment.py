@@ -97,7 +97,6 @@ class PriceExperiment(AnyExperiment):
     """What sight costs at one rate of contacts: every pair of eyes has the margin that it needs."""
 
     name = "price"
-    stays = "each margin of a search depends on the last one, so that parts are not independent"
     out: Path = Path("out/price")
     task: str = DEFAULT
     """What the robots do, by the environment's id."""

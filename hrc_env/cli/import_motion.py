@@ -86,7 +86,7 @@ class ImportMotion:
         with progress_bar(console, name) as say:
             clip, error = retarget(capture, body, lambda share: say(share, name))
         tell_error(console, capture, clip, error)
-        played = fit.played_s(clip, all_grounds(), ANY)
+        played = fit.measure_played_s(clip, all_grounds(), ANY)
         save_clip(clip, self.out)
         ready = f"play it with motions=[{str(self.out)!r}]. " if any(played.values()) else ""
         console.print(f"In [bold]{self.out}[/]: {ready}{fit.describe_fit(clip, played)}")
@@ -99,12 +99,12 @@ class ImportMotion:
         return 0
 
     def _read(self, fps: float | None) -> "Capture":
-        from hrc_env.mocap.names import names_given
+        from hrc_env.mocap.names import read_joint_names
         from hrc_env.mocap.read import read_recording
 
         return read_recording(
             self.file, fps, self.source_fps, self.skeleton, self.allow_off_floor,
-            names_given(self.joint), self.up,
+            read_joint_names(self.joint), self.up,
         )  # fmt: skip
 
 
@@ -113,14 +113,14 @@ def tell_capture(console: Console, capture: "Capture") -> None:
     n_frames = len(capture.joints_world)
     said = f"[bold]{capture.source}[/]: {n_frames} frames at {capture.fps:g} a second, "
     console.print(said + f"{(n_frames - 1) / capture.fps:.1f} s", highlight=False)
-    for sentence in capture.repaired:
+    for sentence in capture.notes:
         console.print(f"[yellow]Repaired:[/] {sentence}", highlight=False)
 
 
 def tell_error(console: Console, capture: "Capture", clip: "Clip", error: "RetargetError") -> None:
     """Which joints were found, and how near the worker comes to them."""
     table = Table("joint", "in the file", "mean [cm]", "p95 [cm]", title="worker beside person")
-    joints = zip(JOINTS, capture.found, 100 * error.mean_m, 100 * error.p95_m, strict=True)
+    joints = zip(JOINTS, capture.node_names, 100 * error.mean_m, 100 * error.p95_m, strict=True)
     for joint, name, mean_cm, p95_cm in joints:
         table.add_row(joint, name, f"{mean_cm:.1f}", f"{p95_cm:.1f}")
     table.add_section()
@@ -143,26 +143,26 @@ def _film_strip(clip: "Clip", worker: str) -> "Image":
 
     from hrc_env.core.records import WorkerMotion
     from hrc_env.geometry.cameras import pinhole
-    from hrc_env.mocap.poses import posed
+    from hrc_env.mocap.poses import pose_segments
     from hrc_env.motion import controls as c
-    from hrc_env.motion.anatomy import anatomy
-    from hrc_env.motion.clip import fitted_to
+    from hrc_env.motion.anatomy import measure_body
+    from hrc_env.motion.clip import scale_clip
     from hrc_env.render import overlay
     from hrc_env.scene.build import SceneConfig, build
     from hrc_env.scene.render import PictureRenderer
     from hrc_env.worker.body import load_body
 
     scene = build(SceneConfig(), "lab", 1, worker)
-    bones = anatomy(load_body(worker))
+    bones = measure_body(load_body(worker))
     eye = np.array([STAGE_M[0] + EYE_M[0], STAGE_M[1] + EYE_M[1], EYE_M[2]])
     target = np.array([*STAGE_M, TARGET_Z_M])
     camera = pinhole("strip", eye, target, HFOV_DEG, *TILE)
     rows = np.linspace(0, len(clip.controls) - 1, N_MOMENTS).astype(int)
-    q = fitted_to(clip, bones.size)[rows]
+    q = scale_clip(clip, bones.lengths)[rows]
     shift = np.array(STAGE_M) - q[:, [c.ROOT_X, c.ROOT_Y]]
     for at in (c.ROOT_X, c.ANKLE, c.ANKLE + 6):
         q[:, at : at + 2] += shift
-    position, turn, _ = posed(q, bones)
+    position, turn, _ = pose_segments(q, bones)
     still = np.zeros((1, *position.shape[1:]))
     tiles = []
     with closing(PictureRenderer(scene, *TILE)) as renderer:

@@ -1,7 +1,7 @@
-"""States: records of arrays whose first axis is the environment; their rows, copies, saved ones.
+"""States: records of arrays whose first axis is the environment, with access to their rows.
 
-A component that works on a few environments only (a reset of 3 of 64) works on a record of
-their rows; as no result depends on the size of the batch, that is the same computation.
+A component that works on some environments only (a reset of 3 of 64) works on a record of their
+rows. As no result depends on the size of the batch, that is the same computation.
 """
 
 import copy
@@ -9,77 +9,88 @@ import dataclasses
 import functools
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, TypeVar, cast
 
 import numpy as np
 
-from hrc_env.core.typing import Bools, Floats, Ints
+from hrc_env.core.typing import Bools, Floats, Ints, is_array, is_dict, is_list_or_tuple
 
 RecordT = TypeVar("RecordT")
 State = dict[str, Any]
 
 
 def rows(record: RecordT, ids: Ints | Bools) -> RecordT:
-    """A copy of rows `ids` of every array of a (nested) record."""
+    """Return rows `ids` of every array of a (nested) record, as copies."""
     return mapped(record, lambda array: array[ids])
 
 
 def one(record: RecordT, b: int) -> RecordT:
-    """Environment `b` of a record, without the batch's axis; its arrays are views."""
+    """Return environment `b` of a record without the batch axis; its arrays are views."""
     return mapped(record, lambda array: array[b])
 
 
 def write_rows(record: object, ids: Any, part: object) -> None:
-    """Write a record of rows back into rows `ids` (integers, a mask, `...`) of a record."""
-    if isinstance(record, np.ndarray):
+    """Write a record of rows into a record of the same kind.
+
+    Args:
+        record: the record, changed in place.
+        ids: the rows, as integers, a mask or `...`.
+        part: the values of these rows.
+    """
+    if is_array(record):
         record[ids] = part
-    if isinstance(record, dict):
+    if is_dict(record) and is_dict(part):
         for name, array in record.items():
-            write_rows(array, ids, part[name])  # type: ignore[index]
+            write_rows(array, ids, part[name])
     for name in names_of(type(record)):
         write_rows(getattr(record, name), ids, getattr(part, name))
 
 
 def mapped(record: RecordT, change: Callable[[Any], Any]) -> RecordT:
-    """A (nested) record of the same kind with `change` applied to every array."""
-    if isinstance(record, np.ndarray):
+    """Return a (nested) record of the same kind with `change` applied to every array."""
+    if is_array(record):
         return change(record)
-    if isinstance(record, dict):
-        return type(record)((name, mapped(part, change)) for name, part in record.items())
+    if is_dict(record):
+        changed: Any = type(record)((k, mapped(part, change)) for k, part in record.items())
+        return changed
     names = names_of(type(record))
     values = [mapped(getattr(record, name), change) for name in names]
     return type(record)(*values) if names else record
 
 
 def copied(value: Any) -> Any:
-    """A deep copy of records, lists and generators; arrays that are read-only are shared."""
-    if isinstance(value, np.ndarray):
+    """Return a deep copy of records, lists and generators; read-only arrays are shared."""
+    if is_array(value):
         return value.copy() if value.flags.writeable else value
-    if names := names_of(type(value)):
-        return type(value)(*[copied(getattr(value, name)) for name in names])
-    if isinstance(value, (list, tuple)):
+    kind = cast(type[Any], type(value))
+    if names := names_of(kind):
+        return kind(*[copied(getattr(value, name)) for name in names])
+    if is_list_or_tuple(value):
         return type(value)(copied(each) for each in value)
     return copy.deepcopy(value)
 
 
 def flat(array: Floats, n_last: int) -> Floats:
-    """(..., *last) as (count, *last), contiguous, where there are n_last axes in `last`."""
+    """Return an array (..., *last) as (count, *last), contiguous; `last` has `n_last` axes."""
     last = array.shape[-n_last:]
     return np.ascontiguousarray(array).reshape(math.prod(array.shape[:-n_last]), *last)
 
 
 def picked(streams: Sequence[np.random.Generator], ids: Ints) -> list[np.random.Generator]:
-    """The generators of environments `ids`."""
+    """Return the generators of environments `ids`."""
     return [streams[b] for b in ids]
 
 
 class Stateful:
-    """Saves and brings back the attributes in `CHANGES`; the others are settings and constants."""
+    """Base of objects whose state can be saved and restored.
+
+    A subclass lists the attributes that change in `CHANGES`; all others are settings and constants.
+    """
 
     CHANGES: ClassVar[tuple[str, ...]] = ()
 
     def get_state(self) -> Any:
-        """A copy of everything that changes; `set_state` brings it back bit for bit."""
+        """Return a copy of everything that changes; `set_state` restores it bit for bit."""
         parts = {name: getattr(self, name) for name in self.CHANGES}
         return {
             name: part.get_state() if hasattr(part, "get_state") else copied(part)
@@ -87,7 +98,7 @@ class Stateful:
         }
 
     def set_state(self, state: Any) -> None:
-        """Continue from a state of a thing with the same settings; the state stays as it is."""
+        """Continue from a state of an object with the same settings; the state is not changed."""
         for name in self.CHANGES:
             part = getattr(self, name)
             if hasattr(part, "set_state"):
@@ -97,8 +108,8 @@ class Stateful:
 
 
 @functools.cache
-def names_of(kind: type) -> tuple[str, ...]:
-    """The fields of a dataclass or a named tuple; whatever else there is has none."""
+def names_of(kind: type[Any]) -> tuple[str, ...]:
+    """Return the field names of a dataclass or a named tuple; of any other class, none."""
     if dataclasses.is_dataclass(kind):
         return tuple(each.name for each in dataclasses.fields(kind))
     return getattr(kind, "_fields", ())

@@ -1,4 +1,4 @@
-"""Checks of what users bring: functions by their arguments, results by kind, shape and values."""
+"""Checks of functions and values that users supply: arguments, kinds, shapes and ranges."""
 
 import inspect
 import os
@@ -11,16 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.core.errors import ConfigError, check_shape
+from hrc_env.core.typing import is_array, is_list_or_tuple, is_numpy_scalar
 
 LONGEST = 80
-"""Characters of a value that an error shows."""
+"""Number of characters of a value that an error shows."""
 
 
 def described(value: object) -> str:
-    """Return what a value is, in a few words."""
-    if isinstance(value, np.ndarray):
+    """Describe a value in a few words, for errors."""
+    if is_array(value):
         return f"an array of {value.dtype} with shape {value.shape}"
-    if isinstance(value, tuple | list):
+    if is_list_or_tuple(value):
         parts = ", ".join(described(each) for each in value[:4])
         more = ", ..." if len(value) > 4 else ""
         return f"a {type(value).__name__} of {len(value)} ({parts}{more})"
@@ -30,7 +31,13 @@ def described(value: object) -> str:
 
 
 def check_arguments(what: str, function: Callable[..., Any], *names: str) -> None:
-    """Raise `ConfigError` unless a function can be called with so many arguments by position."""
+    """Raise `ConfigError` unless a function can be called with these positional arguments.
+
+    Args:
+        what: the function's role, as errors name it.
+        function: the function of a user.
+        names: names of the arguments.
+    """
     try:
         signature = inspect.signature(function)
     except (ValueError, TypeError) as error:  # of what is written in C there is none
@@ -49,16 +56,15 @@ def check_arguments(what: str, function: Callable[..., Any], *names: str) -> Non
 
 
 def function_called(what: str, name: str, meaning: str) -> Any:
-    """Return the function that "module:function" names; modules in the working folder are found,
-    too.
+    """Return the function that "MODULE:FUNCTION" names; the working folder is searched, too.
 
     Args:
-        what: it is to be, as an agent.
-        name: the module's dotted name and, behind a colon, its own.
-        meaning: what it must be, for the error.
+        what: role of the function, such as "agent", for errors.
+        name: dotted name of the module and, after a colon, name of the function.
+        meaning: requirement on the function, for errors.
 
     Raises:
-        ConfigError: there is none.
+        ConfigError: there is no such function.
     """
     module, _, function = name.partition(":")
     if os.getcwd() not in sys.path:  # as `python -m` has it
@@ -76,17 +82,18 @@ def function_called(what: str, name: str, meaning: str) -> Any:
 def numbers_of(
     what: str, value: object, shape: tuple[int, ...], meaning: str, finite: bool = True
 ) -> NDArray[np.float64]:
-    """Return a value as an array of its own, float64 and contiguous.
+    """Return a value as a new array of float64, contiguous.
 
     Args:
-        what: what it is, with its unit, as errors say it.
-        value: an array, or what NumPy makes one of.
-        shape: the expected one.
-        meaning: what its axes are.
+        what: name of the value with its unit, for errors.
+        value: an array, or anything that NumPy turns into one.
+        shape: the expected shape.
+        meaning: meaning of the axes, for errors.
         finite: whether NaN and infinite numbers are refused.
 
     Raises:
-        ConfigError: it is not of real numbers, has another shape, or is not finite.
+        ConfigError: the value does not consist of real numbers, has another shape, or is not
+            finite.
     """
     try:
         array = np.asarray(value)
@@ -107,7 +114,17 @@ def numbers_of(
 
 
 def flags_of(what: str, value: object, shape: tuple[int, ...], meaning: str) -> NDArray[np.bool_]:
-    """Return a value as an array of truth values; `ConfigError` if it is none of this shape."""
+    """Return a value as an array of booleans.
+
+    Args:
+        what: name of the value, for errors.
+        value: an array, or anything that NumPy turns into one.
+        shape: the expected shape.
+        meaning: meaning of the axes, for errors.
+
+    Raises:
+        ConfigError: the value has another shape, or numbers other than 0 and 1.
+    """
     numbers = numbers_of(what, value, shape, meaning)
     if not np.isin(numbers, (0.0, 1.0)).all():
         raise ConfigError(f"{what} must be true or false, got other numbers.")
@@ -115,23 +132,26 @@ def flags_of(what: str, value: object, shape: tuple[int, ...], meaning: str) -> 
 
 
 def points_of(what: str, value: object) -> NDArray[np.float64]:
-    """Return a value as points (N, 3), at least one; `ConfigError` if it is none."""
+    """Return a value as points (N, 3), at least one, or raise `ConfigError`."""
     return numbers_of(what, value, (count_of(value), 3), "points, xyz")
 
 
 def count_of(value: object) -> int:
     """Return the length of a list or array, at least 1; of anything else 1."""
-    if isinstance(value, list | tuple) or (isinstance(value, np.ndarray) and value.ndim > 0):
+    if is_list_or_tuple(value) or (is_array(value) and value.ndim > 0):
         return max(len(value), 1)
     return 1
 
 
 def positive(what: str, value: object, unit: str) -> float:
     """Return a positive finite number, or raise `ConfigError`."""
-    is_number = isinstance(value, int | float | np.integer | np.floating)
-    if not is_number or isinstance(value, bool) or not 0 < float(value) < np.inf:  # type: ignore[arg-type]
+    plain = value.item() if is_numpy_scalar(value) else value
+    if isinstance(plain, bool) or not isinstance(plain, int | float):
+        plain = np.nan
+    number = float(plain)
+    if not 0 < number < np.inf:
         raise ConfigError(f"{what} must be positive and finite [{unit}], got {described(value)}.")
-    return float(value)  # type: ignore[arg-type]
+    return number
 
 
 def check_kind(what: str, value: object, *kinds: type | None) -> None:
@@ -144,7 +164,7 @@ def check_kind(what: str, value: object, *kinds: type | None) -> None:
 
 def check_kinds(what: str, values: object, *kinds: type) -> None:
     """Raise `ConfigError` unless there is a sequence of at least one value of these kinds."""
-    if not isinstance(values, list | tuple) or not values:
+    if not is_list_or_tuple(values) or not values:
         names = " or ".join(kind.__name__ for kind in kinds)
         raise ConfigError(
             f"{what} must be a list of at least one {names}, got {described(values)}."

@@ -61,10 +61,11 @@ def dtype_of(declaration: type) -> np.dtype[Any]:
 
 def _field_type(name: str, hint: Any) -> tuple[Any, ...]:
     """Return (type,) or (type, shape) of a field, as NumPy takes them."""
-    shape: tuple[Any, ...] = ()
+    shapes: list[tuple[int, ...]] = []
     if get_origin(hint) is Annotated:
         hint, *metadata = get_args(hint)
-        shape = tuple(each for each in metadata if isinstance(each, tuple))[-1:]
+        shapes = [each for each in metadata if isinstance(each, tuple)]
+    shape = shapes[-1:]
     if hint in SCALARS:
         return SCALARS[hint], *shape
     if get_origin(hint) is np.ndarray and shape:
@@ -112,6 +113,11 @@ class AnyRecords(Protocol):
         """Number of rows over all axes."""
         ...
 
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """The structured dtype of a row."""
+        ...
+
     def __len__(self) -> int: ...
     def __iter__(self) -> Iterator[Any]: ...
     def __setitem__(self, at: Any, value: Any, /) -> None: ...
@@ -121,7 +127,7 @@ class AnyRecords(Protocol):
 
 
 class Records1(AnyRecords, Protocol[RowT]):
-    """A structured array of one axis, whose rows `RowT` declares."""
+    """A structured array of one axis with rows declared by `RowT`."""
 
     @overload
     def __getitem__(self, at: int, /) -> RowT: ...
@@ -133,7 +139,7 @@ class Records1(AnyRecords, Protocol[RowT]):
 
 
 class Records2(AnyRecords, Protocol[RowT]):
-    """A structured array of two axes, whose rows `RowT` declares."""
+    """A structured array of two axes with rows declared by `RowT`."""
 
     @overload
     def __getitem__(self, at: int, /) -> "Records1[RowT]": ...
@@ -147,7 +153,7 @@ class Records2(AnyRecords, Protocol[RowT]):
 
 
 class Records3(AnyRecords, Protocol[RowT]):
-    """A structured array of three axes, whose rows `RowT` declares."""
+    """A structured array of three axes with rows declared by `RowT`."""
 
     @overload
     def __getitem__(self, at: int, /) -> "Records2[RowT]": ...
@@ -163,7 +169,7 @@ class Records3(AnyRecords, Protocol[RowT]):
 
 
 class Records4(AnyRecords, Protocol[RowT]):
-    """A structured array of four axes, whose rows `RowT` declares."""
+    """A structured array of four axes with rows declared by `RowT`."""
 
     @overload
     def __getitem__(self, at: int, /) -> "Records3[RowT]": ...
@@ -181,7 +187,7 @@ class Records4(AnyRecords, Protocol[RowT]):
 
 
 class Records5(AnyRecords, Protocol[RowT]):
-    """A structured array of five axes, whose rows `RowT` declares."""
+    """A structured array of five axes with rows declared by `RowT`."""
 
     @overload
     def __getitem__(self, at: int, /) -> "Records4[RowT]": ...

@@ -8,7 +8,7 @@ import textwrap
 
 
 def field_docs(kind: type) -> dict[str, str]:
-    """Return the sentences after each field of a dataclass, those that it inherits included."""
+    """Return the docstring of each field of a dataclass, inherited ones included."""
     docs: dict[str, str] = {}
     for each in reversed(kind.__mro__):
         if dataclasses.is_dataclass(each):
@@ -17,10 +17,11 @@ def field_docs(kind: type) -> dict[str, str]:
 
 
 def attribute_docs(kind: type) -> dict[str, str]:
-    """Return the sentences after each annotated attribute in the body of a class."""
+    """Return the docstring of each annotated attribute in the body of a class."""
     docs: dict[str, str] = {}
     (tree,) = ast.parse(textwrap.dedent(inspect.getsource(kind))).body
-    for field, after in itertools.pairwise(getattr(tree, "body", ())):
+    body: list[ast.stmt] = getattr(tree, "body", [])
+    for field, after in itertools.pairwise(body):
         if isinstance(field, ast.AnnAssign) and isinstance(after, ast.Expr):
             docs[ast.unparse(field.target)] = " ".join(ast.literal_eval(after.value).split())
     return docs

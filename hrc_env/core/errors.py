@@ -1,12 +1,22 @@
-"""Errors in one voice: what was expected, what came, what would be valid.
+"""The errors of this package: each states the expected value, the given value and valid ones.
 
-A worker who is not seen is data (growing covariance, a flag), never one of these.
+    HRCError
+    ├── ConfigError            a setting, name, shape or value that cannot work (a ValueError)
+    │   ├── NoGoalError        a reward by goals of a task without goals
+    │   └── NoAttributeError   an attribute that an environment does not have
+    ├── DownloadError          a download that failed or has another content
+    │   └── WeightsError       weights of the pose network
+    ├── RenderingError         no OpenGL context
+    ├── CheckpointError        a saved agent that does not fit its environment
+    └── MissingExtraError      libraries of an extra that is not installed
+
+A worker out of sight is data (a growing covariance, a flag), never an error.
 """
 
 import contextlib
 import difflib
 import numbers
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Generator, Iterable
 from typing import Any, TypeVar
 
 T = TypeVar("T")
@@ -17,11 +27,11 @@ class HRCError(Exception):
 
 
 class ConfigError(HRCError, ValueError):
-    """A setting, name, shape or value that cannot work, with what would."""
+    """A setting, name, shape or value that cannot work; the message has valid ones."""
 
 
 class NoGoalError(ConfigError, AttributeError):
-    """A reward by goals is asked for of a task that has none. Who asks with `hasattr` hears so."""
+    """A reward by goals is requested for a task without goals; `hasattr` gives False."""
 
 
 class NoAttributeError(ConfigError, AttributeError):
@@ -29,7 +39,7 @@ class NoAttributeError(ConfigError, AttributeError):
 
 
 class DownloadError(HRCError, RuntimeError):
-    """Something that is fetched once could not be fetched, or is not what it should be."""
+    """A file that is downloaded once is not available, or is not the expected one."""
 
 
 class WeightsError(DownloadError):
@@ -41,16 +51,16 @@ class RenderingError(HRCError, RuntimeError):
 
 
 class CheckpointError(HRCError, RuntimeError):
-    """A saved agent that does not fit the environment it is loaded for."""
+    """A saved agent does not fit the environment for which it is loaded."""
 
 
 class MissingExtraError(HRCError, ImportError):
-    """Something is wanted whose libraries are an extra that is not installed."""
+    """A feature needs libraries of an extra that is not installed."""
 
 
 @contextlib.contextmanager
-def learner() -> Iterator[None]:
-    """Round imports of the learner's libraries: a `MissingExtraError` has the line to type."""
+def learner() -> Generator[None]:
+    """Turn a failed import of a learner's library into a `MissingExtraError` with the remedy."""
     try:
         yield
     except ModuleNotFoundError as error:
@@ -62,12 +72,18 @@ def learner() -> Iterator[None]:
 
 
 REGISTERED = ("task", "environment", "robot", "estimator", "detector", "shield")
-"""Kinds of things that users can register (`hrc_env.registration`)."""
+"""Kinds of objects that users can register (`hrc_env.registration`)."""
 OWN = "One of your own is known once its file is imported: --import FILE, hrc_env.import_files."
 
 
 def unknown(what: str, got: object, valid: Iterable[str]) -> ConfigError:
-    """The error for a name that is not in a list, with the nearest valid one."""
+    """Return the error for an unknown name, with the nearest valid one.
+
+    Args:
+        what: kind of the name, such as "shield".
+        got: the unknown name.
+        valid: all valid names.
+    """
     names = list(valid)
     near = difflib.get_close_matches(str(got), names, n=1)
     hint = f" Did you mean {near[0]!r}?" if near else ""
@@ -76,7 +92,7 @@ def unknown(what: str, got: object, valid: Iterable[str]) -> ConfigError:
 
 
 def check_names(what: str, names: Iterable[object], valid: Collection[str]) -> None:
-    """Raise the error for the first of the names that is not in a list, if there is one."""
+    """Raise `ConfigError` for the first of the names that is not valid, if there is one."""
     for name in names:
         if name not in valid:
             raise unknown(what, name, valid)
@@ -93,7 +109,13 @@ _MUST: dict[str, Callable[[float], bool]] = {
 
 
 def check_fields(record: object, must: str, *names: str) -> None:
-    """Raise `ConfigError` for the first field of these names that is not as it `must` (`_MUST`)."""
+    """Raise `ConfigError` for the first field that violates a condition.
+
+    Args:
+        record: the settings.
+        must: the condition, a key of `_MUST`.
+        names: the fields.
+    """
     for name in names:
         value = getattr(record, name)
         if not _MUST[must](value):
@@ -101,21 +123,28 @@ def check_fields(record: object, must: str, *names: str) -> None:
 
 
 def needed(value: T | None, what: str) -> T:
-    """A value that must be there, or `ConfigError`."""
+    """Return a value that must not be None, or raise `ConfigError`."""
     if value is None:
         raise ConfigError(f"{what} is asked for, and there is none here.")
     return value
 
 
 def check_shape(what: str, got: tuple[int, ...], expected: tuple[int, ...], meaning: str) -> None:
-    """Raise `ConfigError` unless the shapes agree; `meaning` says what the axes are."""
+    """Raise `ConfigError` unless two shapes agree.
+
+    Args:
+        what: name of the array, for the error.
+        got: its shape.
+        expected: the shape that it must have.
+        meaning: meaning of the axes, for the error.
+    """
     if tuple(got) != tuple(expected):
         raise ConfigError(f"{what} must have shape {expected} ({meaning}), got {tuple(got)}.")
 
 
 def whole(what: str, value: Any, low: int, high: int) -> int:
-    """A whole number in [low, high], or a `ConfigError`."""
-    is_whole = isinstance(value, numbers.Integral) and not isinstance(value, bool)
-    if not is_whole or not low <= int(value) <= high:
+    """Return an integer from `low` to `high`, or raise `ConfigError`."""
+    is_bool = isinstance(value, bool)
+    if is_bool or not isinstance(value, numbers.Integral) or not low <= int(value) <= high:
         raise ConfigError(f"{what} must be a whole number from {low} to {high}, got {value!r}.")
     return int(value)

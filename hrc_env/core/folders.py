@@ -1,17 +1,18 @@
-"""Folders in which files are kept between runs, also where home or package cannot be written."""
+"""Folders for files that are kept between runs, also where home or package are read-only."""
 
 import contextlib
 import hashlib
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from functools import lru_cache
 from pathlib import Path
 
 
 def usual_cache() -> Path | None:
-    """Return `hrc_env` in the user's caches, which need not exist; None without a home."""
+    """Return the folder `hrc_env` in the user's caches, which need not exist; None without a
+    home."""
     chosen = os.environ.get("XDG_CACHE_HOME")
     if sys.platform == "win32":
         chosen = chosen or os.environ.get("LOCALAPPDATA")
@@ -30,7 +31,7 @@ def user_cache() -> Path:
 
 @lru_cache(maxsize=1)
 def temporary_cache() -> Path:
-    """Return a folder among the temporary ones that is this user's alone."""
+    """Return a folder among the temporary ones that only this user can write to."""
     owner = getattr(os, "getuid", lambda: 0)()
     folder = Path(tempfile.gettempdir()) / f"hrc_env-{owner}"
     with contextlib.suppress(OSError):
@@ -45,7 +46,7 @@ def temporary_cache() -> Path:
 
 
 def can_write(folder: Path) -> bool:
-    """Return whether files can be written into a folder, which is made if it can be."""
+    """Return whether files can be written into a folder; it is made if possible."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -55,8 +56,8 @@ def can_write(folder: Path) -> bool:
 
 
 @contextlib.contextmanager
-def alone(folder: Path, wait: Callable[[], object]) -> Iterator[None]:
-    """Hold the lock of a folder; `wait` is called where another program holds it."""
+def alone(folder: Path, wait: Callable[[], object]) -> Generator[None]:
+    """Hold the lock of a folder; `wait` is called if another program holds it."""
     try:
         import fcntl
 

@@ -1,8 +1,9 @@
-"""The numbers in info: what each means, and what stands for one that was not measured.
+"""The numbers in info: their meanings, and stand-ins for numbers that were not measured.
 
-Inside, a result holds NaN where there was nothing to measure. To users an info has the same keys
-from the reset on, and no NaN: a distance to nobody is infinite, and beside a finite stand-in a key
-says whether the number was measured. Words are indices; `worded` gives the words.
+Internally NaN stands where there was nothing to measure. Users receive infos with the same keys
+from the reset on and without NaN: the distance to an absent worker is infinite, and beside a finite
+stand-in a key states whether the number was measured. Words are encoded as indices; `worded`
+translates them.
 """
 
 import fnmatch
@@ -16,12 +17,12 @@ from numpy.typing import NDArray
 
 from hrc_env.core.brought import described
 from hrc_env.core.errors import ConfigError, unknown
-from hrc_env.core.typing import Ints
+from hrc_env.core.typing import Ints, is_sequence_of_text
 
 Info = dict[str, NDArray[Any]]
 """Numbers (B,) by name; NaN where an environment has none in this step."""
 ABSENT = "absent"
-"""The activity and the body of a worker who is not in the episode; as a number -1."""
+"""Activity and body of a worker that is not in the episode; as a number -1."""
 ACTIVITY, BODY = "worker/activity", "worker/body"
 CONTACT_KIND, CONTACT_REGION = "safety/contact_kind", "safety/contact_region"
 WORDS = {
@@ -30,174 +31,223 @@ WORDS = {
     CONTACT_KIND: "contact_kind",
     CONTACT_REGION: "contact_region",
 }
-"""What `worded` says, and the name in `OF_WORKERS` of the indices behind it."""
+"""Keys of `worded`, with the names in `OF_WORKERS` of the indices behind them."""
 PEOPLE = ("activity", "body")
-"""Those that have a word for each worker."""
+"""Words that there are for each worker."""
 Words = dict[str, tuple[str, ...]]
 _WORKER = re.compile(r"^worker_\d+/")
 MISCALIBRATED = "perception/miscalibrated"
 MORE_PEOPLE = "perception/more_people"
 N_CAMERAS, MOVED, TURNED = "episode/n_cameras", "episode/moved_m", "episode/turned_rad"
 DELAY, LIGHT, FAULT = "episode/delay_s", "episode/light", "episode/fault_"
-"""Draws of an episode."""
+"""Keys of the random draws of an episode."""
 
 
 class Entry(NamedTuple):
-    """A number in info."""
+    """Description of a number in info."""
 
     unit: str
+    """Unit of the number, or its range."""
     meaning: str
+    """Meaning of the number, as the documentation prints it."""
     stand_in: float | None = None
-    """What stands for it where it was not measured; None: it always is."""
+    """Stand-in where it was not measured; None: it always is."""
     flag: str | None = None
-    """The key that says whether it was measured; None: another key or the stand-in does."""
+    """Key that states whether it was measured; None: another key or the stand-in shows it."""
 
 
 CAME = "0 where no contact begins"
 SHIELDED = "with `shield=`: "
 ENTRIES: dict[str, Entry] = {
-    "shield/change": Entry("rad/s", f"{SHIELDED}its change of the command, over all joints"),
-    "shield/active": Entry("0 or 1", f"{SHIELDED}whether by more than 0.02 rad/s"),
-    "shield/scale": Entry("-", f"{SHIELDED}what is left of the command along itself; 1: all"),
-    "shield/least_m": Entry(
-        "m", "built-in: least D, what is clear between robot and estimated bodies after margins, "
-        "Z_d and the worker's travel; infinite where nothing near matters", np.inf,
+    "shield/change": Entry(
+        "rad/s", f"{SHIELDED}length of the change of the joint velocities by the shield"
+    ),
+    "shield/active": Entry("0 or 1", f"{SHIELDED}whether that change exceeds 0.02 rad/s"),
+    "shield/scale": Entry("-", f"{SHIELDED}share of the command that is left along itself; 1: all"),
+    "shield/clearance_m": Entry(
+        "m",
+        "built-in shields: least clearance D between robot and estimated bodies, after margins, "
+        "Z_d and the worker's travel; infinite if no body is near enough to matter",
+        np.inf,
     ),
     "shield/slack": Entry(
-        "m/s", "built-in: by how much the worst row is exceeded, retreats not yet reached included"
+        "m/s",
+        "built-in shields: greatest violation of a constraint, retreats that are not yet reached "
+        "included",
     ),
     "shield/unknown": Entry(
-        "0 or 1", "built-in: somebody may be there whom nobody sees: the speed is capped"
+        "0 or 1",
+        "built-in shields: a person may be near whom no camera detects, and the speed is limited",
     ),
     "cost_proximity": Entry("0 or 1", "the true surfaces came nearer than `cost.proximity_m`"),
     "cost_contact": Entry(
         "0 or 1", "the true surfaces touched at any physics substep, by distance"
     ),
     "cost": Entry(
-        "control steps", "sum of `cost.components`: by default 1 for a step nearer than "
-        "`cost.proximity_m` and 1 for one that touches; 0 after a reset. There are also "
-        "`towards`, contacts that begin while the robot comes; `force`, the "
-        "`contact_force_ratio` of contacts; `too_near`; `near_miss`: each that is chosen is in "
-        "`cost_<name>`",
+        "control steps",
+        "sum of `cost.components`: by default 1 for a step nearer than `cost.proximity_m` and 1 "
+        "for a step with a touch; 0 after a reset. Other components are `towards`, contacts that "
+        "begin while the robot moves towards the worker; `force`, the `contact_force_ratio` of "
+        "contacts; `too_near`; `near_miss`. Each chosen one has its own key `cost_<name>`",
     ),
     "cost_sum": Entry("control steps", "the same, under the name that some safe-RL libraries read"),
-    "episode_cost": Entry("control steps", "running sum of `cost` over the episode"),
+    "episode_cost": Entry("control steps", "sum of `cost` over the episode so far"),
     "safety/min_separation_m": Entry(
         "m", "least true separation of the step; infinite without workers", np.inf
     ),
     "safety/robot_towards_m_s": Entry(
-        "m/s", "how fast the robot's motion narrows the separation from the nearest worker; 0 "
-        "beyond 1 m", 0.0, "safety/towards_measured",
+        "m/s",
+        "rate at which the robot's motion reduces the separation from the nearest worker; 0 beyond "
+        "1 m",
+        0.0,
+        "safety/towards_measured",
     ),
     "safety/worker_towards_m_s": Entry(
-        "m/s", "how fast the worker's does; likewise", 0.0, "safety/towards_measured"
+        "m/s",
+        "rate at which the nearest worker's motion reduces the separation; 0 beyond 1 m",
+        0.0,
+        "safety/towards_measured",
     ),
     "safety/too_near": Entry(
-        "0 or 1", "the robot comes towards a worker at more than 0.05 m/s, nearer than the "
-        "protective distance of ISO/TS 15066 with both true directed speeds, 0.1 s of reaction and "
-        "`time_to_stop_s`",
+        "0 or 1",
+        "the robot moves towards a worker at more than 0.05 m/s within the protective distance of "
+        "ISO/TS 15066, with both true directed speeds, 0.1 s of reaction and `time_to_stop_s`",
     ),
-    "safety/time_to_stop_s": Entry("s", "until all joints stand still, at the fastest slew"),
-    "safety/contact_came_m_s": Entry("m/s", f"the robot's directed speed before; {CAME}", 0.0),
-    "safety/contact_closing_m_s": Entry("m/s", "that and the worker's own; likewise", 0.0),
+    "safety/time_to_stop_s": Entry("s", "time in which all joints stop, at the greatest slew"),
+    "safety/contact_came_m_s": Entry(
+        "m/s", f"contact that begins: the robot's directed speed in the step before; {CAME}", 0.0
+    ),
+    "safety/contact_closing_m_s": Entry(
+        "m/s", f"contact that begins: that speed plus the worker's directed speed; {CAME}", 0.0
+    ),
     "safety/contact_force_ratio": Entry(
-        "-", "force of ISO/TS 15066, A.3, at the closing speed, with half of the robot's moving "
-        "mass and its load, as a share of the transient limit of the region; of the head, which "
-        "has none, of its quasi-static one; likewise", 0.0,
+        "-",
+        "contact that begins: force of ISO/TS 15066, A.3, at the closing speed, with half of the "
+        "robot's moving mass and its load, divided by the transient limit of the region; for the "
+        f"head, which has none, by the quasi-static one; {CAME}",
+        0.0,
     ),
     "safety/contact_severity": Entry(
-        "0 to 3", "0: no contact begins, 1: one that the region bears, 2: one that it does not, 3: "
-        "the head is hit",
+        "0 to 3",
+        "0: no contact begins, 1: within the limit of the region, 2: beyond it, 3: on the head",
     ),
     "safety/contacts_towards": Entry(
-        "-", "contacts in the episode so far that began while the robot came towards the worker, "
-        "at more than 0.05 m/s; who touches again within 0.5 s is in the same contact",
+        "-",
+        "contacts in the episode so far that began while the robot moved towards the worker at "
+        "more than 0.05 m/s; another touch within 0.5 s belongs to the same contact",
     ),
-    "safety/contacts_fleeing": Entry("-", "likewise, while it went away"),
-    "safety/contacts_standing": Entry("-", "likewise, while it did neither"),
+    "safety/contacts_fleeing": Entry(
+        "-", "contacts in the episode so far that began while the robot moved away"
+    ),
+    "safety/contacts_standing": Entry(
+        "-", "contacts in the episode so far that began while the robot did neither"
+    ),
     "safety/near_misses": Entry(
-        "-", "how often in the episode so far the separation fell below 0.05 m and rose above "
-        "0.10 m without a touch",
+        "-",
+        "number of times in the episode so far that the separation fell below 0.05 m and rose "
+        "above 0.10 m without a touch",
     ),
     "tracking/mpjpe_m": Entry(
-        "m", "mean joint error of the estimate; -1 where nobody is tracked. Tracks are "
-        "compared with the workers whom they fit best", -1.0, "tracking/mpjpe_measured",
+        "m",
+        "mean joint error of the estimate, each track compared with the worker that fits best; -1 "
+        "without a track",
+        -1.0,
+        "tracking/mpjpe_measured",
     ),
     "tracking/mpjpe_by_identity_m": Entry(
-        "m", "mean joint error of workers from the tracks that they were matched with last, "
-        "wherever these are now; -1 without a match. It lasts while it is within 0.5 m (CLEAR MOT)",
-        -1.0, "tracking/mpjpe_by_identity_measured",
+        "m",
+        "mean joint error of workers from the tracks that they were matched with last, wherever "
+        "these are now; -1 without a match. A match lasts while it is within 0.5 m (CLEAR MOT)",
+        -1.0,
+        "tracking/mpjpe_by_identity_measured",
     ),
     "tracking/id_switches": Entry(
-        "-", "how often in this episode so far a worker was matched with another slot of the "
-        "observation than the time before; two who are exchanged are two",
+        "-",
+        "number of times in the episode so far that a worker was matched with another slot than "
+        "before; two workers that are exchanged count twice",
     ),
     "tracking/idf1": Entry(
-        "0 to 1", "IDF1 of the episode so far: 2 m / n, m steps in which a worker and a track were "
-        "within 0.5 m, each worker with one slot all along, n steps of workers and of tracks; -1 "
-        "while n is 0", -1.0, "tracking/idf1_measured",
+        "0 to 1",
+        "IDF1 of the episode so far: 2 m / n, m steps in which a worker and a track were within "
+        "0.5 m, each worker with one slot throughout, n steps of workers and of tracks; -1 while n "
+        "is 0",
+        -1.0,
+        "tracking/idf1_measured",
     ),
-    "tracking/lost": Entry("0 or 1", "a worker is there who is not tracked"),
-    "task/goals_reached": Entry("-", "goals of this episode reached so far"),
-    "task/goals_missed": Entry("-", "goals of this episode that ran out of time"),
-    "task/studs_placed": Entry("-", "pieces that rest in their places now, let go"),
-    "task/studs_left": Entry("-", "pieces that do not"),
+    "tracking/lost": Entry("0 or 1", "a worker is present without a track"),
+    "task/goals_reached": Entry("-", "goals reached in the episode so far"),
+    "task/goals_missed": Entry("-", "goals of the episode so far whose time ran out"),
+    "task/studs_placed": Entry("-", "pieces that rest in their places, released"),
+    "task/studs_left": Entry("-", "pieces that are not in their places"),
     "task/dropped": Entry("0 or 1", "a piece lies below the table, or the tool was lost"),
     "task/screws_driven": Entry("-", "screws that hold the board"),
-    "task/screws_left": Entry("-", "screws that do not yet"),
+    "task/screws_left": Entry("-", "screws that are not driven yet"),
     "task/worst_m": Entry(
-        "m", "how far the board was off its place at most while screws were driven; -1 before",
-        -1.0, "task/worst_measured",
+        "m",
+        "greatest deviation of the board from its place while screws were driven; -1 before",
+        -1.0,
+        "task/worst_measured",
     ),
     "task/worst_rad": Entry(
-        "rad", "how far it was turned, likewise", -1.0, "task/worst_measured"
+        "rad",
+        "greatest rotation of the board from its place while screws were driven; -1 before",
+        -1.0,
+        "task/worst_measured",
     ),
-    "task/handed_over": Entry("0 or 1", "the worker has the tool, the robot let go and left it"),
-    "task/not_handed_over": Entry("0 or 1", "the opposite"),
+    "task/handed_over": Entry(
+        "0 or 1", "the worker has the tool, and the robot has released it and moved away"
+    ),
+    "task/not_handed_over": Entry("0 or 1", "the opposite of `task/handed_over`"),
     "task/largest_n": Entry(
-        "N", "the largest force that the worker's hand felt so far; 0 before", 0.0
+        "N", "largest force on the worker's hand in the episode so far; 0 before any", 0.0
     ),
-    "task/delivered": Entry("0 or 1", "the base is in its zone, and nothing was hit on the way"),
-    "task/not_delivered": Entry("0 or 1", "the opposite"),
-    "task/fixed_hits": Entry("-", "how often the base began to touch what stands there"),
-    "task/people_hits": Entry("-", "and a worker"),
-    "task/way_left_m": Entry("m", "length of the way to its zone"),
-    "is_success": Entry("0 or 1", "the task's success, as its page says"),
+    "task/delivered": Entry("0 or 1", "the base is in its zone, without a collision on the way"),
+    "task/not_delivered": Entry("0 or 1", "the opposite of `task/delivered`"),
+    "task/fixed_hits": Entry("-", "number of collisions of the base with fixed objects"),
+    "task/people_hits": Entry("-", "number of collisions of the base with workers"),
+    "task/way_left_m": Entry("m", "length of the path to the zone"),
+    "is_success": Entry("0 or 1", "success of the task, as its page defines it"),
     MISCALIBRATED: Entry(
-        "-", "number of cameras that contradict the others as if they had been moved, turned or "
-        "zoomed; which of them: `perception/miscalibrated_<camera>`; at `pixels` and `keypoints`",
+        "-",
+        "number of cameras that contradict the others as if they had been moved, rotated or "
+        "zoomed; `perception/miscalibrated_<camera>` is 1 for these; at `pixels` and `keypoints`",
     ),
     MORE_PEOPLE: Entry(
-        "0 or 1", "cameras detect more people than there are slots for workers, which makes all "
-        "slots unknown; at `pixels` and `keypoints`",
+        "0 or 1",
+        "cameras detect more people than there are slots for workers, which makes all slots "
+        "unknown; at `pixels` and `keypoints`",
     ),
-    N_CAMERAS: Entry("-", "drawn: cameras that hang in this episode; at `pixels` and `keypoints`"),
-    MOVED: Entry("m", "drawn: how far one hangs at most from where it was when made; likewise"),
-    TURNED: Entry("rad", "drawn: how far one is turned at most; likewise"),
-    DELAY: Entry("s", "drawn: how late images come at most, in whole control steps; likewise"),
-    LIGHT: Entry("-", "drawn: strength of the light, 1 as built; likewise"),
-}  # fmt: skip
-"""By name; the reward's terms, workers' and cameras' own are not among them."""
+    N_CAMERAS: Entry("-", "drawn: number of cameras in this episode; at `pixels` and `keypoints`"),
+    MOVED: Entry("m", "drawn: greatest displacement of a camera; at `pixels` and `keypoints`"),
+    TURNED: Entry("rad", "drawn: greatest rotation of a camera; at `pixels` and `keypoints`"),
+    DELAY: Entry(
+        "s",
+        "drawn: greatest delay of images, in whole control steps; at `pixels` and `keypoints`",
+    ),
+    LIGHT: Entry("-", "drawn: strength of the light, 1 as built; at `pixels` and `keypoints`"),
+}
+"""Descriptions by key; those of reward terms, of each worker and of each camera are not
+included."""
 OF_WORKERS: dict[str, str] = {
-    "activity": "what worker N does, as an index; -1: not in the episode",
-    "body": "which body worker N has, likewise",
-    "contact_kind": "of the contact with worker N that begins in this step, what the robot did in "
-    "the step before: 0 it came towards the worker, 1 it went away, 2 neither; -1: none begins",
-    "contact_region": "which region of the body it hits, as an index; -1: none",
+    "activity": "activity of worker N, as an index; -1: not in the episode",
+    "body": "body of worker N, as an index; -1: not in the episode",
+    "contact_kind": "kind of the contact with worker N that begins in this step, by the robot's "
+    "motion in the step before: 0 towards the worker, 1 away, 2 neither; -1: none begins",
+    "contact_region": "region of the body that this contact hits, as an index; -1: none",
 }
 """Meanings of `worker_N/NAME`, N from 0."""
 OWN = Entry("-", "", 0.0)
-"""A number that a task or shield of one's own gives."""
+"""Description of a number that a user's task or shield returns."""
 ALWAYS = ("reward/", "worker_", "cost_", f"{MISCALIBRATED}_", FAULT)
-"""Names that begin so always have a value."""
+"""Beginnings of keys that always have a value."""
 
 OF_BELIEF = ("reward/", "shield/", "perception/")
-"""Names that begin so are of what the robot believes."""
+"""Beginnings of keys that concern the robot's belief."""
 
 
 @cache
 def entry_of(name: str) -> Entry:
-    """Return what is known of a number by its name."""
+    """Return the description of a number by its key."""
     if name in ENTRIES:
         return ENTRIES[name]
     if name.startswith(ALWAYS):
@@ -206,7 +256,7 @@ def entry_of(name: str) -> Entry:
 
 
 def published(info: Info) -> Info:
-    """Return numbers (B,) without NaN, with the keys that say whether they were measured."""
+    """Return numbers (B,) without NaN, with the keys that state whether they were measured."""
     told: Info = {}
     for name, values in info.items():
         entry = entry_of(name)
@@ -221,22 +271,22 @@ def published(info: Info) -> Info:
 
 
 def is_of_belief(name: str) -> bool:
-    """Return whether an info is of what the robot believes; all others are counted on the truth."""
+    """Return whether an info concerns the robot's belief; all others are counted on the truth."""
     return name.startswith(OF_BELIEF)
 
 
 def matching(patterns: str | Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
-    """Return the names of infos that patterns choose, in the order of the infos.
+    """Return the keys of infos that match patterns, in the order of the infos.
 
     Args:
-        patterns: names, or patterns of names as of files: "safety/*"; one may stand alone.
-        names: of all infos that there are.
+        patterns: keys, or patterns as for files: "safety/*"; one may be given alone.
+        names: the keys of all infos.
 
     Raises:
-        ConfigError: a pattern that is no text, or that no name matches, with the nearest name.
+        ConfigError: a pattern is no text or matches no key; the nearest key is named.
     """
     given = [patterns] if isinstance(patterns, str) else patterns
-    if not isinstance(given, Sequence) or not all(isinstance(each, str) for each in given):
+    if not is_sequence_of_text(given):
         raise ConfigError(
             'infos must be names or patterns of names, as ("cost", "safety/*"), got '
             f"{described(patterns)}."
@@ -249,7 +299,7 @@ def matching(patterns: str | Sequence[str], names: Sequence[str]) -> tuple[str, 
 
 
 def of_workers(**parts: Ints) -> Info:
-    """Return the numbers of each worker, of indices (B, W) by the names of `OF_WORKERS`."""
+    """Return the numbers of each worker from indices (B, W) by the names of `OF_WORKERS`."""
     return {
         f"worker_{w}/{name}": part[:, w].astype(np.int64)
         for name, part in parts.items()
@@ -258,15 +308,15 @@ def of_workers(**parts: Ints) -> Info:
 
 
 def worded(info: Mapping[str, Any], words: Mapping[str, Sequence[str]]) -> Words:
-    """Return in words what the info of one environment says of workers and cameras.
+    """Return the words for the indices in the info of one environment.
 
     Args:
-        info: of a reset or step of a single environment.
-        words: by the names of `OF_WORKERS`, the words that the indices stand for.
+        info: info of a reset or step of a single environment.
+        words: words behind the indices, by the names of `OF_WORKERS`.
 
     Returns:
-        "worker/activity" and "worker/body": a name for each worker, "absent" of who is not in the
-        episode. "safety/contact_kind" and "safety/contact_region": a name for each contact that
+        "worker/activity" and "worker/body": a name for each worker, "absent" for one that is not in
+        the episode. "safety/contact_kind" and "safety/contact_region": a name for each contact that
         begins in this step. "perception/miscalibrated": the names of cameras.
     """
     said: Words = {}

@@ -1,33 +1,32 @@
-"""Read-only views of arrays, for functions of users: others are given the same arrays."""
+"""Read-only views of arrays for functions of users, since others receive the same arrays."""
 
 import functools
 from collections.abc import Callable, Collection
 from typing import Any, NoReturn, TypeVar
 
-import numpy as np
-
 from hrc_env.core.batching import names_of
 from hrc_env.core.errors import ConfigError
+from hrc_env.core.typing import is_array, is_dict, is_list_or_tuple
 
 RecordT = TypeVar("RecordT")
 _CONSTANTS: dict[int, tuple[Any, Any]] = {}
-"""Records that never change, by identity, with their read-only forms."""
+"""Read-only forms of records that never change, by identity."""
 _MOST = 64
-"""Greatest number of these that is kept."""
+"""Number of records in `_CONSTANTS` above which they are forgotten."""
 
 
 def read_only(record: RecordT, constants: Collection[str] = ()) -> RecordT:
     """Return a (nested) record of the same kind with read-only views of its arrays.
 
     Args:
-        record: an array, or a dataclass, named tuple, tuple, list or dict of these; anything else
-            is returned as it is.
-        constants: names of its fields whose values never change, as of `constant`.
+        record: an array, or a dataclass, named tuple, tuple, list or dict of arrays; any other
+            value is returned as it is.
+        constants: names of fields whose values never change (`constant`).
     """
-    if isinstance(record, np.ndarray):
-        view = record.view()
+    if is_array(record):
+        view: Any = record.view()
         view.setflags(write=False)
-        return view  # type: ignore[return-value]
+        return view
     if record is None or isinstance(record, float | int | str):
         return record
     names = names_of(type(record))
@@ -37,15 +36,17 @@ def read_only(record: RecordT, constants: Collection[str] = ()) -> RecordT:
             for n in names
         ]
         return _record_of(type(record), names, parts)
-    if isinstance(record, dict):
-        return type(record)((name, read_only(part)) for name, part in record.items())
-    if isinstance(record, tuple | list):
-        return type(record)(map(read_only, record))  # type: ignore[return-value]
+    if is_dict(record):
+        items: Any = type(record)((name, read_only(part)) for name, part in record.items())
+        return items
+    if is_list_or_tuple(record):
+        parts_of: Any = type(record)(map(read_only, record))
+        return parts_of
     return record
 
 
 def constant(record: RecordT) -> RecordT:
-    """Return `read_only` of a record that never changes, made once."""
+    """Return the read-only form of a record that never changes; it is made once."""
     known = _CONSTANTS.get(id(record))
     if known is None or known[0] is not record:
         if len(_CONSTANTS) >= _MOST:
@@ -55,7 +56,7 @@ def constant(record: RecordT) -> RecordT:
 
 
 def is_of_user(function: Any) -> bool:
-    """Return whether a function is none of this package."""
+    """Return whether a function was not defined in this package."""
     try:
         return _is_of_user(function)
     except TypeError:  # an object with a __call__, not hashable
@@ -73,12 +74,12 @@ def called(what: str, function: Callable[..., Any], *given: Any) -> Any:
     """Call a function of a user with read-only arguments.
 
     Args:
-        what: name of the function in the error.
-        function: of the user.
+        what: name of the function, for the error.
+        function: the function.
         given: its arguments, as `read_only` returns them.
 
     Raises:
-        ConfigError: it writes into one of them.
+        ConfigError: the function writes into an argument.
     """
     try:
         return function(*given)
@@ -89,7 +90,7 @@ def called(what: str, function: Callable[..., Any], *given: Any) -> Any:
 
 
 def refuse_writing(what: str, error: ValueError) -> NoReturn:
-    """Raise the `ConfigError` of a function that writes into its arguments."""
+    """Raise `ConfigError` for a function that writes into its arguments."""
     raise ConfigError(
         f"{what} writes into an array that it is given ({error}). It may only read it, as others "
         "are given the same: make a copy first (x = x.copy()), or a new array (x = x - y in place "
@@ -98,8 +99,8 @@ def refuse_writing(what: str, error: ValueError) -> NoReturn:
 
 
 def _record_of(kind: type[Any], names: tuple[str, ...], values: list[Any]) -> Any:
-    """Make a record of its fields, without its `__post_init__`."""
-    if issubclass(kind, tuple):
+    """Make a record of its fields without calling `__post_init__`."""
+    if tuple in kind.__mro__:
         return kind(*values)
     made, write = object.__new__(kind), object.__setattr__
     for name, value in zip(names, values, strict=True):

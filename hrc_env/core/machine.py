@@ -1,22 +1,22 @@
-"""What of this machine the process may use."""
+"""Cores and memory that this process may use."""
 
 import math
 import os
 from pathlib import Path
 
 CGROUP = Path("/sys/fs/cgroup")
-"""Where a container's limits are."""
+"""Folder of a container's limits."""
 CORES = "HRC_ENV_CORES"
-"""Environment variable: how many cores a process may use at most; engines set it for workers."""
+"""Environment variable with the number of cores a process may use; engines set it for workers."""
 
 
 def n_cores() -> int:
-    """How many threads or processes can compute at once."""
+    """Return the number of threads or processes that can compute at once."""
     return math.ceil(usable_cores())
 
 
 def usable_cores() -> float:
-    """Cores that this process may use: by affinity, its container's share, and `CORES`."""
+    """Return the cores that this process may use: by affinity, container and `CORES`."""
     asked = os.environ.get(CORES, "")
     cores = float(len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 0)
     cores = cores or float(os.cpu_count() or 1)
@@ -27,14 +27,14 @@ def usable_cores() -> float:
 
 
 def usable_memory_gb() -> float:
-    """Memory that this process may use [GB]: the machine's, or its container's share."""
+    """Return the memory that this process may use [GB]: the machine's or the container's."""
     machine_bytes = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     shares = [_limit("memory.max"), _limit("memory/memory.limit_in_bytes")]
     return min([machine_bytes, *(int(share) for share in shares if share.isdigit())]) / 1e9
 
 
 def _limit(name: str) -> str:
-    """What a file of the container's limits says; "" where there is none."""
+    """Return the content of a file of the container's limits; "" if there is none."""
     try:
         return (CGROUP / name).read_text().strip()
     except OSError:

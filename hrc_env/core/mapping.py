@@ -1,4 +1,4 @@
-"""Frozen settings from plain mappings or TOML files, field by field, and back."""
+"""Settings from plain mappings or TOML files, field by field, and back."""
 
 import dataclasses
 import enum
@@ -16,23 +16,27 @@ from typing import Any, TypeVar
 import numpy as np
 
 from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.typing import is_array, is_list_or_tuple, is_mapping, is_numpy_scalar
 
 RecordT = TypeVar("RecordT")
-PRESETS: dict[Any, Mapping[str, Any]] = {}
-"""Values that have names, by the type hint of their field: a name stands for the value."""
+PRESETS: dict[Any, dict[str, Any]] = {}
+"""Named values by the type hint of their field: a name stands for the value."""
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def answer_unknown_fields(record: type[RecordT]) -> type[RecordT]:
-    """Let a dataclass answer a keyword that it has not with a `ConfigError` that names the nearest
-    field, instead of a `TypeError`."""
+    """Let a dataclass refuse an unknown keyword with a `ConfigError` instead of a `TypeError`.
+
+    The error names the nearest field, or the present name of one that was renamed: a class may list
+    these as `RENAMED: ClassVar[Mapping[str, str]]`, new names by old ones.
+    """
     init, names = record.__init__, [each.name for each in dataclasses.fields(record)]  # type: ignore[arg-type]
 
     @wraps(init)
     def checked(self: RecordT, *args: Any, **values: Any) -> None:
         for name in values:
             if name not in names:
-                raise unknown(f"field of {record.__name__}", name, names)
+                raise _unknown_field(record, f"field of {record.__name__}", "", name)
         init(self, *args, **values)
 
     record.__init__ = checked  # type: ignore[method-assign]
@@ -45,15 +49,17 @@ def from_mapping(
     path: str = "",
     kinds: Mapping[str, type] | None = None,
 ) -> RecordT:
-    """A dataclass from a mapping; what it nests may be mappings too, tuples may be lists.
+    """Return a dataclass made from a mapping; nested ones may be mappings, tuples may be lists.
 
     Args:
-        path: what comes before the fields' names in errors.
-        kinds: types of fields where the record's own hints leave them open.
+        kind: the dataclass.
+        mapping: values by field.
+        path: prefix of the fields' names in errors.
+        kinds: types of fields that the record's own hints leave open.
 
     Raises:
-        ConfigError: a field that does not exist or is missing, a value of another type or length,
-            or one that the dataclass refuses; by the path, as in `scene.cameras[0].name`.
+        ConfigError: a field does not exist or is missing, has a value of another type or length, or
+            one that the dataclass refuses; the message has the path, as in `scene.cameras[0].name`.
     """
     hints = {**typing.get_type_hints(kind), **(kinds or {})}
     fields = dataclasses.fields(kind)  # type: ignore[arg-type]
@@ -62,7 +68,7 @@ def from_mapping(
     for name, value in mapping.items():
         where = f"{path}{name}"
         if where not in names:
-            raise unknown("config field", where, names)
+            raise _unknown_field(kind, "config field", path, name)
         values[name] = restored(hints[name], value, where)
     for each in fields:
         nothing = each.default is each.default_factory is dataclasses.MISSING
@@ -74,22 +80,31 @@ def from_mapping(
         raise _located(error, kind, path) from error
 
 
+def _unknown_field(record: type, what: str, path: str, name: str) -> ConfigError:
+    """Return the error for a field that a record does not have, or no longer under this name."""
+    renamed = getattr(record, "RENAMED", {})
+    if name in renamed:
+        return ConfigError(f"The {what} {path}{name} is called {path}{renamed[name]} now.")
+    names = [f"{path}{each.name}" for each in dataclasses.fields(record)]
+    return unknown(what, f"{path}{name}", names)
+
+
 def restored(hint: Any, value: Any, where: str) -> Any:
-    """A field's value as its type hint wants it, or a `ConfigError` that says so."""
-    if isinstance(value, str) and (presets := PRESETS.get(hint)):
+    """Return a value converted to a type hint, or raise `ConfigError` with the path `where`."""
+    if isinstance(value, str) and (presets := PRESETS.get(hint, {})):
         if value not in presets:
             raise unknown(where, value, presets)
         return presets[value]
     if dataclasses.is_dataclass(hint):
-        if isinstance(value, Mapping):
-            return from_mapping(typing.cast(type, hint), value, f"{where}.")
+        if is_mapping(value):
+            return from_mapping(typing.cast(type[Any], hint), value, f"{where}.")
         is_it = isinstance(value, typing.cast(type, hint))
         return _checked(is_it, f"{_name_or(hint)}a mapping", value, where)
     if isinstance(hint, types.UnionType):
         return _one_of(typing.get_args(hint), value, where)
     if typing.get_origin(hint) is tuple:
         return _tuple(hint, value, where)
-    if isinstance(value, np.generic):
+    if is_numpy_scalar(value):
         value = value.item()
     if hint is str and isinstance(value, Path):
         return str(value)
@@ -108,14 +123,14 @@ def restored(hint: Any, value: Any, where: str) -> Any:
 
 
 def _name_or(hint: Any) -> str:
-    """How errors begin to say what is valid: the names that a field of this hint takes."""
+    """Return the names that a field of this hint takes, as errors begin with them."""
     presets = PRESETS.get(hint, {})
     return f"a name ({', '.join(map(repr, presets))}) or " if presets else ""
 
 
 def _one_of(hints: tuple[Any, ...], value: Any, where: str) -> Any:
-    """The value as the first of several hints wants it that can have it; errors say all."""
-    refused = []
+    """Return a value converted to the first hint that fits; the error lists all of them."""
+    refused: list[str] = []
     for hint in hints:
         try:
             return restored(hint, value, where)
@@ -125,7 +140,7 @@ def _one_of(hints: tuple[Any, ...], value: Any, where: str) -> Any:
 
 
 def _tuple(hint: Any, value: Any, where: str) -> tuple[Any, ...]:
-    """Every part as its own hint wants it, and as many as there are hints."""
+    """Return a tuple whose parts are converted to their own hints, or raise `ConfigError`."""
     _checked(isinstance(value, list | tuple), f"{_name_or(hint)}a list", value, where)
     inner = typing.get_args(hint)
     hints = [inner[0]] * len(value) if inner[-1] is Ellipsis else list(inner)
@@ -146,13 +161,16 @@ def merge(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def plain(value: Any) -> Any:
-    """A value as JSON has it: paths are text, NumPy's numbers and enumerations what they hold. What
-    has no such form (a recorded clip, a function) stays; `for_json` refuses it."""
-    if isinstance(value, Mapping):
+    """Return a value in JSON's types where it has such a form.
+
+    Paths become text, NumPy's numbers and enumerations their values. Others (a recorded clip, a
+    function) are returned as they are; `for_json` refuses them.
+    """
+    if is_mapping(value):
         return {name: plain(each) for name, each in value.items()}
-    if isinstance(value, list | tuple):
+    if is_list_or_tuple(value):
         return type(value)(map(plain, value))
-    if isinstance(value, np.ndarray | np.generic):
+    if is_array(value) or is_numpy_scalar(value):
         return value.tolist()
     if isinstance(value, enum.Enum):
         return value.value
@@ -160,15 +178,16 @@ def plain(value: Any) -> Any:
 
 
 def for_json(value: Any, where: str) -> Any:
-    """Return a value in JSON's types, records as mappings of their fields.
+    """Return a value in JSON's types, with records as mappings of their fields.
 
     Raises:
-        ConfigError: a part that has no such form, by its path: a function, a class, a recording.
+        ConfigError: a part has no such form: a function, a class, a recording; the message has its
+            path.
     """
     value = plain(value)
-    if isinstance(value, Mapping):
+    if is_mapping(value):
         return {name: for_json(each, f"{where}.{name}") for name, each in value.items()}
-    if isinstance(value, list | tuple):
+    if is_list_or_tuple(value):
         return [for_json(each, f"{where}[{k}]") for k, each in enumerate(value)]
     if dataclasses.is_dataclass(value) and not callable(value):
         parts = {each.name: getattr(value, each.name) for each in dataclasses.fields(value)}
@@ -180,7 +199,7 @@ def for_json(value: Any, where: str) -> Any:
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
-    """The content of a TOML file; `ConfigError` without one."""
+    """Return the content of a TOML file, or raise `ConfigError`."""
     try:
         return tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
@@ -190,13 +209,14 @@ def read_toml(path: str | Path) -> dict[str, Any]:
 
 
 def to_toml(content: Mapping[str, Any], path: str = "") -> str:
-    """TOML of nested mappings, lists, text, numbers and truth values; None is left out."""
-    lines, tables = [], []
+    """Return nested mappings, lists, text, numbers and booleans as TOML; None is left out."""
+    lines: list[str] = []
+    tables: list[str] = []
     for name, value in content.items():
         key = name if _BARE.fullmatch(name) else json.dumps(name)
-        if isinstance(value, Mapping):
+        if is_mapping(value):
             tables.append(f"[{path}{key}]\n{to_toml(value, f'{path}{key}.')}")
-        elif isinstance(value, list | tuple) and value and isinstance(value[0], Mapping):
+        elif is_list_or_tuple(value) and value and is_mapping(value[0]):
             for each in value:
                 tables.append(f"[[{path}{key}]]\n{to_toml(each, f'{path}{key}.')}")
         elif value is not None:
@@ -211,14 +231,16 @@ def _value(value: Any, where: str) -> str:
         return json.dumps(value, ensure_ascii=False)
     if isinstance(value, int | float):
         return repr(value)
-    if isinstance(value, list | tuple):
+    if is_list_or_tuple(value):
         return f"[{', '.join(_value(each, where) for each in value)}]"
     raise ConfigError(f"{where} cannot be written to a file: {value!r}.")
 
 
 def _located(error: ConfigError, kind: type, path: str) -> ConfigError:
-    """What a dataclass says about its fields, with these called by their path: any name with an
-    underscore, others where the sentence begins with them."""
+    """Return an error of a dataclass with fields named by their path.
+
+    Names with an underscore are replaced anywhere, others at the beginning of the sentence.
+    """
     if not path:
         return error
     said = str(error).removeprefix(f"{kind.__name__}.")

@@ -1,7 +1,7 @@
-"""How far a long computation is: a bar in a terminal, a line every ten seconds elsewhere."""
+"""Progress of long computations: a bar in a terminal, a line every ten seconds elsewhere."""
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Sized
+from collections.abc import Callable, Generator, Iterable, Iterator, Sized
 from contextlib import contextmanager
 from datetime import timedelta
 from typing import Self, TypeVar
@@ -10,14 +10,16 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 EVERY_S = 10.0
-"""Between two lines in a log file [s]."""
+"""Time between two lines in a log file [s]."""
 T = TypeVar("T")
 Say = Callable[[float, str], None]
 
 
 class Meter:
-    """Shows how much of something is done, of how much, and how long the rest will take; counts
-    are said where they have a unit. What is no terminal gets plain lines."""
+    """Shows progress and the remaining time of a computation.
+
+    Counts are shown if they have a unit. Where there is no terminal, plain lines are printed.
+    """
 
     def __init__(
         self,
@@ -52,7 +54,13 @@ class Meter:
             self._say()
 
     def show(self, done: float, name: str | None = None, note: str = "") -> None:
-        """So much is done; `name` is what is being done now, `note` how it goes."""
+        """Show the progress.
+
+        Args:
+            done: the amount that is done, out of `total`.
+            name: the current activity; None: as before.
+            note: a remark, such as the latest result.
+        """
         self.done, self.name, self.note = done, name or self.name, note
         self._bar.update(self._task, completed=done, description=self.name, note=note)
         if self._bar.disable and self._clock() - self._line_s >= EVERY_S:
@@ -63,7 +71,7 @@ class Meter:
         self._bar.console.print(sentence, markup=False, highlight=False, soft_wrap=True)
 
     def _say(self) -> None:
-        """One line: share, count, time that has passed and that is left."""
+        """Print one line with share, count, elapsed and remaining time."""
         self._line_s, task = self._clock(), self._bar.tasks[0]
         passed_s, since = self._line_s - self._began_s, self.done - self._before
         left = _time(max(self.total - self.done, 0.0) / since * passed_s) if since > 0 else "?"
@@ -74,8 +82,8 @@ class Meter:
 
 
 @contextmanager
-def progress_bar(console: Console, name: str) -> Iterator[Say]:
-    """Tell it by how much the share that is done grew, and what is being done."""
+def progress_bar(console: Console, name: str) -> Generator[Say]:
+    """Yield a function of (added share, current activity) that advances a progress bar."""
     with Meter(console, name) as meter:
         yield lambda share, label: meter.show(meter.done + share, label)
 
@@ -83,7 +91,14 @@ def progress_bar(console: Console, name: str) -> Iterator[Say]:
 def track(
     values: Iterable[T], description: str, total: int | None = None, console: Console | None = None
 ) -> Iterator[T]:
-    """The values, one after the other, while it is shown how many of them (`total`) are done."""
+    """Yield the values one after the other while their progress is shown.
+
+    Args:
+        values: the values.
+        description: name of the computation.
+        total: number of values; None: their length.
+        console: where it is shown; None: on the standard output.
+    """
     n = len(values) if total is None and isinstance(values, Sized) else total or 0
     with Meter(console or Console(), description, n) as meter:
         for k, value in enumerate(values, 1):

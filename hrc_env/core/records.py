@@ -1,14 +1,15 @@
-"""What the components hand to each other: frozen records of arrays, the batch axis first.
+"""Records that the components exchange: frozen records of arrays, the batch axis first.
 
-B environments, W workers, C cameras, J = 15 joints, S = 22 body segments, K capsules,
-N arm joints. World frame: +Z up, origin on the floor, metres, seconds, radians.
+B environments, W workers, C cameras, J = 15 joints, S = 22 body segments, K capsules, N arm joints.
+World frame: +Z up, origin on the floor, metres, seconds, radians.
 
-Belief and truth are different records on purpose: `PoseEstimate` is what the cameras made
-of a worker, `WorkerTruth` is the worker. Observations, rewards and shields take the first,
-cost and metrics the second (`tests/test_architecture.py` holds this).
+Belief and truth are different records on purpose: `PoseEstimate` is the cameras' estimate of a
+worker, `WorkerTruth` is the worker. Observations, rewards and shields take the first, cost and
+metrics the second (`tests/test_architecture.py` verifies this).
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -36,53 +37,60 @@ class Keypoints:
     """
 
     px: Points2
-    """(B, C, W, J, 2) pixels, continuous from the image's top-left corner."""
+    """Positions of the joints (B, C, W, J, 2) [px], continuous from the image's top-left corner;
+    NaN where there is no measurement."""
     confidence: Floats
-    """(B, C, W, J) in [0, 1]; 0 where there is no measurement."""
+    """Confidence (B, C, W, J) in [0, 1]; 0 where there is no measurement."""
     sigma_px: Floats
-    """(B, C, W, J) standard deviation of each coordinate [px]; infinite where missing."""
+    """Standard deviation of each coordinate (B, C, W, J) [px]; infinite where there is no
+    measurement."""
     time_s: Floats | None = None
-    """(B, C) when each camera's frame was taken [s], on the tracker's clock, which is 0 at the
-    reset; NaN: no frame of that camera. None: every frame is of this very update."""
+    """Time (B, C) at which each camera took its frame [s], on the tracker's clock, which is 0 at
+    the reset; NaN: no frame of that camera. None: every frame belongs to the present update."""
 
 
 @dataclass(frozen=True, slots=True)
 class Roi:
-    """A square region of one camera's image, turned about its centre."""
+    """A square region of one camera's image, rotated about its centre."""
 
     centre_px: tuple[float, float]
-    """Place of its middle, x and y [px] from the image's top-left corner."""
+    """Position of its centre, x and y [px] from the image's top-left corner."""
     side_px: float
     """Length of its sides [px]."""
     rotation_rad: float
-    """Turn of the window's upright, clockwise in the image; 0 is the image's own upright."""
+    """Rotation of the region's upright direction, clockwise in the image [rad]; 0 is upright."""
 
 
 @dataclass(frozen=True, slots=True)
 class PoseEstimate:
-    """The belief about the workers: all that reward, observation, shield and agent know of them."""
+    """The belief about the workers.
+
+    It is everything that reward, observation, shield and agent know about them.
+    """
 
     mean_world: Points3
-    """(B, W, J, 3) [m]; of a worker not yet acquired: the documented prior."""
+    """Means of the joints (B, W, J, 3) in the world frame [m]; without a track: the documented
+    prior."""
     cov_world: Covariances3
-    """(B, W, J, 3, 3) [m^2], finite and positive definite always."""
+    """Covariance of each joint's position (B, W, J, 3, 3) [m^2], always finite and positive
+    definite."""
     velocity_world: Velocities3
     """(B, W, J, 3) [m/s]."""
     age_s: Floats
-    """(B, W, J) seconds since a measurement last supported the joint."""
+    """Time since a measurement last supported each joint (B, W, J) [s]."""
     tracked: Bools
-    """(B, W) whether there is a track; False: prior or predicting for too long (lost)."""
+    """Whether each slot has a track (B, W); False: prior, or predicted for too long (lost)."""
     unknown: Bools = None  # type: ignore[assignment]
-    """(B, W) whether a person without a track may be there: lost, not searched for enough, detected
-    but not tracked, or on floor that no two cameras see (`tracking.presence`); every slot while
-    there are more people than slots. A slot that is neither tracked nor unknown is empty. Not
-    given: every slot without a track is unknown."""
+    """Whether a person without a track may be in the slot (B, W): lost, not searched for enough,
+    detected but not tracked, or on floor that no two cameras see (`tracking.presence`); True for
+    all slots while there are more people than slots. A slot that is neither tracked nor unknown is
+    empty. Default: every slot without a track is unknown."""
     blind_s: Floats = None  # type: ignore[assignment]
-    """(B, W) seconds since cameras last said something: saw the worker, or that nobody is there;
-    of who was never seen or looked for, since the reset. Not given: the youngest joint's age."""
+    """Time since the cameras last saw the worker, or saw that the slot is empty (B, W) [s]; without
+    any look, the time since the reset. Default: age of the joint with the youngest measurement."""
     seen_world: Points3 = None  # type: ignore[assignment]
-    """(B, W, J, 3) where the worker was believed to be when a camera showed them last [m]; NaN of
-    whom none has, or where it is known since that nobody is. Not given: the mean of a track."""
+    """Last detected place of the worker (B, W, J, 3) [m]; NaN without any detection, or if the
+    place was seen empty since. Default: the mean of a track."""
 
     def __post_init__(self) -> None:
         try:
@@ -95,114 +103,118 @@ class PoseEstimate:
             ) from error
 
     def _complete(self) -> None:
-        if self.unknown is None:
+        """Fill in the fields that were not given."""
+        given: Any = self
+        if given.unknown is None:
             object.__setattr__(self, "unknown", ~self.tracked)
-        if self.blind_s is None:
+        if given.blind_s is None:
             object.__setattr__(self, "blind_s", self.age_s.min(-1))
-        if self.seen_world is None:
+        if given.seen_world is None:
             seen = np.where(self.tracked[..., None, None], self.mean_world, np.nan)
             object.__setattr__(self, "seen_world", seen)
 
 
 @dataclass(frozen=True, slots=True)
 class WorkerPath:
-    """Where the worker's body goes: what physics and cost follow from substep to substep."""
+    """Places of the workers' bodies after every physics step, which physics and cost follow."""
 
     position_world: Points3
-    """(B, T, W, S, 3) origins of the 22 body segments after every substep [m]."""
+    """Origins of the 22 body segments after every physics step (B, T, W, S, 3) [m]."""
     quaternion_wxyz: QuaternionsWxyz
-    """(B, T, W, S, 4) world_from_segment."""
+    """Orientations of the segments (B, T, W, S, 4), world_from_segment."""
 
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """What the workers' hands hold, and then what lies there for them; see `props.PROPS`."""
+    """Objects in the workers' hands, and then objects that lie ready for them; see
+    `props.PROPS`."""
 
     kind: Ints
-    """(B, W + L) index into `props.PROPS`; 0: nothing."""
+    """Kind of each object (B, W + L), as an index into `props.PROPS`; 0: none."""
     position_world: Points3
-    """(B, W + L, 3) origin of the prop's frame [m]; of no meaning where there is nothing."""
+    """Origin of each object's frame (B, W + L, 3) [m]; meaningless where there is none."""
     quaternion_wxyz: QuaternionsWxyz
-    """(B, W + L, 4) world_from_prop."""
+    """Orientation of each object (B, W + L, 4), world_from_prop."""
 
 
 @dataclass(frozen=True, slots=True)
 class WorkerMotion:
-    """Where the worker's body is and how it moves: what the motion generator says."""
+    """Pose and velocity of the workers' bodies, as the motion generator returns them."""
 
     position_world: Points3
-    """(B, W, S, 3) origins of the 22 body segments [m]."""
+    """Origins of the 22 body segments (B, W, S, 3) [m]."""
     quaternion_wxyz: QuaternionsWxyz
-    """(B, W, S, 4) world_from_segment."""
+    """Orientations of the segments (B, W, S, 4), world_from_segment."""
     velocity_world: Velocities3
-    """(B, W, S, 3) velocity of the origins [m/s], from the generator."""
+    """Velocities of the origins (B, W, S, 3) [m/s]."""
     angular_velocity_world: Floats
-    """(B, W, S, 3) [rad/s]."""
+    """Angular velocities of the segments in the world frame (B, W, S, 3) [rad/s]."""
     held: Held | None = None
-    """What they hold and what lies there for them; None: nothing."""
+    """Objects that the workers hold and that lie ready for them; None: none."""
     body: Ints | None = None
-    """(B, W) which of the scene's bodies each has; None: all have the first."""
+    """Index of each worker's body among the scene's (B, W); None: all have the first."""
 
 
 @dataclass(frozen=True, slots=True)
 class WorkerTruth:
-    """The worker as they are. Only the estimator's emulators, cost and metrics read it."""
+    """The true workers; only emulators of detectors, cost and metrics read this record."""
 
     joints_world: Points3
-    """(B, W, J, 3) true joints in BlazePose's sense [m]."""
+    """True joints in BlazePose's sense (B, W, J, 3) [m]."""
     velocity_world: Velocities3
     """(B, W, J, 3) [m/s]."""
     capsules_world: Capsules
-    """(B, W, K, 2, 3) the body's capsules [m]."""
+    """Capsules of the bodies (B, W, K, 2, 3), end points [m]."""
     capsule_radius_m: Floats
-    """(B, W, K) [m]."""
+    """Radii of these capsules (B, W, K) [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class RobotState:
-    """The robot as its own encoders know it (exact, so neither belief nor truth)."""
+    """The robot's state by its own encoders: exact, so neither belief nor truth."""
 
     q: JointAngles
-    """(B, N) [rad]."""
+    """Joint positions (B, N) [rad], of slides [m]."""
     qd: JointVelocities
-    """(B, N) [rad/s]."""
+    """Joint velocities (B, N) [rad/s], of slides [m/s]."""
     tool_world: Points3
-    """(B, 3) [m]."""
+    """Position of the tool point (B, 3) [m]."""
     tool_velocity_world: Velocities3
-    """(B, 3) [m/s]."""
+    """Velocity of the tool point (B, 3) [m/s]."""
     tool_axes_world: Floats
-    """(B, 3, 3) the tool's x, y and z axes as columns."""
+    """Axes x, y and z of the tool as columns (B, 3, 3)."""
     capsules_world: Capsules
-    """(B, K, 2, 3) [m], with those of what it carries; far away where it carries nothing."""
+    """Capsules of the robot and its loads (B, K, 2, 3), end points [m]; those of absent loads are
+    far away."""
     capsule_radius_m: Floats
-    """(K,) [m]."""
+    """Radii of these capsules (K,) [m]."""
     slides: Bools | None = None
-    """(N,) which joints are slides, whose q are in m and qd in m/s; None: none is."""
+    """Whether each joint is a slide (N,), with q in m and qd in m/s; None: none is."""
 
 
 @dataclass(frozen=True, slots=True)
 class HandState:
-    """The gripper as its own encoders know it."""
+    """The gripper's state by its own encoders."""
 
     opening_m: Floats
-    """(B,) how far each finger is from the middle [m]."""
+    """Distance of each finger from the middle (B,) [m]."""
     force_n: Floats
-    """(B,) with which its motor presses the fingers together; negative: apart [N]."""
+    """Force with which the motor presses the fingers together (B,) [N]; negative: apart."""
     closed_on: Bools
-    """(B,) whether the fingers press and have come to rest on something."""
+    """Whether the fingers press and rest on an object (B,)."""
 
 
 @dataclass(frozen=True, slots=True)
 class ObjectState:
-    """A task's loose objects: where they are, or are measured to be."""
+    """The loose objects of a task: true or measured poses."""
 
     position_world: Points3
-    """(B, O, 3) the middle of each [m]."""
+    """Centre of each object (B, O, 3) [m]."""
     quaternion_wxyz: QuaternionsWxyz
-    """(B, O, 4) world_from_object."""
+    """Orientation of each object (B, O, 4), world_from_object."""
     velocity_world: Velocities3
-    """(B, O, 3) of its middle [m/s]."""
+    """Velocity of the centre (B, O, 3) [m/s]."""
     spin_object: Floats
-    """(B, O, 3) turn rate about its own axes [rad/s]."""
+    """Angular velocity about the object's own axes (B, O, 3) [rad/s]."""
     held: Bools
-    """(B, O) whether the robot holds it."""
+    """Whether the robot holds the object (B, O)."""

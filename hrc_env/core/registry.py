@@ -1,12 +1,12 @@
-"""Registries: objects by name, those of the package and those that were registered.
+"""Registries of objects by name: those of the package and those that users register.
 
-A name that was registered in the process that started this one is known here, too; its object is
-unpickled when it is first looked up. A registration in this process takes its place.
+A name that was registered in the parent process is known here, too; its object is unpickled on its
+first use. A registration in this process replaces it.
 """
 
 import threading
 from collections import UserDict
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from io import BytesIO
@@ -19,11 +19,11 @@ from hrc_env.core.snapshot import Entry, Snapshot
 
 ObjectT = TypeVar("ObjectT")
 FILES: dict[str, str] = {}
-"""Python files that this process imported, with their errors in words; "": none."""
+"""Python files that this process imported, with the text of their errors; "": none."""
 _LOCK = threading.RLock()
 _REGISTRIES: "dict[str, Registry[Any]]" = {}
 _IMPORTING: list[str] = []
-"""Files that are being imported; "" for one that every child process imports by itself."""
+"""Files that are being imported; "" for one that every child process imports itself."""
 
 
 class Registry(UserDict[str, ObjectT]):
@@ -33,7 +33,7 @@ class Registry(UserDict[str, ObjectT]):
         super().__init__(known or {})
         self.kind = kind
         self.own: dict[str, str | None] = {}
-        """Names that were registered in this process, with the files that did so."""
+        """Names that were registered in this process, with the files that registered them."""
         _REGISTRIES[kind] = self
 
     def register(self, name: str, thing: ObjectT) -> None:
@@ -48,7 +48,7 @@ class Registry(UserDict[str, ObjectT]):
 
     @property
     def inherited(self) -> Mapping[str, Entry]:
-        """Registrations of the process that started this one."""
+        """Registrations of the parent process."""
         return snapshot.inherited().entries.get(self.kind, {})
 
     def name_of(self, thing: object) -> str | None:
@@ -78,8 +78,8 @@ class Registry(UserDict[str, ObjectT]):
 
 
 @contextmanager
-def importing(file: str, recorded: bool) -> Iterator[None]:
-    """Attribute registrations to a file; `recorded`: child processes import it as well."""
+def importing(file: str, recorded: bool) -> Generator[None]:
+    """Attribute registrations to a file; if `recorded`, child processes import it as well."""
     _IMPORTING.append(file if recorded else "")
     try:
         yield
@@ -90,8 +90,8 @@ def importing(file: str, recorded: bool) -> Iterator[None]:
 def share() -> None:
     """Bring the registrations of this process up to date for child processes.
 
-    Functions that are defined in a script or notebook travel with the values that their globals
-    have now. It runs with every registration and whenever an environment is made.
+    Functions that are defined in a script or notebook are sent with the present values of their
+    globals. This runs with every registration and whenever an environment is made.
     """
     with _LOCK:
         parent = snapshot.inherited()
@@ -114,22 +114,26 @@ def _entry(thing: Any, file: str | None, own: set[int]) -> Entry:
 
 
 def _pickled(thing: Any, own: set[int]) -> bytes:
-    """Pickle a registered object, also from a script or a notebook, by value: not by its name."""
-    from cloudpickle import Pickler  # takes time to import
+    """Pickle a registered object by value, so that a script or a notebook can define it."""
+    import cloudpickle  # type: ignore[reportMissingTypeStubs]  # takes time to import
 
-    class ByValue(Pickler):
+    pickler: Any = cloudpickle.Pickler
+
+    class ByValue(pickler):
         def reducer_override(self, obj: Any) -> Any:
+            """Reduce a registered record to its class and fields."""
             if id(obj) in own and is_dataclass(obj):
                 return type(obj), tuple(getattr(obj, each.name) for each in fields(obj))
-            return super().reducer_override(obj)
+            return pickler.reducer_override(self, obj)
 
     file = BytesIO()
-    ByValue(file).dump(thing)
+    by_value: Any = ByValue(file)
+    by_value.dump(thing)
     return file.getvalue()
 
 
 def _restored(kind: str, name: str, entry: Entry) -> Any:
-    """Return an inherited object, or raise a `ConfigError` with other ways to bring it along."""
+    """Return an inherited object, or raise `ConfigError` with other ways to provide it."""
     reason, cause = entry.refused or FILES.get(entry.file) or f"{entry.file} lacks it", None
     if entry.pickled:
         try:

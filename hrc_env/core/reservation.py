@@ -4,12 +4,14 @@ import os
 from tempfile import gettempdir
 
 VARIABLE = "HRC_ENV_REGISTERED"
-"""Environment variable: the file of this process, then those of its parent, its parent's parent
-and so on, as PATH has folders. The first that exists counts; see `core.snapshot`."""
+"""Environment variable with the files of this process, its parent, its grandparent and so on.
+
+They are separated as the folders in PATH; the first that exists counts; see `core.snapshot`.
+"""
 
 
 def reserve() -> str:
-    """Name a file for child processes and return the inherited one that exists; empty: none.
+    """Name a file for child processes, and return the inherited file that exists; empty: none.
 
     Processes that are started before the first registration know its name, too.
     """
@@ -38,5 +40,5 @@ def new_folder() -> str:
 
 
 def is_own(named: str) -> bool:
-    """Return whether the first of several files is of this process."""
+    """Return whether the first of several files belongs to this process."""
     return os.path.basename(named.split(os.pathsep)[0]).startswith(f"{os.getpid()}_")

@@ -1,4 +1,4 @@
-"""results.json: the one form in which benchmarks and experiments write numbers and their origin."""
+"""results.json, the format in which benchmarks and experiments write numbers and their origin."""
 
 import contextlib
 import json
@@ -22,29 +22,30 @@ PACKAGES = ("numpy", "numba", "scipy", "mujoco", "gymnasium", "stable-baselines3
 
 @dataclass(frozen=True, slots=True)
 class Metric:
-    """A number with its spread, and what it is made of."""
+    """A number with its interval and sample size."""
 
     value: float
-    """The mean, rate, share or median."""
+    """Mean, rate, share or median."""
     low: float
-    """Lower end of a 95 % interval, or the smallest of the runs; see the benchmark."""
+    """Lower end of a 95 % interval, or the smallest of several runs."""
     high: float
-    """Upper end, or the largest."""
+    """Upper end of a 95 % interval, or the largest of several runs."""
     unit: str
-    """Of the three numbers, as "m" or "1/min"; "1" of a number without one."""
+    """Unit of the three numbers, such as "m" or "1/min"; "1": none."""
     n: int
-    """How many observations it is made of."""
+    """Number of observations."""
 
 
 def over(values: Sequence[float], unit: str) -> Metric:
-    """The median of repeated measurements, with their smallest and largest."""
+    """Return the median of repeated measurements with their smallest and largest."""
     return Metric(
         float(np.median(values)), float(np.min(values)), float(np.max(values)), unit, len(values)
     )
 
 
 def provenance() -> dict[str, Any]:
-    """Where a result comes from: versions, the checkout's commit (if it is one), the machine."""
+    """Return the origin of a result: versions, the checkout's commit if there is one, the
+    machine."""
     return {
         "hrc_env": _version("hrc_env"),
         "git": _commit(),
@@ -60,7 +61,7 @@ def provenance() -> dict[str, Any]:
 def write_results(
     path: Path, config: Mapping[str, Any], seeds: Sequence[int], metrics: Mapping[str, Metric]
 ) -> None:
-    """Write a results file, whole or not at all."""
+    """Write a results file atomically."""
     content = {
         "config": dict(config),
         **provenance(),
@@ -71,7 +72,7 @@ def write_results(
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
-    """Write a file, whole or not at all (what was there stays); its folder is made."""
+    """Write a file atomically, and make its folder; on failure the former content stays."""
     draft = path.with_name(path.name + ".draft")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -87,7 +88,7 @@ def write_whole(path: Path, content: str | bytes) -> None:
 
 
 def versions() -> dict[str, str | None]:
-    """Of the libraries that numbers depend on; None: it is not installed."""
+    """Return the versions of libraries that numbers depend on; None: not installed."""
     return {name: _version(name) for name in PACKAGES}
 
 
@@ -99,7 +100,7 @@ def _version(package: str) -> str | None:
 
 
 def _commit() -> str | None:
-    """The commit, with "+changes" where the working tree differs, docs apart; None outside a
+    """Return the commit, with "+changes" if files outside of docs differ; None outside a
     checkout."""
     root = Path(__file__).resolve().parents[2]
     if not (root / ".git").exists():

@@ -1,9 +1,8 @@
-"""The 15 joints, as we read the paper's figure 1: names, pairs, bones. The one place that knows.
+"""The 15 joints as we read the paper's figure 1: names, pairs and bones.
 
-The paper takes 15 of BlazePose's 33 landmarks, which its text does not name. A joint here means
-what BlazePose means by it (a "hip" is where BlazePose puts a hip), which is not the anatomical
-centre; how far the worker's true joints are from the detector's is documented with the baked
-bodies.
+The paper takes 15 of BlazePose's 33 landmarks, which its text does not name. A joint here has
+BlazePose's meaning (a "hip" is where BlazePose puts a hip), which is not the anatomical centre; the
+distances of the workers' true joints from the detector's are documented with the baked bodies.
 """
 
 import numpy as np
@@ -41,7 +40,7 @@ BONES: Ints = np.array(
         (0, 1), (0, 2),
     ]
 )  # fmt: skip
-"""Pairs of joints whose distance hardly changes."""
+"""Pairs of joints with a nearly constant distance."""
 
 BONE_LENGTH_M: Floats = np.array(
     [.34, .20, .55, .55, .28, .26, .28, .26, .37, .40, .20, .37, .40, .20, .28, .28]
@@ -61,13 +60,15 @@ SEGMENT_ENDS: tuple[tuple[tuple[int, ...], tuple[int, ...], float], ...] = (
     ((9,), (11,), 0.065), ((10,), (12,), 0.065),  # shanks
     ((11,), (13,), 0.055), ((12,), (14,), 0.055),  # feet
 )  # fmt: skip
-"""Body segments from joints alone: (joints whose mean is one end, ... the other, radius [m])."""
+"""Body segments from joints alone: the joints with their mean as the first end, those of the second
+end, and the radius [m]."""
 
 HAND_SEGMENTS: tuple[tuple[int, int, float, float], ...] = (
     (3, 5, 0.18, 0.05),
     (4, 6, 0.18, 0.05),
 )
-"""Hands, which 15 joints do not hold: (elbow, wrist, reach beyond the wrist [m], radius [m])."""
+"""Hands, which the 15 joints do not include: elbow, wrist, reach beyond the wrist [m], radius
+[m]."""
 
 
 SEGMENT_RADIUS_M: Floats = np.array(

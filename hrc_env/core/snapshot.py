@@ -1,8 +1,8 @@
-"""Snapshots: the registrations of one process in a private file, read by its child processes.
+"""Snapshots: the registrations of a process in a private file that its child processes read.
 
 `reservation.VARIABLE` names the file from the import of this package on, so that children of any
-kind (spawn, forkserver, loky, Ray on this machine) find it however early they started. It exists
-once something is registered; its process removes it at exit.
+kind (spawn, forkserver, loky, Ray on this machine) find it however early they started. The file
+exists once something is registered; its process removes it at exit.
 """
 
 import os
@@ -24,23 +24,27 @@ _LOCK = threading.RLock()
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """How a registered object reaches another process: pickled, by a file, or not at all."""
+    """The form in which a registered object reaches another process: pickled, as a file, or
+    none."""
 
     pickled: bytes = b""
+    """The object by value; empty: not pickled."""
     file: str = ""
-    """The Python file that registers it."""
+    """Python file that registers it; empty: none."""
     refused: str = ""
-    """The error of pickling it."""
+    """Error of pickling it; empty: none."""
     max_episode_steps: int = 0
-    """The time limit of a task."""
+    """Time limit of a task [control steps]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
     """Registrations of a process."""
 
-    entries: Mapping[str, Mapping[str, Entry]] = field(default_factory=dict)
-    """By kind ("robot") and name."""
+    entries: Mapping[str, Mapping[str, Entry]] = field(
+        default_factory=dict[str, Mapping[str, Entry]]
+    )
+    """Entries by kind (such as "robot") and name."""
     files: tuple[str, ...] = ()
     """Python files to import, in this order."""
 
@@ -52,18 +56,19 @@ class _State:
     source: str
     """Files that may be inherited, as in `VARIABLE`; the first that exists counts."""
     pid: int
-    """The process to which `path` belongs."""
+    """Process to which `path` belongs."""
     path: str
-    """Its file."""
+    """File of this process."""
     written: Snapshot | None = None
-    """The content of that file; None: none."""
+    """Content of that file; None: it was not written."""
     seen: tuple[int, int] = (0, 0)
-    """Inode and time of change of the inherited file when it was last read."""
+    """Inode and modification time of the inherited file when it was last read."""
     inherited: Snapshot = Snapshot()
+    """Registrations of the parent process."""
 
 
 def inherited() -> Snapshot:
-    """Return the registrations of the process that started this one, read anew after a change."""
+    """Return the registrations of the parent process; its file is read again after a change."""
     with _LOCK:
         if path := existing(_STATE.source):
             _read(path)
@@ -71,7 +76,7 @@ def inherited() -> Snapshot:
 
 
 def inherit(snapshot: Snapshot) -> None:
-    """Take the registrations of a process on another machine as inherited."""
+    """Use the registrations of a process on another machine as inherited."""
     with _LOCK:
         _STATE.source, _STATE.inherited = "", snapshot
 
@@ -82,7 +87,7 @@ def current() -> Snapshot:
 
 
 def write(snapshot: Snapshot) -> None:
-    """Replace this process's file, atomically; a warning if that is impossible."""
+    """Replace this process's file atomically, or warn if that is impossible."""
     from hrc_env.core.results import write_whole  # takes time to import
 
     with _LOCK:
@@ -106,7 +111,7 @@ def write(snapshot: Snapshot) -> None:
 
 
 def _is_private(folder: Path) -> bool:
-    """Return whether nobody but this user can write there: pickles are code."""
+    """Return whether only this user can write into a folder, since pickles are code."""
     try:
         about = folder.stat(follow_symlinks=False)
     except OSError:

@@ -5,7 +5,8 @@ J joints (15, see `hrc_env.core.skeleton`), S body segments of the worker (22), 
 P particles, T time, N links of the arm.
 """
 
-from typing import Annotated, Any, NamedTuple, TypeAlias
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, NamedTuple, TypeAlias, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,3 +42,35 @@ class Vector3(NamedTuple):
     """Second coordinate."""
     z: float
     """Third coordinate."""
+
+
+def is_array(value: object) -> TypeGuard[NDArray[Any]]:
+    """Return whether a value is an array, of whatever dtype."""
+    return isinstance(value, np.ndarray)
+
+
+def is_dict(value: object) -> TypeGuard[dict[Any, Any]]:
+    """Return whether a value is a dictionary, of whatever types."""
+    return isinstance(value, dict)
+
+
+def is_mapping(value: object) -> TypeGuard[Mapping[Any, Any]]:
+    """Return whether a value is a mapping, of whatever types."""
+    return isinstance(value, Mapping)
+
+
+def is_list_or_tuple(value: object) -> TypeGuard[list[Any] | tuple[Any, ...]]:
+    """Return whether a value is a list or a tuple, of whatever types."""
+    return isinstance(value, list | tuple)
+
+
+def is_numpy_scalar(value: object) -> TypeGuard["np.generic[Any]"]:
+    """Return whether a value is a single value of NumPy's, of whatever type."""
+    return isinstance(value, np.generic)
+
+
+def is_sequence_of_text(value: object) -> TypeGuard[Sequence[str]]:
+    """Return whether a value is a sequence of strings."""
+    if not is_list_or_tuple(value):
+        return isinstance(value, str)
+    return all(isinstance(each, str) for each in value)

@@ -1,4 +1,4 @@
-"""The floor on which people may be whom no track follows, and the people beyond the slots."""
+"""Floor on which undetected people may be, and people beyond the slots for workers."""
 
 from dataclasses import dataclass
 
@@ -49,7 +49,7 @@ class Others:
 
 
 def no_others(batch: int) -> Others:
-    """Return that there are no more people than slots."""
+    """Return the record of no more people than slots."""
     return Others(np.full((batch, MOST_OTHERS, 3), np.nan), np.full((batch, MOST_OTHERS), np.inf))
 
 

@@ -1,6 +1,7 @@
 """The engines by name, and what they have in common."""
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -32,6 +33,10 @@ class Engine(Protocol):
     @property
     def is_parallel(self) -> bool:
         """Whether calls run in other processes, which must be able to unpickle them."""
+        ...
+
+    def opened(self) -> AbstractContextManager[object]:
+        """Return a context in which one run after the other has the same workers, if they can."""
         ...
 
     def run(self, calls: Sequence[Call], tick: Callable[[int, float], None]) -> Iterator[Done]:

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -28,6 +28,10 @@ class Serial:
 
     is_parallel = False
 
+    def opened(self) -> AbstractContextManager[object]:
+        """As of `Engine`."""
+        return nullcontext()
+
     def run(self, calls: Sequence[Call], tick: Callable[[int, float], None]) -> Iterator[Done]:
         """As of `Engine`."""
         for k, call in enumerate(calls):
@@ -43,6 +47,10 @@ class Processes:
     workers: int | None = None
     """How many; None: as many as there are cores."""
     is_parallel = True
+
+    def opened(self) -> AbstractContextManager[object]:
+        """As of `Engine`; each run starts processes of its own."""
+        return nullcontext()
 
     def run(self, calls: Sequence[Call], tick: Callable[[int, float], None]) -> Iterator[Done]:
         """As of `Engine`; unfinished calls of a process that died are computed again."""

@@ -1,10 +1,11 @@
 """The engine ray: every call is a task of a cluster."""
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any
 
-from hrc_env.core.errors import HRCError
+from hrc_env.core.errors import DownloadError, HRCError, RenderingError
 from hrc_env.engines import cluster  # first: it says how Ray is installed where it is missing
 from hrc_env.engines.engine import Call, Done
 from hrc_env.engines.local import ATTEMPTS, call_pickled, pickled
@@ -25,6 +26,10 @@ class RayTasks:
     note: Callable[[str], None] = print
     """Receives notes on the cluster."""
     is_parallel = True
+
+    def opened(self) -> AbstractContextManager[object]:
+        """As of `Engine`: a connection to the cluster."""
+        return cluster.connected(self.address, self.note)
 
     def run(self, calls: Sequence[Call], tick: Callable[[int, float], None]) -> Iterator[Done]:
         """As of `Engine`."""
@@ -52,7 +57,11 @@ def _compute(registrations: Registrations, call: bytes) -> tuple[Any, float]:
     cluster.one_core()
     with cluster.plain_errors():
         registrations.unpack()
-        return call_pickled(call)
+        try:
+            return call_pickled(call)
+        except (RenderingError, DownloadError) as error:  # of what the machine lacks
+            address = ray.util.get_node_ip_address()
+            raise type(error)(f"Machine {address} cannot work: {error}") from error
 
 
 def _got(answer: Any, k: int) -> tuple[Any, float]:

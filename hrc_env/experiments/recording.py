@@ -21,7 +21,7 @@ from hrc_env.pipeline.levels import make_pipeline
 from hrc_env.pipeline.sensor_input import SensorInput, Windows
 from hrc_env.scene.build import Scene
 from hrc_env.tracking.estimators import make_estimator
-from hrc_env.worker.body import stack, worker_truth
+from hrc_env.worker.body import load_bodies, worker_truth
 
 RecordT = TypeVar("RecordT")
 
@@ -54,7 +54,7 @@ def record(
 ) -> Recording:
     """Film the worker of a scene with all its cameras, whose crops follow what an estimator
     predicts; the motions (T, 1, S, ...) are `config.ctrl_dt` apart."""
-    truth = worker_truth(stack(scene.bodies), motions)
+    truth = worker_truth(load_bodies(scene.bodies), motions)
     pipeline = make_pipeline("pixels", estimator, scene, 1, config)
     rngs = [[np.random.default_rng([seed, k])] for k in range(2)]
     q, ids = scene.home_q[None], np.zeros(1, int)

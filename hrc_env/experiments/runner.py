@@ -1,6 +1,7 @@
 """Runs an experiment: plays the parts that are not there yet, then writes numbers and report."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
@@ -103,7 +104,8 @@ def run_experiment(
     """
     out = Path(out)
     own_folder(out, experiment.name, overwrite, experiment.settings())
-    played = experiment.play(cache_of(experiment, out / "parts", progress, engine))
+    with nullcontext() if engine is None else engine.opened():
+        played = experiment.play(cache_of(experiment, out / "parts", progress, engine))
     metrics = experiment.metrics(played)
     report = experiment.report(played, metrics, out / "figures")
     report = replace(report, quick=getattr(experiment, "quick_note", report.quick))

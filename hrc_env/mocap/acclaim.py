@@ -1,19 +1,21 @@
-"""Acclaim: a skeleton (ASF) and its motion (AMC), as the CMU database has them.
+"""Acclaim: a skeleton (ASF) and its motion (AMC), as in the CMU database.
 
-A bone's rotation is C M C^-1 in its parent's frame: C turns the file's axes to the bone's own
-("axis"), M is of its degrees of freedom; about fixed axes in the order in which they are written.
+A bone's rotation in its parent's frame is C M C^-1: C turns the file's axes to the bone's own
+("axis"), and M is the rotation of its degrees of freedom, about fixed axes in the order in which
+they are written.
 """
 
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.typing import Floats, Ints, Rotations
 from hrc_env.geometry.rotations import about_axis
-from hrc_env.mocap.record import FEWEST_FRAMES, Moving, at_rest, forward
+from hrc_env.mocap.record import FEWEST_FRAMES, Moving, compose_tree, place_at_rest
 from hrc_env.mocap.rows import Rows
 
 ROOT = "root"
@@ -25,47 +27,60 @@ class _Bone:
     """One bone of a skeleton; the root has no length."""
 
     direction: Floats = field(default_factory=lambda: np.zeros(3))
+    """Direction (3,) from its start to its end."""
     length: float = 1.0
-    """From its start to its end [unit of the file]."""
+    """Length [unit of the file]."""
     axis: Rotations = field(default_factory=lambda: np.eye(3))
+    """Rotation (3, 3) from the bone's axes to the file's."""
     freedoms: tuple[str, ...] = ()
+    """Degrees of freedom, in the order of the file."""
 
     @property
     def along(self) -> Floats:
-        """(3,) from its start to its end [unit of the file]."""
+        """Vector (3,) from its start to its end [unit of the file]."""
         norm = float(np.linalg.norm(self.direction))
         return self.direction / norm * self.length if norm else np.zeros(3)
 
 
 @dataclass(slots=True)
 class _Skeleton:
-    """An ASF file."""
+    """Content of an ASF file."""
 
     bones: dict[str, _Bone] = field(default_factory=lambda: {ROOT: _Bone()})
+    """Bones by name."""
     parent: dict[str, str] = field(default_factory=dict)
+    """Name of each bone's parent."""
     per_inch: float = 1.0
     """Lengths of the file in an inch (CMU: 0.45)."""
-    radians: bool = False
+    is_in_radians: bool = False
+    """Whether angles are in radians, else in degrees."""
 
 
 def read_acclaim(path: Path, skeleton: Path | None = None) -> Moving:
-    """An AMC file's motion of the skeleton in its ASF file; `ConfigError` where one is damaged."""
+    """Return the motion in an AMC file, of the skeleton in its ASF file.
+
+    Args:
+        path: the .amc file.
+        skeleton: the .asf file; None to look for it beside that.
+
+    Raises:
+        ConfigError: a file is missing, damaged or of another skeleton.
+    """
     if path.suffix.lower() == ".asf":
         raise ConfigError(f"{path.name} is a skeleton without motion; give its .amc file.")
-    found = skeleton or _skeleton_of(path)
-    ours, theirs = _subject(path), _subject(found)
+    skeleton = skeleton or _find_skeleton(path)
+    ours, theirs = _read_subject(path), _read_subject(skeleton)
     if ours and theirs and ours != theirs:
         raise ConfigError(
-            f"{path.name} is of subject {ours}, {found.name} the skeleton of subject {theirs}, "
+            f"{path.name} is of subject {ours}, {skeleton.name} the skeleton of subject {theirs}, "
             f"whose bones have other lengths; expected {ours}.asf beside it or as --skeleton."
         )
-    bones = _read_asf(found)
-    values, repaired = _read_amc(path, bones)
-    return _moving(bones, values, repaired)
+    bones = _read_asf(skeleton)
+    return _make_moving(bones, _read_amc(path, bones))
 
 
-def _skeleton_of(path: Path) -> Path:
-    """The ASF file beside an AMC file: of its name, its subject (02_01.amc: 02.asf), or alone."""
+def _find_skeleton(path: Path) -> Path:
+    """Return the ASF file beside an AMC file: of its name, its subject, or the only one."""
     beside = sorted(p for p in path.parent.iterdir() if p.suffix.lower() == ".asf")
     for stem in (path.stem, path.stem.split("_")[0]):
         for candidate in beside:
@@ -80,26 +95,26 @@ def _skeleton_of(path: Path) -> Path:
     )
 
 
-def _subject(path: Path) -> str:
-    """The subject's number, as the CMU database has it: 2 for 02.asf and 02_01.amc; or nothing."""
+def _read_subject(path: Path) -> str:
+    """Return the subject's number in the CMU database, if any: 2 for 02.asf, 02_01.amc."""
     number = re.match(r"0*(\d+)(?=_|$)", path.stem)
     return number[1] if number else ""
 
 
 def _read_asf(path: Path) -> _Skeleton:
-    """Bones, who hangs on whom, units."""
+    """Return the bones of an ASF file, their tree and their units."""
     rows, skeleton, done = Rows(path), _Skeleton(), list[str]()
     bone, name = _Bone(), ""
-    for words in rows.rest():
+    for words in rows.remaining():
         section, word = done[-1] if done else "", words[0]
         if word.startswith("#"):
             continue
         if word.startswith(":"):
             done.append(word[1:].lower())
         elif section == "units" and word == "length":
-            (skeleton.per_inch,) = rows.numbers(words[1:2])
+            (skeleton.per_inch,) = rows.to_numbers(words[1:2])
         elif section == "units" and word == "angle":
-            skeleton.radians = words[1].startswith("rad")
+            skeleton.is_in_radians = words[1].startswith("rad")
         elif section == "root" and word == "order":
             skeleton.bones[ROOT].freedoms = tuple(each.lower() for each in words[1:])
         elif section == "bonedata" and word == "begin":
@@ -109,28 +124,43 @@ def _read_asf(path: Path) -> _Skeleton:
         elif section == "bonedata" and word == "name":
             name = words[1]
         elif section == "bonedata":
-            _read_bone(words, bone, skeleton.radians, rows)
+            _read_bone(words, bone, skeleton.is_in_radians, rows)
         elif section == "hierarchy" and word not in ("begin", "end"):
             skeleton.parent.update(dict.fromkeys(words[1:], word))
-    _check(skeleton, done, path.name)
+    _check_skeleton(skeleton, done, path.name)
     return skeleton
 
 
-def _read_bone(words: list[str], bone: _Bone, radians: bool, rows: Rows) -> None:
-    """One line of a bone; what the kinematics do not need (limits, masses) is passed over."""
+def _read_bone(words: list[str], bone: _Bone, is_in_radians: bool, rows: Rows) -> None:
+    """Read one line of a bone; limits and masses are skipped.
+
+    Args:
+        words: words of the line.
+        bone: the bone, which is changed.
+        is_in_radians: whether angles are in radians.
+        rows: the file, for errors.
+    """
     if words[0] == "direction":
-        bone.direction = np.array(rows.numbers(words[1:4]))
+        bone.direction = np.array(rows.to_numbers(words[1:4]))
     elif words[0] == "length":
-        (bone.length,) = rows.numbers(words[1:2])
+        (bone.length,) = rows.to_numbers(words[1:2])
     elif words[0] == "axis":
-        angles = np.array(rows.numbers(words[1:4]))
-        bone.axis = _turn(tuple(f"r{axis}" for axis in words[4].lower()), angles[None], radians)[0]
+        angles = np.array(rows.to_numbers(words[1:4]))
+        bone.axis = _compose_turns(
+            tuple(f"r{axis}" for axis in words[4].lower()), angles[None], is_in_radians
+        )[0]
     elif words[0] == "dof":
         bone.freedoms = tuple(word.lower() for word in words[1:])
 
 
-def _check(skeleton: _Skeleton, done: list[str], source: str) -> None:
-    """Refuse a skeleton that lacks a part, or moves in a way that no file of people does."""
+def _check_skeleton(skeleton: _Skeleton, done: list[str], source: str) -> None:
+    """Refuse a skeleton that is incomplete, or has degrees of freedom that no file of people has.
+
+    Args:
+        skeleton: the skeleton.
+        done: names of the sections that were read.
+        source: name of the file, for errors.
+    """
     missing = [part for part in ("units", "root", "bonedata", "hierarchy") if part not in done]
     if missing or not skeleton.parent:
         raise ConfigError(
@@ -148,18 +178,27 @@ def _check(skeleton: _Skeleton, done: list[str], source: str) -> None:
             )
 
 
-def _read_amc(path: Path, skeleton: _Skeleton) -> tuple[dict[str, Floats], tuple[str, ...]]:
-    """(T, freedoms) of every bone that moves."""
+class _Motion(NamedTuple):
+    """The content of an AMC file."""
+
+    values: dict[str, Floats]
+    """Values (T, freedoms) of every bone that moves."""
+    notes: tuple[str, ...]
+    """A sentence for each deviation from the format."""
+
+
+def _read_amc(path: Path, skeleton: _Skeleton) -> _Motion:
+    """Return the motion in an AMC file."""
     rows, frames = Rows(path), list[dict[str, list[float]]]()
-    for words in rows.rest():
+    for words in rows.remaining():
         if words[0][0] in "#:":
-            skeleton.radians = skeleton.radians or words[0] == ":RADIANS"
+            skeleton.is_in_radians = skeleton.is_in_radians or words[0] == ":RADIANS"
         elif len(words) == 1 and words[0].isdigit():
             frames.append({})
         elif not frames:
             raise ConfigError(f"{path.name} is no AMC file: expected frame 1, got {words[0]!r}.")
         else:
-            frames[-1][words[0]] = rows.numbers(words[1:])
+            frames[-1][words[0]] = rows.to_numbers(words[1:])
     moving = {name: len(bone.freedoms) for name, bone in skeleton.bones.items() if bone.freedoms}
     if strangers := sorted(set().union(*frames) - set(skeleton.bones)):
         raise ConfigError(
@@ -171,8 +210,9 @@ def _read_amc(path: Path, skeleton: _Skeleton) -> tuple[dict[str, Floats], tuple
         there = frames[0] if frames else {}
         wrong = [
             f"{name} has {len(there.get(name, ()))} numbers, not {n}"
-            for name, n in moving.items() if len(there.get(name, ())) != n
-        ]  # fmt: skip
+            for name, n in moving.items()
+            if len(there.get(name, ())) != n
+        ]
         raise ConfigError(
             f"{path.name} is cut off or belongs to another skeleton: {len(whole)} of its "
             f"{len(frames)} frames have a number for each freedom of every bone"
@@ -180,12 +220,12 @@ def _read_amc(path: Path, skeleton: _Skeleton) -> tuple[dict[str, Floats], tuple
         )
     values = {name: np.array([frame[name] for frame in whole]) for name in moving}
     cut = f"The last frame is cut off: {len(whole)} are used."
-    return values, (cut,) if len(whole) < len(frames) else ()
+    return _Motion(values, (cut,) if len(whole) < len(frames) else ())
 
 
-def _moving(skeleton: _Skeleton, values: dict[str, Floats], repaired: tuple[str, ...]) -> Moving:
-    """Every bone as a node at its start, and the tips of the chains, in inches."""
-    names, parent, along = _tree(skeleton)
+def _make_moving(skeleton: _Skeleton, motion: _Motion) -> Moving:
+    """Return every bone as a node at its start, and the tips of the chains, in inches."""
+    (names, parent, along), values = _list_nodes(skeleton), motion.values
     offset = np.repeat(along[None] / skeleton.per_inch, len(values[ROOT]), axis=0)
     for column, freedom in enumerate(skeleton.bones[ROOT].freedoms):
         if freedom[0] == "t":
@@ -195,16 +235,36 @@ def _moving(skeleton: _Skeleton, values: dict[str, Floats], repaired: tuple[str,
     for node, name in enumerate(names):
         if name in values:
             bone = skeleton.bones[name]
-            turn = _turn(bone.freedoms, values[name], skeleton.radians)
+            turn = _compose_turns(bone.freedoms, values[name], skeleton.is_in_radians)
             rotation[:, node] = bone.axis @ turn @ bone.axis.T
-    position, turned = forward(parent, offset, rotation)
-    rest = at_rest(parent, along / skeleton.per_inch)
+    poses = compose_tree(parent, offset, rotation)
+    rest = place_at_rest(parent, along / skeleton.per_inch)
     shift = np.zeros((len(offset), 3))
-    return Moving(tuple(names), parent, position, turned, rest, float("nan"), shift, repaired)
+    return Moving(
+        tuple(names),
+        parent,
+        poses.position,
+        poses.rotation,
+        rest,
+        float("nan"),
+        shift,
+        motion.notes,
+    )
 
 
-def _tree(skeleton: _Skeleton) -> tuple[list[str], Ints, Floats]:
-    """Names, parents and offsets (N, 3) in the parent's frame of bones and tips, parents first."""
+class _Nodes(NamedTuple):
+    """Bones and tips of a skeleton, parents first."""
+
+    names: list[str]
+    """Name of each node."""
+    parent: Ints
+    """Parent (N,) of each node, -1 for the root."""
+    along: Floats
+    """Offset (N, 3) of each node in its parent's frame [unit of the file]."""
+
+
+def _list_nodes(skeleton: _Skeleton) -> _Nodes:
+    """Return bones and tips, parents first."""
     names, parent, along, tips = [ROOT], [-1], [np.zeros(3)], []
     for node, name in enumerate(names):  # grows while it is read
         children = [child for child, above in skeleton.parent.items() if above == name]
@@ -215,13 +275,20 @@ def _tree(skeleton: _Skeleton) -> tuple[list[str], Ints, Floats]:
             tips.append(node)
     parent += tips
     along += [skeleton.bones[names[node]].along for node in tips]
-    return names + [f"{names[node]} end" for node in tips], np.array(parent), np.array(along)
+    names += [f"{names[node]} end" for node in tips]
+    return _Nodes(names, np.array(parent), np.array(along))
 
 
-def _turn(freedoms: tuple[str, ...], values: Floats, radians: bool) -> Rotations:
-    """(T, 3, 3) turns about fixed axes, the first written is done first."""
+def _compose_turns(freedoms: tuple[str, ...], values: Floats, is_in_radians: bool) -> Rotations:
+    """Return rotations (T, 3, 3) about fixed axes, the first one applied first.
+
+    Args:
+        freedoms: degrees of freedom; those of translation have no effect.
+        values: their values (T, freedoms).
+        is_in_radians: whether angles are in radians.
+    """
     turned = np.tile(np.eye(3), (len(values), 1, 1))
     for freedom, value in zip(freedoms, values.T, strict=True):
         if freedom[0] == "r":
-            turned = about_axis(freedom[1], value if radians else np.radians(value)) @ turned
+            turned = about_axis(freedom[1], value if is_in_radians else np.radians(value)) @ turned
     return turned

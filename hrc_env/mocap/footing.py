@@ -1,56 +1,89 @@
-"""What the feet of a recorded person tell of the floor: where it is, and whether they are on it."""
+"""The floor of a recording, found by the feet of the person, and whether they are on it."""
+
+from typing import NamedTuple
 
 import numpy as np
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import JOINT
 from hrc_env.core.typing import Bools, Floats, Points3, Rotations
-from hrc_env.mocap.person import runs, smoothed
+from hrc_env.mocap.person import Run, find_runs, smooth
+from hrc_env.mocap.record import Repaired
 
 ANKLE_M = 0.06
-"""An ankle is so much higher than the foot's tip on a foot that stands [m]; the baked bodies'."""
-RESTS_M_S, SMOOTH_S, LEAST_S = 0.15, 0.05, 0.1
-"""The lower foot rests while its height changes by less [m/s], smoothed over this time, for at
-least that [s]; recordings whose feet slide are not refused."""
+"""Height of the ankle above the tip of a standing foot [m], from the baked bodies."""
+RESTS_M_S = 0.15
+"""Rate of the height of the lower foot below which it rests [m/s].
+
+Recordings with sliding feet are not refused.
+"""
+SMOOTH_S = 0.05
+"""Time over which heights are smoothed [s]."""
+LEAST_S = 0.1
+"""Duration of the shortest rest of a foot [s]."""
 FLOOR_SHARE = 20.0
-"""The floor is this percentile of the heights at which feet rest: people step up more than down."""
-TILTED_RAD, EVEN_M, APART_M = (0.015, 0.07), 0.015, 1.0
-"""A floor aslant by so much is levelled [rad] if feet rest so near to one plane (standard
-deviation), and this far apart along its slope [m]."""
-LEVEL_M, LEVEL_S = 0.08, 0.3
-"""Feet that rest higher or lower than the floor by more [m], together for longer [s], stand on
-something else."""
-AIR_M, AIR_S, HAND_M = 0.10, 0.7, 0.1
-"""A person is in the air with both feet higher than this [m] and no hand on the floor (the wrist
-of a hand on the floor is lower than the third [m]); a jump lasts no longer than the second [s]."""
+"""Percentile of the heights of resting feet at the floor: people step up more than down."""
+LEAST_TILT_RAD = 0.015
+"""Least tilt of a floor that is levelled [rad]."""
+MOST_TILT_RAD = 0.07
+"""Greatest tilt of a floor that is levelled [rad]."""
+EVEN_M = 0.015
+"""Greatest standard deviation of resting feet from the plane of a floor that is levelled [m]."""
+APART_M = 1.0
+"""Least extent of resting feet along the slope of a floor that is levelled [m]."""
+LEVEL_M = 0.08
+"""Distance of resting feet from the floor beyond which they stand on an object [m]."""
+LEVEL_S = 0.3
+"""Greatest time that feet may rest on objects in all [s]."""
+AIR_M = 0.10
+"""Height of both feet above which a person is in the air, without a hand on the floor [m]."""
+AIR_S = 0.7
+"""Duration of the longest jump [s]."""
+HAND_M = 0.1
+"""Height of the wrist of a hand on the floor [m]."""
 RUN_M_S = 2.5
-"""The feet of a person faster than this hardly rest [m/s]."""
+"""Speed of a person above which the feet hardly rest [m/s]."""
 LEAST_SHARE = 0.1
-"""One foot or the other rests for this share of the time at least."""
-FLOOR_M, SOLE_M = (-0.03, 0.09), 0.03
-"""Heights of standing feet's tips between which the file's floor is believed; on a floor that was
-found [m]; the baked bodies' are 0.01 to 0.04."""
+"""Least share of the time in which one foot or the other rests."""
+FLOOR_M = (-0.03, 0.09)
+"""Heights of the tips of standing feet between which the floor of the file is accepted [m]."""
+SOLE_M = 0.03
+"""Height of the tips of feet on a floor that was found [m]; 0.01 to 0.04 for the baked bodies."""
 ACCEPT = "To play it all the same, as on one floor: --allow-off-floor (allow_off_floor=True)."
 
 
-def grounded(
-    joints: Points3, fps: float, source: str, at_zero: bool, allowed: bool
-) -> tuple[Points3, tuple[str, ...]]:
-    """The joints on a level floor at 0, moved only where the file's own is elsewhere; what was
-    changed, a sentence each.
+class Support(NamedTuple):
+    """The lower foot of a person over time."""
 
-    `at_zero`: the file's own floor is at 0 by convention, and its skeleton comes from elsewhere.
+    height: Floats
+    """Height (T,) of its tip if it is flat [m]."""
+    rests: Bools
+    """Whether it rests (T,)."""
+
+
+def put_on_floor(
+    joints: Points3, fps: float, source: str, at_zero: bool, is_allowed: bool
+) -> Repaired:
+    """Return joints on a level floor at 0, moved only if the file's floor is elsewhere.
+
+    Args:
+        joints: joints (T, 15, 3), upright [m].
+        fps: frame rate [Hz].
+        source: name of the file, for errors.
+        at_zero: whether the file's floor is at 0 by convention, with a skeleton from another file.
+        is_allowed: whether faults are accepted.
 
     Raises:
-        ConfigError: the feet are not on one floor, or not on the file's, and that is not `allowed`.
+        ConfigError: the feet are not on one floor, or not on the file's, and faults are not
+            accepted.
     """
-    joints, told = level(joints, fps)
-    faults, found = off_floor(joints, fps), floor_height(joints, fps)
-    if not FLOOR_M[0] < found < FLOOR_M[1]:
-        off = found - SOLE_M
+    joints, notes = level_floor(joints, fps)
+    faults, height = describe_floor_faults(joints, fps), measure_floor_height(joints, fps)
+    if not FLOOR_M[0] < height < FLOOR_M[1]:
+        off = height - SOLE_M
         joints = joints - np.array([0.0, 0.0, off])
-        told = (*told, f"The floor was found at {off:+.2f} m and moved to 0.")
-        if off > 0.0 and _hangs(joints):
+        notes = (*notes, f"The floor was found at {off:+.2f} m and moved to 0.")
+        if off > 0.0 and _is_hanging(joints):
             faults = (
                 *faults,
                 f"Hands are above the head and feet {off:.2f} m above the file's floor (hanging?).",
@@ -62,94 +95,94 @@ def grounded(
                 f"{SOLE_M - FLOOR_M[0]:.2f} m are expected of the person's own. Give their .asf "
                 "file with --skeleton.",
             )
-    if faults and not allowed:
+    if faults and not is_allowed:
         raise ConfigError(f"{source}: {' '.join(faults)} {ACCEPT}")
-    return joints, (*told, *faults)
+    return Repaired(joints, (*notes, *faults))
 
 
-def _hangs(joints: Points3) -> bool:
-    """Whether both hands are above the head for most of the time."""
+def _is_hanging(joints: Points3) -> bool:
+    """Return whether both hands are above the head for most of the time."""
     hands = joints[:, [JOINT["left_wrist"], JOINT["right_wrist"]], 2].min(1)
     return bool(np.median(hands - joints[:, JOINT["nose"], 2]) > 0.0)
 
 
-def supports(joints: Points3, fps: float) -> tuple[Floats, Bools]:
-    """(T,) height of the lower foot's tip if it is flat [m], and whether that foot rests."""
+def find_support(joints: Points3, fps: float) -> Support:
+    """Return height and rest of the lower foot."""
     ankles, tips = (
         [joints[:, JOINT[f"{side}_{part}"], 2] for side in ("left", "right")]
         for part in ("ankle", "foot")
     )
-    height = smoothed(np.minimum(np.min(ankles, 0) - ANKLE_M, np.min(tips, 0)), SMOOTH_S * fps)
-    on = np.abs(np.gradient(height, 1.0 / fps)) < RESTS_M_S
-    for first, last in runs(on):
-        on[first:last] = last - first >= LEAST_S * fps
-    return height, on
+    height = smooth(np.minimum(np.min(ankles, 0) - ANKLE_M, np.min(tips, 0)), SMOOTH_S * fps)
+    rests = np.abs(np.gradient(height, 1.0 / fps)) < RESTS_M_S
+    for first, end in find_runs(rests):
+        rests[first:end] = end - first >= LEAST_S * fps
+    return Support(height, rests)
 
 
-def floor_height(joints: Points3, fps: float) -> float:
-    """Height of the tips of feet that stand on the floor [m]; of the lowest, where none rests."""
-    height, rests = supports(joints, fps)
+def measure_floor_height(joints: Points3, fps: float) -> float:
+    """Return the height of the tips of resting feet, or of the lowest if none rests [m]."""
+    height, rests = find_support(joints, fps)
     return float(
         np.percentile(height[rests], FLOOR_SHARE) if rests.any() else np.percentile(height, 5.0)
     )
 
 
-def level(joints: Points3, fps: float) -> tuple[Points3, tuple[str, ...]]:
-    """The joints turned so that a floor which is slightly aslant is level."""
-    height, rests = supports(joints, fps)
+def level_floor(joints: Points3, fps: float) -> Repaired:
+    """Return joints turned so that a slightly tilted floor is level."""
+    height, rests = find_support(joints, fps)
     points = np.column_stack([joints[rests, JOINT["left_hip"], :2], height[rests]])
     if len(points) < 3:
-        return joints, ()
+        return Repaired(joints, ())
     points -= points.mean(0)
     axes = np.linalg.svd(points[:, :2], full_matrices=False)[2]
     wide = axes[np.ptp(points[:, :2] @ axes.T, axis=0) > APART_M]
     slope = np.linalg.lstsq(points[:, :2] @ wide.T, points[:, 2], rcond=None)[0] @ wide
     angle, left = float(np.arctan(np.linalg.norm(slope))), points[:, 2] - points[:, :2] @ slope
-    if not TILTED_RAD[0] < angle < TILTED_RAD[1] or left.std() > EVEN_M:
-        return joints, ()
-    told = f"The floor was aslant by {np.degrees(angle):.1f} degrees and has been levelled."
-    return joints @ _levelling(slope).T, (told,)
+    if not LEAST_TILT_RAD < angle < MOST_TILT_RAD or left.std() > EVEN_M:
+        return Repaired(joints, ())
+    note = f"The floor was aslant by {np.degrees(angle):.1f} degrees and has been levelled."
+    return Repaired(joints @ _make_levelling(slope).T, (note,))
 
 
-def _levelling(slope: Floats) -> Rotations:
-    """(3, 3) the smallest rotation of a plane z = slope . (x, y) to z = 0."""
+def _make_levelling(slope: Floats) -> Rotations:
+    """Return the smallest rotation (3, 3) of a plane z = slope . (x, y) to z = 0."""
     up = np.array([-slope[0], -slope[1], 1.0]) / np.sqrt(1.0 + slope @ slope)
     x, y, z = up
     cross = np.array([[0.0, 0.0, -x], [0.0, 0.0, -y], [x, y, 0.0]])
     return np.eye(3) + cross + cross @ cross / (1.0 + z)
 
 
-def off_floor(joints: Points3, fps: float) -> tuple[str, ...]:
-    """What the feet of a person do who is not on one level floor, a sentence each."""
-    height, rests = supports(joints, fps)
-    height = height - floor_height(joints, fps)
-    told = []
+def describe_floor_faults(joints: Points3, fps: float) -> tuple[str, ...]:
+    """Return a sentence for each way in which the feet are not on one level floor."""
+    height, rests = find_support(joints, fps)
+    height = height - measure_floor_height(joints, fps)
+    faults = []
     elsewhere = rests & (np.abs(height) > LEVEL_M)
     if elsewhere.sum() > LEVEL_S * fps:
         low, high = np.percentile(height[rests], (2, 98))
-        told.append(
+        faults.append(
             f"Feet rest at heights from {low:+.2f} to {high:+.2f} m (stairs, terrain, a seat?); "
             f"within {LEVEL_M} m of one floor are expected."
         )
     hands = joints[:, [JOINT["left_wrist"], JOINT["right_wrist"]], 2].min(1) - HAND_M
-    off = np.minimum(height, hands - floor_height(joints, fps)) > AIR_M
-    first, last = max(runs(off), key=lambda run: run[1] - run[0], default=(0, 0))
-    if (last - first) / fps > AIR_S and not told:
-        told.append(
-            f"Both feet are more than {AIR_M} m above the floor for {(last - first) / fps:.1f} s "
+    off = np.minimum(height, hands - measure_floor_height(joints, fps)) > AIR_M
+    first, end = max(find_runs(off), key=lambda run: run.end - run.first, default=Run(0, 0))
+    if (end - first) / fps > AIR_S and not faults:
+        faults.append(
+            f"Both feet are more than {AIR_M} m above the floor for {(end - first) / fps:.1f} s "
             f"from {first / fps:.1f} s on (hanging, thrown up?); at most {AIR_S} s are expected."
         )
-    if rests.mean() < LEAST_SHARE and not _runs(joints, height, fps):
-        told.append(
+    if rests.mean() < LEAST_SHARE and not _is_running(joints, height, fps):
+        faults.append(
             f"One foot or the other rests for {100 * rests.mean():.0f} % of the time; at least "
-            f"{100 * LEAST_SHARE:.0f} % are expected of who goes on a floor."
+            f"{100 * LEAST_SHARE:.0f} % are expected of a person on a floor."
         )
-    return tuple(told)
+    return tuple(faults)
 
 
-def _runs(joints: Points3, height: Floats, fps: float) -> bool:
-    """Return whether the person runs: fast, with a foot near the floor every AIR_S at least."""
+def _is_running(joints: Points3, height: Floats, fps: float) -> bool:
+    """Return whether the person runs: fast, with a foot near the floor every `AIR_S` at least."""
     hip = joints[:, JOINT["left_hip"], :2]
     speed_m_s = np.median(np.linalg.norm(np.diff(hip, axis=0), axis=-1)) * fps
-    aloft = max((last - first for first, last in runs(height > LEVEL_M)), default=0)
+    aloft = max((end - first for first, end in find_runs(height > LEVEL_M)), default=0)
     return bool(speed_m_s > RUN_M_S and aloft / fps < AIR_S)

@@ -17,16 +17,31 @@ SIDED: dict[str, tuple[str, ...]] = {
     "knee": ("lowleg", "lowerleg", "leg", "shin", "calf", "tibia", "knee", "shank", "lleg"),
     "ankle": ("ankle", "foot"),
     "foot": (
-        "toebase end", "toe end", "toes end", "toe0 end", "ball end", "toeend", "toetip",
-        "toebase", "toes", "toe0", "toe", "ball", "ankle end", "foot end", "foot",
+        "toebase end",
+        "toe end",
+        "toes end",
+        "toe0 end",
+        "ball end",
+        "toeend",
+        "toetip",
+        "toebase",
+        "toes",
+        "toe0",
+        "toe",
+        "ball",
+        "ankle end",
+        "foot end",
+        "foot",
     ),
-}  # fmt: skip
-"""Names of a joint, best first, without prefixes and sides (which may stand before, behind or in
-between); "x end" is the tip (End Site) of joint x."""
+}
+"""Names of a joint, best first, without prefixes and sides.
+
+A side may precede, follow or interrupt them; "x end" is the tip (End Site) of joint x.
+"""
 HEAD: tuple[str, ...] = ("head", "skull", "face")
 """Names of the node that turns with the face."""
 NAMED = (*JOINTS, "head")
-"""The names for which a node can be given explicitly."""
+"""Names for which a node can be given explicitly."""
 SIDES = {
     **dict.fromkeys(("left", "l", "lft", "lf"), "left"),
     **dict.fromkeys(("right", "r", "rgt", "rt"), "right"),
@@ -35,17 +50,74 @@ SIDES = {
 TAILS = ("joint", "jnt", "jt", "bone", "bn", "bend", "skin", "bind")
 """Words behind a name without a meaning."""
 OWN = frozenset(
-    ("fore", "upper", "up", "low", "lower", "u", "f", "arm", "forearm", "hand", "wrist", "elbow",
-     "shoulder", "shldr", "clavicle", "collar", "leg", "thigh", "shin", "calf", "knee", "ankle",
-     "hip", "foot", "toe", "toes", "ball", "head", "neck", "thumb", "index", "middle", "mid",
-     "ring", "pinky", "little", "finger", "eye", "twist", "roll", "ik", "pole", "helper", "end",
-     "nub", "tip", "share", "in")
-)  # fmt: skip
+    (
+        "fore",
+        "upper",
+        "up",
+        "low",
+        "lower",
+        "u",
+        "f",
+        "arm",
+        "forearm",
+        "hand",
+        "wrist",
+        "elbow",
+        "shoulder",
+        "shldr",
+        "clavicle",
+        "collar",
+        "leg",
+        "thigh",
+        "shin",
+        "calf",
+        "knee",
+        "ankle",
+        "hip",
+        "foot",
+        "toe",
+        "toes",
+        "ball",
+        "head",
+        "neck",
+        "thumb",
+        "index",
+        "middle",
+        "mid",
+        "ring",
+        "pinky",
+        "little",
+        "finger",
+        "eye",
+        "twist",
+        "roll",
+        "ik",
+        "pole",
+        "helper",
+        "end",
+        "nub",
+        "tip",
+        "share",
+        "in",
+    )
+)
 """Words that belong to a name: without one of them it means another part."""
 WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
-CUT, TAIL, TURNED = 0.05, 0.2, 0.1
-"""Costs of a reading: for each word that is cut off before, for each behind, and for two words in
-reverse order; each better name of the same joint costs 1."""
+CUT = 0.05
+"""Cost of each word that is left out before a name; each better name of a joint costs 1."""
+TAIL = 0.2
+"""Cost of each word that is left out behind a name."""
+TURNED = 0.1
+"""Cost of two words in reverse order."""
+
+
+class _Joined(NamedTuple):
+    """Words joined to one."""
+
+    word: str
+    """The word."""
+    cost: float
+    """Cost of the words that were left out or reversed."""
 
 
 class Reading(NamedTuple):
@@ -54,15 +126,15 @@ class Reading(NamedTuple):
     side: str
     """"left", "right" or ""."""
     word: str
-    """The part of the body, in lower case without blanks; with " end" a tip."""
+    """Part of the body, in lower case without blanks; with " end" for a tip."""
     cost: float
-    """The cost of the parts that were left out."""
+    """Cost of the parts that were left out."""
 
 
 def read_name(name: str) -> list[Reading]:
     """Return the ways to read a name such as "mixamorig:LeftUpLeg" or "Bip01 L UpperArm"."""
-    end, words = " end" if name.endswith(" end") else "", _words(name)
-    found, cost = [*_split(words, 0.0)], 0.0
+    end, words = " end" if name.endswith(" end") else "", _split_words(name)
+    readings, cost = [*_split_readings(words, 0.0)], 0.0
     while len(words) > 1:
         last = len(words) - (2 if words[-1] in SIDES else 1)  # "upper_arm_01_L"
         if not (words[last] in TAILS or words[last].isdigit()):
@@ -70,57 +142,64 @@ def read_name(name: str) -> list[Reading]:
         number = int(words[last]) if words[last].isdigit() else 0
         cost += TAIL + min(0.01 * number, TAIL)
         del words[last]
-        found += _split(words, cost)
-    return [Reading(side, word + end, paid) for side, word, paid in found]
+        readings += _split_readings(words, cost)
+    return [Reading(side, word + end, cost) for side, word, cost in readings]
 
 
 def has_side(name: str) -> bool:
     """Return whether a name contains a word for left or right."""
-    return any(word in SIDES for word in _words(name))
+    return any(word in SIDES for word in _split_words(name))
 
 
-def _words(name: str) -> list[str]:
+def _split_words(name: str) -> list[str]:
     """Return the words of a name in lower case, without a namespace before a colon."""
     return [word.lower() for word in WORD.findall(name.rsplit(":", 1)[-1].removesuffix(" end"))]
 
 
-def _split(words: list[str], cost: float) -> Iterator[Reading]:
+def _split_readings(words: list[str], cost: float) -> Iterator[Reading]:
     """Yield readings of words: with a side anywhere or none, without some of the first words."""
     for k in [k for k, word in enumerate(words) if word in SIDES]:
         rest = words[:k] + words[k + 1 :]
-        yield from (Reading(SIDES[words[k]], each, cost + more) for each, more in _joined(rest))
-    for each, more in _joined(words):
-        yield Reading("", each, cost + more)
+        yield from (Reading(SIDES[words[k]], word, cost + more) for word, more in _join_words(rest))
+    for word, more in _join_words(words):
+        yield Reading("", word, cost + more)
         for form, side in SIDES.items():
-            if each.startswith(form):
-                yield Reading(side, each.removeprefix(form), cost + more)
-            if each.endswith(form):
-                yield Reading(side, each.removesuffix(form), cost + more)
+            if word.startswith(form):
+                yield Reading(side, word.removeprefix(form), cost + more)
+            if word.endswith(form):
+                yield Reading(side, word.removesuffix(form), cost + more)
 
 
-def _joined(words: list[str]) -> Iterator[tuple[str, float]]:
+def _join_words(words: list[str]) -> Iterator[_Joined]:
     """Yield words joined to one, without more and more of the first ones, and the cost."""
     for k in range(len(words)):
         if k and words[k - 1] in OWN:
             return
-        yield "".join(words[k:]), CUT * k
+        yield _Joined("".join(words[k:]), CUT * k)
         if len(words) - k == 2:
-            yield words[-1] + words[-2], CUT * k + TURNED
+            yield _Joined(words[-1] + words[-2], CUT * k + TURNED)
 
 
-def cost_as(wanted: Sequence[str], side: str, readings: Sequence[Reading]) -> float:
-    """Return the cost of reading a name as one of the wanted words, infinite for another name."""
-    paid = [
-        wanted.index(each.word) + each.cost
-        for each in readings
-        if each.side == side and each.word in wanted
+def find_cost(wanted: Sequence[str], side: str, readings: Sequence[Reading]) -> float:
+    """Return the cost of reading a name as one of the wanted words, infinite for another name.
+
+    Args:
+        wanted: words, best first.
+        side: "left", "right" or "".
+        readings: ways to read the name.
+    """
+    costs = [
+        wanted.index(reading.word) + reading.cost
+        for reading in readings
+        if reading.side == side and reading.word in wanted
     ]
-    return min(paid, default=float("inf"))
+    return min(costs, default=float("inf"))
 
 
-def names_given(entries: Sequence[str]) -> dict[str, str]:
-    """Return which node each joint is, of entries "left_shoulder=lShldr" and names of TOML files
-    that hold such lines.
+def read_joint_names(entries: Sequence[str]) -> dict[str, str]:
+    """Return the node name of each joint, from entries such as "left_shoulder=lShldr".
+
+    An entry may also be the name of a TOML file of such lines.
 
     Raises:
         ConfigError: an entry is neither, or names no joint.
@@ -142,20 +221,28 @@ def names_given(entries: Sequence[str]) -> dict[str, str]:
     return given
 
 
-def node_called(name: object, names: Sequence[str], source: str) -> int:
-    """Return the node of an explicitly given name, whose case does not matter."""
+def find_node(name: object, names: Sequence[str], source: str) -> int:
+    """Return the node of an explicitly given name; upper and lower case are equal."""
     for exact in (True, False):
-        for node, each in enumerate(names):
-            if each == name or (not exact and each.lower() == str(name).lower()):
+        for node, known in enumerate(names):
+            if known == name or (not exact and known.lower() == str(name).lower()):
                 return node
     raise unknown(f"node of {source}", name, names)
 
 
-def nodes_given(joints: Mapping[str, str], names: Sequence[str], source: str) -> dict[str, int]:
-    """Return the nodes of explicitly named joints; `ConfigError` for an unknown node or joint, and
-    for a node of two joints."""
+def find_nodes(joints: Mapping[str, str], names: Sequence[str], source: str) -> dict[str, int]:
+    """Return the nodes of explicitly named joints.
+
+    Args:
+        joints: names of the nodes, by joint.
+        names: names of all nodes.
+        source: name of the file, for errors.
+
+    Raises:
+        ConfigError: a node or joint is unknown, or a node is given for two joints.
+    """
     check_names("joint", joints, NAMED)
-    given = {joint: node_called(name, names, source) for joint, name in joints.items()}
+    given = {joint: find_node(name, names, source) for joint, name in joints.items()}
     twice = [joint for joint, node in given.items() if [*given.values()].count(node) > 1]
     if twice:
         raise ConfigError(f"{source}: {', '.join(twice)} must be different nodes.")

@@ -1,4 +1,4 @@
-"""Any file of motion capture to a `Capture`."""
+"""Reading any motion-capture file as a `Capture`."""
 
 import zipfile
 from collections.abc import Mapping
@@ -12,78 +12,84 @@ from hrc_env.core.skeleton import JOINTS, N_JOINTS
 from hrc_env.core.typing import Floats, Points3
 from hrc_env.mocap.acclaim import read_acclaim
 from hrc_env.mocap.bvh import read_bvh
-from hrc_env.mocap.person import resampled
+from hrc_env.mocap.person import resample
 from hrc_env.mocap.record import FEWEST_FRAMES, Capture
-from hrc_env.mocap.repair import Upward, from_origin, mended
-from hrc_env.mocap.skeleton import find_joints, joints_of, rest_up
+from hrc_env.mocap.repair import Upward, add_shift, repair_joints
+from hrc_env.mocap.skeleton import extract_joints, find_joints, find_rest_up
 from hrc_env.motion.clip import check_rate
 
 SUFFIXES = (".bvh", ".amc", ".npz")
-CMU_HZ, LEAST_S = 120.0, 0.5
-"""Rate of the CMU database's AMC files, which do not hold it; shortest clip [s]."""
+CMU_HZ = 120.0
+"""Frame rate of the CMU database's AMC files, which do not contain it [Hz]."""
+LEAST_S = 0.5
+"""Duration of the shortest clip [s]."""
 
 
 class _Content(NamedTuple):
-    """The content of a file, in its own frame and unit."""
+    """Content of a file, in its own frame and unit."""
 
     joints: Points3
-    """(T, 15, 3)."""
+    """Joints (T, 15, 3), missing ones NaN."""
     fps: float
-    """Frames a second; NaN: not in the file."""
-    landmarks: bool
-    """As in `Capture`."""
-    found: tuple[str, ...]
-    """As in `Capture`."""
-    repaired: tuple[str, ...] = ()
-    """As in `Capture`."""
+    """Frame rate [Hz]; NaN if it is not in the file."""
+    are_landmarks: bool
+    """Whether joints are BlazePose landmarks, as in `Capture`."""
+    node_names: tuple[str, ...]
+    """Name in the file of each joint (15,)."""
+    notes: tuple[str, ...] = ()
+    """A sentence for each guess and each repair."""
     rest_up: Floats | None = None
-    """(3,) from hips to shoulders of the skeleton at rest, NaN if it does not stand."""
+    """Unit vector (3,) from hips to shoulders of the skeleton at rest; NaN if it does not stand."""
 
 
 def read_recording(
-    path: Path, fps: float | None = None, source_fps: float | None = None,
-    skeleton: Path | None = None, allow_off_floor: bool = False,
-    joints: Mapping[str, str] | None = None, up: str | None = None,
-) -> Capture:  # fmt: skip
-    """Read, mend and resample a recording of a person in motion.
+    path: Path,
+    fps: float | None = None,
+    source_fps: float | None = None,
+    skeleton: Path | None = None,
+    allow_off_floor: bool = False,
+    joints: Mapping[str, str] | None = None,
+    up: str | None = None,
+) -> Capture:
+    """Read, repair and resample a recording of a person in motion.
 
     Args:
         path: a .bvh, .amc or .npz file (docs/people_and_scenes.md).
-        fps: frames a second of the result; None: the file's.
-        source_fps: the file's true rate, where it has none or a wrong one.
-        skeleton: the .asf file of an .amc file; None: it is looked for beside it.
-        allow_off_floor: accept people who are not on one level floor (stairs, terrain, long in the
-            air) as if they were.
+        fps: frame rate of the result [Hz]; None for the file's.
+        source_fps: true frame rate of the file [Hz], if it has none or a wrong one.
+        skeleton: the .asf file of an .amc file; None to look for it beside that.
+        allow_off_floor: whether people off one level floor (stairs, terrain, long in the air) are
+            accepted, as if they were on it.
         joints: names in the file of joints that are not recognized, as {"left_shoulder": "lShldr"}.
-        up: the file's upward axis, as "+y", where it is not recognized.
+        up: upward axis of the file, as "+y", if it is not recognized.
 
     Returns:
-        The person's joints (T, 15, 3) [m], +z up, the floor at 0, and what was mended.
+        The person's joints (T, 15, 3) [m], +z up, the floor at 0, with notes on repairs.
 
     Raises:
-        ConfigError: it is no such file, damaged beyond repair, of another's skeleton or off the
-            floor.
+        ConfigError: the file is of no known format, damaged beyond repair, of another skeleton or
+            off the floor.
     """
     source = path.name
     read = _read(path, skeleton, joints)
-    rate_hz, repaired = read.fps, read.repaired
+    rate_hz, notes = read.fps, read.notes
     if source_fps is not None:
         rate_hz = source_fps
     elif np.isnan(rate_hz):
-        rate_hz, repaired = CMU_HZ, (*repaired, f"No frame rate: taken to be {CMU_HZ:g} Hz.")
+        rate_hz, notes = CMU_HZ, (*notes, f"No frame rate: taken to be {CMU_HZ:g} Hz.")
     check_rate(rate_hz, source)
     acclaim = path.suffix.lower() == ".amc"
     upward = Upward(up, read.rest_up)
-    placed, notes = mended(read.joints, rate_hz, source, acclaim, allow_off_floor, upward)
-    lasts_s = (len(placed) - 1) / rate_hz
-    if lasts_s < LEAST_S:
-        raise ConfigError(f"{source}: {lasts_s:.2f} s of motion; {LEAST_S} s is the least.")
+    placed, repairs = repair_joints(read.joints, rate_hz, source, acclaim, allow_off_floor, upward)
+    duration_s = (len(placed) - 1) / rate_hz
+    if duration_s < LEAST_S:
+        raise ConfigError(f"{source}: {duration_s:.2f} s of motion; {LEAST_S} s is the least.")
     if fps is not None and fps != rate_hz:
         check_rate(fps, "the wished rate")
-        placed = resampled(placed, rate_hz, fps)
-        notes = (*notes, f"Resampled from {rate_hz:g} to {fps:g} frames a second.")
+        placed = resample(placed, rate_hz, fps)
+        repairs = (*repairs, f"Resampled from {rate_hz:g} to {fps:g} frames a second.")
         rate_hz = fps
-    return Capture(placed, rate_hz, read.landmarks, read.found, source, (*repaired, *notes))
+    return Capture(placed, rate_hz, read.are_landmarks, read.node_names, source, (*notes, *repairs))
 
 
 def _read(path: Path, skeleton: Path | None, joints: Mapping[str, str] | None) -> _Content:
@@ -96,7 +102,8 @@ def _read(path: Path, skeleton: Path | None, joints: Mapping[str, str] | None) -
             raise ConfigError(
                 f"{path.name}: joints= is for .bvh and .amc files; an .npz file has no names."
             )
-        return _Content(*_read_joints(path), True, JOINTS)
+        read = _read_joints(path)
+        return _Content(read.joints, read.fps, True, JOINTS)
     if suffix == ".bvh":
         moving = read_bvh(path)
     elif suffix in (".amc", ".asf"):
@@ -105,16 +112,25 @@ def _read(path: Path, skeleton: Path | None, joints: Mapping[str, str] | None) -
         raise ConfigError(
             f"{path.name}: expected a file that ends in {', '.join(SUFFIXES)}, got {suffix!r}."
         )
-    found = find_joints(moving, path.name, joints)
-    made, node = f"made from {moving.names[found.head]}", found.node
+    nodes = find_joints(moving, path.name, joints)
+    made, node = f"made from {moving.names[nodes.head]}", nodes.node
     named = tuple(moving.names[node[joint]] if joint in node else made for joint in JOINTS)
-    placed, told = from_origin(joints_of(moving, found), moving.shift)
-    repaired = (*moving.repaired, *found.notes, *told)
-    return _Content(placed, moving.fps, False, named, repaired, rest_up(moving, found))
+    placed, shifted = add_shift(extract_joints(moving, nodes), moving.shift)
+    notes = (*moving.notes, *nodes.notes, *shifted)
+    return _Content(placed, moving.fps, False, named, notes, find_rest_up(moving, nodes))
 
 
-def _read_joints(path: Path) -> tuple[Points3, float]:
-    """Joints (T, 15, 3) in any unit, missing ones NaN, and frames a second, of an npz file."""
+class _Joints(NamedTuple):
+    """Joints in an .npz file."""
+
+    joints: Points3
+    """Joints (T, 15, 3) in any unit, missing ones NaN."""
+    fps: float
+    """Frame rate [Hz]."""
+
+
+def _read_joints(path: Path) -> _Joints:
+    """Return the joints in an .npz file."""
     wanted = ("joints", "fps")
     try:
         with np.load(path, allow_pickle=False) as file:
@@ -136,4 +152,4 @@ def _read_joints(path: Path) -> tuple[Points3, float]:
         )
     if fps.size != 1:
         raise ConfigError(f"{path.name}: fps must be one number, got shape {fps.shape}.")
-    return np.where(np.isfinite(joints), joints, np.nan), float(fps.reshape(-1)[0])
+    return _Joints(np.where(np.isfinite(joints), joints, np.nan), float(fps.reshape(-1)[0]))

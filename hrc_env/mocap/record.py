@@ -1,6 +1,7 @@
-"""What a file of motion capture says, in the project's joints, frames and units."""
+"""The content of a motion-capture file, in the project's joints, frames and units."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,48 +12,73 @@ FEWEST_FRAMES = 2
 
 @dataclass(frozen=True, slots=True)
 class Capture:
-    """A person's joints over time, upright on the floor."""
+    """The joints of a person over time, upright on the floor."""
 
     joints_world: Points3
-    """(T, 15, 3) joints in the order of `hrc_env.core.skeleton.JOINTS`, +Z up, floor at 0 [m]."""
+    """Joints (T, 15, 3) in the order of `core.skeleton.JOINTS`, +z up, the floor at 0 [m]."""
     fps: float
-    """Frames a second."""
-    landmarks: bool
-    """True: joints as BlazePose means them; False: the centres that the bones turn about."""
-    found: tuple[str, ...]
-    """(15,) by which name the file calls each joint."""
+    """Frame rate [Hz]."""
+    are_landmarks: bool
+    """Whether joints are BlazePose landmarks, else centres of rotation of the bones."""
+    node_names: tuple[str, ...]
+    """Name in the file of each joint (15,)."""
     source: str
     """Name of the file."""
-    repaired: tuple[str, ...] = ()
-    """What was guessed or mended, a sentence each."""
+    notes: tuple[str, ...] = ()
+    """A sentence for each guess and each repair."""
 
 
 @dataclass(frozen=True, slots=True)
 class Moving:
-    """A skeleton in a file's own frame and unit, N nodes over T frames."""
+    """A skeleton in the frame and the unit of its file: N nodes over T frames."""
 
     names: tuple[str, ...]
-    """(N,) as in the file; the tip of a chain is called after its joint, with " end" added."""
+    """Names (N,) in the file; the tip of a chain has the name of its joint with " end" added."""
     parent: Ints
-    """(N,) the node that each hangs on, -1 for none; it comes before those that hang on it."""
+    """Parent (N,) of each node, -1 for none; parents come before their children."""
     position: Points3
-    """(T, N, 3) origins of the nodes [unit of the file]."""
+    """Origins (T, N, 3) of the nodes [unit of the file]."""
     rotation: Rotations
-    """(T, N, 3, 3) file_from_node."""
+    """Rotations (T, N, 3, 3) file_from_node."""
     rest: Points3
-    """(N, 3) origins with every rotation zero [unit of the file]."""
+    """Origins (N, 3) with every rotation zero [unit of the file]."""
     fps: float
-    """Frames a second; NaN where the format has none."""
+    """Frame rate [Hz]; NaN where the format has none."""
     shift: Points3
-    """(T, 3) how much further all nodes would be if the places of whole bodies were added to their
-    OFFSET and did not stand for it [unit of the file]."""
-    repaired: tuple[str, ...] = ()
-    """What was guessed or mended, a sentence each."""
+    """Displacement (T, 3) of all nodes if positions of the whole body are meant relative to OFFSET.
+
+    It is in the unit of the file.
+    """
+    notes: tuple[str, ...] = ()
+    """A sentence for each guess and each repair."""
 
 
-def forward(parent: Ints, offset: Floats, rotation: Rotations) -> tuple[Points3, Rotations]:
-    """Origins (T, N, 3) and rotations (T, N, 3, 3) of a tree whose parents come first (-1: none),
-    from those in the parent's frame."""
+class Repaired(NamedTuple):
+    """Joints after a repair."""
+
+    joints: Points3
+    """Joints (T, 15, 3)."""
+    notes: tuple[str, ...]
+    """A sentence for each change."""
+
+
+class TreePose(NamedTuple):
+    """Poses of the nodes of a tree."""
+
+    position: Points3
+    """Origins (T, N, 3) of the nodes."""
+    rotation: Rotations
+    """Rotations (T, N, 3, 3) of the nodes."""
+
+
+def compose_tree(parent: Ints, offset: Floats, rotation: Rotations) -> TreePose:
+    """Return the poses of a tree's nodes from those in their parents' frames.
+
+    Args:
+        parent: parent (N,) of each node, -1 for none; parents come first.
+        offset: origins (T, N, 3) or (1, N, 3) in the parents' frames.
+        rotation: rotations (T, N, 3, 3) in the parents' frames.
+    """
     position = np.broadcast_to(offset, (*rotation.shape[:2], 3)).copy()
     turned = rotation.copy()
     for node, above in enumerate(parent):
@@ -60,9 +86,10 @@ def forward(parent: Ints, offset: Floats, rotation: Rotations) -> tuple[Points3,
             turned[:, node] = turned[:, above] @ rotation[:, node]
             arm = turned[:, above] @ position[:, node, :, None]
             position[:, node] = position[:, above] + arm[..., 0]
-    return position, turned
+    return TreePose(position, turned)
 
 
-def at_rest(parent: Ints, offset: Floats) -> Points3:
-    """Origins (N, 3) of a tree without rotations."""
-    return forward(parent, offset[None], np.tile(np.eye(3), (1, len(offset), 1, 1)))[0][0]
+def place_at_rest(parent: Ints, offset: Floats) -> Points3:
+    """Return the origins (N, 3) of the nodes of a tree without rotations."""
+    rotation = np.tile(np.eye(3), (1, len(offset), 1, 1))
+    return compose_tree(parent, offset[None], rotation).position[0]

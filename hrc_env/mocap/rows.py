@@ -1,4 +1,4 @@
-"""Lines of text files of motion capture, in whatever encoding and with whatever decimal sign."""
+"""Lines of motion-capture text files, in any encoding and with any decimal sign."""
 
 import codecs
 import math
@@ -9,13 +9,15 @@ from pathlib import Path
 from hrc_env.core.errors import ConfigError
 
 MARKS = (
-    (codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF32_LE, "utf-32-le"),
-    (codecs.BOM_UTF32_BE, "utf-32-be"), (codecs.BOM_UTF16_LE, "utf-16-le"),
+    (codecs.BOM_UTF8, "utf-8"),
+    (codecs.BOM_UTF32_LE, "utf-32-le"),
+    (codecs.BOM_UTF32_BE, "utf-32-be"),
+    (codecs.BOM_UTF16_LE, "utf-16-le"),
     (codecs.BOM_UTF16_BE, "utf-16-be"),
-)  # fmt: skip
+)
 """Byte order marks and the encodings that they announce, the longer ones first."""
-LOOKED_AT = 400
-"""Bytes at the beginning of a file by which UTF-16 without a mark is known."""
+INSPECTED = 400
+"""Number of bytes at the beginning of a file by which UTF-16 without a mark is recognized."""
 NO_NUMBER = re.compile(r"[-+]?(1\.#\w+|nan(\(\w*\))?|inf(inity)?)", re.IGNORECASE)
 """Spellings of missing values: not a number, or not finite."""
 
@@ -25,7 +27,7 @@ def decode(data: bytes) -> str:
     for mark, encoding in MARKS:
         if data.startswith(mark):
             return data[len(mark) :].decode(encoding, errors="replace").strip("\0\x1a")
-    begin = data[:LOOKED_AT]
+    begin = data[:INSPECTED]
     for first, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):
         if begin[first::2].count(0) > len(begin) // 4:
             return data.decode(encoding, errors="replace").strip("\0\x1a")
@@ -38,7 +40,7 @@ def decode(data: bytes) -> str:
 def separate_numbers(words: Sequence[str], count: int | None = None) -> list[str]:
     """Return the numbers in words, each with a decimal point; "," and ";" may be in between.
 
-    A comma is the decimal sign where there are `count` numbers then, else it separates them. If the
+    A comma is the decimal sign if there are `count` numbers then, else it separates them. If the
     count is not known, it separates them where one word has two commas, or a comma and a point.
     """
     if not any("," in word or ";" in word for word in words):
@@ -57,7 +59,7 @@ def to_number(word: str) -> float:
 
 
 class Rows:
-    """The lines of a text file that hold words, one after the other; errors say where."""
+    """The lines of a text file that contain words, in order; errors give the line."""
 
     def __init__(self, path: Path, comments: str = "") -> None:
         """Read a file without its comments, each of which begins with a match of `comments`."""
@@ -67,15 +69,15 @@ class Rows:
         self.at = 0
 
     def next(self, expected: str) -> list[str]:
-        """Words of the next line that has any; `ConfigError` where the file ends here."""
-        for words in self.rest():
+        """Return the words of the next line that has any; `ConfigError` at the end of the file."""
+        for words in self.remaining():
             return words
         raise ConfigError(
             f"{self.source} is cut off: after its {len(self._lines)} lines {expected} is missing."
         )
 
-    def rest(self) -> Iterator[list[str]]:
-        """Words of each line that is left and has any."""
+    def remaining(self) -> Iterator[list[str]]:
+        """Yield the words of each remaining line that has any."""
         while self.at < len(self._lines):
             line = self._lines[self.at]
             words = (self._comment.sub("", line) if self._comment else line).split()
@@ -83,17 +85,25 @@ class Rows:
             if words:
                 yield words
 
-    def wrong(self, expected: str) -> ConfigError:
-        """The error for the line that was read last."""
+    def make_error(self, expected: str) -> ConfigError:
+        """Return the error for the line that was read last."""
         line = self._lines[max(self.at, 1) - 1].strip() if self._lines else ""
         return ConfigError(f"{self.source}, line {self.at}: {expected}; got {line[:60]!r}.")
 
-    def numbers(self, words: Sequence[str], count: int | None = None) -> list[float]:
-        """Words of the line that was read last as numbers, `count` of them if that is known."""
+    def to_numbers(self, words: Sequence[str], count: int | None = None) -> list[float]:
+        """Return words of the line that was read last as numbers.
+
+        Args:
+            words: the words.
+            count: number of numbers, if it is known.
+
+        Raises:
+            ConfigError: a word is no number, or there are too few.
+        """
         try:
             values = [to_number(word) for word in separate_numbers(words, count)]
         except ValueError:
-            raise self.wrong("expected a number") from None
+            raise self.make_error("expected a number") from None
         if count is not None and len(values) < count:
-            raise self.wrong(f"expected {count} numbers")
+            raise self.make_error(f"expected {count} numbers")
         return values[:count]

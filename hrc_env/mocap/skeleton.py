@@ -1,4 +1,4 @@
-"""Which node of a file's skeleton is which of the 15 joints, and where its nose is."""
+"""The nodes of a file's skeleton that are the 15 joints, and the position of its nose."""
 
 import itertools
 from collections.abc import Iterator, Mapping
@@ -10,45 +10,48 @@ import numpy as np
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import JOINTS, N_JOINTS
 from hrc_env.core.typing import Floats, Points3
-from hrc_env.mocap.names import HEAD, SIDED, Reading, cost_as, has_side, nodes_given, read_name
-from hrc_env.mocap.person import across, middle, stature
+from hrc_env.mocap.names import HEAD, SIDED, Reading, find_cost, find_nodes, has_side, read_name
+from hrc_env.mocap.person import measure_stature, midpoint, span
 from hrc_env.mocap.record import Moving
 
-__all__ = ["HEAD", "SIDED", "Found", "find_joints", "joints_of", "rest_up"]
+__all__ = ["HEAD", "SIDED", "JointNodes", "extract_joints", "find_joints", "find_rest_up"]
 
 CHAINS = tuple(
     tuple(f"{side}_{part}" for part in parts)
     for side in ("left", "right")
     for parts in (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle", "foot"))
 )
-"""Joints of each limb; each hangs on the one before."""
+"""Joints of each limb; each is below the one before in the tree."""
 CHOICES = 6
 """Number of nodes considered for a joint, the best by name."""
-NOSE_SHARE, STANDS = 0.065, -0.7
-"""From the head's joint forward to the nose, as a share of stature (the baked bodies); a rest pose
-stands if the cosine between trunk and thighs is below this."""
+NOSE_SHARE = 0.065
+"""Distance of the nose ahead of the head's joint, as a share of stature (the baked bodies)."""
+STANDS = -0.7
+"""Cosine of the angle between trunk and thighs below which a rest pose stands."""
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
-    """Which nodes of a skeleton the joints are."""
+class JointNodes:
+    """The nodes of a skeleton that are the joints."""
 
     node: dict[str, int]
-    """The node of each joint, the nose only if the file has one."""
+    """Node of each joint; of the nose only if the file has one."""
     head: int
-    """The node that turns with the face."""
+    """Node that turns with the face."""
     notes: tuple[str, ...] = ()
-    """Joints that were recognized by the structure and not by their names, a sentence each."""
+    """A sentence for each joint that was recognized by the structure and not by its name."""
 
 
 class _Candidate(NamedTuple):
     """A node that may be a joint by its name."""
 
     cost: float
+    """Cost of reading its name as the joint's."""
     node: int
+    """Index of the node."""
 
 
-def find_joints(moving: Moving, source: str, joints: Mapping[str, str] | None = None) -> Found:
+def find_joints(moving: Moving, source: str, joints: Mapping[str, str] | None = None) -> JointNodes:
     """Return the node of each joint, by the names of the nodes and the structure of the skeleton.
 
     Args:
@@ -60,21 +63,21 @@ def find_joints(moving: Moving, source: str, joints: Mapping[str, str] | None = 
         ConfigError: a joint is missing; the message lists those that were found.
     """
     names, parent = moving.names, moving.parent.tolist()
-    given = nodes_given(joints or {}, names, source)
+    given = find_nodes(joints or {}, names, source)
     readings = [read_name(name) for name in names]
-    known = {joint: _candidates(joint, readings) for joint in JOINTS}
+    known = {joint: _list_candidates(joint, readings) for joint in JOINTS}
     known |= {joint: [_Candidate(0.0, node)] for joint, node in given.items() if joint in JOINTS}
-    notes = [*_between(known, names, parent)]
+    notes = [*_infer_middle_joints(known, names, parent)]
     found: dict[str, int] = {}
     for chain in CHAINS:
-        found |= _hanging(chain, known, parent)
+        found |= _choose_chain(chain, known, parent)
     for joint in sorted((each for each in known if known[each]), key=lambda j: known[j][0].cost):
         free = [each.node for each in known[joint] if each.node not in found.values()]
         if joint not in found and free:
             found[joint] = free[0]
-    head = given.get("head", _head(readings))
+    head = given.get("head", _find_head(readings))
     if head is None and {"left_shoulder", "right_shoulder"} <= {*found}:
-        head = _top(found, names, parent)
+        head = _find_top(found, names, parent)
         if head is not None:
             notes.append(f"The head was taken to be {names[head]}: the trunk ends there.")
     missed = [joint for joint in JOINTS[1:] if joint not in found]
@@ -87,46 +90,58 @@ def find_joints(moving: Moving, source: str, joints: Mapping[str, str] | None = 
             f"(--joint {missed[0]}=NAME, joints={{{missed[0]!r}: NAME}}), or rename them as in "
             "docs/people_and_scenes.md."
         )
-    return Found(found, head, tuple(notes))
+    return JointNodes(found, head, tuple(notes))
 
 
-def _candidates(joint: str, readings: list[list[Reading]]) -> list[_Candidate]:
-    """Nodes that may be a joint by their names, the best first."""
+def _list_candidates(joint: str, readings: list[list[Reading]]) -> list[_Candidate]:
+    """Return the nodes that may be a joint by their names, the best first."""
     side, _, part = joint.partition("_")
-    words, where = (SIDED[part], side) if part else ((joint,), "")
-    costs = [cost_as(words, where, each) for each in readings]
+    words, side = (SIDED[part], side) if part else ((joint,), "")
+    costs = [find_cost(words, side, ways) for ways in readings]
     return sorted(_Candidate(cost, k) for k, cost in enumerate(costs) if cost < np.inf)[:CHOICES]
 
 
-def _above(node: int, parent: list[int]) -> list[int]:
-    """The nodes that a node hangs on, the nearest first."""
+def _list_ancestors(node: int, parent: list[int]) -> list[int]:
+    """Return the ancestors of a node, the nearest first."""
     nodes = []
     while (node := parent[node]) >= 0:
         nodes.append(node)
     return nodes
 
 
-def _hanging(
+def _choose_chain(
     chain: tuple[str, ...], known: dict[str, list[_Candidate]], parent: list[int]
 ) -> dict[str, int]:
-    """The cheapest choice of nodes for a limb's joints of which each hangs on the one before; empty
-    if there is none."""
+    """Return the cheapest nodes for a limb's joints, each below the one before; empty if none fit.
+
+    Args:
+        chain: joints of the limb.
+        known: candidates of each joint.
+        parent: parent of each node.
+    """
     choices = [(0.0, list[int]())]
     for joint in chain:
         choices = [
             (cost + each.cost, [*nodes, each.node])
             for cost, nodes in choices
             for each in known[joint]
-            if not nodes or nodes[-1] in _above(each.node, parent)
+            if not nodes or nodes[-1] in _list_ancestors(each.node, parent)
         ]
     return dict(zip(chain, min(choices)[1], strict=True)) if choices else {}
 
 
-def _between(
+def _infer_middle_joints(
     known: dict[str, list[_Candidate]], names: tuple[str, ...], parent: list[int]
 ) -> Iterator[str]:
-    """Add the only node between shoulder and wrist, or hip and ankle, to `known` as elbow or knee
-    if neither side has a known name for it; yields a sentence for each."""
+    """Infer elbows and knees that neither side has a known name for, and yield a sentence for each.
+
+    The only node between shoulder and wrist, or hip and ankle, is added to the candidates.
+
+    Args:
+        known: candidates of each joint, to which the nodes are added.
+        names: names of the nodes.
+        parent: parent of each node.
+    """
     for upper, part, lower in (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle")):
         sides = ("left_", "right_")
         if any(known[side + part] for side in sides):
@@ -134,7 +149,7 @@ def _between(
         found = {}
         for side in sides:
             for top, end in itertools.product(known[side + upper], known[side + lower]):
-                path = _above(end.node, parent)
+                path = _list_ancestors(end.node, parent)
                 if path[1:2] == [top.node] and side not in found:
                     found[side] = path[0], top.node, end.node
         if len(found) == len(sides):
@@ -146,25 +161,33 @@ def _between(
                 )
 
 
-def _head(readings: list[list[Reading]]) -> int | None:
-    """The node that is called a head."""
-    costs = [cost_as(HEAD, "", each) for each in readings]
+def _find_head(readings: list[list[Reading]]) -> int | None:
+    """Return the node that is called a head, if there is one."""
+    costs = [find_cost(HEAD, "", each) for each in readings]
     best = int(np.argmin(costs))
     return best if costs[best] < np.inf else None
 
 
-def _top(found: dict[str, int], names: tuple[str, ...], parent: list[int]) -> int | None:
-    """The node at the end of the one branch in the middle over the shoulders' common node."""
-    left, right = (_above(found[f"{side}_shoulder"], parent) for side in ("left", "right"))
+def _find_top(found: dict[str, int], names: tuple[str, ...], parent: list[int]) -> int | None:
+    """Return the last node of the only middle branch above the shoulders, if there is one.
+
+    Args:
+        found: nodes of the joints.
+        names: names of the nodes.
+        parent: parent of each node.
+    """
+    left, right = (_list_ancestors(found[f"{side}_shoulder"], parent) for side in ("left", "right"))
     limbs, top = {*left, *right, *found.values()}, None
     node = next((each for each in left if each in right), -1)
     while node >= 0:
         ahead = [
             child
             for child, above in enumerate(parent)
-            if above == node and child not in limbs and not names[child].endswith(" end")
+            if above == node
+            and child not in limbs
+            and not names[child].endswith(" end")
             and not has_side(names[child])
-        ]  # fmt: skip
+        ]
         if len(ahead) > 1:
             return None
         node = ahead[0] if ahead else -1
@@ -172,52 +195,62 @@ def _top(found: dict[str, int], names: tuple[str, ...], parent: list[int]) -> in
     return top
 
 
-def joints_of(moving: Moving, found: Found) -> Points3:
-    """(T, 15, 3) the joints in the file's frame and unit; a nose is made where it has none."""
-    order = [found.node.get(joint, found.head) for joint in JOINTS]
+def extract_joints(moving: Moving, nodes: JointNodes) -> Points3:
+    """Return the joints (T, 15, 3) in the frame and unit of the file; a missing nose is made."""
+    order = [nodes.node.get(joint, nodes.head) for joint in JOINTS]
     joints = moving.position[:, order].copy()
-    if JOINTS[0] not in found.node:
-        ahead = _facing(joints, moving, moving.rest[order], found.head)
-        joints[:, 0] += NOSE_SHARE * stature(joints) * (moving.rotation[:, found.head] @ ahead)
+    if JOINTS[0] not in nodes.node:
+        ahead = _find_face_direction(joints, moving, moving.rest[order], nodes.head)
+        joints[:, 0] += (
+            NOSE_SHARE * measure_stature(joints) * (moving.rotation[:, nodes.head] @ ahead)
+        )
     return joints
 
 
-def rest_up(moving: Moving, found: Found) -> Points3:
-    """(3,) unit vector from the hips to the shoulders of the skeleton at rest, if it stands there;
-    else NaN."""
-    rest = moving.rest[[found.node.get(joint, found.head) for joint in JOINTS]]
-    if not _stands(rest):
+def find_rest_up(moving: Moving, nodes: JointNodes) -> Points3:
+    """Return the unit vector (3,) from hips to shoulders at rest; NaN unless it stands."""
+    rest = moving.rest[[nodes.node.get(joint, nodes.head) for joint in JOINTS]]
+    if not _is_standing(rest):
         return np.full(3, np.nan)
-    trunk = middle(rest, "shoulder") - middle(rest, "hip")
+    trunk = midpoint(rest, "shoulder") - midpoint(rest, "hip")
     return trunk / np.linalg.norm(trunk)
 
 
-def _facing(joints: Points3, moving: Moving, rest: Points3, head: int) -> Floats:
-    """(3,) the face's direction in the head's frame: from the rest pose if that one stands, else
-    straight ahead of the chest, on the mean."""
-    if _stands(rest):
-        return _ahead(rest)
-    local = np.swapaxes(moving.rotation[:, head], -1, -2) @ _ahead(joints)[..., None]
+def _find_face_direction(joints: Points3, moving: Moving, rest: Points3, head: int) -> Floats:
+    """Return the face's direction (3,) in the head's frame.
+
+    It is taken from the rest pose if that stands, else from the mean forward direction of the
+    chest.
+
+    Args:
+        joints: joints (T, 15, 3).
+        moving: skeleton of the file.
+        rest: joints (15, 3) at rest.
+        head: node that turns with the face.
+    """
+    if _is_standing(rest):
+        return _find_forward(rest)
+    local = np.swapaxes(moving.rotation[:, head], -1, -2) @ _find_forward(joints)[..., None]
     mean = np.nanmean(local[..., 0], axis=0)
     return mean / np.linalg.norm(mean)
 
 
-def _stands(rest: Points3) -> bool:
-    """Whether a rest pose (15, 3) has its legs below its trunk, its shoulders apart."""
+def _is_standing(rest: Points3) -> bool:
+    """Return whether a rest pose (15, 3) has its legs below its trunk and its shoulders apart."""
     if rest.shape != (N_JOINTS, 3):
         return False
-    trunk = middle(rest, "shoulder") - middle(rest, "hip")
-    thighs = middle(rest, "knee") - middle(rest, "hip")
-    wide = np.linalg.norm(across(rest, "shoulder")) > 0.3 * np.linalg.norm(trunk)
+    trunk = midpoint(rest, "shoulder") - midpoint(rest, "hip")
+    thighs = midpoint(rest, "knee") - midpoint(rest, "hip")
+    wide = np.linalg.norm(span(rest, "shoulder")) > 0.3 * np.linalg.norm(trunk)
     norms = np.linalg.norm(trunk) * np.linalg.norm(thighs)
     return bool(wide and norms > 0.0 and trunk @ thighs < STANDS * norms)
 
 
-def _ahead(joints: Points3) -> Points3:
-    """(..., 3) unit vectors forward of a trunk, told from the backward ones by the feet."""
-    trunk = middle(joints, "shoulder") - middle(joints, "hip")
-    ahead = np.cross(across(joints, "shoulder") + across(joints, "hip"), trunk)
+def _find_forward(joints: Points3) -> Points3:
+    """Return unit vectors (..., 3) forward of a trunk; the feet decide on the sign."""
+    trunk = midpoint(joints, "shoulder") - midpoint(joints, "hip")
+    ahead = np.cross(span(joints, "shoulder") + span(joints, "hip"), trunk)
     ahead /= np.linalg.norm(ahead, axis=-1, keepdims=True)
-    feet = middle(joints, "foot") - middle(joints, "ankle")
+    feet = midpoint(joints, "foot") - midpoint(joints, "ankle")
     sign = np.sign(np.nanmean((ahead * feet).sum(-1)))
     return ahead * (sign or 1.0)

@@ -1,4 +1,4 @@
-"""A worker's bones as the kinematics want them: rest offsets, rest frames and lengths."""
+"""A worker's bones for the kinematics: rest offsets, rest frames and lengths."""
 
 from dataclasses import dataclass, fields, replace
 
@@ -9,26 +9,36 @@ from hrc_env.geometry.rotations import about_axis
 from hrc_env.worker.body import N_SEGMENTS, PARENT, Body
 
 CHEST, HEAD = 3, 5
+"""Segments of the trunk that limbs and gaze refer to."""
 LEFT, SIDE_STRIDE = 6, 8
-"""First segment of the left side, and how many a side has (order of `hrc_env.worker.body`)."""
+"""First segment of the left side, and number of segments of a side (order of `worker.body`)."""
 CLAVICLE, UPPER_ARM, FOREARM, HAND, THIGH, SHANK, FOOT, TOES = range(8)
 """Segments of one side, counted from its first."""
 
 ARM, FOREARM_GRIP, LEG, THIGH_LENGTH, SHANK_LENGTH, ANKLE_Z, STAND_Z = range(7)
 ANKLE_X, BALL_X, BALL_Z, HEEL_X, UPPER_LENGTH = range(7, 12)
 N_SIZES = 12
-"""Columns of `Anatomy.size`: shoulder and elbow to grip, hip to ankle and its bones, heights of
-ankle and standing pelvis, ankle from pelvis, ball and heel from ankle, upper arm [m]."""
-ROUND = ("pelvis", "abdomen", "torso", "chest", "left_shoulder", "right_shoulder")
-N_ROUND = 2 * len(ROUND)
-"""Capsules on which a trunk lies; their ends, shoulders' as if they hung on the chest."""
+"""Number of columns of `Anatomy.lengths`.
 
-GRIP_M, HEEL_M = 0.08, -0.045
-"""Hands grip half a hand beyond the wrist; heels touch a quarter of a foot behind the ankle [m]."""
-FOREARM_TWIST_RAD, HAND_TWIST_RAD = 0.15, 0.35
-"""Outward turns about the forearm from the rest pose, so that a hanging palm faces the thigh."""
+Shoulder to grip, elbow to grip, hip to ankle, thigh, shank, heights of the ankle and of the
+standing pelvis, ankle ahead of the pelvis, ball ahead of and above the ankle, heel ahead of the
+ankle, upper arm [m].
+"""
+ROUND = ("pelvis", "abdomen", "torso", "chest", "left_shoulder", "right_shoulder")
+"""Capsules on which a lying trunk rests."""
+N_ROUND = 2 * len(ROUND)
+"""Number of ends of those capsules; those of the shoulders as if they hung on the chest."""
+
+GRIP_M = 0.08
+"""Distance of the grip beyond the wrist [m]; half a hand."""
+HEEL_M = -0.045
+"""Distance of the heel's contact ahead of the ankle [m]; a quarter of a foot behind it."""
+FOREARM_TWIST_RAD = 0.15
+"""Outward turn about the forearm from the rest pose [rad]; a hanging palm faces the thigh."""
+HAND_TWIST_RAD = 0.35
+"""Outward turn of the hand about the forearm from the rest pose [rad]."""
 STAND_SHARE = 0.994
-"""Standing hip height as a share of the leg's length: knees just unlocked."""
+"""Height of the standing hip as a share of the leg's length: knees just unlocked."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,29 +46,29 @@ class Anatomy:
     """Constants of one body, or of N bodies with a first axis of N."""
 
     offset: Floats
-    """(22, 3) origin of each segment in its parent's frame at rest [m]."""
+    """Origin (22, 3) of each segment in its parent's frame at rest [m]."""
     frame: Floats
-    """(22, 3, 3) of limb bones: rows bone, hinge x bone, hinge at rest (else zero)."""
-    size: Floats
-    """(12,) lengths [m], see the names above."""
-    round: Floats
-    """(12, 5) ends of the capsules ROUND: segment, place in its frame, radius [m]."""
+    """Rows bone, hinge x bone and hinge (22, 3, 3) of each limb bone at rest; else zero."""
+    lengths: Floats
+    """Lengths (12,) [m]; the constants above name the columns."""
+    trunk_ends: Floats
+    """Ends (12, 5) of the capsules `ROUND`: segment, position in its frame (3) [m], radius [m]."""
 
 
-def anatomies(bodies: Body) -> Anatomy:
-    """Measure N bodies, or one: arrays (N, ...), each row as `anatomy` of that body alone."""
+def measure_bodies(bodies: Body) -> Anatomy:
+    """Measure N bodies, or one; arrays (N, ...), each row as `measure_body` of that body alone."""
     rests = bodies.rest_position.reshape(-1, N_SEGMENTS, 3)
     ends = bodies.capsule_ends.reshape(len(rests), -1, 2, 3)
     radii = bodies.capsule_radius_m.reshape(len(rests), -1)
     each = [
-        anatomy(replace(bodies, rest_position=rest, capsule_ends=end, capsule_radius_m=radius))
+        measure_body(replace(bodies, rest_position=rest, capsule_ends=end, capsule_radius_m=radius))
         for rest, end, radius in zip(rests, ends, radii, strict=True)
     ]
     return Anatomy(*(np.stack([getattr(a, f.name) for a in each]) for f in fields(Anatomy)))
 
 
-def anatomy(body: Body) -> Anatomy:
-    """Measure a body; the right side's lengths are taken to equal the left side's."""
+def measure_body(body: Body) -> Anatomy:
+    """Measure one body; the lengths of the right side are taken to equal those of the left side."""
     rest = np.asarray(body.rest_position, float)
     offset = rest - rest[np.maximum(PARENT, 0)]
     offset[0] = rest[0]
@@ -67,16 +77,18 @@ def anatomy(body: Body) -> Anatomy:
         # Elbows point backwards, knees forwards: the pole each hinge is made with.
         for bone, pole in ((UPPER_ARM, -1.0), (FOREARM, -1.0), (THIGH, 1.0), (SHANK, 1.0)):
             along = rest[first + bone + 1] - rest[first + bone]
-            frame[first + bone] = _rest_frame(along, np.array([pole, 0.0, 0.0]))
+            frame[first + bone] = _make_rest_frame(along, np.array([pole, 0.0, 0.0]))
         outward = -1.0 if first == LEFT else 1.0
         straight = frame[first + FOREARM].copy()
         frame[first + FOREARM] = about_axis("x", outward * FOREARM_TWIST_RAD) @ straight
         frame[first + HAND] = about_axis("x", outward * HAND_TWIST_RAD) @ straight
-    return Anatomy(np.ascontiguousarray(offset), frame, _sizes(rest), _round(body, rest))
+    return Anatomy(
+        np.ascontiguousarray(offset), frame, _measure_lengths(rest), _list_trunk_ends(body, rest)
+    )
 
 
-def _round(body: Body, rest: Floats) -> Floats:
-    """`Anatomy.round`."""
+def _list_trunk_ends(body: Body, rest: Floats) -> Floats:
+    """Return `Anatomy.trunk_ends` of a body with rest positions (22, 3)."""
     rows = []
     for name in ROUND:
         k = body.capsule_names.index(name)
@@ -87,16 +99,16 @@ def _round(body: Body, rest: Floats) -> Floats:
     return np.array(rows)
 
 
-def _rest_frame(along: Floats, pole: Floats) -> Floats:
-    """Rows bone, hinge x bone, hinge of a bone whose middle joint would bulge to `pole`."""
+def _make_rest_frame(along: Floats, pole: Floats) -> Floats:
+    """Return rows bone, hinge x bone and hinge of a bone with a joint bulging to `pole`."""
     along = along / np.linalg.norm(along)
     hinge = np.cross(pole, along)
     hinge /= np.linalg.norm(hinge)
     return np.stack([along, np.cross(hinge, along), hinge])
 
 
-def _sizes(rest: Floats) -> Floats:
-    """The lengths of `Anatomy.size`."""
+def _measure_lengths(rest: Floats) -> Floats:
+    """Return `Anatomy.lengths` of rest positions (22, 3)."""
     names = ("clavicle", "arm", "elbow", "wrist", "hip", "knee", "ankle", "ball")
     at = {name: rest[LEFT + index] for index, name in enumerate(names)}
     upper, fore, thigh, shank = (

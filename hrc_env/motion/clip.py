@@ -12,33 +12,39 @@ from hrc_env.core.results import write_whole
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import ANKLE_Z, ARM, BALL_X, BALL_Z, HEEL_X, LEG, N_SIZES, STAND_Z
-from hrc_env.motion.curves import about
+from hrc_env.motion.curves import pivot_foot
 
 VERSION = 1
-"""Of the file; raised when its columns or fields change."""
+"""Version of the file, raised when its columns or fields change."""
 RECORDED = np.array([*range(c.N_BLENDED), *range(c.ANKLE, c.ANKLE + 12)])
-"""(32,) columns of the control vector that a recording fills: all that is blended, both feet."""
-SLOWEST_HZ, FASTEST_HZ, FARTHEST_M, FASTEST_M_S = 5.0, 1000.0, 200.0, 15.0
-"""Frame rates between which a recording is believed, and how far and fast its root; judgement."""
+"""Columns (32,) of the control vector that a recording fills: the blended ones, and both feet."""
+SLOWEST_HZ = 5.0
+"""Least plausible frame rate [Hz]; judgement."""
+FASTEST_HZ = 1000.0
+"""Greatest plausible frame rate [Hz]; judgement."""
+FARTHEST_M = 200.0
+"""Greatest plausible distance of the root from the origin [m]; judgement."""
+FASTEST_M_S = 15.0
+"""Greatest plausible speed of the root [m/s]; judgement."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clip:
-    """Motion of the worker whose measures are `size`, beginning at the origin, towards +x."""
+    """Motion of a worker with the lengths `size`, which begins at the origin, towards +x."""
 
     controls: Floats
-    """(T, N_CONTROLS) of `controls`; zero where a recording says nothing (see RECORDED)."""
+    """Control vectors (T, N_CONTROLS), see `controls`; columns outside of `RECORDED` are zero."""
     fps: float
-    """Frames a second."""
+    """Frame rate [Hz]."""
     contacts: Bools
-    """(T, 2) whether the left and the right foot stand."""
+    """Whether the left and the right foot stand (T, 2)."""
     size: Floats
-    """(N_SIZES,) lengths of the worker that it was made for [m], see `Anatomy.size`."""
+    """Lengths (N_SIZES,) of the worker that it was made for [m], see `Anatomy.lengths`."""
     source: str
     """Name of the recording."""
 
     def __post_init__(self) -> None:
-        """Refuse shapes, numbers or speeds that no recording has."""
+        """Refuse shapes, numbers and speeds that no recording of a person has."""
         q, source = self.controls, self.source
         check_rate(self.fps, source)
         if q.ndim != 2 or len(q) < 2 or q.shape[1] != c.N_CONTROLS:
@@ -65,8 +71,8 @@ class Clip:
         return hash((self.source, self.fps, len(self.controls)))
 
 
-def placed_at_origin(controls: Floats) -> Floats:
-    """Control vectors moved and turned so that the first root is at the origin, towards +x."""
+def move_to_origin(controls: Floats) -> Floats:
+    """Return control vectors that begin with the root at the origin, towards +x."""
     out = controls.copy()
     x, y, yaw = controls[0, [c.ROOT_X, c.ROOT_Y, c.HEADING]]
     cos, sin = np.cos(yaw), np.sin(yaw)
@@ -78,8 +84,11 @@ def placed_at_origin(controls: Floats) -> Floats:
     return out
 
 
-def fitted_to(clip: Clip, size: Floats) -> Floats:
-    """(T, N_CONTROLS) for a worker of other measures: ways scale with legs, reach with arms."""
+def scale_clip(clip: Clip, size: Floats) -> Floats:
+    """Return control vectors (T, N_CONTROLS) for a worker with other lengths (N_SIZES,) [m].
+
+    Paths scale with the legs, the reach of the hands with the arms.
+    """
     out, legs = clip.controls.copy(), size[LEG] / clip.size[LEG]
     out[:, [c.ROOT_X, c.ROOT_Y]] *= legs
     out[:, c.PELVIS_Z] = size[STAND_Z] + legs * (out[:, c.PELVIS_Z] - clip.size[STAND_Z])
@@ -91,7 +100,7 @@ def fitted_to(clip: Clip, size: Floats) -> Floats:
 
 
 def save_clip(clip: Clip, path: Path) -> None:
-    """Write a clip to an .npz file, whole or not at all."""
+    """Write a clip to an .npz file, completely or not at all."""
     arrays = {item.name: getattr(clip, item.name) for item in fields(clip)}
     arrays["controls"] = clip.controls[:, RECORDED]
     file = io.BytesIO()
@@ -115,9 +124,9 @@ def load_clip(path: Path) -> Clip:
     except (zipfile.BadZipFile, ValueError, EOFError, OSError, KeyError) as error:
         raise ConfigError(f"{path} is damaged or no clip: {error}.") from None
     if version != VERSION or set(arrays) != names:
-        what = f"version {version}" if version else f"arrays {', '.join(sorted(found)) or 'none'}"
+        got = f"version {version}" if version else f"arrays {', '.join(sorted(found)) or 'none'}"
         raise ConfigError(
-            f"{path}: expected a clip of version {VERSION}, got {what}. Make it (anew) with: "
+            f"{path}: expected a clip of version {VERSION}, got {got}. Make it (anew) with: "
             f"python -m hrc_env import-motion RECORDING --out {path}"
         )
     recorded = np.asarray(arrays["controls"], float)
@@ -130,7 +139,7 @@ def load_clip(path: Path) -> Clip:
 
 
 def check_rate(fps: float, source: str) -> None:
-    """Refuse a frame rate that cannot be."""
+    """Refuse a frame rate [Hz] outside of the plausible range."""
     if not SLOWEST_HZ <= fps <= FASTEST_HZ:
         raise ConfigError(
             f"{source}: a frame rate between {SLOWEST_HZ:g} and {FASTEST_HZ:g} frames a second is "
@@ -138,14 +147,25 @@ def check_rate(fps: float, source: str) -> None:
         )
 
 
-def footprints(feet: Floats, size: Floats) -> Floats:
-    """(T, 4) flat feet's ankles and headings, from (T, 5 or more): ankle, heading, pitch."""
-    flat = feet[:, :3] - rolled(feet[:, 3], feet[:, 4], size)
+def find_footprints(feet: Floats, size: Floats) -> Floats:
+    """Return ankle (3) and heading (T, 4) that feet would have if they were flat.
+
+    Args:
+        feet: ankle (3) [m], heading and pitch [rad] of a foot (T, 5 or more).
+        size: lengths (N_SIZES,) of the body [m].
+    """
+    flat = feet[:, :3] - shift_by_roll(feet[:, 3], feet[:, 4], size)
     return np.concatenate([flat, feet[:, 3:4]], axis=1)
 
 
-def rolled(yaw: Floats, pitch: Floats, size: Floats) -> Floats:
-    """(T, 3) how far a foot's pitch takes its ankle: heel up round the ball, toes up."""
+def shift_by_roll(yaw: Floats, pitch: Floats, size: Floats) -> Floats:
+    """Return the displacement (T, 3) of an ankle by the pitch of its foot [m].
+
+    Args:
+        yaw: heading of the foot (T,) [rad].
+        pitch: pitch about the ball if positive, else about the heel (T,) [rad].
+        size: lengths (N_SIZES,) of the body [m].
+    """
     ball, heel = (size[BALL_X], size[BALL_Z]), (size[HEEL_X], -size[ANKLE_Z])
-    ahead, above = np.array([about(p, *(ball if p > 0.0 else heel)) for p in pitch.tolist()]).T
+    ahead, above = np.array([pivot_foot(p, *(ball if p > 0.0 else heel)) for p in pitch.tolist()]).T
     return np.stack([np.cos(yaw) * ahead, np.sin(yaw) * ahead, above], -1)

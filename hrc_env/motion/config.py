@@ -1,64 +1,67 @@
-"""Settings of the workers' behaviour, and how people are with the robot: presets by name."""
+"""Settings of the workers' behaviour, and presets for how people are with the robot."""
 
-from collections import namedtuple
 from dataclasses import asdict, dataclass, field, fields
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.motion.clip import Clip
+from hrc_env.motion.points import Point
 from hrc_env.motion.schedule import JOBS, Job, check_jobs
 
 Range = tuple[float, float]
+"""A range (low, high)."""
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class PeopleConfig:
-    """What workers notice of the robot, and how brisk they are; judgement without a source."""
+    """How attentive, brisk and careful workers are; defaults without a source are judgement."""
 
     notice_m: float = 0.40
-    """Workers notice a part of the arm that comes so near to trunk, head or a hand [m]."""
+    """Distance from trunk, head or a hand within which workers notice a part of the arm [m]."""
     fast_m_s: float = 0.6
-    """From up to twice as far they notice one that comes at them faster than this [m/s]."""
+    """Approach speed of the arm above which `notice_m` counts twice [m/s].
+    """
     delay_s: Range = (0.4, 0.8)
-    """Time from then until they react [s]: longer than to a signal one waits for; judgement."""
+    """Time from noticing to reacting [s]; longer than the reaction to an expected signal."""
     pause_probability: float = 0.4
-    """Chance that they pause: hands stay where they are, walkers come to a stand."""
+    """Probability that a worker pauses: hands stay where they are, walkers come to a stand."""
     step_back_probability: float = 0.15
-    """Chance that they take their hands away and step back."""
+    """Probability that a worker withdraws the hands and steps back."""
     pause_s: Range = (0.6, 1.6)
-    """How long a pause lasts [s]."""
+    """Duration of a pause [s]."""
     calm_s: float = 4.0
-    """After a reaction nothing startles them for so long [s]."""
+    """Time after a reaction in which nothing startles the worker [s]."""
     detour_m: float = 0.55
-    """Paths keep so far from where tool and elbow are when a walk begins [m]; 0: they do not."""
+    """Distance of paths from the robot's tool and elbow [m]; 0 to ignore them."""
     speed_m_s: Range = (0.8, 1.4)
-    """Walking speed of a worker, one for an episode [m/s]; adults indoors."""
+    """Walking speed of a worker, drawn once an episode [m/s]; adults indoors."""
     tempo: float = 1.0
-    """Pauses between two things to do, and stays at one place, take this much of their time."""
+    """Factor of the pauses between two tasks and of the stays at one place."""
     sudden_probability: float = 0.05
-    """Chance that a reach is sudden; ISO 13855's approach speeds are for such."""
+    """Probability that a reach is sudden; the approach speeds of ISO 13855 are for such reaches."""
     lunge_probability: float = 0.01
-    """Chance that a reach to the robot is a lunge: a step, and the hand there in half a second."""
+    """Probability that a reach to the robot is a lunge with a step, in half a second."""
     stumble_probability: float = 0.01
-    """Chance that a walker's foot catches on something."""
+    """Probability that a walker's foot catches on something."""
     fall_probability: float = 0.0
-    """Chance that a walker with empty hands stumbles and falls, where there is room ahead."""
+    """Probability that a walker with empty hands stumbles and falls, where there is room ahead."""
     lie_s: Range = (1.5, 5.0)
-    """How long they lie before they get up [s]; judgement."""
+    """Time that a fallen worker lies on the floor before getting up [s]."""
     stay_down_probability: float = 0.15
-    """Chance that who has fallen lies for 15 to 40 s."""
+    """Probability that a fallen worker lies on the floor for 15 to 40 s instead."""
     run_probability: float = 0.0
-    """Chance that someone with empty hands runs to a place, where the way is long enough."""
+    """Probability that a worker with empty hands runs to a place, where the path is long enough."""
     run_m_s: Range = (2.5, 3.5)
-    """Speed of those who run [m/s]; a way of 2.4 m allows 2.5, one of 4.4 m allows 3.5."""
+    """Speed of a run [m/s]; a path of 2.4 m allows 2.5 m/s, one of 4.4 m allows 3.5 m/s."""
     careless_probability: float = 0.01
-    """Chance that a worker takes a few steps back between two things to do, without looking."""
+    """Probability that a worker takes a few steps back between two tasks without looking."""
 
     def __post_init__(self) -> None:
+        """Refuse ranges and probabilities that are out of bounds."""
         _check_ranges(self)
         for name, value in asdict(self).items():
             if np.min(value) < 0.0:
@@ -73,9 +76,9 @@ class PeopleConfig:
             raise ConfigError(f"tempo must be positive, got {self.tempo}.")
 
 
-def _check_ranges(config: Any) -> None:
-    """Refuse ranges that are not (low, high), and probabilities outside [0, 1]."""
-    for name in (each.name for each in fields(config)):
+def _check_ranges(config: "PeopleConfig | MotionConfig") -> None:
+    """Refuse ranges that are not (low, high), and probabilities outside of [0, 1]."""
+    for name in (item.name for item in fields(config)):
         value = getattr(config, name)
         if name.endswith(("_m", "_s")) and isinstance(value, tuple) and value[0] > value[1]:
             raise ConfigError(f"{name} must be (low, high), got {value}.")
@@ -86,43 +89,66 @@ def _check_ranges(config: Any) -> None:
 PEOPLE: dict[str, PeopleConfig] = {
     "attentive": PeopleConfig(),
     "hurried": PeopleConfig(
-        notice_m=0.25, fast_m_s=1.0, pause_probability=0.2, step_back_probability=0.05,
-        pause_s=(0.3, 0.8), detour_m=0.3, speed_m_s=(1.2, 1.7), tempo=0.55,
-        sudden_probability=0.12, lunge_probability=0.03, stumble_probability=0.03,
+        notice_m=0.25,
+        fast_m_s=1.0,
+        pause_probability=0.2,
+        step_back_probability=0.05,
+        pause_s=(0.3, 0.8),
+        detour_m=0.3,
+        speed_m_s=(1.2, 1.7),
+        tempo=0.55,
+        sudden_probability=0.12,
+        lunge_probability=0.03,
+        stumble_probability=0.03,
         careless_probability=0.02,
     ),
     "unaware": PeopleConfig(
-        notice_m=0.0, fast_m_s=99.0, pause_probability=0.0, step_back_probability=0.0,
-        detour_m=0.0, sudden_probability=0.08, lunge_probability=0.02,
-        stumble_probability=0.01, careless_probability=0.04,
+        notice_m=0.0,
+        fast_m_s=99.0,
+        pause_probability=0.0,
+        step_back_probability=0.0,
+        detour_m=0.0,
+        sudden_probability=0.08,
+        lunge_probability=0.02,
+        stumble_probability=0.01,
+        careless_probability=0.04,
     ),
     "headlong": PeopleConfig(
-        speed_m_s=(1.1, 1.6), tempo=0.4, stumble_probability=0.1, fall_probability=0.3,
+        speed_m_s=(1.1, 1.6),
+        tempo=0.4,
+        stumble_probability=0.1,
+        fall_probability=0.3,
         run_probability=0.6,
     ),
-}  # fmt: skip
-"""By name: who looks out for the robot, who has no time to, who does not know that it moves; who
-does look out, but runs and falls."""
+}
+"""Kinds of people by name.
+
+"attentive" workers look out for the robot, "hurried" ones have little time to, "unaware" ones do
+not know that it moves; "headlong" workers look out for it, but run and fall.
+"""
 
 
 @dataclass(frozen=True)
 class MotionConfig:
-    """What a worker does and how fast; ranges are drawn from uniformly. "Judgement": no source."""
+    """Activities of workers and their speed; ranges are drawn from uniformly.
+
+    Defaults marked "judgement" have no source.
+    """
 
     near_probability: float = 0.85
-    """Chance that the next errand is at the robot; judgement, so that the two often meet."""
+    """Probability that the next errand is at the robot; judgement, so that the two often meet."""
     near_radius_m: Range = (1.0, 1.35)
-    """Distance from the base axis when working with the robot [m]: its targets within reach."""
+    """Distance from the base axis when working with the robot [m]: its targets are within reach."""
     near_azimuth_rad: float = 0.785
-    """Greatest angle from the robot's front there [rad]; judgement."""
+    """Greatest angle from the robot's front when working with the robot [rad]; judgement."""
     dwell_s: Range = (6.0, 16.0)
     """Time at one place before another errand [s]; judgement."""
     spacing_m: float = 1.1
-    """Workers choose no place this near to another worker's [m]; judgement."""
+    """Least distance of a chosen place from another worker's place [m]; judgement."""
     near_pause_s: Range = (0.5, 2.0)
-    """Length of a pause at the robot [s]; judgement."""
+    """Duration of a pause at the robot [s]; judgement."""
     away_pause_s: Range = (1.0, 4.0)
-    """Length of a pause elsewhere [s]; judgement."""
+    """Duration of a pause elsewhere [s]; judgement."""
 
     target_radius_m: Range = (0.45, 0.9)
     """Distance of a hand's target from the base axis [m]: inside the robot's workspace."""
@@ -135,7 +161,7 @@ class MotionConfig:
     sudden_speed_m_s: float = 2.5
     """Peak speed of a sudden reach [m/s]; judgement, near the fastest arm movements at work."""
     two_hands_probability: float = 0.3
-    """Chance that both hands reach; judgement."""
+    """Probability that both hands reach; judgement."""
     hold_s: Range = (0.2, 1.4)
     """Time that the hands work at the target [s]; judgement."""
     lift_s: Range = (1.0, 1.4)
@@ -144,17 +170,20 @@ class MotionConfig:
     """Height of the grips on a load on the floor or a low box [m]; judgement."""
 
     people: PeopleConfig = field(default_factory=PeopleConfig)
-    """How the workers are with the robot and their work; the environment's `people` by name."""
+    """How attentive, brisk and careful the workers are; the environment takes `people` by name."""
     jobs: tuple[Job, ...] = JOBS
-    """What they do, and what follows what; the name "framing" (this) or "low_work" stands for a
-    choice of jobs: with the second some are at the robot's foot, kneeling, on the haunches, bent
-    (docs/people_and_scenes.md)."""
+    """Jobs of the workers and their order; a name stands for a choice of jobs.
+
+    "framing" is this default; with "low_work" some jobs are at the robot's foot: kneeling, on the
+    haunches, bent (docs/people_and_scenes.md).
+    """
     motions: tuple[str | Clip, ...] = ()
-    """Clips of recorded motion that workers play, too (docs/people_and_scenes.md)."""
+    """Clips that workers play, or paths of their files (docs/people_and_scenes.md)."""
     motions_probability: float = 0.5
-    """Chance that a worker with empty hands plays one next, where there is room for it."""
+    """Probability that a worker with empty hands plays a clip next, where there is room for it."""
 
     def __post_init__(self) -> None:
+        """Refuse ranges, probabilities, jobs and clips that are out of bounds."""
         _check_ranges(self)
         if self.spacing_m < 0.8:
             raise ConfigError(
@@ -166,15 +195,50 @@ class MotionConfig:
                 raise ConfigError(f"motions must hold paths or clips, got {motion!r}.")
 
 
-Numbers = namedtuple("Numbers", (
-    "target_radius_m", "target_z_m", "target_spread_rad", "hand_speed_m_s", "sudden_speed_m_s",
-    "two_hands_probability", "hold_s", "lift_s", "load_z_m", "robot_xy_m", "sudden_probability",
-))  # fmt: skip
-"""The settings that compiled code reads, which takes named tuples."""
+class HandParams(NamedTuple):
+    """Settings of reaches and lifts for kernels; ranges are (low, high)."""
+
+    target_radius_m: Range
+    """Distance of a hand's target from the base axis [m]."""
+    target_z_m: Range
+    """Height of a hand's target [m]."""
+    target_spread_rad: float
+    """Greatest angle between target and worker seen from the base axis [rad]."""
+    hand_speed_m_s: Range
+    """Peak speed of a reaching hand [m/s]."""
+    sudden_speed_m_s: float
+    """Peak speed of a sudden reach [m/s]."""
+    two_hands_probability: float
+    """Probability that both hands reach."""
+    hold_s: Range
+    """Time that the hands work at the target [s]."""
+    lift_s: Range
+    """Time to bend down to a load, and again to raise it [s]."""
+    load_z_m: Range
+    """Height of the grips on a load on the floor or a low box [m]."""
+    robot_xy_m: Point
+    """The robot's axis on the floor."""
+    sudden_probability: float
+    """Probability that a reach is sudden."""
 
 
-def numbers(config: MotionConfig, robot_xy_m: Range) -> Numbers:
-    """The settings as compiled code takes them, of floats."""
-    known = {**vars(config), **asdict(config.people), "robot_xy_m": robot_xy_m}
-    values = [known[name] for name in Numbers._fields]
-    return Numbers(*(tuple(map(float, v)) if isinstance(v, tuple) else float(v) for v in values))
+def make_hand_params(config: MotionConfig, robot_xy_m: Point) -> HandParams:
+    """Return the settings of reaches and lifts for kernels."""
+    return HandParams(
+        target_radius_m=_to_floats(config.target_radius_m),
+        target_z_m=_to_floats(config.target_z_m),
+        target_spread_rad=float(config.target_spread_rad),
+        hand_speed_m_s=_to_floats(config.hand_speed_m_s),
+        sudden_speed_m_s=float(config.sudden_speed_m_s),
+        two_hands_probability=float(config.two_hands_probability),
+        hold_s=_to_floats(config.hold_s),
+        lift_s=_to_floats(config.lift_s),
+        load_z_m=_to_floats(config.load_z_m),
+        robot_xy_m=Point(float(robot_xy_m[0]), float(robot_xy_m[1])),
+        sudden_probability=float(config.people.sudden_probability),
+    )
+
+
+def _to_floats(limits: Range) -> Range:
+    """Return (low, high) as floats, which kernels are compiled for."""
+    return float(limits[0]), float(limits[1])

@@ -1,21 +1,28 @@
-"""Smooth curves and places on the floor that every activity is made of; never `fastmath`."""
+"""Smooth curves and points on the floor, of which every activity is made.
+
+These kernels are never compiled with `fastmath`.
+"""
 
 import math
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
+from hrc_env.motion.points import Point, SagittalShift
 
 
 @kernel
 def min_jerk(u: float) -> float:
-    """0 to 1 over u, at rest at both ends, else held; peak rate 1.875 (Flash & Hogan 1985)."""
+    """Return a rise from 0 to 1 over u in [0, 1], at rest at both ends.
+
+    The peak rate is 1.875 (Flash & Hogan 1985).
+    """
     u = min(max(u, 0.0), 1.0)
     return u * u * u * (10.0 - 15.0 * u + 6.0 * u * u)
 
 
 @kernel
 def ramp(u: float) -> float:
-    """Integral of a smoothstep: distance while speed grows smoothly from 0 to 1, then stays."""
+    """Return the distance travelled at a speed that rises from 0 to 1 over u in [0, 1]."""
     if u <= 0.0:
         return 0.0
     if u >= 1.0:
@@ -25,7 +32,12 @@ def ramp(u: float) -> float:
 
 @kernel
 def cruise(u: float, share: float) -> float:
-    """0 to 1 over u in [0, 1] at constant speed but for smooth ramps of `share` at each end."""
+    """Return a rise from 0 to 1 over u in [0, 1] at constant speed.
+
+    Args:
+        u: time as a share of the duration.
+        share: share of the duration of the smooth ramp at each end.
+    """
     u, top = min(max(u, 0.0), 1.0), share / (1.0 - share)
     if u < 0.5:
         return top * ramp(u / share)
@@ -34,7 +46,7 @@ def cruise(u: float, share: float) -> float:
 
 @kernel
 def hump(u: float) -> float:
-    """0 at the ends of [0, 1], 1 in the middle, flat to second order at the ends; 0 outside."""
+    """Return 0 outside of [0, 1] and 1 in its middle, flat to second order at the ends."""
     u = min(max(u, 0.0), 1.0)
     v = 4.0 * u * (1.0 - u)
     return v * v * v
@@ -42,14 +54,20 @@ def hump(u: float) -> float:
 
 @kernel
 def soft_min(a: float, b: float, width: float) -> float:
-    """The smaller one, rounded off (downwards) where the two differ by less than `width`."""
+    """Return the smaller number, rounded off downwards where both are close.
+
+    Args:
+        a: one number.
+        b: the other number.
+        width: difference below which the result is rounded off.
+    """
     closeness = max(1.0 - abs(a - b) / width, 0.0)
     return min(a, b) - width * closeness * closeness * closeness / 6.0
 
 
 @kernel
 def saturate(d: float, knee: float, limit: float) -> float:
-    """d up to `knee`, then bending smoothly so that it never passes `limit`."""
+    """Return `d` up to `knee`, then bend smoothly so that the result never passes `limit`."""
     if d <= knee:
         return d
     span = limit - knee
@@ -58,7 +76,14 @@ def saturate(d: float, knee: float, limit: float) -> float:
 
 @kernel
 def decay(u: float, duration: float, value: float, rate: float) -> float:
-    """Quintic from (value, rate, 0) at u = 0 to rest at zero at u = 1 (inertialisation)."""
+    """Return a quintic from (value, rate, 0) at u = 0 to rest at zero at u = 1 (inertialization).
+
+    Args:
+        u: time as a share of the duration.
+        duration: duration [s].
+        value: value at the beginning.
+        rate: rate at the beginning [1/s].
+    """
     if u >= 1.0:
         return 0.0
     v = rate * duration
@@ -70,25 +95,48 @@ def decay(u: float, duration: float, value: float, rate: float) -> float:
 
 @kernel
 def wrap(angle: float) -> float:
-    """The same direction in (-pi, pi]."""
+    """Return the same direction in (-pi, pi]."""
     return math.atan2(math.sin(angle), math.cos(angle))
 
 
 @kernel
-def placed(x: float, y: float, yaw: float, ahead: float, left: float) -> tuple[float, float]:
-    """The point so far ahead and to the left of who is at (x, y) and faces yaw."""
+def move_point(x: float, y: float, yaw: float, ahead: float, left: float) -> Point:
+    """Return a point displaced along and across a heading.
+
+    Args:
+        x: world x of the point [m].
+        y: world y of the point [m].
+        yaw: heading [rad].
+        ahead: displacement along the heading [m].
+        left: displacement to the left of the heading [m].
+    """
     cos, sin = math.cos(yaw), math.sin(yaw)
-    return x + cos * ahead - sin * left, y + sin * ahead + cos * left
+    return Point(x + cos * ahead - sin * left, y + sin * ahead + cos * left)
 
 
 @kernel
 def shift(q: Floats, at: int, yaw: float, ahead: float, left: float) -> None:
-    """Move the point (q[at], q[at + 1]) ahead and to the left of who faces yaw."""
-    q[at], q[at + 1] = placed(q[at], q[at + 1], yaw, ahead, left)
+    """Displace the point (q[at], q[at + 1]) along and across a heading, in place.
+
+    Args:
+        q: array that holds the point [m].
+        at: index of its x.
+        yaw: heading [rad].
+        ahead: displacement along the heading [m].
+        left: displacement to the left of the heading [m].
+    """
+    q[at], q[at + 1] = move_point(q[at], q[at + 1], yaw, ahead, left)
 
 
 @kernel
-def about(pitch: float, pivot_x: float, pivot_z: float) -> tuple[float, float]:
-    """How far forward and up the ankle goes when the foot pitches about a point of its own."""
+def pivot_foot(pitch: float, pivot_x: float, pivot_z: float) -> SagittalShift:
+    """Return the displacement of the ankle when the foot pitches about a pivot.
+
+    Args:
+        pitch: pitch of the foot, the heel up [rad].
+        pivot_x: distance of the pivot ahead of the ankle [m].
+        pivot_z: height of the pivot relative to the ankle [m].
+    """
     cos, sin = math.cos(pitch), math.sin(pitch)
-    return pivot_x * (1.0 - cos) - pivot_z * sin, pivot_z * (1.0 - cos) + pivot_x * sin
+    ahead = pivot_x * (1.0 - cos) - pivot_z * sin
+    return SagittalShift(ahead, pivot_z * (1.0 - cos) + pivot_x * sin)

@@ -1,4 +1,4 @@
-"""What decisions of workers are made from: constants, the state, draws; and where they may go."""
+"""Inputs of the workers' decisions: constants, state and draws; and where workers may go."""
 
 import math
 from collections.abc import Iterable, Iterator
@@ -6,85 +6,85 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hrc_env.core.typing import Bools, Floats, Records
+from hrc_env.core.declared import Records1, Records2
+from hrc_env.core.typing import Bools, Floats
 from hrc_env.motion import lying
 from hrc_env.motion import state as st
-from hrc_env.motion.activities.falling import fallen_root
+from hrc_env.motion.activities.falling import predict_fallen_root
 from hrc_env.motion.activities.pieces import Clips
 from hrc_env.motion.anatomy import Anatomy
-from hrc_env.motion.config import MotionConfig, Numbers
-from hrc_env.motion.floorplan import CELL_M, Floorplan, beside_robot, slack_at
+from hrc_env.motion.config import HandParams, MotionConfig
+from hrc_env.motion.floorplan import CELL_M, Floorplan, locate_beside_robot, read_slack
+from hrc_env.motion.lying import Load
+from hrc_env.motion.points import Place
 from hrc_env.motion.schedule import HERE, Job, Schedule
-from hrc_env.motion.state import (
-    N_START,
-    NOWHERE,
-    ON_STAGE,
-    UNDER_WAY,
-    WAITING,
-    Place,
-    Worker,
-    Workers,
-)
-from hrc_env.motion.traffic import AHEAD_M, APART_M, FALL_M, HANDS_M
+from hrc_env.motion.state import N_START, NOWHERE, ON_STAGE, UNDER_WAY, WAITING, Worker
+from hrc_env.motion.traffic import AHEAD_M, APART_M, FALL_APART_M, HANDS_M
 from hrc_env.worker.props import PROP_NAMES
 from hrc_env.world import WORKPLACE_KINDS
 
 NEXT, BOW, LASTS, DELAY, REACTION, REACTION_S, EVENT, DWELL = range(N_START, N_START + 8)
-"""Which draw decides what; the first N_START are the activity's own."""
+"""Draw of each decision; the first `N_START` are those of the activity."""
 PLACES, N_DRAWS = N_START + 8, N_START + 8 + 3 * 5
-"""First of the draws for places, three for each of five; uniform numbers of one decision."""
+"""First draw for places, three for each of five, and the number of draws of one decision."""
 N_STAGES = 4
-"""So many of the places from which a clip has room are tried."""
+"""Number of places that are tried from which a clip has room."""
 ANY_ACTIVITY = -1
-"""In the place of an activity: whichever is drawn."""
+"""Stands for whichever activity is drawn."""
 ROBOT_WORK_M = 1.1
 """Height of the work at the robot [m]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BehaviourParams:
-    """Constants."""
+    """Constants of the workers' behaviour."""
 
     config: MotionConfig
-    numbers: Numbers
+    """Settings of the workers' motion."""
+    hand_params: HandParams
+    """Those of the settings that kernels read."""
     plan: Floorplan
+    """The floor."""
     schedule: Schedule
+    """The jobs that there are places for."""
     clips: Clips
+    """Pieces of recorded motion."""
     anatomy: Anatomy
-    """(N, ...) of the bodies that there are."""
-    loads: Records
-    """(L,) of `lying.LOAD`: what lies about at first."""
+    """Measures (N, ...) of the pool of bodies."""
+    loads: Records1[Load]
+    """Loads (L,) that lie about when an episode begins."""
     fewest: int
-    """Workers who are in an episode at least."""
+    """Least number of workers in an episode."""
     robot_girth_m: float = 0.0
-    """How far a robot that drives reaches round the points of it that people watch [m]."""
+    """Reach of a driving robot around the points of it that people watch [m]; 0 for an arm."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cast:
-    """The people of one episode, and their first activities, as far as these are not drawn."""
+    """The workers of one episode and their first activities, as far as these are not drawn."""
 
     n_workers: int | None = None
+    """Number of workers; None to draw it."""
     bodies: tuple[int, ...] | None = None
-    """Row of the bodies that there are, for each of the first workers."""
+    """Row of the body of each of the first workers; None to draw them."""
     activities: tuple[int, ...] | None = None
-    """The first activity of each of the first workers: indices of `state.ACTIVITY_NAMES`, or
-    `ANY_ACTIVITY`."""
+    """First activity of the first workers: indices into `ACTIVITY_NAMES` or `ANY_ACTIVITY`."""
     mind: BehaviourParams | None = None
-    """How they are with the robot; None: as in all episodes."""
+    """Behaviour in this episode; None for that of all episodes."""
 
 
 @dataclass(frozen=True, slots=True)
 class MotionState:
-    """All that changes is in the arrays: copying them copies the state."""
+    """State of all workers; copying its arrays copies the state."""
 
-    workers: Workers
-    """(B, W) of WORKER."""
-    loads: Records
-    """(B, L) of `lying.LOAD`."""
+    workers: Records2[Worker]
+    """Record of each worker (B, W)."""
+    loads: Records2[Load]
+    """Loads (B, L) that lie about."""
     mind: BehaviourParams
+    """Constants of the behaviour."""
     minds: dict[int, BehaviourParams] = field(default_factory=dict)
-    """Those of environments whose episode has one of its own."""
+    """Constants of the environments that have their own in this episode."""
 
     def mind_of(self, b: int) -> BehaviourParams:
         """Return the constants of environment b's episode."""
@@ -93,149 +93,168 @@ class MotionState:
 
 @dataclass(slots=True)
 class Decision:
-    """A worker who decides."""
+    """Inputs of the decision of one worker."""
 
     mind: BehaviourParams
-    workers: Workers
-    """(W,) of their environment."""
+    """Constants of the behaviour."""
+    workers: Records1[Worker]
+    """Records (W,) of the workers of the environment."""
     w: int
+    """Row of the deciding worker."""
     draws: Floats
-    """(N_DRAWS,)."""
-    now: float
-    """Clock [s]."""
-    loads: Records
-    """(L,) of their environment: what lies about."""
-    load: int = 0
-    """What they hold when they decide."""
-    wanted: int | None = None
-    """The activity that they have to begin the episode with; None: any."""
+    """Uniform draws (N_DRAWS,) in [0, 1)."""
+    clock_s: float
+    """Time since the episode began [s]."""
+    loads: Records1[Load]
+    """Loads (L,) that lie about in the environment."""
+    held_prop: int = 0
+    """Prop that the worker holds when deciding, an index into `PROPS`."""
+    first_activity: int | None = None
+    """Activity that the worker has to begin the episode with; None for any."""
 
     @property
-    def me(self) -> Worker:
+    def worker(self) -> Worker:
+        """Record of the deciding worker."""
         return self.workers[self.w]
 
-    def go(self, going: int) -> None:
-        """They are `THERE`, `UNDER_WAY` or `WAITING` now."""
-        self.me["going"] = going
-        if going != WAITING:
-            self.me["since_s"] = 0.0
+    def set_travel(self, travel: int) -> None:
+        """Set the progress of the errand to `THERE`, `UNDER_WAY` or `WAITING`."""
+        self.worker.travel = travel
+        if travel != WAITING:
+            self.worker.waiting_since_s = 0.0
 
     @property
     def kind_here(self) -> str:
-        """Kind of the place where they are and have something to do; else nothing."""
-        at = self.me["at"]
+        """Kind of the place where the worker has something to do; empty if there is none."""
+        at = self.worker.place_kind
         return "" if at in (NOWHERE, ON_STAGE) else WORKPLACE_KINDS[at]
 
     @property
     def job(self) -> Job:
-        """What they do or want to do."""
-        return self.mind.schedule.jobs[self.me["job"]]
+        """Current or intended job."""
+        return self.mind.schedule.jobs[self.worker.job]
 
     @property
-    def loaded(self) -> bool:
-        return bool(self.me["load_prop"] > 0)
+    def is_loaded(self) -> bool:
+        """Whether the worker carries a load."""
+        return bool(self.worker.load_prop > 0)
 
     def draw(self, index: int, limits: tuple[float, float]) -> float:
-        """A draw stretched to (low, high)."""
+        """Return a draw scaled to [low, high)."""
         return limits[0] + self.draws.item(index) * (limits[1] - limits[0])
 
-    def others(self) -> Bools:
-        """(W,) which other workers are there."""
-        there = self.workers["present"].copy()
-        there[self.w] = False
-        return there
+    def find_others(self) -> Bools:
+        """Return which other workers (W,) are present."""
+        others = self.workers["is_present"].copy()
+        others[self.w] = False
+        return others
 
 
-def in_the_way(who: Decision) -> Floats:
-    """(n, 3) x, y, radius of where other workers will stand and work, of the robot's arm, and of
-    what lies about."""
-    people, rows = who.mind.config.people, []
-    ends = [who.workers[name][who.others()].tolist() for name in ("end_x", "end_y", "end_yaw")]
+def list_obstacles(decision: Decision) -> Floats:
+    """Return discs (n, 3) that a path goes around: x, y, radius [m].
+
+    They are where other workers will stand and work, the robot's arm, and loads that lie about.
+    """
+    people, rows = decision.mind.config.people, []
+    others = decision.workers[decision.find_others()]
+    ends = [others[name].tolist() for name in ("end_x", "end_y", "end_yaw")]
     for x, y, yaw in zip(*ends, strict=True):
         rows.append((x, y, APART_M))
         rows.append((x + AHEAD_M * math.cos(yaw), y + AHEAD_M * math.sin(yaw), HANDS_M))
-    for other in who.workers[who.others() & (who.workers["activity"] == st.FALL)]:
-        rows.append((*fallen_root(float(other["time_s"]), other), FALL_M[1]))
-    robot = who.me["robot_world"]
+    for other in others[others["activity"] == st.FALL]:
+        rows.append((*predict_fallen_root(float(other.time_s), other), FALL_APART_M))
+    robot = decision.worker.robot_world
     if people.detour_m > 0.0 and np.isfinite(robot[0, 0]):
-        away_m = people.detour_m + who.mind.robot_girth_m
+        away_m = people.detour_m + decision.mind.robot_girth_m
         rows += [(x, y, away_m) for x, y, _ in robot.tolist()]
-    return np.vstack([np.reshape(rows, (-1, 3)), lying.in_the_way(who.loads)])
+    return np.vstack([np.reshape(rows, (-1, 3)), lying.list_load_discs(decision.loads)])
 
 
-def wished(who: Decision) -> Iterator[Place]:
-    """Places for the job that nobody else has, the one last chosen first."""
-    if who.me["going"] == UNDER_WAY:
-        yield tuple(who.me["spot"].tolist())  # type: ignore[misc]
-    yield from _free_places(who, who.job)
+def list_places(decision: Decision) -> Iterator[Place]:
+    """Yield places for the job that no other worker has, the one last chosen first."""
+    if decision.worker.travel == UNDER_WAY:
+        yield Place(*decision.worker.place.tolist())
+    yield from _list_free_places(decision, decision.job)
 
 
-def free_stages(who: Decision, starts: Floats) -> Iterator[Place]:
-    """The nearest few of places (k, 3) to begin a clip from that no other worker's is near."""
-    away = np.hypot(*(starts[:, :2] - who.me["spot"][:2]).T)
+def list_stages(decision: Decision, starts: Floats) -> Iterator[Place]:
+    """Yield the nearest few of the poses (k, 3) for a clip that no other worker is near."""
+    away = np.hypot(*(starts[:, :2] - decision.worker.place[:2]).T)
     nearest = starts[np.argsort(away, kind="stable")[:N_STAGES]].tolist()
-    return _free(who, ((x, y, yaw, 0.0) for x, y, yaw in nearest))
+    return _keep_free(decision, (Place(x, y, yaw, 0.0) for x, y, yaw in nearest))
 
 
-def _free_places(who: Decision, job: Job) -> Iterator[Place]:
-    """Places for a job that no other worker's is near; of what it takes up, where that lies; for
-    what they push, where nothing is."""
+def _list_free_places(decision: Decision, job: Job) -> Iterator[Place]:
+    """Yield places for a job that no other worker is near.
+
+    For a load that is taken up they are where it lies, for something that is pushed where nothing
+    lies.
+    """
     if job.prop != PROP_NAMES[0] and job.by == "walk" and job.at != HERE:
-        return _free(who, lying.stands(who.loads, PROP_NAMES.index(job.prop), job.at))
-    free = _free(who, _candidates(who, job.at))
-    return (p for p in free if not lying.is_left(who.loads, p)) if job.by == "push" else free
+        kind = PROP_NAMES.index(job.prop)
+        return _keep_free(decision, lying.list_stands(decision.loads, kind, job.at))
+    free = _keep_free(decision, _list_candidates(decision, job.at))
+    if job.by != "push":
+        return free
+    return (place for place in free if not lying.has_load_at(decision.loads, place))
 
 
-def _free(who: Decision, places: Iterable[Place]) -> Iterator[Place]:
-    """Those of some places that no other worker's is near."""
-    apart_m, spots = who.mind.config.spacing_m, who.workers["spot"][who.others(), :2].tolist()
+def _keep_free(decision: Decision, places: Iterable[Place]) -> Iterator[Place]:
+    """Yield those of some places that no other worker is near."""
+    apart_m = decision.mind.config.spacing_m
+    taken = decision.workers["place"][decision.find_others(), :2].tolist()
     for place in places:
-        if all(math.dist(spot, place[:2]) >= apart_m for spot in spots):
+        if all(math.dist(point, place[:2]) >= apart_m for point in taken):
             yield place
 
 
-def _candidates(who: Decision, kind: str) -> Iterator[Place]:
-    """Places of a kind: drawn round the robot, the scene's elsewhere, or where the worker is."""
-    draws, config, plan = who.draws[PLACES:].tolist(), who.mind.config, who.mind.plan
+def _list_candidates(decision: Decision, kind: str) -> Iterator[Place]:
+    """Yield places of a kind: drawn around the robot, the scene's, or where the worker is."""
+    draws, config, plan = decision.draws[PLACES:].tolist(), decision.mind.config, decision.mind.plan
     if kind == HERE:
-        yield tuple(who.me["spot"].tolist())  # type: ignore[misc]
+        yield Place(*decision.worker.place.tolist())
     elif kind == "robot":
         for radius, azimuth, turn in zip(draws[::3], draws[1::3], draws[2::3], strict=True):
             low, high = config.near_radius_m
             r = low + radius * (high - low)
             angle = config.near_azimuth_rad * (2.0 * azimuth - 1.0)
-            x, y = beside_robot(plan.grounds, r, angle)
-            if slack_at(x, y, plan.slack, plan.origin) >= 0.0:
-                yield x, y, angle + math.pi + 0.15 * (2.0 * turn - 1.0), ROBOT_WORK_M
+            x, y = locate_beside_robot(plan.grounds, r, angle)
+            if read_slack(x, y, plan.grid) >= 0.0:
+                yaw = angle + math.pi + 0.15 * (2.0 * turn - 1.0)
+                yield Place(x, y, yaw, ROBOT_WORK_M)
     else:
         places = [place for place in plan.grounds.places if place.kind == kind]
         first = int(draws[0] * len(places))
         for place in (*places[first:], *places[:first]):
-            yield lying.spot_of(place)
+            yield lying.get_place(place)
 
 
-def take_first_place(who: Decision) -> None:
-    """A place to begin at, and the job there; where all are taken, the loneliest that is free."""
-    mind, me, draw = who.mind, who.me, who.draws.item(NEXT)
+def take_first_place(decision: Decision) -> None:
+    """Choose place and job of the beginning; if all are taken, the most remote spot."""
+    mind, worker, draw = decision.mind, decision.worker, decision.draws.item(NEXT)
     begins = [k for k, _ in mind.schedule.begins]
     near = draw < mind.config.near_probability or not begins
-    first = mind.schedule.robot if near else begins[int(who.draws[BOW] * len(begins))]
+    first = mind.schedule.robot if near else begins[int(decision.draws[BOW] * len(begins))]
     jobs: tuple[int, ...] = (first, mind.schedule.robot, *begins)
-    if who.wanted is not None:
-        jobs = _jobs_of(who, who.wanted, near)
+    if decision.first_activity is not None:
+        jobs = _list_jobs(decision, decision.first_activity, near)
     for job in jobs:
         chosen = mind.schedule.jobs[job]
-        for place in _free_places(who, chosen):
-            me["job"], me["at"], me["spot"] = job, WORKPLACE_KINDS.index(chosen.at), place
-            dwell = who.draw(DWELL, mind.config.dwell_s) * mind.config.people.tempo
-            me["until_s"] = max(0.05, dwell * who.draws.item(LASTS))
+        for place in _list_free_places(decision, chosen):
+            worker.job, worker.place_kind = job, WORKPLACE_KINDS.index(chosen.at)
+            worker.place[:] = place
+            dwell = decision.draw(DWELL, mind.config.dwell_s) * mind.config.people.tempo
+            worker.stay_until_s = max(0.05, dwell * decision.draws.item(LASTS))
             return
-    me["job"], me["at"], me["spot"] = mind.schedule.robot, NOWHERE, _loneliest(who)
+    worker.job, worker.place_kind = mind.schedule.robot, NOWHERE
+    worker.place[:] = _find_loneliest(decision)
 
 
-def jobs_by_activity(schedule: Schedule) -> dict[str, list[int]]:
-    """Return the jobs with which workers can be told to begin an episode, by their activity: empty
-    hands do for them, they have a place, and nobody is waited for."""
+def group_jobs(schedule: Schedule) -> dict[str, list[int]]:
+    """Return the jobs with which an episode can begin on request, by activity.
+
+    These jobs need empty hands and a place, and wait for no signal.
+    """
     jobs: dict[str, list[int]] = {}
     for k, job in enumerate(schedule.jobs):
         loaded = job.activity in ("set down", "hand over") or job.by != "walk"
@@ -244,21 +263,26 @@ def jobs_by_activity(schedule: Schedule) -> dict[str, list[int]]:
     return jobs
 
 
-def _jobs_of(who: Decision, activity: int, near: bool) -> tuple[int, ...]:
-    """The jobs of an activity in the order in which they are tried, those at the robot first if
-    `near`."""
-    schedule = who.mind.schedule
-    jobs = jobs_by_activity(schedule).get(st.ACTIVITY_NAMES[activity], [])
-    first = int(who.draws[BOW] * len(jobs))
+def _list_jobs(decision: Decision, activity: int, near: bool) -> tuple[int, ...]:
+    """Return the jobs of an activity in the order in which they are tried.
+
+    Args:
+        decision: inputs of the decision.
+        activity: index into `ACTIVITY_NAMES`.
+        near: whether jobs at the robot come first.
+    """
+    schedule = decision.mind.schedule
+    jobs = group_jobs(schedule).get(st.ACTIVITY_NAMES[activity], [])
+    first = int(decision.draws[BOW] * len(jobs))
     turned = (*jobs[first:], *jobs[:first])
     return tuple(sorted(turned, key=lambda k: near and schedule.jobs[k].at != "robot"))
 
 
-def _loneliest(who: Decision) -> Place:
-    """Where there is room to walk, farthest from the other workers."""
-    ground = who.mind.plan
-    x, y = (np.argwhere(ground.slack >= 0.0) * CELL_M + ground.origin).T
-    others = who.workers["spot"][who.others(), :2]
+def _find_loneliest(decision: Decision) -> Place:
+    """Return the walkable spot that is farthest from the other workers."""
+    grid = decision.mind.plan.grid
+    x, y = (np.argwhere(grid.slack >= 0.0) * CELL_M + grid.origin).T
+    others = decision.workers["place"][decision.find_others(), :2]
     away = np.min([np.hypot(x - ox, y - oy) for ox, oy in others], axis=0)
     k = int(np.argmax(away))
-    return float(x[k]), float(y[k]), 2.0 * math.pi * who.draws.item(BOW), 0.0
+    return Place(float(x[k]), float(y[k]), 2.0 * math.pi * decision.draws.item(BOW), 0.0)

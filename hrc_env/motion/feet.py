@@ -1,112 +1,156 @@
-"""Feet: locked to their footprint while loaded, rolling from heel to ball, swinging between.
+"""Feet: fixed to their footprint while loaded, rolling from heel to ball, swinging in between.
 
 Step k is taken by foot (first + k) % 2, leaves the floor at start + k * period and lands a fixed
-swing later. Steps may be gone back: then their time runs backwards.
+swing time later. Steps that are retraced run backwards in time.
 """
 
 import math
+from typing import NamedTuple
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import ANKLE_Z, BALL_X, BALL_Z, HEEL_X
-from hrc_env.motion.curves import about, cruise, hump, min_jerk, placed, shift
-from hrc_env.motion.state import Pair, Worker
+from hrc_env.motion.curves import cruise, hump, min_jerk, move_point, pivot_foot, shift
+from hrc_env.motion.state import Worker
 
-STRIKE_PITCH, PUSH_PITCH = -0.35, 1.0
-"""Foot's pitch at heel strike and push-off of a full stride [rad] (Winter, Biomechanics)."""
-FLAT_S, ROLL_SHARE = 0.10, 0.62
-"""Heel strike to foot flat [s]; heel-off to toe-off as a share of the period of a step."""
-RAMP_SHARE, LIFT_BASE_M, LIFT_STRIDE_M = 0.29, 0.025, 0.045
-"""Share of a swing in which the foot gathers (and again loses) speed; its rise above its roll: of
-any step, and more with the stride [m]."""
-RUN_RAMP_SHARE, KICK_M, KICK_PITCH = 0.36, 0.20, 1.3
-"""The same of runners; how far their heels come up behind; their push-off beside a walker's;
-judgement."""
+STRIKE_PITCH = -0.35
+"""Pitch of the foot at heel strike of a full stride [rad] (Winter, Biomechanics)."""
+PUSH_PITCH = 1.0
+"""Pitch of the foot at push-off of a full stride [rad] (Winter, Biomechanics)."""
+FLAT_S = 0.10
+"""Time from heel strike to a flat foot [s]."""
+ROLL_SHARE = 0.62
+"""Time from heel-off to toe-off as a share of the period of a step."""
+RAMP_SHARE = 0.29
+"""Share of a swing in which the foot gathers speed, and again loses it."""
+LIFT_BASE_M = 0.025
+"""Rise of the foot in any step, above the rise by its roll [m]."""
+LIFT_STRIDE_M = 0.045
+"""Additional rise of the foot in a full stride [m]."""
+RUN_RAMP_SHARE = 0.36
+"""`RAMP_SHARE` of runners; judgement."""
+KICK_M = 0.20
+"""Height by which the heel of a runner comes up behind [m]; judgement."""
+KICK_PITCH = 1.3
+"""Push-off pitch of a runner as a multiple of a walker's; judgement."""
+
+
+class FootPitch(NamedTuple):
+    """Pitch that steps add to a foot."""
+
+    heel_up: float
+    """Pitch about the ball, the heel up [rad]."""
+    toes_up: float
+    """Pitch about the heel, the toes up [rad]; negative or zero."""
 
 
 @kernel
-def _roll(t: float, lift: float, land: float, period: float, stride: float) -> Pair:
-    """Pitch that one step adds: heel up round the ball, then toes up round the heel."""
+def _pitch_foot(t: float, lift: float, land: float, period: float, stride: float) -> FootPitch:
+    """Return the pitch that one step adds: heel up about the ball, then toes up about the heel.
+
+    Args:
+        t: time [s].
+        lift: time of lift-off [s].
+        land: time of landing [s].
+        period: period of a step [s].
+        stride: length of the step as a share of a full stride.
+    """
     swing = land - lift
     rising = min(ROLL_SHARE * period, lift)  # the first step's heel stays down until time 0
     up = min_jerk((t - lift + rising) / (rising + 0.12 * swing))
     if up == 0.0:
-        return 0.0, 0.0
+        return FootPitch(0.0, 0.0)
     down = min_jerk((t - lift - 0.10 * swing) / (0.72 * swing))
     toes_up = min_jerk((t - lift - 0.50 * swing) / (0.50 * swing))
     flat = min_jerk((t - land) / FLAT_S)
-    return stride * PUSH_PITCH * (up - down), stride * STRIKE_PITCH * (toes_up - flat)
+    heel_up = stride * PUSH_PITCH * (up - down)
+    return FootPitch(heel_up, stride * STRIKE_PITCH * (toes_up - flat))
 
 
 @kernel
-def step_time(t: float, me: Worker) -> float:
-    """The time that counts for feet: it turns round when the steps are gone back."""
-    undo = me.undo_at
+def to_step_time(t: float, worker: Worker) -> float:
+    """Return the time at which the steps are read, which runs backwards when they are retraced."""
+    undo = worker.undo_at
     return t if undo <= 0.0 or t < undo else 2.0 * undo - t
 
 
 @kernel
-def foot(t: float, side: int, prints: Floats, stance: Floats, me: Worker) -> None:
-    """Write the ankle columns of one side at time t into the control vector."""
-    q = me.q
+def place_foot(t: float, side: int, footprints: Floats, stance: Floats, worker: Worker) -> None:
+    """Write the six ankle columns of one foot at time t into the control vector.
+
+    Args:
+        t: time on the clock of the steps [s].
+        side: 0 left, 1 right.
+        footprints: footprints (N, 5) of the steps.
+        stance: footprints (2, 5) at the beginning.
+        worker: record with the plan of the steps; its `q` is written.
+    """
+    q = worker.q
     x, y, yaw, ground = stance[side, 0], stance[side, 1], stance[side, 2], stance[side, 4]
     heel_up, toes_up, rise, flown = 0.0, 0.0, 0.0, 0.0
-    count = me.step_count
+    count = worker.step_count
     if count > 0:
-        start, period, swing = me.step_start, me.step_period, me.step_swing
-        first = (side + me.step_first) % 2
+        start, period, swing = worker.step_start, worker.step_period, worker.step_swing
+        first = (side + worker.step_first) % 2
         k = math.floor((t - start) / period)  # the foot's latest step that has left the floor
         k = min(k - (k - first) % 2, count - 1 - (count - 1 - first) % 2)
         coming = max(k + 2, first)
         if coming < count:
-            lift, stride = start + coming * period, prints[coming, 3]
-            land = lift + swing + me.flight_s * stride
-            heel_up, toes_up = _roll(t, lift, land, period, stride)
+            lift, stride = start + coming * period, footprints[coming, 3]
+            land = lift + swing + worker.flight_s * stride
+            heel_up, toes_up = _pitch_foot(t, lift, land, period, stride)
         if k >= first:
             lift = start + k * period
-            aloft = swing + me.flight_s * prints[k, 3]
-            w = (t - lift) / aloft
+            aloft = swing + worker.flight_s * footprints[k, 3]
+            u = (t - lift) / aloft
             if k >= 2 + first:
-                x, y, yaw = prints[k - 2, 0], prints[k - 2, 1], prints[k - 2, 2]
-                ground = prints[k - 2, 4]
-            gathers = RUN_RAMP_SHARE if me.flight_s > 0.0 else RAMP_SHARE
-            share, stride = cruise(w, gathers), prints[k, 3]
-            x, y = x + share * (prints[k, 0] - x), y + share * (prints[k, 1] - y)
-            yaw += min_jerk(w) * (prints[k, 2] - yaw)
-            heel, toes = _roll(t, lift, lift + aloft, period, stride)
+                x, y, yaw = footprints[k - 2, 0], footprints[k - 2, 1], footprints[k - 2, 2]
+                ground = footprints[k - 2, 4]
+            gathers = RUN_RAMP_SHARE if worker.flight_s > 0.0 else RAMP_SHARE
+            share, stride = cruise(u, gathers), footprints[k, 3]
+            x, y = x + share * (footprints[k, 0] - x), y + share * (footprints[k, 1] - y)
+            yaw += min_jerk(u) * (footprints[k, 2] - yaw)
+            heel, toes = _pitch_foot(t, lift, lift + aloft, period, stride)
             heel_up, toes_up = heel_up + heel, toes_up + toes
-            step_up = prints[k, 4] - ground
+            step_up = footprints[k, 4] - ground
             if step_up != 0.0:  # up early, before the foot comes over the tread; down late
-                ground += step_up * min_jerk((w if step_up > 0.0 else w - 0.4) / 0.6)
-            rise = (LIFT_BASE_M + LIFT_STRIDE_M * stride) * hump(w)
-            flown = min_jerk(2.0 * w) if w < 1.0 else 0.0
-            if me.flight_s > 0.0 and w < 1.0:
-                rise += KICK_M * stride * hump(w * (1.7 - 0.7 * w))
-    if me.flight_s > 0.0:
+                ground += step_up * min_jerk((u if step_up > 0.0 else u - 0.4) / 0.6)
+            rise = (LIFT_BASE_M + LIFT_STRIDE_M * stride) * hump(u)
+            flown = min_jerk(2.0 * u) if u < 1.0 else 0.0
+            if worker.flight_s > 0.0 and u < 1.0:
+                rise += KICK_M * stride * hump(u * (1.7 - 0.7 * u))
+    if worker.flight_s > 0.0:
         heel_up *= KICK_PITCH
     at = c.ANKLE + 6 * side
-    ahead, above = about(heel_up, me.size[BALL_X], me.size[BALL_Z])
-    behind, below = about(toes_up, me.size[HEEL_X], -me.size[ANKLE_Z])
-    q[at], q[at + 1] = placed(x, y, yaw, ahead + behind, 0.0)
-    q[at + 2] = me.size[ANKLE_Z] + above + below + rise + ground
+    ahead, above = pivot_foot(heel_up, worker.lengths[BALL_X], worker.lengths[BALL_Z])
+    behind, below = pivot_foot(toes_up, worker.lengths[HEEL_X], -worker.lengths[ANKLE_Z])
+    q[at], q[at + 1] = move_point(x, y, yaw, ahead + behind, 0.0)
+    q[at + 2] = worker.lengths[ANKLE_Z] + above + below + rise + ground
     q[at + 3], q[at + 4], q[at + 5] = yaw, heel_up + toes_up, heel_up * flown + toes_up
 
 
 @kernel
-def feet(t: float, me: Worker) -> None:
+def place_feet(t: float, worker: Worker) -> None:
+    """Write the ankle columns of both feet at time t into the control vector."""
     for side in range(2):
-        foot(t, side, me.prints, me.stance, me)
+        place_foot(t, side, worker.footprints, worker.stance, worker)
 
 
 @kernel
-def raise_heel(side: int, pitch: float, me: Worker) -> None:
-    """Pitch a standing foot about its ball, where the toes stay (negative: about its heel)."""
-    q = me.q
+def raise_heel(side: int, pitch: float, worker: Worker) -> None:
+    """Pitch a standing foot about its ball, or about its heel if pitch is negative.
+
+    Args:
+        side: 0 left, 1 right.
+        pitch: additional pitch, the heel up [rad].
+        worker: record; its `q` is changed.
+    """
+    q = worker.q
     at = c.ANKLE + 6 * side
-    ahead, above = about(pitch, me.size[BALL_X], me.size[BALL_Z])
+    ahead, above = pivot_foot(pitch, worker.lengths[BALL_X], worker.lengths[BALL_Z])
     if pitch < 0.0:
-        ahead, above = about(pitch, me.size[HEEL_X], -me.size[ANKLE_Z])
+        ahead, above = pivot_foot(pitch, worker.lengths[HEEL_X], -worker.lengths[ANKLE_Z])
     shift(q, at, q[at + 3], ahead, 0.0)
     q[at + 2] += above
     q[at + 4] += pitch

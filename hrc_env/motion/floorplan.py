@@ -1,70 +1,95 @@
-"""Where a worker's root may be: the slack [m] on a grid, to what stands there and the edge."""
+"""Where a worker's root may be: the free distance, or slack, on a grid over the floor."""
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
+from hrc_env.motion.points import Point
 from hrc_env.world import Grounds
 
-BODY_M, STAND_M = 0.40, 0.22
-"""Walkers keep so far from what stands there: half their width, swinging arms included; those who
-work there, half the depth of a trunk and its sway [m]; judgement."""
+BODY_M = 0.40
+"""Distance that walkers keep from objects [m]: half their width, swinging arms included."""
+STAND_M = 0.22
+"""Distance that workers keep from objects at work [m]: half a trunk's depth, and its sway."""
 CELL_M = 0.05
-"""Grid of the field [m]."""
+"""Size of a cell of the grid [m]."""
+
+
+class FloorGrid(NamedTuple):
+    """Slack on a grid over the floor; the arrays are read-only."""
+
+    slack: Floats
+    """Distance (X, Y) to objects and the edge beyond `BODY_M` [m]; walkers fit where it is >= 0."""
+    origin: Floats
+    """World x, y (2,) of the first grid point [m]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Floorplan:
-    """The grounds as the planner wants them; arrays are read-only."""
+    """The floor of a scene as planners use it."""
 
-    slack: Floats
-    """(X, Y) of grid points [m]: where it is 0 or more a walker has room."""
-    origin: Floats
-    """(2,) first grid point [m]."""
+    grid: FloorGrid
+    """Slack on a grid."""
     grounds: Grounds
+    """The floor as the scene describes it."""
 
 
-def floorplan(grounds: Grounds) -> Floorplan:
-    """Measure the grounds; `ConfigError`: nowhere to walk, or no room at a workplace."""
+def make_floorplan(grounds: Grounds) -> Floorplan:
+    """Measure the floor of a scene.
+
+    Args:
+        grounds: walkable area, footprints of objects, places and the robot.
+
+    Raises:
+        ConfigError: nothing is walkable, or a workplace has no room to stand.
+    """
     (x0, x1), (y0, y1) = grounds.walkable_x_m, grounds.walkable_y_m
     xs = np.arange(x0, x1 + 0.5 * CELL_M, CELL_M)
     ys = np.arange(y0, y1 + 0.5 * CELL_M, CELL_M)
-    slack, origin = _slack(xs[:, None], ys, grounds), np.array([xs[0], ys[0]])
+    slack, origin = _measure_slack(xs[:, None], ys, grounds), np.array([xs[0], ys[0]])
     if slack.max() < 0.0:
         raise ConfigError("The grounds leave no room for a worker: everything is blocked.")
     for array in (slack, origin):
         array.flags.writeable = False
+    grid = FloorGrid(slack, origin)
     for place in grounds.places:
-        if slack_at(*place.xy_m, slack, origin) < STAND_M - BODY_M:
+        if read_slack(*place.xy_m, grid) < STAND_M - BODY_M:
             raise ConfigError(
                 f"Workplace {place.name!r} at {place.xy_m} leaves no room to stand: expected "
                 f"{STAND_M} m at least from what stands there and inside the walkable area."
             )
-    return Floorplan(slack, origin, grounds)
+    return Floorplan(grid, grounds)
 
 
-def beside_robot(grounds: Grounds, radius_m: float, angle_rad: float) -> tuple[float, float]:
-    """The point so far from the robot's axis, at an angle from its front [m]."""
+def locate_beside_robot(grounds: Grounds, radius_m: float, angle_rad: float) -> Point:
+    """Return the point at a distance from the robot's axis and an angle from its front."""
     x, y = grounds.robot_xy_m
-    return x + radius_m * math.cos(angle_rad), y + radius_m * math.sin(angle_rad)
+    return Point(x + radius_m * math.cos(angle_rad), y + radius_m * math.sin(angle_rad))
 
 
-def room_for(plan: Floorplan, apart_m: float) -> int:
-    """How many workers find a place so far apart from each other, taken as they come."""
+def count_room(plan: Floorplan, apart_m: float) -> int:
+    """Return how many places fit a distance apart, taken in the order of the grid."""
     coarse = 4  # grid points of the field to one that is tried
     taken = np.zeros((0, 2))
-    for point in np.argwhere(plan.slack[::coarse, ::coarse] >= 0.0) * coarse * CELL_M:
+    for point in np.argwhere(plan.grid.slack[::coarse, ::coarse] >= 0.0) * coarse * CELL_M:
         if not len(taken) or np.hypot(*(taken - point).T).min() >= apart_m:
             taken = np.vstack([taken, point])
     return len(taken)
 
 
-def _slack(xs: Floats, ys: Floats, grounds: Grounds) -> Floats:
-    """(X, Y) distance of xs (X, 1) and ys (Y,) from footprints and the robot, less half a body."""
+def _measure_slack(xs: Floats, ys: Floats, grounds: Grounds) -> Floats:
+    """Return the distance (X, Y) from footprints and the robot beyond half a body [m].
+
+    Args:
+        xs: world x (X, 1) of the grid points [m].
+        ys: world y (Y,) of the grid points [m].
+        grounds: the floor.
+    """
     robot_x, robot_y = grounds.robot_xy_m
     slack = np.hypot(xs - robot_x, ys - robot_y) - grounds.robot_clearance_m
     for x, y, half_length, half_width, yaw in np.asarray(grounds.blocked, float).tolist():
@@ -77,8 +102,15 @@ def _slack(xs: Floats, ys: Floats, grounds: Grounds) -> Floats:
 
 
 @kernel
-def slack_at(x: float, y: float, slack: Floats, origin: Floats) -> float:
-    """The field at a point, between grid points; negative beyond the walkable area [m]."""
+def read_slack(x: float, y: float, grid: FloorGrid) -> float:
+    """Return the slack at a point, interpolated; negative outside of the walkable area [m].
+
+    Args:
+        x: world x [m].
+        y: world y [m].
+        grid: slack on a grid.
+    """
+    slack, origin = grid.slack, grid.origin
     u, v = (x - origin[0]) / CELL_M, (y - origin[1]) / CELL_M
     i = min(max(int(u), 0), slack.shape[0] - 2)
     j = min(max(int(v), 0), slack.shape[1] - 2)

@@ -1,27 +1,29 @@
-"""The procedural workers: behaviour, activities and kinematics as one moving batch.
+"""The simulated workers: behaviour, activities and kinematics as one batch.
 
-Every activity is a closed form in the time since it began; velocities are its difference quotients.
+Every activity is a closed form in the time since it began; velocities are difference quotients.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
+from hrc_env.core.declared import Records2
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Held, WorkerMotion, WorkerPath
-from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records, Velocities3
+from hrc_env.core.typing import Bools, Floats, Ints, Points3, QuaternionsWxyz, Velocities3
 from hrc_env.geometry.rotations import matrix
 from hrc_env.motion import state as st
-from hrc_env.motion.activities.pieces import stage, stocked
-from hrc_env.motion.activities.strokes import screws as driven
-from hrc_env.motion.anatomy import GRIP_M, HAND, LEFT, SIDE_STRIDE, anatomies
-from hrc_env.motion.behaviour import begin_episode, follow_up
+from hrc_env.motion.activities.pieces import cut_clips, make_stage
+from hrc_env.motion.activities.strokes import count_screws
+from hrc_env.motion.anatomy import GRIP_M, HAND, LEFT, SIDE_STRIDE, measure_bodies
+from hrc_env.motion.behaviour import begin_episode, begin_next_activity
 from hrc_env.motion.blending import RATE_H_S, evaluate
 from hrc_env.motion.clip import Clip, load_clip
-from hrc_env.motion.config import PEOPLE, MotionConfig, PeopleConfig, numbers
+from hrc_env.motion.config import PEOPLE, MotionConfig, PeopleConfig, make_hand_params
 from hrc_env.motion.decision import (
     ANY_ACTIVITY,
     N_DRAWS,
@@ -29,31 +31,47 @@ from hrc_env.motion.decision import (
     Cast,
     MotionState,
 )
-from hrc_env.motion.floorplan import floorplan, room_for
-from hrc_env.motion.holding import N_HELD, prop_pose
-from hrc_env.motion.kinematics import pose, quaternion, spin
-from hrc_env.motion.lying import LOAD, at_first, lay_out
-from hrc_env.motion.reactions import attend, notice
-from hrc_env.motion.schedule import schedule_at
-from hrc_env.motion.state import Worker, Workers
+from hrc_env.motion.floorplan import count_room, make_floorplan
+from hrc_env.motion.holding import N_HELD, write_prop_pose
+from hrc_env.motion.kinematics import pose, write_angular_velocity, write_quaternion
+from hrc_env.motion.lying import LOAD, Load, make_loads, reset_loads
+from hrc_env.motion.points import Point
+from hrc_env.motion.reactions import NoticeParams, follow_signal, notice_robot
+from hrc_env.motion.schedule import make_schedule
+from hrc_env.motion.state import Worker
 from hrc_env.worker.body import N_SEGMENTS, Body
 from hrc_env.world import FOOT_M, Grounds, WorkerProgress, WorkerSignal, Workplace
 
 __all__ = [
-    "ABSENT", "PEOPLE", "Cast", "Clip", "MotionConfig", "MotionState", "PeopleConfig", "activity",
-    "activity_names", "advance", "current", "make_state", "reset", "watch",
-]  # fmt: skip
+    "ABSENT",
+    "PEOPLE",
+    "Cast",
+    "Clip",
+    "MotionConfig",
+    "MotionState",
+    "PeopleConfig",
+    "activity",
+    "activity_names",
+    "advance",
+    "current",
+    "make_state",
+    "reset",
+    "watch",
+]
 
 activity_names: tuple[str, ...] = st.ACTIVITY_NAMES
 """Names of the values of `activity`."""
 ABSENT = -1
-"""The activity of who is not in an episode."""
-PARKED_Z_M, HALT_S = -100.0, 0.3
-"""Height of who is not in an episode, where no camera looks [m]; hands halt within so long [s]."""
+"""Activity of an absent worker."""
+PARKED_Z_M = -100.0
+"""Height of absent workers, where no camera looks [m]."""
+HALT_S = 0.3
+"""Time in which moving hands halt [s]."""
 
 CAST_TRIES = 40
-"""So often the beginning of an episode is drawn in which workers are to do certain things."""
+"""Number of draws for an episode in which workers begin with given activities."""
 NOBODY_CAST: Mapping[int, Cast] = MappingProxyType({})
+"""No casts: everything is drawn."""
 
 OPEN_FLOOR = Grounds(
     walkable_x_m=(-0.1, 2.4),
@@ -68,69 +86,153 @@ OPEN_FLOOR = Grounds(
     robot_xy_m=FOOT_M[:2],
     robot_clearance_m=0.8,
 )
-"""Where workers are whom no scene holds: the laboratory's walkway without its furniture."""
+"""Floor for workers without a scene: the laboratory's walkway without its furniture."""
+
+
+class BodyPath(NamedTuple):
+    """Positions and orientations of bodies, in the world."""
+
+    position: Points3
+    """Origins (..., 22, 3) of the segments [m]."""
+    quaternion: QuaternionsWxyz
+    """Orientations (..., 22, 4) of the segments, scalar first."""
+
+
+class BodyRates(NamedTuple):
+    """Velocities of bodies in the world, and the props that they hold."""
+
+    velocity: Velocities3
+    """Velocities (..., 22, 3) of the origins of the segments [m/s]."""
+    angular_velocity: Floats
+    """Angular velocities (..., 22, 3) of the segments [rad/s]."""
+    held: Floats
+    """Held props (..., N_HELD), see `holding`."""
+
+
+class Advance(NamedTuple):
+    """Motion over some steps."""
+
+    path: WorkerPath
+    """Path of the bodies, arrays (B, T, W, 22, ...)."""
+    motion: WorkerMotion
+    """Bodies after the last step, arrays (B, W, 22, ...)."""
+
+
+class Grip(NamedTuple):
+    """Where the used hand of each worker grips."""
+
+    position: Points3
+    """Position (B, W, 3) of the grip in the world [m]."""
+    velocity: Velocities3
+    """Velocity (B, W, 3) of the grip [m/s]."""
+
+
+class MindGroup(NamedTuple):
+    """Environments with the same constants of behaviour."""
+
+    mind: BehaviourParams
+    """The constants."""
+    parts: tuple[slice, ...]
+    """Slices of the environments."""
 
 
 def make_state(
-    batch: int, n_workers: int, body: Body, config: MotionConfig,
-    grounds: Grounds = OPEN_FLOOR, fewest: int | None = None, robot_girth_m: float = 0.0,
-) -> MotionState:  # fmt: skip
-    """Workers of `batch` environments, `n_workers` each; call `reset` before use.
+    batch: int,
+    n_workers: int,
+    body: Body,
+    config: MotionConfig,
+    grounds: Grounds = OPEN_FLOOR,
+    fewest: int | None = None,
+    robot_girth_m: float = 0.0,
+) -> MotionState:
+    """Return the state of the workers of some environments; call `reset` before use.
 
-    They have the `body`, or each episode gives each one of several, and walk on the `grounds`. At
-    least `fewest` of them are in an episode, drawn at its beginning; None: all. A robot that drives
-    reaches `robot_girth_m` round what they watch of it; 0: it is an arm.
+    Args:
+        batch: number of environments.
+        n_workers: number of workers in each of them.
+        body: the body of all workers, or a pool of which each worker gets one in each episode.
+        config: settings of the motion.
+        grounds: the floor on which they walk.
+        fewest: least number of workers in an episode, which is drawn; None for all.
+        robot_girth_m: reach of a driving robot around the points that workers watch of it [m];
+            0 for an arm.
+
+    Raises:
+        ConfigError: the floor has no room for so many workers, or for a clip.
     """
     fewest = n_workers if fewest is None else fewest
-    bones, plan = anatomies(body), floorplan(grounds)
-    fit = room_for(plan, config.spacing_m)
+    bones, plan = measure_bodies(body), make_floorplan(grounds)
+    fit = count_room(plan, config.spacing_m)
     if n_workers > fit:
         raise ConfigError(
             f"n_workers={n_workers}: no more than {fit} fit on these grounds, "
             f"{config.spacing_m} m from each other."
         )
     clips = [m if isinstance(m, Clip) else load_clip(Path(m)) for m in config.motions]
-    schedule = schedule_at(config.jobs, {place.kind for place in grounds.places})
-    values = numbers(config, grounds.robot_xy_m)
-    pieces = stocked(clips, bones.size, stage(plan, config))
-    loads = at_first(grounds.places, schedule.jobs)[: None if n_workers else 0]
+    schedule = make_schedule(config.jobs, {place.kind for place in grounds.places})
+    hand_params = make_hand_params(config, Point(*grounds.robot_xy_m))
+    pieces = cut_clips(clips, bones.lengths, make_stage(plan, config))
+    loads = make_loads(grounds.places, schedule.jobs)[: None if n_workers else 0]
     mind = BehaviourParams(
-        config, values, plan, schedule, pieces, bones, loads, fewest, robot_girth_m
+        config, hand_params, plan, schedule, pieces, bones, loads, fewest, robot_girth_m
     )
-    # What they bring themselves, or receive, needs room, too.
-    there = np.zeros((batch, len(loads) + n_workers), LOAD)
-    return MotionState(np.zeros((batch, n_workers), st.WORKER), there, mind)
+    # Each worker may also bring or receive a load, which needs a row.
+    rows = np.zeros((batch, len(loads) + n_workers), LOAD)
+    return MotionState(np.zeros((batch, n_workers), st.WORKER), rows, mind)
 
 
 def reset(
-    state: MotionState, ids: Ints, rngs: Sequence[np.random.Generator],
+    state: MotionState,
+    ids: Ints,
+    rngs: Sequence[np.random.Generator],
     casts: Mapping[int, Cast] = NOBODY_CAST,
-) -> None:  # fmt: skip
-    """Start environments `ids` anew; rngs holds one generator for each of the B environments.
+) -> None:
+    """Begin new episodes of some environments.
 
-    `casts` says by environment what is not drawn; the same numbers are drawn with and without one.
-    `ConfigError` where workers find no place for an activity with which they are to begin.
+    Args:
+        state: state of all workers, which is changed.
+        ids: environments (N,).
+        rngs: one generator for each of the B environments.
+        casts: by environment, what is not drawn; the same numbers are drawn with and without a
+            cast.
+
+    Raises:
+        ConfigError: workers find no place for an activity with which they have to begin.
     """
     n_workers, fewest = state.workers.shape[1], state.mind.fewest
     for b in np.asarray(ids).tolist():
-        bodies = drawn_bodies(rngs[b].random(n_workers), len(state.mind.anatomy.size))
+        bodies = draw_bodies(rngs[b].random(n_workers), len(state.mind.anatomy.lengths))
         n = n_workers if fewest == n_workers else int(rngs[b].integers(fewest, n_workers + 1))
-        lay_out(state.loads[b], state.mind.loads, rngs[b].spawn(1)[0])
+        reset_loads(state.loads[b], state.mind.loads, rngs[b].spawn(1)[0])
         draws = rngs[b].random((n_workers, 2, N_DRAWS))
         state.minds.pop(b, None)
         if b in casts:
-            _begin_as_cast(state, b, (n, bodies), draws, casts[b], rngs[b])
+            _begin_cast_episode(state, b, n, bodies, draws, casts[b], rngs[b])
         else:
             begin_episode(state, b, n, bodies, draws)
 
 
-def _begin_as_cast(
-    state: MotionState, b: int, drawn: tuple[int, Ints], draws: Floats, cast: Cast,
+def _begin_cast_episode(
+    state: MotionState,
+    b: int,
+    n_present: int,
+    bodies: Ints,
+    draws: Floats,
+    cast: Cast,
     rng: np.random.Generator,
-) -> None:  # fmt: skip
-    """Begin the episode of environment b with a cast; draw again until all do as they are to."""
-    n, bodies = drawn
-    n = n if cast.n_workers is None else cast.n_workers
+) -> None:
+    """Begin an episode with a cast; draw again until all workers begin with their activities.
+
+    Args:
+        state: state of all workers, which is changed.
+        b: environment.
+        n_present: drawn number of workers.
+        bodies: drawn row of the body (W,) of each worker.
+        draws: uniform draws (W, 2, N_DRAWS) in [0, 1).
+        cast: what is not drawn.
+        rng: generator of further draws.
+    """
+    n = n_present if cast.n_workers is None else cast.n_workers
     if cast.bodies is not None:
         bodies[: len(cast.bodies)] = cast.bodies
     if cast.mind is not None:
@@ -152,8 +254,8 @@ def _begin_as_cast(
     )
 
 
-def drawn_bodies(draws: Floats, n_bodies: int) -> Ints:
-    """(W,) a body for each worker by draws in [0, 1), no two the same while there are others."""
+def draw_bodies(draws: Floats, n_bodies: int) -> Ints:
+    """Return a body (W,) for each worker by draws in [0, 1), different ones if possible."""
     bodies, left = np.zeros(len(draws), np.int64), list[int]()
     for w, draw in enumerate(draws.tolist()):
         left = left or list(range(n_bodies))
@@ -163,208 +265,302 @@ def drawn_bodies(draws: Floats, n_bodies: int) -> Ints:
 
 def advance(
     state: MotionState, rngs: Sequence[np.random.Generator], dt_s: float, n_steps: int
-) -> tuple[WorkerPath, WorkerMotion]:
-    """Move on by n_steps of dt_s; generators are drawn from only when an activity ends.
+) -> Advance:
+    """Advance all workers by some steps.
 
-    Returns the path, arrays (B, T, W, 22, ...) at dt_s, 2 dt_s, ... after the last call, and the
-    motion at its end, (B, W, 22, ...).
+    Args:
+        state: state of all workers, which is changed.
+        rngs: one generator for each environment, used only when an activity ends.
+        dt_s: duration of a step [s].
+        n_steps: number of steps T.
+
+    Returns:
+        The path at dt_s, 2 dt_s, ... after the last call, and the bodies at its end.
     """
     workers, frames = state.workers, state.mind.clips.frames
     batch, n_workers = workers.shape
     done, over = np.zeros(batch, np.int64), np.zeros(workers.shape, np.bool_)
-    path, now = _blank((batch, n_steps, n_workers), 3, 4), _blank_now(workers)
-    while _move_on(float(dt_s), n_steps, done, over, workers, frames, path, now):
+    path, rates = _make_path((batch, n_steps, n_workers)), _make_rates(workers.shape)
+    while _advance_until_decision(float(dt_s), n_steps, done, over, workers, frames, path, rates):
         for b, w in np.argwhere(over).tolist():
-            follow_up(state, b, w, rngs[b].random(N_DRAWS))
-    last = path[0][:, -1], path[1][:, -1]
-    return WorkerPath(*path), _motion(workers, last, now, state.loads)
+            begin_next_activity(state, b, w, rngs[b].random(N_DRAWS))
+    last = BodyPath(path.position[:, -1], path.quaternion[:, -1])
+    motion = _make_motion(workers, last, rates, state.loads)
+    return Advance(WorkerPath(path.position, path.quaternion), motion)
 
 
 def watch(
-    state: MotionState, elbow_and_tool_world: Floats, motion: WorkerMotion, dt_s: float,
+    state: MotionState,
+    elbow_and_tool_world: Floats,
+    motion: WorkerMotion,
+    dt_s: float,
     cue: WorkerSignal | None = None,
-) -> None:  # fmt: skip
-    """Let the workers see where elbow and tool, or front and back (B, 2, 3), of the robot are, dt_s
-    after the last look, and how far what they wait for has come."""
+) -> None:
+    """Let the workers look at the robot, and follow the signal of the task.
+
+    Args:
+        state: state of all workers, which is changed.
+        elbow_and_tool_world: elbow and tool, or front and back, of each robot (B, 2, 3) [m].
+        motion: bodies of the workers.
+        dt_s: time since the last look [s].
+        cue: signal of the task; None if it has none.
+    """
     if cue is not None:
-        attend(cue.stage, cue.offered_world, dt_s, state.workers)
-    bodies = motion.position_world, motion.velocity_world
-    seen = elbow_and_tool_world, *bodies, state.workers
-    for mind, rows in _by_mind(state):
+        follow_signal(cue.stage, cue.offered_world, dt_s, state.workers)
+    for mind, parts in _group_by_mind(state):
         people = mind.config.people
-        settings = (people.notice_m, people.fast_m_s, people.calm_s, mind.robot_girth_m)
-        for part in (slice(None),) if rows is None else rows:
-            notice(dt_s, settings, *(each[part] for each in seen))
+        params = NoticeParams(people.notice_m, people.fast_m_s, people.calm_s, mind.robot_girth_m)
+        for part in parts:
+            notice_robot(
+                dt_s,
+                params,
+                elbow_and_tool_world[part],
+                motion.position_world[part],
+                motion.velocity_world[part],
+                state.workers[part],
+            )
 
 
-def _by_mind(state: MotionState) -> Iterator[tuple[BehaviourParams, list[slice] | None]]:
-    """Each set of constants with the environments that it is of; None: all."""
+def _group_by_mind(state: MotionState) -> Iterator[MindGroup]:
+    """Yield each set of constants with its environments."""
     if not state.minds:
-        yield state.mind, None
+        yield MindGroup(state.mind, (slice(None),))
         return
-    of_all = [slice(b, b + 1) for b in range(len(state.workers)) if b not in state.minds]
-    yield state.mind, of_all
+    common = [slice(b, b + 1) for b in range(len(state.workers)) if b not in state.minds]
+    yield MindGroup(state.mind, tuple(common))
     for b, mind in state.minds.items():
-        yield mind, [slice(b, b + 1)]
+        yield MindGroup(mind, (slice(b, b + 1),))
 
 
 def progress(state: MotionState, motion: WorkerMotion) -> WorkerProgress:
-    """What workers, whose bodies are in `motion`, have done in the activity that they are in."""
+    """Return the progress of all workers in their current activity.
+
+    Args:
+        state: state of all workers.
+        motion: their bodies.
+    """
     workers = state.workers
     takes = (workers["activity"] == st.TAKE) & (workers["time_s"] > workers["out_at"])
     screws, boring = np.zeros(workers.shape, np.int64), np.zeros(workers.shape, np.bool_)
-    _deeds(workers, screws, boring)
+    _count_work(workers, screws, boring)
+    grip = _measure_grip(workers, motion)
     return WorkerProgress(
-        workers["present"].copy(), screws, boring, takes, *_gripping(workers, motion)
+        workers["is_present"].copy(), screws, boring, takes, grip.position, grip.velocity
     )
 
 
-def _gripping(workers: Workers, motion: WorkerMotion) -> tuple[Points3, Velocities3]:
-    """(B, W, 3) where the hand that each uses grips, and how fast it is."""
+def _measure_grip(workers: Records2[Worker], motion: WorkerMotion) -> Grip:
+    """Return position and velocity of the grip of the hand that each worker uses."""
     hands = (LEFT + HAND + SIDE_STRIDE * workers["side"])[..., None, None]
 
     def of_hand(values: Floats) -> Floats:
+        """Return the rows (B, W, ...) of the used hands."""
         return np.take_along_axis(values, hands, axis=2)[:, :, 0]
 
     bone = np.take_along_axis(workers["frame"][..., 0, :], hands, axis=2)[:, :, 0]
     arm = (matrix(of_hand(motion.quaternion_wxyz)) @ (GRIP_M * bone)[..., None])[..., 0]
     turning = np.cross(of_hand(motion.angular_velocity_world), arm)
-    return of_hand(motion.position_world) + arm, of_hand(motion.velocity_world) + turning
+    velocity = of_hand(motion.velocity_world) + turning
+    return Grip(of_hand(motion.position_world) + arm, velocity)
 
 
 @kernel
-def _deeds(workers: Workers, n_screws: Ints, boring: Bools) -> None:
+def _count_work(workers: Records2[Worker], n_screws: Ints, boring: Bools) -> None:
+    """Write the number of driven screws of each worker, and whether one is being driven."""
     for b, w in np.ndindex(workers.shape):
         if workers[b, w].activity == st.SCREW:
-            n_screws[b, w], boring[b, w] = driven(workers[b, w])
+            progress = count_screws(workers[b, w])
+            n_screws[b, w], boring[b, w] = progress.n_done, progress.is_driving
 
 
 def current(state: MotionState, ids: Ints | None = None) -> WorkerMotion:
-    """The bodies now: arrays (B, W, 22, ...), or of environments `ids` only (len(ids), W, ...)."""
+    """Return the bodies now, arrays (B, W, 22, ...), or those of environments `ids` only."""
     rows = slice(None) if ids is None else np.asarray(ids, np.int64)
-    return bodies_of(state.workers[rows], state.mind.clips.frames, state.loads[rows])
+    return evaluate_motion(state.workers[rows], state.mind.clips.frames, state.loads[rows])
 
 
-def bodies_of(workers: Workers, frames: Floats, loads: Records | None = None) -> WorkerMotion:
-    """The bodies of workers (B, W) at their times; `frames` are of the clips, loads (B, L) lie
-    about."""
-    place, now = _blank(workers.shape, 3, 4), _blank_now(workers)
-    _bodies_now(workers, frames, place, now)
-    return _motion(workers, place, now, loads)
+def evaluate_motion(
+    workers: Records2[Worker], frames: Floats, loads: Records2[Load] | None = None
+) -> WorkerMotion:
+    """Return the bodies of workers at their times.
+
+    Args:
+        workers: records (B, W).
+        frames: frames of all clips.
+        loads: loads (B, L) that lie about.
+    """
+    path, rates = _make_path(workers.shape), _make_rates(workers.shape)
+    _evaluate_bodies(workers, frames, path, rates)
+    return _make_motion(workers, path, rates, loads)
 
 
 def activity(state: MotionState) -> Ints:
-    """(B, W) what each worker does: an index into `activity_names`, or `ABSENT`."""
-    return np.where(state.workers["present"], state.workers["activity"], ABSENT)
+    """Return the activity (B, W) of each worker, an index into `activity_names` or `ABSENT`."""
+    return np.where(state.workers["is_present"], state.workers["activity"], ABSENT)
 
 
-Places = tuple[Floats, ...]
-"""Positions and quaternions (..., 22, 3 or 4)."""
-Now = tuple[Floats, ...]
-"""Velocities, angular velocities (..., 22, 3), what is held (..., N_HELD)."""
-
-
-def _motion(
-    workers: Workers, place: Places, now: Now, loads: Records | None = None
+def _make_motion(
+    workers: Records2[Worker],
+    path: BodyPath,
+    rates: BodyRates,
+    loads: Records2[Load] | None = None,
 ) -> WorkerMotion:
-    (position, turn), (velocity, turning, rows) = place, now
+    """Return bodies (B, W, ...) with the props that they hold, and loads (B, L) that lie about."""
+    rows = rates.held
     if loads is not None:
         rows = np.concatenate([rows, loads["shown"]], axis=1)
     held = Held(rows[..., 0].astype(np.int64), rows[..., 1:4].copy(), rows[..., 4:].copy())
-    return WorkerMotion(position, turn, velocity, turning, held, workers["body"].copy())
+    return WorkerMotion(
+        path.position,
+        path.quaternion,
+        rates.velocity,
+        rates.angular_velocity,
+        held,
+        workers["body"].copy(),
+    )
 
 
-def _blank(lead: tuple[int, ...], *widths: int) -> Places:
-    """An array (*lead, 22, n) for each width n."""
-    return tuple(np.empty((*lead, N_SEGMENTS, n)) for n in widths)
+def _make_path(lead: tuple[int, ...]) -> BodyPath:
+    """Return empty arrays for bodies with some leading axes."""
+    return BodyPath(np.empty((*lead, N_SEGMENTS, 3)), np.empty((*lead, N_SEGMENTS, 4)))
 
 
-def _blank_now(workers: Workers) -> Now:
-    return *_blank(workers.shape, 3, 3), np.empty((*workers.shape, N_HELD))
+def _make_rates(lead: tuple[int, ...]) -> BodyRates:
+    """Return empty arrays for bodies with some leading axes."""
+    shape = (*lead, N_SEGMENTS, 3)
+    return BodyRates(np.empty(shape), np.empty(shape), np.empty((*lead, N_HELD)))
 
 
 @kernel
-def _move_on(
-    dt_s: float, n_steps: int, done: Ints, over: Bools, workers: Workers, frames: Floats,
-    path: Places, now: Now,
-) -> bool:  # fmt: skip
-    """Move every environment on until done or someone must decide; whether anyone must.
+def _advance_until_decision(
+    dt_s: float,
+    n_steps: int,
+    done: Ints,
+    over: Bools,
+    workers: Records2[Worker],
+    frames: Floats,
+    path: BodyPath,
+    rates: BodyRates,
+) -> bool:
+    """Advance every environment until it is done or a worker has to decide.
 
-    Whose activities are `over` (B, W), done or taken back to their beginning, have decided.
+    Args:
+        dt_s: duration of a step [s].
+        n_steps: number of steps.
+        done: number (B,) of steps that are done, which is increased.
+        over: whether an activity (B, W) is over, at its end or back at its beginning; on the next
+            call these workers have decided.
+        workers: records (B, W), which are changed.
+        frames: frames of all clips.
+        path: path of the bodies, which is written.
+        rates: rates after the last step, which are written.
+
+    Returns:
+        Whether any worker has to decide.
     """
     waiting = False
     for b in range(done.shape[0]):
         while done[b] < n_steps:
             t, ticked, due = done[b], over[b].any(), False
             for w in range(workers.shape[1]):
-                me = workers[b, w]
+                worker = workers[b, w]
                 if not ticked:
-                    _tick(dt_s, me)
-                back = me.pace < 0.0 and me.time_s <= 0.0
-                over[b, w] = back or me.time_s >= me.duration_s
+                    _tick(dt_s, worker)
+                back = worker.pace < 0.0 and worker.time_s <= 0.0
+                over[b, w] = back or worker.time_s >= worker.duration_s
                 due = due or over[b, w]
             if due:
                 waiting = True
                 break
             for w in range(workers.shape[1]):
-                me = workers[b, w]
+                worker = workers[b, w]
                 last = t == n_steps - 1
                 if last:
-                    _rates_of(frames, now[0][b, w], now[1][b, w], me)
-                    prop_pose(now[2][b, w], me)
+                    _evaluate_rates(
+                        frames, rates.velocity[b, w], rates.angular_velocity[b, w], worker
+                    )
+                    write_prop_pose(rates.held[b, w], worker)
                 else:
-                    _pose(0.0, frames, me)
-                _place(path[0][b, t, w], path[1][b, t, w], me)
+                    _pose_at(0.0, frames, worker)
+                _write_pose(path.position[b, t, w], path.quaternion[b, t, w], worker)
             done[b] += 1
     return waiting
 
 
 @kernel
-def _bodies_now(workers: Workers, frames: Floats, path: Places, now: Now) -> None:
-    """Bodies as they are, into arrays (B, W, ...)."""
+def _evaluate_bodies(
+    workers: Records2[Worker], frames: Floats, path: BodyPath, rates: BodyRates
+) -> None:
+    """Write the bodies now.
+
+    Args:
+        workers: records (B, W).
+        frames: frames of all clips.
+        path: poses (B, W, ...), which are written.
+        rates: rates (B, W, ...), which are written.
+    """
     for b, w in np.ndindex(workers.shape):
-        me = workers[b, w]
-        _rates_of(frames, now[0][b, w], now[1][b, w], me)
-        prop_pose(now[2][b, w], me)
-        _place(path[0][b, w], path[1][b, w], me)
+        worker = workers[b, w]
+        _evaluate_rates(frames, rates.velocity[b, w], rates.angular_velocity[b, w], worker)
+        write_prop_pose(rates.held[b, w], worker)
+        _write_pose(path.position[b, w], path.quaternion[b, w], worker)
 
 
 @kernel
-def _tick(dt_s: float, me: Worker) -> None:
-    """Let time go on at the worker's pace, which comes nearer to the wished one."""
+def _tick(dt_s: float, worker: Worker) -> None:
+    """Advance the clocks of a worker by a step [s]; the pace approaches the wanted one."""
     most = dt_s / HALT_S
-    me.pace += min(max(me.pace_wished - me.pace, -most), most)
-    me.time_s += dt_s * me.pace
-    me.clock_s += dt_s
+    worker.pace += min(max(worker.wanted_pace - worker.pace, -most), most)
+    worker.time_s += dt_s * worker.pace
+    worker.clock_s += dt_s
 
 
 @kernel
-def _pose(later_s: float, frames: Floats, me: Worker) -> None:
-    """A worker a little later than now: q, p and r."""
-    evaluate(me.time_s + me.pace * later_s, me.clock_s + later_s, frames, me)
-    pose(me)
+def _pose_at(later_s: float, frames: Floats, worker: Worker) -> None:
+    """Write `q`, `p` and `r` of a worker a time later than now.
+
+    Args:
+        later_s: that time [s].
+        frames: frames of all clips.
+        worker: record of the worker.
+    """
+    evaluate(worker.time_s + worker.pace * later_s, worker.clock_s + later_s, frames, worker)
+    pose(worker)
 
 
 @kernel
-def _rates_of(frames: Floats, velocity: Floats, turning: Floats, me: Worker) -> None:
-    """The pose now, and velocities (22, 3) from that RATE_H_S later."""
-    _pose(RATE_H_S, frames, me)
-    me.later_p = me.p
-    me.later_r = me.r
-    _pose(0.0, frames, me)
+def _evaluate_rates(frames: Floats, velocity: Floats, turning: Floats, worker: Worker) -> None:
+    """Write the pose now, and velocities from the pose `RATE_H_S` later.
+
+    Args:
+        frames: frames of all clips.
+        velocity: velocities (22, 3), which are written [m/s].
+        turning: angular velocities (22, 3), which are written [rad/s].
+        worker: record of the worker.
+    """
+    _pose_at(RATE_H_S, frames, worker)
+    worker.later_p = worker.p
+    worker.later_r = worker.r
+    _pose_at(0.0, frames, worker)
     rate = 1.0 / RATE_H_S
-    for s in range(velocity.shape[0]):
+    for segment in range(velocity.shape[0]):
         for i in range(3):
-            velocity[s, i] = (me.later_p[s, i] - me.p[s, i]) * rate
-        spin(me.r, me.later_r, s, RATE_H_S, turning)
+            velocity[segment, i] = (worker.later_p[segment, i] - worker.p[segment, i]) * rate
+        write_angular_velocity(worker.r, worker.later_r, segment, RATE_H_S, turning)
 
 
 @kernel
-def _place(position: Floats, quaternion_: Floats, me: Worker) -> None:
-    """Write a pose into (22, ...) arrays; far below the floor of who is not there."""
-    down = 0.0 if me.present else PARKED_Z_M
-    for s in range(position.shape[0]):
+def _write_pose(position: Floats, quaternion: Floats, worker: Worker) -> None:
+    """Write a pose into arrays; absent workers are far below the floor.
+
+    Args:
+        position: origins (22, 3), which are written [m].
+        quaternion: orientations (22, 4), which are written.
+        worker: record of the worker.
+    """
+    down = 0.0 if worker.is_present else PARKED_Z_M
+    for segment in range(position.shape[0]):
         for i in range(3):
-            position[s, i] = me.p[s, i]
-        position[s, 2] += down
-        quaternion(me.r, s, quaternion_)
+            position[segment, i] = worker.p[segment, i]
+        position[segment, 2] += down
+        write_quaternion(worker.r, segment, quaternion)

@@ -1,4 +1,4 @@
-"""What hands hold: a prop's pose decides where they are."""
+"""Props in the hands: the pose of a prop determines where the hands are."""
 
 import math
 
@@ -7,27 +7,26 @@ import numpy as np
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
-from hrc_env.motion.curves import placed
+from hrc_env.motion.curves import move_point
 from hrc_env.motion.state import Worker
 from hrc_env.worker.props import PROPS
 
 GRIPS = np.array([np.nan_to_num(prop.grips) for prop in PROPS])
-"""(N, 2, 3) where the left and right hand hold each prop, in its frame [m]."""
+"""Grips (N, 2, 3) of the left and the right hand on each prop, in the prop's frame [m]."""
 TWO_HANDED = np.array([bool(np.isfinite(prop.grips).all()) for prop in PROPS])
-"""(N,) whether both hands do; a tool for one hand is held at its origin."""
-
+"""Whether each prop (N,) is held by both hands; a tool for one hand is held at its origin."""
 N_HELD = 8
-"""Numbers that say what is held: kind, position (3), quaternion (4, scalar first)."""
+"""Columns of a held prop: kind, position (3) [m], unit quaternion (4, scalar first)."""
 
 
 @kernel
-def prop_pose(out: Floats, me: Worker) -> None:
-    """Write what q holds and where into out (N_HELD,)."""
+def write_prop_pose(out: Floats, worker: Worker) -> None:
+    """Write kind, position and quaternion of the held prop into `out` (N_HELD,)."""
     out[:] = 0.0
-    out[0], out[4] = me.q[c.PROP], 1.0
+    out[0], out[4] = worker.q[c.PROP], 1.0
     if out[0] == 0.0:
         return
-    pose = me.q[c.PROP_POSE :]
+    pose = worker.q[c.PROP_POSE :]
     yaw, pitch, roll = pose[3], pose[4], pose[5]
     out[1], out[2], out[3] = pose[0], pose[1], pose[2]
     cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
@@ -40,9 +39,17 @@ def prop_pose(out: Floats, me: Worker) -> None:
 
 
 @kernel
-def grip(side: int, gx: float, gy: float, gz: float, me: Worker) -> None:
-    """Send a hand to a point of the prop's frame; its pose stands in q."""
-    q = me.q
+def grip(side: int, gx: float, gy: float, gz: float, worker: Worker) -> None:
+    """Set the target of a hand to a point in the frame of the prop in the control vector.
+
+    Args:
+        side: 0 left, 1 right.
+        gx: x of the point in the prop's frame [m].
+        gy: y of the point in the prop's frame [m].
+        gz: z of the point in the prop's frame [m].
+        worker: record; its `q` is changed.
+    """
+    q = worker.q
     yaw, pitch, roll = q[c.PROP_POSE + 3], q[c.PROP_POSE + 4], q[c.PROP_POSE + 5]
     cy, sy = math.cos(yaw), math.sin(yaw)
     cp, sp = math.cos(pitch), math.sin(pitch)
@@ -56,36 +63,52 @@ def grip(side: int, gx: float, gy: float, gz: float, me: Worker) -> None:
 
 
 @kernel
-def hold_load(x: float, y: float, yaw: float, up: float, me: Worker) -> None:
-    """Put the load where someone at (x, y) facing yaw holds it, and the hands on it."""
-    place_load(x, y, yaw, up, me)
-    grip_load(1.0, me)
+def hold_load(x: float, y: float, yaw: float, up: float, worker: Worker) -> None:
+    """Put the load where a worker holds it, and both hands onto it.
+
+    Args:
+        x: world x of the root [m].
+        y: world y of the root [m].
+        yaw: heading [rad].
+        up: height of the load above that of standing [m].
+        worker: record; its `q` is changed.
+    """
+    place_load(x, y, yaw, up, worker)
+    grip_load(1.0, worker)
 
 
 @kernel
-def place_load(x: float, y: float, yaw: float, up: float, me: Worker) -> None:
-    """Put the load where it is of someone at (x, y) facing yaw, `up` higher than standing."""
-    q, at = me.q, me.load_at
-    q[c.PROP] = me.load_prop
-    q[c.PROP_POSE], q[c.PROP_POSE + 1] = placed(x, y, yaw, at[0], at[1])
+def place_load(x: float, y: float, yaw: float, up: float, worker: Worker) -> None:
+    """Put the load where a worker holds it.
+
+    Args:
+        x: world x of the root [m].
+        y: world y of the root [m].
+        yaw: heading [rad].
+        up: height of the load above that of standing [m].
+        worker: record; its `q` is changed.
+    """
+    q, at = worker.q, worker.load_at
+    q[c.PROP] = worker.load_prop
+    q[c.PROP_POSE], q[c.PROP_POSE + 1] = move_point(x, y, yaw, at[0], at[1])
     q[c.PROP_POSE + 2], q[c.PROP_POSE + 3] = up + at[2], yaw + at[3]
     q[c.PROP_POSE + 4], q[c.PROP_POSE + 5] = at[4], at[5]
 
 
 @kernel
-def grip_load(share: float, me: Worker) -> None:
-    """Send the hands that hold it to the load, by a share."""
+def grip_load(share: float, worker: Worker) -> None:
+    """Send the hands that hold the load to it, by a share."""
     for side in range(2):
-        held = me.load_grip[3 * side : 3 * side + 3]
-        grip(side, held[0], held[1], held[2], me)
-        me.q[c.HAND_SHARE + side] = share * me.load_used[side]
+        held = worker.load_grip[3 * side : 3 * side + 3]
+        grip(side, held[0], held[1], held[2], worker)
+        worker.q[c.HAND_SHARE + side] = share * worker.load_used[side]
 
 
 @kernel
-def take_load(prop: int, me: Worker) -> None:
-    """Both hands hold the prop, where it is made to be held."""
-    me.load_prop = prop
-    me.load_at[:] = 0.0
+def take_load(prop: int, worker: Worker) -> None:
+    """Let both hands hold the prop at its grips."""
+    worker.load_prop = prop
+    worker.load_at[:] = 0.0
     for i in range(6):
-        me.load_grip[i] = GRIPS[prop, i // 3, i % 3]
-    me.load_used[:] = 1.0
+        worker.load_grip[i] = GRIPS[prop, i // 3, i % 3]
+    worker.load_used[:] = 1.0

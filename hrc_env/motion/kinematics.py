@@ -1,4 +1,4 @@
-"""From a control vector to 22 body segments: a spine, and four limbs by two-bone IK."""
+"""From a control vector to 22 body segments: a spine, and four limbs of two bones."""
 
 import math
 
@@ -9,47 +9,62 @@ from hrc_env.motion import controls as c
 from hrc_env.motion.curves import min_jerk, saturate, soft_min
 from hrc_env.motion.state import Worker
 
-ARM_KNEE, ARM_LIMIT = 0.97, 0.998
-"""Shares of the arm's length where stretching begins to resist, and that it never passes."""
+ARM_KNEE = 0.97
+"""Share of the arm's length from which stretching is resisted."""
+ARM_LIMIT = 0.998
+"""Share of the arm's length that the arm never passes."""
 SHOULDER_RAD = 0.22
-"""How far a clavicle turns forward, and up, at most."""
-LEG_LIMIT, LEG_SOFTNESS_M = 0.998, 0.05
-"""Share of its length that a leg uses at most (knees never lock), and the width over which that
-takes over from the wished height of the pelvis."""
+"""Greatest turn of a clavicle forward, and up [rad]."""
+LEG_LIMIT = 0.998
+"""Greatest share of its length that a leg uses, so that knees never lock."""
+LEG_SOFTNESS_M = 0.05
+"""Width over which the reach of the legs takes over from the wanted height of the pelvis [m]."""
 REST_SOFTNESS_M = 0.06
-"""Nearer than this to the floor a trunk's fall is slowed down, so that it does not stop at once."""
-TRAILING_SHARE, TRAILING_BENT, HEEL_OFF_M = 0.12, 0.06, 0.1
-"""A runner's trailing foot does not hold the pelvis back, though the leg be too short by the first
-share, but comes along once its heel is so far up [m]: from the last of the leg's length on."""
+"""Height above the floor below which a falling trunk is slowed down [m]."""
+TRAILING_SHARE = 0.12
+"""Share of a leg's length by which a runner's trailing foot may be out of reach."""
+TRAILING_BENT = 0.06
+"""Share of the leg's length before its end at which a trailing foot begins to follow."""
+HEEL_OFF_M = 0.1
+"""Height of a runner's heel at which the foot trails [m]."""
 LOWER_KNEE_RAD = 0.5
-"""How far on a side who lies there has both knees to the same one; judgement."""
+"""Roll from which both knees of a worker on their side point the same way [rad]; judgement."""
 TARGET, POLE, HINGE, GRIP = range(22, 26)
+"""Auxiliary rows of `Worker.p`: target of a limb, pole and hinge of its middle joint, the grip."""
 TURN = 22
-"""Rows after the 22 segments that the kinematics work in: points and vectors, a rotation."""
+"""Auxiliary row of `Worker.r`."""
 
 
 @kernel
-def yaw_pitch_roll(yaw: float, pitch: float, roll: float, s: int, me: Worker) -> None:
-    """r[s] = Rz(yaw) Ry(pitch) Rx(roll)."""
-    r = me.r
+def set_rotation(yaw: float, pitch: float, roll: float, segment: int, worker: Worker) -> None:
+    """Set r[segment] = Rz(yaw) Ry(pitch) Rx(roll).
+
+    Args:
+        yaw: angle about z [rad].
+        pitch: angle about y [rad].
+        roll: angle about x [rad].
+        segment: row of `r`.
+        worker: record; its `r` is written.
+    """
+    r = worker.r
     cy, sy = math.cos(yaw), math.sin(yaw)
     cp, sp = math.cos(pitch), math.sin(pitch)
     cr, sr = math.cos(roll), math.sin(roll)
-    r[s, 0, 0] = cy * cp
-    r[s, 0, 1] = cy * sp * sr - sy * cr
-    r[s, 0, 2] = cy * sp * cr + sy * sr
-    r[s, 1, 0] = sy * cp
-    r[s, 1, 1] = sy * sp * sr + cy * cr
-    r[s, 1, 2] = sy * sp * cr - cy * sr
-    r[s, 2, 0] = -sp
-    r[s, 2, 1] = cp * sr
-    r[s, 2, 2] = cp * cr
+    r[segment, 0, 0] = cy * cp
+    r[segment, 0, 1] = cy * sp * sr - sy * cr
+    r[segment, 0, 2] = cy * sp * cr + sy * sr
+    r[segment, 1, 0] = sy * cp
+    r[segment, 1, 1] = sy * sp * sr + cy * cr
+    r[segment, 1, 2] = sy * sp * cr - cy * sr
+    r[segment, 2, 0] = -sp
+    r[segment, 2, 1] = cp * sr
+    r[segment, 2, 2] = cp * cr
 
 
 @kernel
-def product(a: int, b: int, out: int, me: Worker) -> None:
-    """r[out] = r[a] r[b]."""
-    r = me.r
+def multiply(a: int, b: int, out: int, worker: Worker) -> None:
+    """Set r[out] = r[a] r[b]."""
+    r = worker.r
     for i in range(3):
         x, y, z = r[a, i, 0], r[a, i, 1], r[a, i, 2]
         r[out, i, 0] = x * r[b, 0, 0] + y * r[b, 1, 0] + z * r[b, 2, 0]
@@ -58,19 +73,26 @@ def product(a: int, b: int, out: int, me: Worker) -> None:
 
 
 @kernel
-def attach(child: int, parent: int, me: Worker) -> None:
-    """Put the child's origin where its rest offset lies in the parent's frame."""
-    p, r = me.p, me.r
-    x, y, z = me.bones[child, 0], me.bones[child, 1], me.bones[child, 2]
+def attach(child: int, parent: int, worker: Worker) -> None:
+    """Set the child's origin to its rest offset in the parent's frame."""
+    p, r = worker.p, worker.r
+    x, y, z = worker.bones[child, 0], worker.bones[child, 1], worker.bones[child, 2]
     for i in range(3):
         turned = r[parent, i, 0] * x + r[parent, i, 1] * y + r[parent, i, 2] * z
         p[child, i] = p[parent, i] + turned
 
 
 @kernel
-def aim(bone: int, end: int, length: float, me: Worker) -> None:
-    """Turn a bone to point from its origin to p[end], its hinge along p[HINGE]."""
-    p, r = me.p, me.r
+def aim(bone: int, end: int, length: float, worker: Worker) -> None:
+    """Turn a bone to point from its origin to p[end], with its hinge along p[HINGE].
+
+    Args:
+        bone: row of the bone.
+        end: row of `p` that the bone points to.
+        length: length of the bone [m].
+        worker: record; its `r` is written.
+    """
+    p, r = worker.p, worker.r
     inverse = 1.0 / length
     bx = (p[end, 0] - p[bone, 0]) * inverse
     by = (p[end, 1] - p[bone, 1]) * inverse
@@ -78,18 +100,30 @@ def aim(bone: int, end: int, length: float, me: Worker) -> None:
     hx, hy, hz = p[HINGE, 0], p[HINGE, 1], p[HINGE, 2]
     mx, my, mz = hy * bz - hz * by, hz * bx - hx * bz, hx * by - hy * bx
     for j in range(3):
-        b, m, h = me.frame[bone, 0, j], me.frame[bone, 1, j], me.frame[bone, 2, j]
+        b, m, h = worker.frame[bone, 0, j], worker.frame[bone, 1, j], worker.frame[bone, 2, j]
         r[bone, 0, j] = bx * b + mx * m + hx * h
         r[bone, 1, j] = by * b + my * m + hy * h
         r[bone, 2, j] = bz * b + mz * m + hz * h
 
 
 @kernel
-def bend(
-    start: int, end: int, first: float, second: float, knee: float, limit: float, me: Worker
+def solve_two_bones(
+    start: int, end: int, first: float, second: float, knee: float, limit: float, worker: Worker
 ) -> None:
-    """Two-bone IK from p[start] to p[TARGET]: p[start + 1], towards p[POLE], and p[end]."""
-    p = me.p
+    """Solve a chain of two bones from p[start] to p[TARGET].
+
+    The middle joint p[start + 1], the end p[end] and p[HINGE] are written.
+
+    Args:
+        start: row of the first bone; its middle joint, row start + 1, bulges towards p[POLE].
+        end: row of `p` for the end of the chain.
+        first: length of the first bone [m].
+        second: length of the second bone [m].
+        knee: share of the chain's length from which stretching is resisted.
+        limit: share of the chain's length that the chain never passes.
+        worker: record; its `p` is written.
+    """
+    p = worker.p
     dx = p[TARGET, 0] - p[start, 0]
     dy = p[TARGET, 1] - p[start, 1]
     dz = p[TARGET, 2] - p[start, 2]
@@ -114,85 +148,101 @@ def bend(
 
 
 @kernel
-def trunk(me: Worker) -> None:
-    """Pelvis (as high as wished and as the legs allow), spine, neck and head."""
-    q, p = me.q, me.p
+def pose_trunk(worker: Worker) -> None:
+    """Pose pelvis, spine, neck and head, as high as wanted and as the legs allow."""
+    q, p = worker.q, worker.p
     yaw = q[c.HEADING] + q[c.PELVIS_YAW]
-    yaw_pitch_roll(yaw, q[c.PELVIS_PITCH], q[c.PELVIS_ROLL], 0, me)
-    if me.rolled != 0.0:
-        yaw_pitch_roll(me.rolled, 0.0, 0.0, TURN, me)
-        product(0, TURN, 0, me)
+    set_rotation(yaw, q[c.PELVIS_PITCH], q[c.PELVIS_ROLL], 0, worker)
+    if worker.trunk_roll != 0.0:
+        set_rotation(worker.trunk_roll, 0.0, 0.0, TURN, worker)
+        multiply(0, TURN, 0, worker)
     p[0, 0], p[0, 1], p[0, 2] = q[c.ROOT_X], q[c.ROOT_Y], q[c.PELVIS_Z]
-    longest = LEG_LIMIT * me.size[an.LEG]
+    longest = LEG_LIMIT * worker.lengths[an.LEG]
     for side in range(2):
         thigh, ankle = an.LEFT + side * an.SIDE_STRIDE + an.THIGH, c.ANKLE + 6 * side
-        attach(thigh, 0, me)
+        attach(thigh, 0, worker)
         dx, dy = q[ankle] - p[thigh, 0], q[ankle + 1] - p[thigh, 1]
         may = longest
-        if me.flight_s > 0.0:
-            may *= 1.0 + TRAILING_SHARE * _heel_off(side, me)
+        if worker.flight_s > 0.0:
+            may *= 1.0 + TRAILING_SHARE * _measure_heel_lift(side, worker)
         rise = math.sqrt(max(may * may - dx * dx - dy * dy, 0.01))
         highest = q[ankle + 2] + rise - (p[thigh, 2] - p[0, 2])
         p[0, 2] = soft_min(p[0, 2], highest, LEG_SOFTNESS_M)
     share = 1.0 / 3.0
     twist, flex, lateral = q[c.SPINE_TWIST], q[c.SPINE_FLEX], q[c.SPINE_SIDE]
-    yaw_pitch_roll(share * twist, share * flex, share * lateral, TURN, me)
-    for s in range(1, an.CHEST + 1):
-        attach(s, s - 1, me)
-        product(s - 1, TURN, s, me)
+    set_rotation(share * twist, share * flex, share * lateral, TURN, worker)
+    for segment in range(1, an.CHEST + 1):
+        attach(segment, segment - 1, worker)
+        multiply(segment - 1, TURN, segment, worker)
     yaw = 0.5 * q[c.HEAD_YAW]
-    pitched(math.cos(yaw), math.sin(yaw), 0.5 * q[c.HEAD_PITCH], TURN, me)
-    for s in range(an.CHEST + 1, an.HEAD + 1):
-        attach(s, s - 1, me)
-        product(s - 1, TURN, s, me)
-    if me.fallen > 0.0:
-        _rest_on_floor(me)
+    set_pitch(math.cos(yaw), math.sin(yaw), 0.5 * q[c.HEAD_PITCH], TURN, worker)
+    for segment in range(an.CHEST + 1, an.HEAD + 1):
+        attach(segment, segment - 1, worker)
+        multiply(segment - 1, TURN, segment, worker)
+    if worker.fall_share > 0.0:
+        _rest_on_floor(worker)
 
 
 @kernel
-def _rest_on_floor(me: Worker) -> None:
+def _rest_on_floor(worker: Worker) -> None:
     """Raise a trunk, head included, out of the floor."""
-    p, r = me.p, me.r
+    p, r = worker.p, worker.r
     low = math.inf
     for k in range(an.N_ROUND):
-        end, s = me.round[k], int(me.round[k, 0])
-        above = p[s, 2] - end[4]
+        end, segment = worker.trunk_ends[k], int(worker.trunk_ends[k, 0])
+        above = p[segment, 2] - end[4]
         for i in range(3):
-            above += r[s, 2, i] * end[1 + i]
+            above += r[segment, 2, i] * end[1 + i]
         low = min(low, above)
     up = -soft_min(-low, 0.0, REST_SOFTNESS_M) - low
-    for s in range(an.HEAD + 1):
-        p[s, 2] += up
+    for segment in range(an.HEAD + 1):
+        p[segment, 2] += up
 
 
 @kernel
-def _level_pole(side: int, s: int, ahead: float, out: float, me: Worker) -> None:
-    """Turn the pole to what it is of who has fallen, by that share: `ahead` of segment s, or, by a
-    share `out`, level and outwards, elbows also to the feet; the lower knee of who lies on a side
-    to where they face."""
-    p, r = me.p, me.r
+def _level_pole(side: int, segment: int, ahead: float, out: float, worker: Worker) -> None:
+    """Turn the pole of a limb to that of a fallen worker, by the share `fall_share`.
+
+    The pole points along the segment's x axis, or, by the share `out`, level and outwards (elbows
+    also towards the feet). The lower knee of a worker on their side points to where they face.
+
+    Args:
+        side: 0 left, 1 right.
+        segment: row of the segment whose x axis is used.
+        ahead: 1 for a knee, -1 for an elbow.
+        out: share of pointing outwards.
+        worker: record; its p[POLE] is changed.
+    """
+    p, r = worker.p, worker.r
     left = 1.0 - 2.0 * side
-    if ahead > 0.0 and left * me.lie_roll < -LOWER_KNEE_RAD:
+    if ahead > 0.0 and left * worker.lie_roll < -LOWER_KNEE_RAD:
         left = -left
-    cos, sin = math.cos(me.q[c.HEADING]), math.sin(me.q[c.HEADING])
+    cos, sin = math.cos(worker.q[c.HEADING]), math.sin(worker.q[c.HEADING])
     back = 0.8 if ahead < 0.0 else 0.0
     for i, level in enumerate((-left * sin - back * cos, left * cos - back * sin, 0.0)):
-        pole = (1.0 - out) * ahead * r[s, i, 0] + out * level
-        p[POLE, i] += me.fallen * (pole - p[POLE, i])
+        pole = (1.0 - out) * ahead * r[segment, i, 0] + out * level
+        p[POLE, i] += worker.fall_share * (pole - p[POLE, i])
 
 
 @kernel
-def shoulder(side: int, cos: float, sin: float, me: Worker) -> None:
-    """The clavicle, going a little up and forward with the hand; the grip goes to p[TARGET]."""
-    q, p, r = me.q, me.p, me.r
+def pose_shoulder(side: int, cos: float, sin: float, worker: Worker) -> None:
+    """Pose a clavicle, which follows the hand a little, and set p[TARGET] to the grip.
+
+    Args:
+        side: 0 left, 1 right.
+        cos: cosine of the level heading of the chest.
+        sin: sine of the level heading of the chest.
+        worker: record; its `p` and `r` are written.
+    """
+    q, p, r = worker.q, worker.p, worker.r
     sign = 1.0 - 2.0 * side
     clavicle = an.LEFT + side * an.SIDE_STRIDE + an.CLAVICLE
     upper = clavicle + 1
-    attach(clavicle, an.CHEST, me)
+    attach(clavicle, an.CHEST, worker)
     for i in range(3):
         for j in range(3):
             r[clavicle, i, j] = r[an.CHEST, i, j]
-    attach(upper, clavicle, me)
+    attach(upper, clavicle, worker)
     rel, tgt, share = c.HAND_OFFSET + 3 * side, c.HAND_TARGET + 3 * side, q[c.HAND_SHARE + side]
     x = p[upper, 0] + cos * q[rel] - sin * q[rel + 1]
     y = p[upper, 1] + sin * q[rel] + cos * q[rel + 1]
@@ -201,127 +251,179 @@ def shoulder(side: int, cos: float, sin: float, me: Worker) -> None:
     p[TARGET, 1] = y + share * (q[tgt + 1] - y)
     p[TARGET, 2] = z + share * (q[tgt + 2] - z)
     dx, dy = p[TARGET, 0] - p[upper, 0], p[TARGET, 1] - p[upper, 1]
-    ahead = (cos * dx + sin * dy) / me.size[an.ARM]
-    above = (p[TARGET, 2] - p[upper, 2]) / me.size[an.ARM]
+    ahead = (cos * dx + sin * dy) / worker.lengths[an.ARM]
+    above = (p[TARGET, 2] - p[upper, 2]) / worker.lengths[an.ARM]
     forward, up = min(max(ahead - 0.3, 0.0) / 0.7, 1.0), min(max(above + 0.5, 0.0), 1.0)
     if forward > 0.0 or up > 0.0:
         forward, up = forward * forward * (3.0 - 2.0 * forward), up * up * (3.0 - 2.0 * up)
-        give = sign * SHOULDER_RAD * (1.0 - me.fallen)
-        yaw_pitch_roll(-give * forward, 0.0, give * up, TURN, me)
-        product(an.CHEST, TURN, clavicle, me)
-        attach(upper, clavicle, me)
+        give = sign * SHOULDER_RAD * (1.0 - worker.fall_share)
+        set_rotation(-give * forward, 0.0, give * up, TURN, worker)
+        multiply(an.CHEST, TURN, clavicle, worker)
+        attach(upper, clavicle, worker)
 
 
 @kernel
-def arm(side: int, cos: float, sin: float, me: Worker) -> None:
-    """Shoulder to hand, the elbow back and out; cos and sin: level heading of the chest."""
-    p = me.p
-    shoulder(side, cos, sin, me)
+def pose_arm(side: int, cos: float, sin: float, worker: Worker) -> None:
+    """Pose an arm from shoulder to hand, its elbow back and outwards.
+
+    Args:
+        side: 0 left, 1 right.
+        cos: cosine of the level heading of the chest.
+        sin: sine of the level heading of the chest.
+        worker: record; its `p` and `r` are written.
+    """
+    p = worker.p
+    pose_shoulder(side, cos, sin, worker)
     sign = 1.0 - 2.0 * side
     upper = an.LEFT + side * an.SIDE_STRIDE + an.UPPER_ARM
     fore, hand = upper + 1, upper + 2
-    swivel = me.q[c.SWIVEL + side]
+    swivel = worker.q[c.SWIVEL + side]
     level, out = math.cos(swivel), math.sin(swivel)
     back, left = -0.7 * level, sign * (0.45 * level + out)
     p[POLE, 0], p[POLE, 1] = cos * back - sin * left, sin * back + cos * left
-    above = (p[TARGET, 2] - p[upper, 2]) / me.size[an.ARM]
+    above = (p[TARGET, 2] - p[upper, 2]) / worker.lengths[an.ARM]
     p[POLE, 2] = -0.9 * level * (0.15 + 0.85 * min_jerk(1.2 * (above + 1.0)))
-    if me.fallen > 0.0:
-        _level_pole(side, an.CHEST, -1.0, me.elbows_out, me)
-    bend(upper, GRIP, me.size[an.UPPER_LENGTH], me.size[an.FOREARM_GRIP], ARM_KNEE, ARM_LIMIT, me)
-    aim(upper, fore, me.size[an.UPPER_LENGTH], me)
-    aim(fore, GRIP, me.size[an.FOREARM_GRIP], me)
-    attach(hand, fore, me)
-    aim(hand, GRIP, an.GRIP_M, me)
+    if worker.fall_share > 0.0:
+        _level_pole(side, an.CHEST, -1.0, worker.elbows_out, worker)
+    solve_two_bones(
+        upper,
+        GRIP,
+        worker.lengths[an.UPPER_LENGTH],
+        worker.lengths[an.FOREARM_GRIP],
+        ARM_KNEE,
+        ARM_LIMIT,
+        worker,
+    )
+    aim(upper, fore, worker.lengths[an.UPPER_LENGTH], worker)
+    aim(fore, GRIP, worker.lengths[an.FOREARM_GRIP], worker)
+    attach(hand, fore, worker)
+    aim(hand, GRIP, an.GRIP_M, worker)
 
 
 @kernel
-def _heel_off(side: int, me: Worker) -> float:
-    """How far a runner's heel has left the floor, as a share."""
-    return min_jerk((me.q[c.ANKLE + 6 * side + 2] - me.size[an.ANKLE_Z]) / HEEL_OFF_M - 0.5)
+def _measure_heel_lift(side: int, worker: Worker) -> float:
+    """Return the share by which a runner's heel has left the floor."""
+    return min_jerk(
+        (worker.q[c.ANKLE + 6 * side + 2] - worker.lengths[an.ANKLE_Z]) / HEEL_OFF_M - 0.5
+    )
 
 
 @kernel
-def leg(side: int, me: Worker) -> None:
-    """Hip to toes; the knee over the foot."""
-    q, p, r = me.q, me.p, me.r
+def pose_leg(side: int, worker: Worker) -> None:
+    """Pose a leg from hip to toes, its knee over the foot."""
+    q, p, r = worker.q, worker.p, worker.r
     thigh, ankle = an.LEFT + side * an.SIDE_STRIDE + an.THIGH, c.ANKLE + 6 * side
     shank, foot, toes = thigh + 1, thigh + 2, thigh + 3
-    attach(thigh, 0, me)
+    attach(thigh, 0, worker)
     cos, sin = math.cos(q[ankle + 3]), math.sin(q[ankle + 3])
-    pitched(cos, sin, q[ankle + 4], foot, me)
-    pitched(cos, sin, q[ankle + 5], toes, me)
+    set_pitch(cos, sin, q[ankle + 4], foot, worker)
+    set_pitch(cos, sin, q[ankle + 5], toes, worker)
     p[POLE, 0], p[POLE, 1] = 0.75 * cos + 0.25 * r[0, 0, 0], 0.75 * sin + 0.25 * r[0, 1, 0]
     p[POLE, 2] = 0.12
-    if me.fallen > 0.0:
-        _level_pole(side, 0, 1.0, me.knees_out, me)
+    if worker.fall_share > 0.0:
+        _level_pole(side, 0, 1.0, worker.knees_out, worker)
     for i in range(3):
         p[TARGET, i] = q[ankle + i]
     straight = 1.0
-    if me.flight_s > 0.0:
-        straight -= TRAILING_BENT * _heel_off(side, me)
-    bend(thigh, foot, me.size[an.THIGH_LENGTH], me.size[an.SHANK_LENGTH], straight, 1.001, me)
-    aim(thigh, shank, me.size[an.THIGH_LENGTH], me)
-    aim(shank, foot, me.size[an.SHANK_LENGTH], me)
-    attach(toes, foot, me)
+    if worker.flight_s > 0.0:
+        straight -= TRAILING_BENT * _measure_heel_lift(side, worker)
+    solve_two_bones(
+        thigh,
+        foot,
+        worker.lengths[an.THIGH_LENGTH],
+        worker.lengths[an.SHANK_LENGTH],
+        straight,
+        1.001,
+        worker,
+    )
+    aim(thigh, shank, worker.lengths[an.THIGH_LENGTH], worker)
+    aim(shank, foot, worker.lengths[an.SHANK_LENGTH], worker)
+    attach(toes, foot, worker)
 
 
 @kernel
-def pitched(cos: float, sin: float, pitch: float, s: int, me: Worker) -> None:
-    """r[s] = Rz Ry(pitch), the cosine and sine of the first angle given."""
-    r = me.r
+def set_pitch(cos: float, sin: float, pitch: float, segment: int, worker: Worker) -> None:
+    """Set r[segment] = Rz(yaw) Ry(pitch).
+
+    Args:
+        cos: cosine of the yaw.
+        sin: sine of the yaw.
+        pitch: angle about y [rad].
+        segment: row of `r`.
+        worker: record; its `r` is written.
+    """
+    r = worker.r
     cp, sp = 1.0, 0.0
     if pitch != 0.0:
         cp, sp = math.cos(pitch), math.sin(pitch)
-    r[s, 0, 0], r[s, 0, 1], r[s, 0, 2] = cos * cp, -sin, cos * sp
-    r[s, 1, 0], r[s, 1, 1], r[s, 1, 2] = sin * cp, cos, sin * sp
-    r[s, 2, 0], r[s, 2, 1], r[s, 2, 2] = -sp, 0.0, cp
+    r[segment, 0, 0], r[segment, 0, 1], r[segment, 0, 2] = cos * cp, -sin, cos * sp
+    r[segment, 1, 0], r[segment, 1, 1], r[segment, 1, 2] = sin * cp, cos, sin * sp
+    r[segment, 2, 0], r[segment, 2, 1], r[segment, 2, 2] = -sp, 0.0, cp
 
 
 @kernel
-def pose(me: Worker) -> None:
-    """Fill the first 22 rows of p and r from q."""
-    q = me.q
-    trunk(me)
+def pose(worker: Worker) -> None:
+    """Fill the rows of the segments of `p` and `r` from the control vector `q`."""
+    q = worker.q
+    pose_trunk(worker)
     yaw = q[c.HEADING] + q[c.PELVIS_YAW] + q[c.SPINE_TWIST]
     cos, sin = math.cos(yaw), math.sin(yaw)
     for side in range(2):
-        arm(side, cos, sin, me)
-        leg(side, me)
+        pose_arm(side, cos, sin, worker)
+        pose_leg(side, worker)
 
 
 @kernel
-def quaternion(r: Floats, s: int, out: Floats) -> None:
-    """Unit quaternion (scalar first, w >= 0) of r[s] into out[s], by Shepperd's method."""
-    trace = r[s, 0, 0] + r[s, 1, 1] + r[s, 2, 2]
+def write_quaternion(r: Floats, segment: int, out: Floats) -> None:
+    """Write the unit quaternion (scalar first, w >= 0) of r[segment] by Shepperd's method.
+
+    Args:
+        r: rotations (N, 3, 3).
+        segment: row of `r` and of `out`.
+        out: quaternions (N, 4).
+    """
+    trace = r[segment, 0, 0] + r[segment, 1, 1] + r[segment, 2, 2]
     if trace > 0.0:
         w = 0.5 * math.sqrt(trace + 1.0)
         n = 0.25 / w
-        out[s, 0], out[s, 1] = w, (r[s, 2, 1] - r[s, 1, 2]) * n
-        out[s, 2], out[s, 3] = (r[s, 0, 2] - r[s, 2, 0]) * n, (r[s, 1, 0] - r[s, 0, 1]) * n
+        out[segment, 0], out[segment, 1] = w, (r[segment, 2, 1] - r[segment, 1, 2]) * n
+        out[segment, 2], out[segment, 3] = (
+            (r[segment, 0, 2] - r[segment, 2, 0]) * n,
+            (r[segment, 1, 0] - r[segment, 0, 1]) * n,
+        )
         return
     i = 0
-    if r[s, 1, 1] > r[s, 0, 0]:
+    if r[segment, 1, 1] > r[segment, 0, 0]:
         i = 1
-    if r[s, 2, 2] > r[s, i, i]:
+    if r[segment, 2, 2] > r[segment, i, i]:
         i = 2
     j, k = (i + 1) % 3, (i + 2) % 3
-    largest = 0.5 * math.sqrt(1.0 + r[s, i, i] - r[s, j, j] - r[s, k, k])
+    largest = 0.5 * math.sqrt(1.0 + r[segment, i, i] - r[segment, j, j] - r[segment, k, k])
     n = 0.25 / largest
-    w = (r[s, k, j] - r[s, j, k]) * n
+    w = (r[segment, k, j] - r[segment, j, k]) * n
     sign = -1.0 if w < 0.0 else 1.0
-    out[s, 0], out[s, 1 + i] = sign * w, sign * largest
-    out[s, 1 + j] = sign * (r[s, i, j] + r[s, j, i]) * n
-    out[s, 1 + k] = sign * (r[s, i, k] + r[s, k, i]) * n
+    out[segment, 0], out[segment, 1 + i] = sign * w, sign * largest
+    out[segment, 1 + j] = sign * (r[segment, i, j] + r[segment, j, i]) * n
+    out[segment, 1 + k] = sign * (r[segment, i, k] + r[segment, k, i]) * n
 
 
 @kernel
-def spin(before: Floats, after: Floats, s: int, duration: float, out: Floats) -> None:
-    """Angular velocity (world) that takes before[s] to a close later after[s], into out[s]."""
+def write_angular_velocity(
+    before: Floats, after: Floats, segment: int, duration: float, out: Floats
+) -> None:
+    """Write the angular velocity in the world that takes one rotation to a slightly later one.
+
+    Args:
+        before: rotations (N, 3, 3).
+        after: the same a moment later.
+        segment: row of `before`, `after` and `out`.
+        duration: time from one to the other [s].
+        out: angular velocities (N, 3) [rad/s].
+    """
     x = y = z = 0.0
     for a in range(3):
-        bx, by, bz = before[s, 0, a], before[s, 1, a], before[s, 2, a]
-        ax, ay, az = after[s, 0, a], after[s, 1, a], after[s, 2, a]
+        bx, by, bz = before[segment, 0, a], before[segment, 1, a], before[segment, 2, a]
+        ax, ay, az = after[segment, 0, a], after[segment, 1, a], after[segment, 2, a]
         x, y, z = x + by * az - bz * ay, y + bz * ax - bx * az, z + bx * ay - by * ax
     half = 0.5 / duration
-    out[s, 0], out[s, 1], out[s, 2] = half * x, half * y, half * z
+    out[segment, 0], out[segment, 1], out[segment, 2] = half * x, half * y, half * z

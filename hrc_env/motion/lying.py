@@ -1,218 +1,277 @@
-"""Loads that lie about: in piles at first, then where workers have laid them down.
+"""Loads that lie about: in piles when an episode begins, then where workers lay them down.
 
-None appears or vanishes: a worker takes up what lies on top at a place, and what is laid down lies
-there from then on, on what lies there already. Nobody makes piles grow; a reset does.
+No load appears or vanishes: a worker takes up the uppermost load at a place, and a load that is
+laid down lies there from then on, on top of the loads that are there. Only a reset restores piles.
 """
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from hrc_env.core.declared import Records1, dtype_of
 from hrc_env.core.errors import unknown
-from hrc_env.core.typing import Bools, Floats, Records
+from hrc_env.core.typing import Bools, Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion.activities.going import CART, WHEELBARROW
 from hrc_env.motion.activities.loads import BOARD
-from hrc_env.motion.curves import placed
-from hrc_env.motion.holding import N_HELD, prop_pose
+from hrc_env.motion.curves import move_point
+from hrc_env.motion.holding import N_HELD, write_prop_pose
+from hrc_env.motion.points import Place
 from hrc_env.motion.schedule import Job
-from hrc_env.motion.state import NOWHERE, Place, Worker
+from hrc_env.motion.state import NOWHERE, Worker
 from hrc_env.worker.props import BOUNDS_M, PROP_NAMES
 from hrc_env.world import AWAY_M, WORKPLACE_KINDS, Workplace
 
-LOAD = np.dtype(
-    [
-        ("shown", "f8", (N_HELD,)),  # as `holding.prop_pose` writes it; of kind 0 there is none
-        ("pose", "f8", (6,)),  # x, y, z, yaw, pitch, roll
-        ("stand", "f8", (4,)),  # from where it is taken up: a `Place`
-        ("at", "i8"),  # kind of that place, index into `WORKPLACE_KINDS`, or NOWHERE
-    ],
-    align=True,
-)
-"""A load that lies somewhere; a row without one is room for another."""
-MOVED_M, TURNED_RAD = 0.015, 0.03
-"""In piles loads lie off their place by up to so much, each by its own."""
+
+class Load:
+    """A load that lies somewhere; a row of kind 0 is room for another one."""
+
+    shown: Annotated[Floats, (N_HELD,)]
+    """Kind, position [m] and quaternion of the load, as `holding.write_prop_pose` writes them."""
+    pose: Annotated[Floats, (6,)]
+    """Pose in the world: x, y, z [m], yaw, pitch, roll [rad]."""
+    stand: Annotated[Floats, (4,)]
+    """Place from which it is taken up: x, y [m], heading [rad], height [m]."""
+    at: int
+    """Kind of that place, an index into `WORKPLACE_KINDS`, or `NOWHERE`."""
+
+
+LOAD = np.dtype((np.record, dtype_of(Load)))
+"""NumPy's type of a `Load`; its rows have attributes in Python, too."""
+MOVED_M = 0.015
+"""Greatest displacement of a load in a pile from its place, along x and y [m]."""
+TURNED_RAD = 0.03
+"""Greatest turn of a load in a pile from its place [rad]."""
 HIGH = ("pile", "bench", "task")
-"""Kinds of places whose height is that of a surface on which loads lie; elsewhere that is the
-floor, or the wall."""
+"""Kinds of places with a surface, at the place's height, on which loads lie.
+
+At other places the loads lie on the floor, or hang on the wall.
+"""
 HUNG_M = 1.2
-"""Boards are put to a wall no higher than this [m]; judgement."""
-AT_HAND_M, EXACT_M, EXACT_COS = 0.13, 0.01, 0.9999
-"""Who is so near to where a load is taken up can take it; a cart, only who is exactly there."""
+"""Greatest height of boards at a wall [m]; judgement."""
+AT_HAND_M = 0.13
+"""Distance from the place of a load within which it can be taken up [m]."""
+EXACT_M = 0.01
+"""Distance from the place of a cart within which it can be taken [m]."""
+EXACT_COS = 0.9999
+"""Least cosine of the heading from that of the place of a cart, which can then be taken."""
 WHEELED = (CART, WHEELBARROW)
 """Props that are taken by their handles."""
-ROOM_M, TOUCH_M = 0.40, 0.01
-"""Paths keep so far from what lies about, and half its shorter side, from its middle; what overlaps
-by less than that lies beside each other [m]."""
+ROOM_M = 0.40
+"""Distance of paths from the middle of a load, beyond half its shorter side [m]."""
+TOUCH_M = 0.01
+"""Overlap up to which two loads lie beside each other [m]."""
 
 
-def at_first(places: Sequence[Workplace], jobs: Sequence[Job]) -> Records:
-    """(L,) of `LOAD`: what lies at places at first. Where a job takes up what no place of its kind
-    has, the first one has one."""
+class Extent(NamedTuple):
+    """Vertical extent of a load from its origin."""
+
+    low: float
+    """Lower end [m]."""
+    high: float
+    """Upper end [m]."""
+
+
+class Footprints(NamedTuple):
+    """Rectangles that loads cover on the floor."""
+
+    middle: Floats
+    """Middles (n, 2) in the world [m]."""
+    half: Floats
+    """Half edges (n, 2) along and across the loads [m]."""
+
+
+def make_loads(places: Sequence[Workplace], jobs: Sequence[Job]) -> Records1[Load]:
+    """Return the loads (L,) that lie at places when an episode begins.
+
+    The first place of a kind has a load that a job takes up there, if no place of its kind has one.
+    """
     wanted = {(job.prop, job.at) for job in jobs if job.activity == "pick up"}
     wanted -= {(prop, place.kind) for place in places for prop in place.loads}
     loads = np.zeros(0, LOAD)
     for place in places:
         more = sorted(prop for prop, kind in wanted if kind == place.kind)
         wanted -= {(prop, place.kind) for prop in more}
-        spot = spot_of(place)
+        stand = get_place(place)
         for prop in (*place.loads, *more):
             if prop not in PROP_NAMES[1:]:
                 raise unknown(f"load at {place.name!r}", prop, PROP_NAMES[1:])
             kind = PROP_NAMES.index(prop)
             row = np.zeros(1, LOAD)
             row["shown"][0, 0] = kind
-            row["pose"] = resting(kind, place.kind, spot, place.ahead_m, loads)
-            row["stand"], row["at"] = spot, WORKPLACE_KINDS.index(place.kind)
+            row["pose"] = find_rest_pose(kind, place.kind, stand, place.ahead_m, loads)
+            row["stand"], row["at"] = stand, WORKPLACE_KINDS.index(place.kind)
             loads = np.concatenate([loads, row])
     return loads
 
 
-def spot_of(place: Workplace) -> Place:
-    """Where one stands at a place."""
-    return *place.xy_m, place.yaw_rad, place.height_m
+def get_place(place: Workplace) -> Place:
+    """Return where a worker stands at a workplace."""
+    return Place(*place.xy_m, place.yaw_rad, place.height_m)
 
 
-def lay_out(loads: Records, first: Records, rng: np.random.Generator) -> None:
-    """Fill the rows of an environment with what lies there `at_first`, a little off its place."""
+def reset_loads(loads: Records1[Load], first: Records1[Load], rng: np.random.Generator) -> None:
+    """Fill the rows of an environment with the loads of the beginning, a little off their places.
+
+    Args:
+        loads: rows of the environment, which are written.
+        first: loads of the beginning, as `make_loads` returns them.
+        rng: generator of the displacements.
+    """
     loads[...] = np.zeros((), LOAD)
     loads[: len(first)] = first
     off = 2.0 * rng.random((len(first), 3)) - 1.0
     for row, (x, y, turn) in zip(loads, off.tolist(), strict=False):
-        if row["shown"][0] not in WHEELED:
-            row["pose"][:2] += MOVED_M * x, MOVED_M * y
-            row["pose"][3] += TURNED_RAD * turn
-        half = 0.5 * row["pose"][3]
-        row["shown"][1:] = *row["pose"][:3], math.cos(half), 0.0, 0.0, math.sin(half)
+        if row.shown[0] not in WHEELED:
+            row.pose[:2] += MOVED_M * x, MOVED_M * y
+            row.pose[3] += TURNED_RAD * turn
+        half = 0.5 * row.pose[3]
+        row.shown[1:] = *row.pose[:3], math.cos(half), 0.0, 0.0, math.sin(half)
 
 
-def resting(kind: int, at: str, spot: Place, ahead_m: float, loads: Records) -> Floats:
-    """(6,) where a load of a kind rests that is laid down `ahead_m` ahead of a spot, at a place of
-    a kind ("": none): a board flat to a wall, below what is there, all else on top of it."""
-    hung = at == "wall" and kind == BOARD
-    low, high = _level(kind, hung)
-    if hung:
+def find_rest_pose(
+    kind: int, at: str, stand: Place, ahead_m: float, loads: Records1[Load]
+) -> Floats:
+    """Return the pose (6,) at which a load rests that is laid down at a place.
+
+    A board rests flat on a wall, below the boards there; all other loads rest on top of others.
+
+    Args:
+        kind: kind of the load, an index into `PROPS`.
+        at: kind of the place; "" for none.
+        stand: where the worker stands.
+        ahead_m: distance of the load ahead of the worker [m].
+        loads: loads that lie about.
+    """
+    is_hung = at == "wall" and kind == BOARD
+    low, high = _measure_extent(kind, is_hung)
+    if is_hung:
         ahead_m += BOUNDS_M[kind, 0, 2]
-    x, y = placed(spot[0], spot[1], spot[2], ahead_m, 0.0)
-    pose = np.array([x, y, 0.0, spot[2], 0.5 * math.pi if hung else 0.0, 0.0])
-    pose[2] = min(spot[3], HUNG_M) if hung else (spot[3] if at in HIGH else 0.0) - low
-    for other in loads[_under(kind, pose, loads)]:
-        z, span = other["pose"][2], _level(int(other["shown"][0]), other["pose"][4] > 1.0)
-        pose[2] = min(pose[2], z + span[0] - high) if hung else max(pose[2], z + span[1] - low)
+    x, y = move_point(stand.x, stand.y, stand.yaw, ahead_m, 0.0)
+    pose = np.array([x, y, 0.0, stand.yaw, 0.5 * math.pi if is_hung else 0.0, 0.0])
+    pose[2] = min(stand.height, HUNG_M) if is_hung else (stand.height if at in HIGH else 0.0) - low
+    for other in loads[_find_overlapping(kind, pose, loads)]:
+        z, extent = other.pose[2], _measure_extent(int(other.shown[0]), other.pose[4] > 1.0)
+        pose[2] = (
+            min(pose[2], z + extent.low - high) if is_hung else max(pose[2], z + extent.high - low)
+        )
     return pose
 
 
-def on_top(loads: Records) -> Bools:
-    """(L,) which loads there are and bear nothing."""
+def find_uncovered(loads: Records1[Load]) -> Bools:
+    """Return which rows (L,) hold a load that bears no other."""
     free = loads["shown"][:, 0] > 0
     for row in np.flatnonzero(free):
-        over = _under(int(loads["shown"][row, 0]), loads["pose"][row], loads)
+        over = _find_overlapping(int(loads["shown"][row, 0]), loads["pose"][row], loads)
         free[row] = not (over & (loads["pose"][:, 2] > loads["pose"][row, 2])).any()
     return free
 
 
-def stands(loads: Records, kind: int, at: str) -> Iterator[Place]:
-    """From where loads of a kind can be taken up that lie at places of a kind."""
-    here = on_top(loads) & (loads["shown"][:, 0] == kind)
+def list_stands(loads: Records1[Load], kind: int, at: str) -> Iterator[Place]:
+    """Yield the places from which loads of a kind at places of a kind can be taken up."""
+    here = find_uncovered(loads) & (loads["shown"][:, 0] == kind)
     here &= loads["at"] == WORKPLACE_KINDS.index(at)
     for row in loads["stand"][here]:
-        yield tuple(row.tolist())  # type: ignore[misc]
+        yield Place(*row.tolist())
 
 
-def at_hand(loads: Records, kind: int, me: Worker) -> int:
-    """The row of a load of a kind that a worker can take up from where they stand; -1: none."""
+def find_load_at_hand(loads: Records1[Load], kind: int, worker: Worker) -> int:
+    """Return the row of a load of a kind that a worker can take up on the spot; -1 for none."""
     x, y, yaw = loads["stand"][:, :3].T
-    away = np.hypot(x - me["start_x"], y - me["start_y"])
-    near = on_top(loads) & (loads["shown"][:, 0] == kind) & (away < AT_HAND_M)
+    away = np.hypot(x - worker.start_x, y - worker.start_y)
+    near = find_uncovered(loads) & (loads["shown"][:, 0] == kind) & (away < AT_HAND_M)
     if kind in WHEELED:
-        near &= (away < EXACT_M) & (np.cos(yaw - me["start_yaw"]) > EXACT_COS)
+        near &= (away < EXACT_M) & (np.cos(yaw - worker.start_yaw) > EXACT_COS)
     return int(np.argmin(np.where(near, away, np.inf))) if near.any() else -1
 
 
-def is_left(loads: Records, spot: Place) -> bool:
-    """Whether something lies there that is taken up from a spot."""
-    away = np.hypot(*(loads["stand"][:, :2] - spot[:2]).T)
+def has_load_at(loads: Records1[Load], stand: Place) -> bool:
+    """Return whether a load lies there that is taken up from a place."""
+    away = np.hypot(*(loads["stand"][:, :2] - stand[:2]).T)
     return bool(((loads["shown"][:, 0] > 0) & (away < AT_HAND_M)).any())
 
 
-def is_any(loads: Records, kind: int) -> bool:
-    """Whether a load of a kind lies anywhere."""
+def has_load(loads: Records1[Load], kind: int) -> bool:
+    """Return whether a load of a kind lies anywhere."""
     return bool((loads["shown"][:, 0] == kind).any())
 
 
-def take(loads: Records, row: int) -> None:
-    """It is in somebody's hands."""
+def remove_load(loads: Records1[Load], row: int) -> None:
+    """Remove a load that a worker has taken up."""
     loads[row] = np.zeros((), LOAD)
 
 
-def place_here(places: Sequence[Workplace], me: Worker) -> Workplace | None:
-    """The place at which a worker stands, if it is one."""
+def find_place_here(places: Sequence[Workplace], worker: Worker) -> Workplace | None:
+    """Return the workplace at which a worker stands, if there is one."""
     for place in places:
         x, y = place.xy_m
-        if math.hypot(me["start_x"] - x, me["start_y"] - y) < AT_HAND_M:
+        if math.hypot(worker.start_x - x, worker.start_y - y) < AT_HAND_M:
             return place
     return None
 
 
-def rest_here(loads: Records, places: Sequence[Workplace], me: Worker) -> Floats:
-    """(6,) where what a worker holds rests when it is laid down where they stand."""
-    kind, place = int(me["load_prop"]), place_here(places, me)
+def find_rest_pose_here(
+    loads: Records1[Load], places: Sequence[Workplace], worker: Worker
+) -> Floats:
+    """Return the pose (6,) at which a worker's load rests when it is laid down on the spot."""
+    kind, place = int(worker.load_prop), find_place_here(places, worker)
     if place is None:
-        spot = float(me["start_x"]), float(me["start_y"]), float(me["start_yaw"]), 0.0
-        return resting(kind, "", spot, AWAY_M, loads)
-    return resting(kind, place.kind, spot_of(place), place.ahead_m, loads)
+        here = Place(float(worker.start_x), float(worker.start_y), float(worker.start_yaw), 0.0)
+        return find_rest_pose(kind, "", here, AWAY_M, loads)
+    return find_rest_pose(kind, place.kind, get_place(place), place.ahead_m, loads)
 
 
-def lay_down(loads: Records, places: Sequence[Workplace], me: Worker) -> None:
-    """What is in the hands of a worker who ends an activity lies there from now on."""
+def lay_down_load(loads: Records1[Load], places: Sequence[Workplace], worker: Worker) -> None:
+    """Add the load at the end of a worker's activity to those that lie about."""
     free = np.flatnonzero(loads["shown"][:, 0] == 0)
     if not len(free):
         return
     row = loads[int(free[0])]
-    prop_pose(row["shown"], me)
-    row["pose"] = me["q"][c.PROP_POSE : c.PROP_POSE + 6]
-    here = float(me["end_x"]), float(me["end_y"]), float(me["end_yaw"]), 0.0
-    place = place_here(places, me)
-    row["stand"] = here if place is None else spot_of(place)
-    row["at"] = NOWHERE if place is None else WORKPLACE_KINDS.index(place.kind)
+    write_prop_pose(row.shown, worker)
+    row.pose = worker.q[c.PROP_POSE : c.PROP_POSE + 6]
+    here = Place(float(worker.end_x), float(worker.end_y), float(worker.end_yaw), 0.0)
+    place = find_place_here(places, worker)
+    row.stand = np.array(here if place is None else get_place(place))
+    row.at = NOWHERE if place is None else WORKPLACE_KINDS.index(place.kind)
 
 
-def in_the_way(loads: Records) -> Floats:
-    """(n, 3) x, y, radius of what paths go round."""
-    there = loads[loads["shown"][:, 0] > 0]
-    middle, half = _seen_from_above(there["shown"][:, 0], there["pose"])
+def list_load_discs(loads: Records1[Load]) -> Floats:
+    """Return discs (n, 3) that paths go around: x, y, radius [m]."""
+    lying = loads[loads["shown"][:, 0] > 0]
+    middle, half = _project(lying["shown"][:, 0], lying["pose"])
     return np.concatenate([middle, ROOM_M + half.min(1, keepdims=True)], axis=1)
 
 
-def _level(kind: int, hung: bool) -> tuple[float, float]:
-    """How far a load reaches below and above its origin [m]."""
-    axis = 0 if hung else 2
-    return float(BOUNDS_M[kind, 0, axis]), float(BOUNDS_M[kind, 1, axis])
+def _measure_extent(kind: int, is_hung: bool) -> Extent:
+    """Return the vertical extent of a load of a kind, hung on a wall or lying."""
+    axis = 0 if is_hung else 2
+    return Extent(float(BOUNDS_M[kind, 0, axis]), float(BOUNDS_M[kind, 1, axis]))
 
 
-def _under(kind: int, pose: Floats, loads: Records) -> Bools:
-    """(L,) which loads are below or above one that lies at a pose."""
-    middle, half = _seen_from_above(np.array([kind]), pose[None])
-    middles, halves = _seen_from_above(loads["shown"][:, 0], loads["pose"])
+def _find_overlapping(kind: int, pose: Floats, loads: Records1[Load]) -> Bools:
+    """Return which loads (L,) are above or below one of a kind at a pose (6,)."""
+    middle, half = _project(np.array([kind]), pose[None])
+    middles, halves = _project(loads["shown"][:, 0], loads["pose"])
     off, yaws = middles - middle, loads["pose"][:, 3]
     meets = loads["shown"][:, 0] > 0
     for axis in (pose[3], pose[3] + 0.5 * math.pi, yaws, yaws + 0.5 * math.pi):
         apart = np.abs(off[:, 0] * np.cos(axis) + off[:, 1] * np.sin(axis))
-        reach = _reach(half, pose[3] - axis) + _reach(halves, yaws - axis)
+        reach = _measure_half_width(half, pose[3] - axis) + _measure_half_width(halves, yaws - axis)
         meets &= apart < reach - TOUCH_M
     return meets
 
 
-def _seen_from_above(kind: Floats, poses: Floats) -> tuple[Floats, Floats]:
-    """(n, 2) middles of loads at poses (n, 6) in the world, and half edges [m]."""
+def _project(kind: Floats, poses: Floats) -> Footprints:
+    """Return the rectangles of loads of kinds (n,) at poses (n, 6)."""
     box = BOUNDS_M[kind.astype(int), :, :2]
     (ahead, left), half = box.mean(1).T, 0.5 * (box[:, 1] - box[:, 0])
     cos, sin = np.cos(poses[:, 3]), np.sin(poses[:, 3])
     middle = np.stack([cos * ahead - sin * left, sin * ahead + cos * left], axis=1)
-    return poses[:, :2] + middle, half
+    return Footprints(poses[:, :2] + middle, half)
 
 
-def _reach(half: Floats, turn_rad: Floats) -> Floats:
-    """(n,) how far rectangles with half edges (n, 2) reach along axes so far turned from them."""
+def _measure_half_width(half: Floats, turn_rad: Floats) -> Floats:
+    """Return half the widths (n,) of rectangles along axes at an angle to them."""
     return half[:, 0] * np.abs(np.cos(turn_rad)) + half[:, 1] * np.abs(np.sin(turn_rad))

@@ -1,46 +1,72 @@
-"""Standing at ease, and the one way in which trunks go to where hands are wanted."""
+"""Standing at ease, and how a trunk follows hands that are wanted somewhere."""
 
 import math
 
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Floats
+from hrc_env.core.typing import Floats, Vector3
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import ARM, FOREARM_GRIP, LEFT, SIDE_STRIDE, STAND_Z, UPPER_ARM
-from hrc_env.motion.curves import placed, shift, wrap
+from hrc_env.motion.curves import move_point, shift, wrap
 from hrc_env.motion.kinematics import ARM_KNEE, pose
-from hrc_env.motion.state import Pair, Triple, Worker
+from hrc_env.motion.points import Point, Sides
+from hrc_env.motion.state import Worker
 
 STANCE_HALF_WIDTH_M = 0.10
-"""Ankles' distance from the middle when standing [m]; shoulder-wide for the baked bodies."""
+"""Distance of the ankles from the middle when standing [m]; shoulder width of the baked bodies."""
 TOE_OUT_RAD = 0.12
-"""Feet turn out by about 7 degrees, standing and walking."""
-SWAY_HZ, SHIFT_M = (0.11, 0.17, 0.29, 0.41, 0.23), 0.018
-"""Rates of a standing person's sway, incommensurable; weight shifts by so much [m]; judgement."""
-RELAXED_PITCH, RELAXED_ELBOW, RELAXED_OUT, HAND_OUT_M = 0.02, 0.38, 0.26, 0.05
-"""Hanging arms: upper arm forward, elbow bent, upper arm away from the trunk [rad], and the hand
-farther out than the elbow [m]: beside broad hips, too; judgement."""
+"""Outward turn of the feet, standing and walking [rad]; about 7 degrees."""
+SWAY_HZ = (0.11, 0.17, 0.29, 0.41, 0.23)
+"""Rates of a standing person's sway, incommensurable [Hz]; judgement."""
+SHIFT_M = 0.018
+"""Amplitude of the weight shift [m]; judgement."""
+RELAXED_PITCH = 0.02
+"""Forward turn of a hanging upper arm [rad]; judgement."""
+RELAXED_ELBOW = 0.38
+"""Bend of the elbow of a hanging arm [rad]; judgement."""
+RELAXED_OUT = 0.26
+"""Turn of a hanging upper arm away from the trunk [rad]; judgement."""
+HAND_OUT_M = 0.05
+"""Distance of a hanging hand outwards of its elbow [m], also beside broad hips; judgement."""
 MOST_LEAN = 1.3
 """Lean beyond which a person would step instead."""
-NECK_SHARE, HEAD_SHARE = 0.70, 0.75
-"""Height of the eyes above the pelvis as a share of the pelvis's, from the baked bodies; the head's
-share of a turn of gaze, the eyes do the rest (Freedman & Sparks 1997: 70-80 %)."""
-MOST_YAW_RAD, MOST_DOWN_RAD, MOST_UP_RAD = 1.2, 0.75, 0.75
-"""How far neck and head turn from the chest; comfortable ranges, judgement."""
+NECK_SHARE = 0.70
+"""Height of the eyes above the pelvis as a share of the pelvis's height, from the baked bodies."""
+HEAD_SHARE = 0.75
+"""Share of the head in a turn of gaze; the eyes do the rest (Freedman & Sparks 1997: 70-80 %)."""
+MOST_YAW_RAD = 1.2
+"""Greatest turn of the head from the chest to a side [rad]; comfortable range, judgement."""
+MOST_DOWN_RAD = 0.75
+"""Greatest turn of the head from the chest downwards [rad]; comfortable range, judgement."""
+MOST_UP_RAD = 0.75
+"""Greatest turn of the head from the chest upwards [rad]; comfortable range, judgement."""
 
 
 @kernel
-def sway(clock_s: float, i: int, me: Worker) -> float:
-    """A slow wave of the worker's own, between -1 and 1."""
-    return math.sin(2.0 * math.pi * (SWAY_HZ[i] * clock_s + me.phases[i]))
+def sway(clock_s: float, i: int, worker: Worker) -> float:
+    """Return a slow wave in [-1, 1] with the worker's own phase.
+
+    Args:
+        clock_s: time since the episode began [s].
+        i: index into `SWAY_HZ`.
+        worker: record with the phases.
+    """
+    return math.sin(2.0 * math.pi * (SWAY_HZ[i] * clock_s + worker.phases[i]))
 
 
 @kernel
-def hang(side: int, pitch: float, elbow: float, me: Worker) -> None:
-    """Let an arm hang: upper arm `pitch` forward of the vertical, elbow bent by `elbow`."""
-    q = me.q
+def hang(side: int, pitch: float, elbow: float, worker: Worker) -> None:
+    """Let an arm hang.
+
+    Args:
+        side: 0 left, 1 right.
+        pitch: turn of the upper arm forward from the vertical [rad].
+        elbow: bend of the elbow [rad].
+        worker: record; its `q` is changed.
+    """
+    q = worker.q
     sign = 1.0 - 2.0 * side
-    fore = me.size[FOREARM_GRIP]
-    upper = me.size[ARM] - fore
+    fore = worker.lengths[FOREARM_GRIP]
+    upper = worker.lengths[ARM] - fore
     at = c.HAND_OFFSET + 3 * side
     cos, sin = math.cos(pitch), math.sin(pitch)
     both_cos, both_sin = math.cos(pitch + elbow), math.sin(pitch + elbow)
@@ -50,14 +76,26 @@ def hang(side: int, pitch: float, elbow: float, me: Worker) -> None:
 
 
 @kernel
-def stand(x: float, y: float, yaw: float, clock_s: float, me: Worker) -> None:
-    """Fill every column but the feet: at ease at (x, y), shifting weight, looking about."""
-    q = me.q
-    first, second, third = sway(clock_s, 0, me), sway(clock_s, 1, me), sway(clock_s, 2, me)
-    fourth, fifth = sway(clock_s, 3, me), sway(clock_s, 4, me)
+def stand(x: float, y: float, yaw: float, clock_s: float, worker: Worker) -> None:
+    """Fill every column but those of the feet: at ease, shifting weight, looking about.
+
+    Args:
+        x: world x of the root [m].
+        y: world y of the root [m].
+        yaw: heading [rad].
+        clock_s: time since the episode began [s].
+        worker: record; its `q` is written.
+    """
+    q = worker.q
+    first, second, third = (
+        sway(clock_s, 0, worker),
+        sway(clock_s, 1, worker),
+        sway(clock_s, 2, worker),
+    )
+    fourth, fifth = sway(clock_s, 3, worker), sway(clock_s, 4, worker)
     side_shift, ahead = SHIFT_M * (0.7 * first + 0.3 * third), 0.006 * fourth
-    q[c.ROOT_X], q[c.ROOT_Y] = placed(x, y, yaw, ahead, side_shift)
-    q[c.HEADING], q[c.PELVIS_Z] = yaw, me.size[STAND_Z]
+    q[c.ROOT_X], q[c.ROOT_Y] = move_point(x, y, yaw, ahead, side_shift)
+    q[c.HEADING], q[c.PELVIS_Z] = yaw, worker.lengths[STAND_Z]
     q[c.PELVIS_PITCH] = 0.02 + 0.01 * fourth
     q[c.PELVIS_ROLL] = 1.2 * side_shift
     q[c.PELVIS_YAW] = 0.03 * second
@@ -69,15 +107,22 @@ def stand(x: float, y: float, yaw: float, clock_s: float, me: Worker) -> None:
     q[c.SWIVEL], q[c.SWIVEL + 1] = 0.1, 0.1
     for side in range(2):
         wave = 0.04 * (third if side else fourth)
-        hang(side, RELAXED_PITCH + wave, RELAXED_ELBOW + wave, me)
+        hang(side, RELAXED_PITCH + wave, RELAXED_ELBOW + wave, worker)
         q[c.HAND_SHARE + side] = 0.0
     q[c.HAND_TARGET : c.HAND_TARGET + 6] = q[c.PROP] = 0.0
 
 
 @kernel
-def lean(amount: float, squat: float, twist: float, me: Worker) -> None:
-    """Bend the trunk forward (1: a deep bow), the pelvis going back, knees by `squat`, and turn."""
-    q = me.q
+def lean(amount: float, squat: float, twist: float, worker: Worker) -> None:
+    """Bend the trunk forward, the pelvis going back, and turn it.
+
+    Args:
+        amount: lean; 1 is a deep bow.
+        squat: share of the lean that the knees take.
+        twist: turn to the left [rad].
+        worker: record; its `q` is changed.
+    """
+    q = worker.q
     shift(q, c.ROOT_X, q[c.HEADING], -(0.07 + 0.10 * squat) * amount, 0.0)
     q[c.PELVIS_Z] -= (0.03 + 0.28 * squat) * amount
     q[c.PELVIS_PITCH] += (0.62 - 0.12 * squat) * amount
@@ -88,50 +133,78 @@ def lean(amount: float, squat: float, twist: float, me: Worker) -> None:
 
 
 @kernel
-def beyond(me: Worker) -> float:
-    """How far the targets in q lie beyond what the used arms reach from this posture [m]."""
-    used = (me.q[c.HAND_SHARE], me.q[c.HAND_SHARE + 1])
-    far = farthest(UPPER_ARM, me.q[c.HAND_TARGET :], used, me)
-    return max(far - ARM_KNEE * me.size[ARM], -1.0)
+def measure_overreach(worker: Worker) -> float:
+    """Return the distance of the hands' targets beyond the reach of the arms [m]."""
+    used = Sides(worker.q[c.HAND_SHARE], worker.q[c.HAND_SHARE + 1])
+    far = find_farthest(UPPER_ARM, worker.q[c.HAND_TARGET :], used, worker)
+    return max(far - ARM_KNEE * worker.lengths[ARM], -1.0)
 
 
 @kernel
-def farthest(segment: int, goals: Floats, used: Pair, me: Worker) -> float:
-    """From a segment of the used arms, posed as q says, to the farther goal (6,) [m]; -1: none."""
-    pose(me)
+def find_farthest(segment: int, goals: Floats, used: Sides, worker: Worker) -> float:
+    """Pose the body and return the greatest distance of a segment from its goal [m].
+
+    Args:
+        segment: segment of an arm, counted from the first of its side.
+        goals: points in the world (6,), left and right [m].
+        used: 1 for each arm that counts, else 0; -1 is returned if neither does.
+        worker: record with the control vector.
+    """
+    pose(worker)
     far = -1.0
     for side in range(2):
         at, d = LEFT + SIDE_STRIDE * side + segment, 0.0
         for i in range(3):
-            d += (goals[3 * side + i] - me.p[at, i]) ** 2
+            d += (goals[3 * side + i] - worker.p[at, i]) ** 2
         if used[side] > 0.0:
             far = max(far, math.sqrt(d))
     return far
 
 
 @kernel
-def from_here(at: Triple, me: Worker) -> Triple:
-    """A point ahead, left [m] of where the worker stands, at a height, in the world."""
-    x, y = placed(me.start_x, me.start_y, me.start_yaw, at[0], at[1])
-    return x, y, at[2]
+def locate_ahead(ahead: float, left: float, height: float, worker: Worker) -> Vector3:
+    """Return a point relative to where the worker's activity begins, in the world.
+
+    Args:
+        ahead: distance along the heading [m].
+        left: distance to the left [m].
+        height: height above the floor [m].
+        worker: record with the start pose.
+    """
+    x, y = move_point(worker.start_x, worker.start_y, worker.start_yaw, ahead, left)
+    return Vector3(x, y, height)
 
 
 @kernel
-def from_root(ahead: float, left: float, me: Worker) -> Pair:
-    """A point of the floor so far ahead and left of the root [m], as q has it."""
-    q = me.q
-    return placed(q[c.ROOT_X], q[c.ROOT_Y], q[c.HEADING], ahead, left)
+def locate_from_root(ahead: float, left: float, worker: Worker) -> Point:
+    """Return a point of the floor relative to the root in the control vector.
+
+    Args:
+        ahead: distance along the heading [m].
+        left: distance to the left [m].
+        worker: record with the control vector.
+    """
+    q = worker.q
+    return move_point(q[c.ROOT_X], q[c.ROOT_Y], q[c.HEADING], ahead, left)
 
 
 @kernel
-def look_at(x: float, y: float, z: float, share: float, me: Worker) -> None:
-    """Turn the head to a point of the world, by a share; everything but the head stands in q."""
-    q = me.q
+def look_at(x: float, y: float, z: float, share: float, worker: Worker) -> None:
+    """Turn the head to a point in the world, by a share; all other columns are set before.
+
+    Args:
+        x: world x of the point [m].
+        y: world y of the point [m].
+        z: world z of the point [m].
+        share: share of the turn.
+        worker: record; its `q` is changed.
+    """
+    q = worker.q
     if share <= 0.0:
         return
     tilt = q[c.PELVIS_PITCH] + q[c.SPINE_FLEX]
     heading = q[c.HEADING] + q[c.PELVIS_YAW]
-    tall = NECK_SHARE * me.size[STAND_Z]
+    tall = NECK_SHARE * worker.lengths[STAND_Z]
     ahead = math.sin(0.6 * tilt) * tall
     dx = x - q[c.ROOT_X] - math.cos(heading) * ahead
     dy = y - q[c.ROOT_Y] - math.sin(heading) * ahead

@@ -1,94 +1,139 @@
-"""What workers notice of the robot: they pause, or take their hands away and step back.
+"""Reactions to the robot: workers pause, or withdraw their hands and step back.
 
-Hands pause or are taken away by their activity's time halting or going backwards; walkers brake.
-What they would do, and how late, is drawn when an activity begins.
+Hands pause or are withdrawn by halting or reversing the clock of their activity; walkers brake.
+Kind and delay of a reaction are drawn when an activity begins.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
+from hrc_env.core.declared import Records1, Records2
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.motion import state as st
 from hrc_env.motion.anatomy import CHEST, HAND, HEAD, LEFT, SIDE_STRIDE
-from hrc_env.motion.state import WORKER, Worker, Workers
-from hrc_env.motion.traffic import goes, meets
+from hrc_env.motion.state import WORKER, Worker
+from hrc_env.motion.traffic import find_meeting, is_on_path
 from hrc_env.motion.walk import brake
 
 BODY_POINTS = (CHEST, HEAD, LEFT + HAND, LEFT + SIDE_STRIDE + HAND)
 """Segments that people guard."""
-MEETS_M, MEETS_M_S = 0.20, 0.30
-"""Who takes something brings the hand so far to it, so fast [m, m/s]; judgement."""
+MEETS_M = 0.20
+"""Greatest distance by which a taking hand moves to the tool that is offered [m]; judgement."""
+MEETS_M_S = 0.30
+"""Speed at which a taking hand moves to the tool that is offered [m/s]; judgement."""
 WAITS_SHARE = 0.4
-"""Who is further on the way down to a load does not wait for the robot; judgement."""
+"""Share of the way down to a load after which a worker does not wait for the robot; judgement."""
 WITHDRAW = -1.6
-"""Pace at which hands come back."""
-MACHINE_S, MACHINE_CALM_S = 2.0, 0.4
-"""So far ahead walkers look at a machine that drives, and so soon again after a reaction [s];
-judgement."""
-People = tuple[float, float, float, float]
-"""`PeopleConfig.notice_m`, `.fast_m_s`, `.calm_s`, and how far a robot that drives reaches round
-the points that people watch; 0: it is an arm [m]."""
+"""Pace at which hands are withdrawn."""
+MACHINE_S = 2.0
+"""Time over which walkers predict a driving machine [s]; judgement."""
+MACHINE_CALM_S = 0.4
+"""Time after a reaction without another reaction to a driving machine [s]; judgement."""
+
+
+class NoticeParams(NamedTuple):
+    """When workers notice the robot."""
+
+    notice_m: float
+    """Distance within which a part of the robot is noticed [m]."""
+    fast_m_s: float
+    """Approach speed above which the arm is noticed from twice that distance [m/s]."""
+    calm_s: float
+    """Time after a reaction in which nothing startles a worker [s]."""
+    girth_m: float
+    """Reach of a driving robot around the points that are watched [m]; 0 for an arm."""
 
 
 @kernel
-def notice(
-    dt_s: float, people: People, robot_world: Floats, position_world: Floats,
-    velocity_world: Floats, workers: Workers,
-) -> None:  # fmt: skip
-    """Let all look at the robot (B, 2, 3), dt_s after the last look, and react when it is time."""
+def notice_robot(
+    dt_s: float,
+    params: NoticeParams,
+    robot_world: Floats,
+    position_world: Floats,
+    velocity_world: Floats,
+    workers: Records2[Worker],
+) -> None:
+    """Let all workers look at the robot, and react when their delay is over.
+
+    Args:
+        dt_s: time since the last look [s].
+        params: when workers notice the robot.
+        robot_world: two points (B, 2, 3) of the robot [m].
+        position_world: origins (B, W, 22, 3) of the workers' segments [m].
+        velocity_world: their velocities [m/s].
+        workers: records (B, W), which are changed.
+    """
     for b, w in np.ndindex(workers.shape):
-        me = workers[b, w]
-        if me.present:
-            if me.doing == st.PAUSE and me.clock_s >= me.doing_until:
-                me.doing, me.pace_wished = st.NO_REACTION, 1.0
-            if me.clock_s >= me.acts_at:
-                me.acts_at = math.inf
+        worker = workers[b, w]
+        if worker.is_present:
+            if worker.current_reaction == st.PAUSE and worker.clock_s >= worker.reaction_until_s:
+                worker.current_reaction, worker.wanted_pace = st.NO_REACTION, 1.0
+            if worker.clock_s >= worker.reacts_at_s:
+                worker.reacts_at_s = math.inf
                 _react(w, workers[b])
-                calm_s = people[2] if people[3] == 0.0 else MACHINE_CALM_S
-                me.calm_until = me.clock_s + me.reaction_s + calm_s
-            elif me.acts_at == math.inf and me.clock_s > me.calm_until:
-                if people[3] > 0.0:
-                    chest = position_world[b, w, CHEST], velocity_world[b, w, CHEST]
-                    startled = _machine_near(dt_s, people, robot_world[b], chest, me)
+                calm_s = params.calm_s if params.girth_m == 0.0 else MACHINE_CALM_S
+                worker.calm_until_s = worker.clock_s + worker.reaction_s + calm_s
+            elif worker.reacts_at_s == math.inf and worker.clock_s > worker.calm_until_s:
+                if params.girth_m > 0.0:
+                    chest, chest_velocity = position_world[b, w, CHEST], velocity_world[b, w, CHEST]
+                    startled = _is_machine_startling(
+                        dt_s, params, robot_world[b], chest, chest_velocity, worker
+                    )
                 else:
-                    startled = me.reaction != st.NO_REACTION and _startling(
-                        dt_s, people, robot_world[b], position_world[b, w], me
+                    startled = worker.planned_reaction != st.NO_REACTION and _is_arm_startling(
+                        dt_s, params, robot_world[b], position_world[b, w], worker
                     )
                 if startled:
-                    me.acts_at = me.clock_s + me.delay_s
-            if me.activity == st.PICK_UP and me.doing == st.NO_REACTION:
-                me.pace_wished = 0.0 if _in_use(people, robot_world[b], me) else 1.0
-        for k, i in np.ndindex(me.robot_world.shape):
-            me.robot_world[k, i] = robot_world[b, k, i]
+                    worker.reacts_at_s = worker.clock_s + worker.reaction_delay_s
+            if worker.activity == st.PICK_UP and worker.current_reaction == st.NO_REACTION:
+                worker.wanted_pace = 0.0 if _is_load_in_use(params, robot_world[b], worker) else 1.0
+        for k, i in np.ndindex(worker.robot_world.shape):
+            worker.robot_world[k, i] = robot_world[b, k, i]
 
 
 @kernel
-def attend(cue: Ints, offered: Floats, dt_s: float, workers: Workers) -> None:
-    """Tell everybody how far what they wait for has come, (B,): 0 not yet, 1 there, 2 theirs. Who
-    works at it halts until it is there, who takes it until it is theirs, while the hand goes to
-    where it is offered (B, 3)."""
+def follow_signal(stage: Ints, offered: Floats, dt_s: float, workers: Records2[Worker]) -> None:
+    """Let workers follow the signal of the task.
+
+    The stages are 0 (not yet), 1 (the robot is in place) and 2 (the tool is released). Work on the
+    robot's workpiece halts until stage 1. A taking hand waits for stage 2, and moves to what is
+    offered.
+
+    Args:
+        stage: stage (B,) of the signal.
+        offered: point (B, 3) at which the tool is offered [m].
+        dt_s: time since the last call [s].
+        workers: records (B, W), which are changed.
+    """
     for b, w in np.ndindex(workers.shape):
-        me = workers[b, w]
-        me.cued = cue[b]
-        if me.activity == st.SCREW:
-            ready = me.out_at + me.take_s
-            works = ready < me.time_s < ready + me.out_s + me.hold_s
-            me.pace_wished = 0.0 if works and me.cued < 1 else 1.0
-        elif me.activity == st.TAKE:
-            waits = me.time_s > me.out_at + me.out_s and me.cued < 2
-            me.pace_wished = 0.0 if waits else 1.0
+        worker = workers[b, w]
+        worker.signal = int(stage[b])
+        if worker.activity == st.SCREW:
+            ready = worker.out_at + worker.take_s
+            works = ready < worker.time_s < ready + worker.out_s + worker.hold_s
+            worker.wanted_pace = 0.0 if works and worker.signal < 1 else 1.0
+        elif worker.activity == st.TAKE:
+            waits = worker.time_s > worker.out_at + worker.out_s and worker.signal < 2
+            worker.wanted_pace = 0.0 if waits else 1.0
             if waits:
-                _meet(offered[b], dt_s, me)
+                _move_hand(offered[b], dt_s, worker)
 
 
 @kernel
-def _meet(offered: Floats, dt_s: float, me: Worker) -> None:
-    """Bring the hand that takes nearer to what is offered, if that is near where it was put out."""
-    goal, squared = me.target[3 * me.side : 3 * me.side + 3], 0.0
+def _move_hand(offered: Floats, dt_s: float, worker: Worker) -> None:
+    """Move the target of a taking hand towards the offered point, if that is close.
+
+    Args:
+        offered: point (3,) at which the tool is offered [m].
+        dt_s: time since the last call [s].
+        worker: record; its target is changed.
+    """
+    goal, squared = worker.target[3 * worker.side : 3 * worker.side + 3], 0.0
     for i in range(3):
-        squared += (offered[i] - me.tool_pose[i]) ** 2
+        squared += (offered[i] - worker.tool_pose[i]) ** 2
     if not squared < MEETS_M**2:
         return
     squared = 0.0
@@ -100,91 +145,132 @@ def _meet(offered: Floats, dt_s: float, me: Worker) -> None:
 
 
 @kernel
-def _in_use(people: People, robot: Floats, me: Worker) -> bool:
-    """Whether hands that set out for a load have to wait, as a point of the robot is near it."""
-    if me.time_s > me.out_at + WAITS_SHARE * me.out_s:
+def _is_load_in_use(params: NoticeParams, robot: Floats, worker: Worker) -> bool:
+    """Return whether hands must wait because a point of the robot is close to the load.
+
+    Args:
+        params: when workers notice the robot.
+        robot: two points (2, 3) of the robot [m].
+        worker: record of the worker.
+    """
+    if worker.time_s > worker.out_at + WAITS_SHARE * worker.out_s:
         return False
     for k in range(robot.shape[0]):
         squared = 0.0
         for i in range(3):
-            squared += (robot[k, i] - me.tool_pose[i]) ** 2
-        if squared < people[0] ** 2:
+            squared += (robot[k, i] - worker.tool_pose[i]) ** 2
+        if squared < params.notice_m**2:
             return True
     return False
 
 
 @kernel
-def _startling(dt_s: float, people: People, robot: Floats, body: Floats, me: Worker) -> bool:
-    """Whether a point of the arm is near, or comes fast from not far."""
+def _is_arm_startling(
+    dt_s: float, params: NoticeParams, robot: Floats, body: Floats, worker: Worker
+) -> bool:
+    """Return whether a point of the arm is close, or approaches fast.
+
+    Args:
+        dt_s: time since the last look [s].
+        params: when workers notice the robot.
+        robot: two points (2, 3) of the robot [m].
+        body: origins (22, 3) of the worker's segments [m].
+        worker: record with the last look.
+    """
     for segment in BODY_POINTS:
         for k in range(robot.shape[0]):
-            now, then = 0.0, 0.0
+            distance, last_distance = 0.0, 0.0
             for i in range(3):
-                now += (robot[k, i] - body[segment, i]) ** 2
-                then += (me.robot_world[k, i] - body[segment, i]) ** 2
-            now, then = math.sqrt(now), math.sqrt(then)
-            if now < people[0]:
+                distance += (robot[k, i] - body[segment, i]) ** 2
+                last_distance += (worker.robot_world[k, i] - body[segment, i]) ** 2
+            distance, last_distance = math.sqrt(distance), math.sqrt(last_distance)
+            if distance < params.notice_m:
                 return True
-            if now < 2.0 * people[0] and then - now > people[1] * dt_s:
+            if (
+                distance < 2.0 * params.notice_m
+                and last_distance - distance > params.fast_m_s * dt_s
+            ):
                 return True
     return False
 
 
 @kernel
-def _machine_near(
-    dt_s: float, people: People, robot: Floats, chest: tuple[Floats, Floats], me: Worker
+def _is_machine_startling(
+    dt_s: float,
+    params: NoticeParams,
+    robot: Floats,
+    chest_world: Floats,
+    chest_velocity: Floats,
+    worker: Worker,
 ) -> bool:
-    """Whether a machine that drives is too near, seen from above; or soon will be, to walkers, none
-    of whom overlooks it who takes notice of robots at all."""
-    place, speed = chest
-    walks = goes(me.activity)
-    if people[0] == 0.0 or not (walks or me.reaction != st.NO_REACTION):
+    """Return whether a driving machine is too close, or soon will be to a walker.
+
+    Distances are seen from above.
+
+    Walkers that take notice of robots at all never overlook a machine.
+
+    Args:
+        dt_s: time since the last look [s].
+        params: when workers notice the robot.
+        robot: two points (2, 3) of the robot [m].
+        chest_world: position (3,) of the worker's chest [m].
+        chest_velocity: velocity (3,) of the chest [m/s].
+        worker: record with the last look.
+    """
+    walks = is_on_path(worker.activity)
+    if params.notice_m == 0.0 or not (walks or worker.planned_reaction != st.NO_REACTION):
         return False
     for k in range(robot.shape[0]):
-        x, y = robot[k, 0] - place[0], robot[k, 1] - place[1]
+        x, y = robot[k, 0] - chest_world[0], robot[k, 1] - chest_world[1]
         vx, vy, later_s = 0.0, 0.0, 0.0
-        if walks and me.robot_world[k, 0] < math.inf:
-            vx = (robot[k, 0] - me.robot_world[k, 0]) / dt_s - speed[0]
-            vy = (robot[k, 1] - me.robot_world[k, 1]) / dt_s - speed[1]
+        if walks and worker.robot_world[k, 0] < math.inf:
+            vx = (robot[k, 0] - worker.robot_world[k, 0]) / dt_s - chest_velocity[0]
+            vy = (robot[k, 1] - worker.robot_world[k, 1]) / dt_s - chest_velocity[1]
             nearest_s = -(x * vx + y * vy) / max(vx * vx + vy * vy, 1e-6)
             later_s = min(nearest_s, MACHINE_S)
         if later_s >= 0.0 and (
-            math.hypot(x + later_s * vx, y + later_s * vy) - people[3] < people[0]
+            math.hypot(x + later_s * vx, y + later_s * vy) - params.girth_m < params.notice_m
         ):
             return True
     return False
 
 
 @kernel
-def _react(w: int, workers: Workers) -> None:
-    """Do what worker w does about the robot, if what they are at allows it."""
-    me = workers[w]
-    kind = me.activity
+def _react(w: int, workers: Records1[Worker]) -> None:
+    """Begin the planned reaction of worker w, if the current activity allows it."""
+    worker = workers[w]
+    kind = worker.activity
     upright = kind == st.REACH or kind in st.IDLE or st.HAMMER <= kind <= st.POINT
-    if goes(kind):
+    if is_on_path(kind):
         if kind in (st.WALK, st.CARRY, st.RUN) and _brake(w, workers):
-            me.doing = st.PAUSE
-            me.doing_until = me.clock_s + me.duration_s - me.time_s + me.reaction_s
-    elif me.reaction == st.BACK_AWAY and upright:
-        me.doing = st.BACK_AWAY
+            worker.current_reaction = st.PAUSE
+            worker.reaction_until_s = (
+                worker.clock_s + worker.duration_s - worker.time_s + worker.reaction_s
+            )
+    elif worker.planned_reaction == st.BACK_AWAY and upright:
+        worker.current_reaction = st.BACK_AWAY
         if kind in st.IDLE:
-            me.duration_s = me.time_s
+            worker.duration_s = worker.time_s
         else:
-            me.pace_wished = WITHDRAW
+            worker.wanted_pace = WITHDRAW
     elif kind != st.FALL:
-        me.doing, me.doing_until, me.pace_wished = st.PAUSE, me.clock_s + me.reaction_s, 0.0
+        worker.current_reaction, worker.reaction_until_s, worker.wanted_pace = (
+            st.PAUSE,
+            worker.clock_s + worker.reaction_s,
+            0.0,
+        )
 
 
 @kernel(makes_arrays=True)
-def _brake(w: int, workers: Workers) -> bool:
-    """Brake a walker, unless somebody would walk into them; whether they do."""
+def _brake(w: int, workers: Records1[Worker]) -> bool:
+    """Brake a walker unless another one would come too close; return whether they brake."""
     before = np.empty(1, WORKER)
     before[0] = workers[w]
-    lasts = brake(workers[w].time_s, workers[w])
-    if lasts < 0.0:
+    duration_s = brake(workers[w].time_s, workers[w])
+    if duration_s < 0.0:
         return False
-    workers[w].duration_s = lasts
-    found, _, _ = meets(w, workers)
-    if found >= 0.0:
+    workers[w].duration_s = duration_s
+    meeting_s = find_meeting(w, workers).time_s
+    if meeting_s >= 0.0:
         workers[w] = before[0]
-    return found < 0.0
+    return meeting_s < 0.0

@@ -1,7 +1,9 @@
-"""Everything that workers can do, in scenes of one or a few activities: for reports, pictures."""
+"""All activities of workers, in scenes of one or a few activities, for reports and pictures."""
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,133 +14,178 @@ from hrc_env.motion.activities.falling import plan_fall
 from hrc_env.motion.activities.going import CART, WHEELBARROW, start_turn
 from hrc_env.motion.activities.loads import BOARD, BOX, finish_lift, plan_pick_up
 from hrc_env.motion.activities.running import plan_run
-from hrc_env.motion.anatomy import anatomy
-from hrc_env.motion.blending import settle, stop
-from hrc_env.motion.curves import placed
-from hrc_env.motion.feet import feet
-from hrc_env.motion.generator import bodies_of
+from hrc_env.motion.anatomy import measure_body
+from hrc_env.motion.blending import place_standing, stop
+from hrc_env.motion.curves import move_point
+from hrc_env.motion.feet import place_feet
+from hrc_env.motion.floorplan import FloorGrid
+from hrc_env.motion.generator import evaluate_motion
 from hrc_env.motion.paths import lay_path
+from hrc_env.motion.points import Point
 from hrc_env.motion.starting import STARTS, Start, start_going
 from hrc_env.motion.state import N_START, WORKER, Worker
 from hrc_env.worker.body import Body
 
-Act = tuple[int, Start, float]
-"""An activity, what begins it, the height of its place [m]."""
-AWAY_M, FAR_M = 3.0, 8.0
-"""Length of a way, and of the walks that are measured [m]."""
-OPEN = np.full((401, 401), 9.0), np.full(2, -10.0)
-"""A floor without anything: 10 m to each side."""
+AWAY_M = 3.0
+"""Length of a path [m]."""
+FAR_M = 8.0
+"""Length of the walks that are measured [m]."""
+OPEN = FloorGrid(np.full((401, 401), 9.0), np.full(2, -10.0))
+"""An empty floor, 10 m to each side."""
+
+
+class Act(NamedTuple):
+    """An activity to be performed."""
+
+    activity: int
+    """Index into `ACTIVITY_NAMES`."""
+    start: Start
+    """Start function of the activity."""
+    height_m: float
+    """Height of the work [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Film:
-    """What a worker did."""
+    """The performance of one activity."""
 
     activity: int
+    """Index into `ACTIVITY_NAMES`."""
     time_s: Floats
-    """(T,) since the activity began."""
+    """Times (T,) since the activity began [s]."""
     controls: Floats
-    """(T, N_CONTROLS)."""
+    """Control vectors (T, N_CONTROLS)."""
     motion: WorkerMotion
-    """Arrays (T, 1, ...)."""
+    """Bodies, arrays (T, 1, ...)."""
     worker: Worker
-    """As the activity planned it."""
+    """Record of the worker with the plan of the activity."""
 
 
-def alone(
+def make_worker(
     body: Body, xy_m: tuple[float, float] = (0.0, 0.0), yaw_rad: float = 0.0, right: bool = True
 ) -> Worker:
-    """A worker at a point, feet side by side, who has nothing to do."""
-    bones, me = anatomy(body), np.zeros(1, WORKER)[0]
-    me["present"], me["pace"] = True, 1.0
-    me["bones"], me["frame"], me["size"] = bones.offset, bones.frame, bones.size
-    me["round"] = bones.round
-    me["speed_m_s"], me["squat_share"], me["right_handed"] = 1.2, 0.7, 0.9 if right else 0.1
-    settle(*xy_m, yaw_rad, me)
-    feet(0.0, me)
-    return me
+    """Return a worker without a task, standing at a point with the feet side by side.
+
+    Args:
+        body: body of the worker.
+        xy_m: root on the floor, in the world [m].
+        yaw_rad: heading [rad].
+        right: whether the worker is right-handed.
+    """
+    bones, worker = measure_body(body), np.zeros(1, WORKER)[0]
+    worker.is_present, worker.pace = True, 1.0
+    worker.bones, worker.frame, worker.lengths = bones.offset, bones.frame, bones.lengths
+    worker.trunk_ends = bones.trunk_ends
+    worker.speed_m_s, worker.squat_share, worker.right_handed = 1.2, 0.7, 0.9 if right else 0.1
+    place_standing(*xy_m, yaw_rad, worker)
+    place_feet(0.0, worker)
+    return worker
 
 
-def perform(acts: Sequence[Act], me: Worker, rng: np.random.Generator, dt_s: float) -> list[Film]:
-    """Films of acts in their order, at intervals of dt_s; the worker stands where they end."""
+def perform(
+    acts: Sequence[Act], worker: Worker, rng: np.random.Generator, dt_s: float
+) -> list[Film]:
+    """Return films of activities in their order; the worker stands where the last one ends.
+
+    Args:
+        acts: the activities.
+        worker: record of the worker, which is changed.
+        rng: generator of the draws.
+        dt_s: interval of the films [s].
+    """
     films, clock_s = [], 10.0 * float(rng.random())
     for activity, start, height_m in acts:
-        me["activity"] = activity
-        lasts_s = start(rng.random(N_START), height_m, me)
-        films.append(_film(me, np.arange(0.0, lasts_s, dt_s), clock_s))
-        stop(me)
-        feet(0.0, me)
+        worker.activity = activity
+        lasts_s = start(rng.random(N_START), height_m, worker)
+        films.append(_record(worker, np.arange(0.0, lasts_s, dt_s), clock_s))
+        stop(worker)
+        place_feet(0.0, worker)
         clock_s += lasts_s
     return films
 
 
-def _film(me: Worker, time_s: Floats, clock_s: float) -> Film:
-    """The worker at times (T,) of an activity begun at a clock; without angular velocities."""
-    moments = np.full((len(time_s), 1), me, WORKER)
+def _record(worker: Worker, time_s: Floats, clock_s: float) -> Film:
+    """Return the film of an activity; angular velocities are zero.
+
+    Args:
+        worker: record with the plan.
+        time_s: times (T,) since the activity began [s].
+        clock_s: clock at which it began [s].
+    """
+    moments = np.full((len(time_s), 1), worker, WORKER)
     moments["time_s"][:, 0], moments["clock_s"][:, 0] = time_s, clock_s + time_s
-    motion = bodies_of(moments, np.zeros((1, 1)))
+    motion = evaluate_motion(moments, np.zeros((1, 1)))
     motion = replace(motion, angular_velocity_world=np.zeros_like(motion.velocity_world), body=None)
-    return Film(int(me["activity"]), time_s, moments["q"][:, 0].copy(), motion, me.copy())
+    return Film(int(worker.activity), time_s, moments["q"][:, 0].copy(), motion, copy(worker))
 
 
 def _going(activity: int, speed_m_s: float = 1.1, prop: int = 0, way_m: float = AWAY_M) -> Act:
-    """Go some way ahead."""
+    """Return an activity of going some way ahead.
 
-    def start(draws: Floats, height_m: float, me: Worker) -> float:
-        x, y, yaw = (float(me[name]) for name in ("start_x", "start_y", "start_yaw"))
-        lay_path((x, y), np.zeros((0, 3)), placed(x, y, yaw, way_m, 0.0), me)
+    Args:
+        activity: index into `ACTIVITY_NAMES`.
+        speed_m_s: speed [m/s].
+        prop: cart that is pushed, an index into `PROPS`.
+        way_m: length of the path [m].
+    """
+
+    def start(draws: Floats, height_m: float, worker: Worker) -> float:
+        x, y, yaw = float(worker.start_x), float(worker.start_y), float(worker.start_yaw)
+        lay_path(Point(x, y), np.zeros((0, 3)), move_point(x, y, yaw, way_m, 0.0), worker)
         if activity == st.RUN:
-            return plan_run(yaw, speed_m_s, me)
+            return plan_run(yaw, speed_m_s, worker)
         if activity == st.FALL:
             lie_s = 2.0 + 2.0 * float(draws[4])
-            return plan_fall(draws, yaw, speed_m_s, lie_s, *OPEN, me)
-        return start_going(activity, draws, yaw, speed_m_s, prop, me)
+            return plan_fall(draws, yaw, speed_m_s, lie_s, OPEN, worker)
+        return start_going(activity, draws, yaw, speed_m_s, prop, worker)
 
-    return activity, start, 0.0
+    return Act(activity, start, 0.0)
 
 
-def _hammer(lightly: bool, height_m: float) -> tuple[Act]:
-    def start(draws: Floats, height_m: float, me: Worker) -> float:
+def _hammer(lightly: bool, height_m: float) -> tuple[Act, ...]:
+    def start(draws: Floats, height_m: float, worker: Worker) -> float:
         chosen = draws.copy()
         chosen[2] = 0.0 if lightly else 1.0  # which decides between taps and blows
-        return STARTS[st.HAMMER](chosen, height_m, me)
+        return STARTS[st.HAMMER](chosen, height_m, worker)
 
-    return ((st.HAMMER, start, height_m),)
+    return (Act(st.HAMMER, start, height_m),)
 
 
-def _turn(draws: Floats, height_m: float, me: Worker) -> float:
+def _turn(draws: Floats, height_m: float, worker: Worker) -> float:
     turn = (1.0 if draws[0] < 0.5 else -1.0) * (0.8 + 2.0 * draws[1])
-    return start_turn(float(me["start_yaw"]) + turn, me)
+    return start_turn(float(worker.start_yaw) + turn, worker)
 
 
 def _take(prop: int, on_shoulder: bool, height_m: float) -> Act:
-    def start(draws: Floats, height_m: float, me: Worker) -> float:
-        return finish_lift(plan_pick_up(draws, height_m, prop, on_shoulder, me), me)
+    def start(draws: Floats, height_m: float, worker: Worker) -> float:
+        return finish_lift(plan_pick_up(draws, height_m, prop, on_shoulder, worker), worker)
 
-    return st.PICK_UP, start, height_m
-
-
-def _here(activity: int, height_m: float = 0.0) -> tuple[Act]:
-    return ((activity, STARTS[activity], height_m),)
+    return Act(st.PICK_UP, start, height_m)
 
 
-def _stand(draws: Floats, height_m: float, me: Worker) -> float:
+def _here(activity: int, height_m: float = 0.0) -> tuple[Act, ...]:
+    return (Act(activity, STARTS[activity], height_m),)
+
+
+def _stand(draws: Floats, height_m: float, worker: Worker) -> float:
     return 4.0
 
 
 FLOOR_M, TABLE_M = 0.2, 0.85
 _CARRY = _going(st.CARRY)
 REPERTOIRE: dict[str, tuple[Act, ...]] = {
-    "stand": ((st.STAND, _stand, 0.0),),
+    "stand": (Act(st.STAND, _stand, 0.0),),
     "look round": _here(st.LOOK_ROUND),
     "point": _here(st.POINT),
     **{f"walk {v} m/s": (_going(st.WALK, v, way_m=FAR_M),) for v in (0.8, 1.1, 1.3, 1.4, 1.8)},
-    "turn": ((st.TURN, _turn, 0.0),),
+    "turn": (Act(st.TURN, _turn, 0.0),),
     "step back": _here(st.STEP_BACK),
     "stumble": (_going(st.STUMBLE, 1.2),),
     "lunge": _here(st.LUNGE, 1.1),
     "box from the floor to a table": (
-        _take(BOX, False, FLOOR_M), _CARRY, *_here(st.SET_DOWN, TABLE_M)
+        _take(BOX, False, FLOOR_M),
+        _CARRY,
+        *_here(st.SET_DOWN, TABLE_M),
     ),
     "board in both hands": (_take(BOARD, False, TABLE_M), _CARRY, *_here(st.SET_DOWN, FLOOR_M)),
     "board on the shoulder": (_take(BOARD, True, FLOOR_M), _CARRY, *_here(st.SET_DOWN, FLOOR_M)),
@@ -156,17 +203,17 @@ REPERTOIRE: dict[str, tuple[Act, ...]] = {
     "saw": _here(st.SAW, TABLE_M),
     "measure": _here(st.MEASURE, TABLE_M),
     "climb": _here(st.CLIMB, 0.22),
-}  # fmt: skip
+}
 """Scenes by name."""
 HASTY: dict[str, tuple[Act, ...]] = {
     **{f"run {v} m/s": (_going(st.RUN, v, way_m=FAR_M),) for v in (2.5, 3.0, 3.5)},
     "fall": (_going(st.FALL, 1.2),),
 }
-"""The same of what only those do who run and fall; no emulator is fitted to them."""
+"""Scenes of running and falling; no emulator is fitted to them."""
 FOR_TASKS: dict[str, tuple[Act, ...]] = {
     "screw below each other": _here(st.SCREW, 1.5),
     "take what is brought": _here(st.TAKE, 1.15),
 }
-"""And of what workers do for tasks."""
+"""Scenes of activities for tasks."""
 SCENES = {**REPERTOIRE, **HASTY, **FOR_TASKS}
-"""All."""
+"""All scenes."""

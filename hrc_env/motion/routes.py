@@ -1,4 +1,4 @@
-"""Ways round things and people: A* on a grid (Hart, Nilsson and Raphael 1968), pulled tight."""
+"""Paths around objects and people: A* on a grid (Hart, Nilsson and Raphael 1968), pulled tight."""
 
 import heapq
 import math
@@ -8,44 +8,57 @@ import numpy as np
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats, Ints
-from hrc_env.motion.floorplan import CELL_M, slack_at
-from hrc_env.motion.paths import along, lay_path
-from hrc_env.motion.state import MAX_VIA, Pair, Worker
+from hrc_env.motion.floorplan import CELL_M, FloorGrid, read_slack
+from hrc_env.motion.paths import lay_path, locate_on_path
+from hrc_env.motion.points import Point
+from hrc_env.motion.state import MAX_VIA, Worker
 
-STRIDE, SAMPLE_M = 3, 0.06
-"""Grid points of the field to a node of the search: 15 cm; lines are looked at in such steps."""
+STRIDE = 3
+"""Cells of the floor's grid from node to node of the search; 15 cm."""
+SAMPLE_M = 0.06
+"""Distance of the points of a line that are checked [m]."""
 EASE_M = 0.7
-"""So near its ends a way may be as near to things as its ends are [m]."""
-SEARCHED_M, PULLED_M, WALKED_M = 0.05, 0.03, -0.02
-"""Slack that nodes, straight lines and the arcs at last must have [m]."""
+"""Distance from an end of a path within which it may be as close to objects as that end [m]."""
+SEARCHED_M = 0.05
+"""Least slack of nodes of the search [m]."""
+PULLED_M = 0.03
+"""Least slack of straight lines [m]."""
+WALKED_M = -0.02
+"""Least slack of the path with its arcs [m]."""
 ARMS_M = (1.2, 0.7, 0.35, 0.15, 0.02)
-"""How far before a corner an arc begins at most [m], tried in turn."""
+"""Greatest distance before a corner at which its arc begins, tried in turn [m]."""
 BOW_SHARE = 0.12
-"""People do not walk dead straight: sideways bow of a free way as a share of it; judgement."""
+"""Sideways bow of a free path as a share of its length, as people do not walk straight."""
 
 
 class Ground(NamedTuple):
-    """What ways keep clear of."""
+    """Obstacles of a path."""
 
     ends: Floats
-    """(2, 3) x, y and slack of the way's ends."""
+    """Ends of the path (2, 3): x, y, slack [m]."""
     discs: Floats
-    """(n, 3) x, y, radius of what is in the way for now."""
-    slack: Floats
-    origin: Floats
-    """Of a `Floorplan`."""
+    """Temporary obstacles (n, 3): x, y, radius [m]."""
+    grid: FloorGrid
+    """Slack on the floor."""
 
 
 @kernel
-def roomy(x: float, y: float, margin: float, ground: Ground) -> bool:
-    """Whether a point of a way is free, with `margin` [m] of slack far from the ends."""
-    need = margin
+def is_point_free(x: float, y: float, margin: float, ground: Ground) -> bool:
+    """Return whether a point of a path is free.
+
+    Args:
+        x: world x [m].
+        y: world y [m].
+        margin: least slack far from the ends [m].
+        ground: obstacles.
+    """
+    least = margin
     for k in range(2):
-        own = ground.ends[k, 2]
-        if own < margin:
+        slack = ground.ends[k, 2]
+        if slack < margin:
             away = math.hypot(x - ground.ends[k, 0], y - ground.ends[k, 1]) / EASE_M
-            need = min(need, own - 0.005 + (margin - own) * min(away, 1.0))
-    if slack_at(x, y, ground.slack, ground.origin) < need:
+            least = min(least, slack - 0.005 + (margin - slack) * min(away, 1.0))
+    if read_slack(x, y, ground.grid) < least:
         return False
     for k in range(ground.discs.shape[0]):
         if math.hypot(x - ground.discs[k, 0], y - ground.discs[k, 1]) < ground.discs[k, 2]:
@@ -54,80 +67,108 @@ def roomy(x: float, y: float, margin: float, ground: Ground) -> bool:
 
 
 @kernel
-def clear(x0: float, y0: float, x1: float, y1: float, margin: float, ground: Ground) -> bool:
-    """Whether a straight line is free."""
+def is_line_free(x0: float, y0: float, x1: float, y1: float, margin: float, ground: Ground) -> bool:
+    """Return whether a straight line is free.
+
+    Args:
+        x0: world x of its first point [m].
+        y0: world y of its first point [m].
+        x1: world x of its last point [m].
+        y1: world y of its last point [m].
+        margin: least slack far from the ends [m].
+        ground: obstacles.
+    """
     n = int(math.hypot(x1 - x0, y1 - y0) / SAMPLE_M) + 1
     for k in range(n + 1):
         u = k / n
         x, y = x0 + u * (x1 - x0), y0 + u * (y1 - y0)
-        if not roomy(x, y, margin, ground):
+        if not is_point_free(x, y, margin, ground):
             return False
     return True
 
 
 @kernel(makes_arrays=True)
-def route(
-    start: Pair, end: Pair, bow: float, discs: Floats, slack: Floats, origin: Floats, me: Worker
+def find_route(
+    start: Point, end: Point, bow: float, discs: Floats, grid: FloorGrid, worker: Worker
 ) -> bool:
-    """Find a way and lay the path, if there is one; whether there is.
+    """Find a path and lay it, if there is one.
 
-    `bow` in [-1, 1] is how a free way bends; discs (n, 3), x, y, radius, give way to its ends.
+    Args:
+        start: first point.
+        end: last point.
+        bow: bend of a straight path in [-1, 1].
+        discs: temporary obstacles (n, 3), x, y, radius [m]; they are shrunk to leave the ends free.
+        grid: slack on the floor.
+        worker: record that the path is written into.
+
+    Returns:
+        Whether there is a path.
     """
-    ends, own, via = np.empty((2, 3)), discs.copy(), np.empty((MAX_VIA, 3))
+    ends, shrunk, via = np.empty((2, 3)), discs.copy(), np.empty((MAX_VIA, 3))
     for k in range(2):
-        x, y = start if k == 0 else end
-        ends[k, 0], ends[k, 1], ends[k, 2] = x, y, slack_at(x, y, slack, origin)
-        for i in range(own.shape[0]):
-            own[i, 2] = min(own[i, 2], math.hypot(x - own[i, 0], y - own[i, 1]) - 0.02)
-    ground = Ground(ends, own, slack, origin)
-    if clear(start[0], start[1], end[0], end[1], PULLED_M, ground):
-        via[0, 0] = 0.5 * (start[0] + end[0]) - BOW_SHARE * bow * (end[1] - start[1])
-        via[0, 1] = 0.5 * (start[1] + end[1]) + BOW_SHARE * bow * (end[0] - start[0])
+        x, y = (start.x, start.y) if k == 0 else (end.x, end.y)
+        ends[k, 0], ends[k, 1], ends[k, 2] = x, y, read_slack(x, y, grid)
+        for i in range(shrunk.shape[0]):
+            shrunk[i, 2] = min(shrunk[i, 2], math.hypot(x - shrunk[i, 0], y - shrunk[i, 1]) - 0.02)
+    ground = Ground(ends, shrunk, grid)
+    if is_line_free(start.x, start.y, end.x, end.y, PULLED_M, ground):
+        via[0, 0] = 0.5 * (start.x + end.x) - BOW_SHARE * bow * (end.y - start.y)
+        via[0, 1] = 0.5 * (start.y + end.y) + BOW_SHARE * bow * (end.x - start.x)
         via[0, 2] = 9.0
-        lay_path(start, via[:1], end, me)
-        if not walkable(ground, me):
-            lay_path(start, via[:0], end, me)
+        lay_path(start, via[:1], end, worker)
+        if not is_path_free(ground, worker):
+            lay_path(start, via[:0], end, worker)
         return True
     n = _search(start, end, ground, via)
     for arm in ARMS_M:
         if n >= 0:
             via[:n, 2] = arm
-            lay_path(start, via[:n], end, me)
-            if walkable(ground, me):
+            lay_path(start, via[:n], end, worker)
+            if is_path_free(ground, worker):
                 return True
     return False
 
 
 @kernel
-def walkable(ground: Ground, me: Worker) -> bool:
-    """Whether the path of a plan is free."""
-    n = int(me.length / SAMPLE_M) + 1
+def is_path_free(ground: Ground, worker: Worker) -> bool:
+    """Return whether the path that is laid is free."""
+    n = int(worker.length / SAMPLE_M) + 1
     for k in range(n + 1):
-        x, y = along(k / n * me.length, me)
-        if not roomy(x, y, WALKED_M, ground):
+        x, y = locate_on_path(k / n * worker.length, worker)
+        if not is_point_free(x, y, WALKED_M, ground):
             return False
     return True
 
 
 @kernel(makes_arrays=True)
-def _search(start: Pair, end: Pair, ground: Ground, via: Floats) -> int:
-    """Corners of a short way by A* (`route`); -1 where there is none, or it has too many."""
-    h, origin = STRIDE * CELL_M, ground.origin
-    n_x = (ground.slack.shape[0] + STRIDE - 1) // STRIDE
-    n_y = (ground.slack.shape[1] + STRIDE - 1) // STRIDE
+def _search(start: Point, end: Point, ground: Ground, via: Floats) -> int:
+    """Find a short path by A*, and write its corners.
+
+    Args:
+        start: first point.
+        end: last point.
+        ground: obstacles.
+        via: corners (`MAX_VIA`, 3), of which the first two columns are written.
+
+    Returns:
+        The number of corners; -1 if there is no path, or none with so few corners.
+    """
+    h, slack, origin = STRIDE * CELL_M, ground.grid.slack, ground.grid.origin
+    n_x = (slack.shape[0] + STRIDE - 1) // STRIDE
+    n_y = (slack.shape[1] + STRIDE - 1) // STRIDE
     cost, parent = np.full(n_x * n_y, np.inf), np.full(n_x * n_y, -1)
-    state = np.zeros(n_x * n_y, np.int8)  # 0 not looked at, 1 free, 2 not free, 3 done
+    state = np.zeros(n_x * n_y, np.int8)  # 0 not visited, 1 free, 2 blocked, 3 done
     queue: list = [(0.0, -1)]
     heapq.heappop(queue)
-    si, sj = round((start[0] - origin[0]) / h), round((start[1] - origin[1]) / h)
+    si, sj = round((start.x - origin[0]) / h), round((start.y - origin[1]) / h)
     for i in range(max(si - 2, 0), min(si + 3, n_x)):
         for j in range(max(sj - 2, 0), min(sj + 3, n_y)):
             x, y = origin[0] + i * h, origin[1] + j * h
-            if clear(start[0], start[1], x, y, PULLED_M, ground):
+            if is_line_free(start.x, start.y, x, y, PULLED_M, ground):
                 node = i * n_y + j
-                cost[node] = math.hypot(x - start[0], y - start[1])
+                cost[node] = math.hypot(x - start.x, y - start.y)
                 state[node] = 1
-                heapq.heappush(queue, (cost[node] + math.hypot(end[0] - x, end[1] - y), node))
+                heapq.heappush(queue, (cost[node] + math.hypot(end.x - x, end.y - y), node))
     while len(queue) > 0:
         _, node = heapq.heappop(queue)
         if state[node] == 3:
@@ -135,35 +176,48 @@ def _search(start: Pair, end: Pair, ground: Ground, via: Floats) -> int:
         state[node] = 3
         i, j = node // n_y, node % n_y
         x, y = origin[0] + i * h, origin[1] + j * h
-        near = math.hypot(end[0] - x, end[1] - y) < 2.0 * h
-        if near and clear(x, y, end[0], end[1], PULLED_M, ground):
-            return _pull(node, parent, n_y, start, end, ground, via)
+        near = math.hypot(end.x - x, end.y - y) < 2.0 * h
+        if near and is_line_free(x, y, end.x, end.y, PULLED_M, ground):
+            return _pull_tight(node, parent, n_y, start, end, ground, via)
         for a in range(max(i - 1, 0), min(i + 2, n_x)):
             for b in range(max(j - 1, 0), min(j + 2, n_y)):
                 other, x, y = a * n_y + b, origin[0] + a * h, origin[1] + b * h
                 if state[other] == 0:
-                    state[other] = 1 if roomy(x, y, SEARCHED_M, ground) else 2
+                    state[other] = 1 if is_point_free(x, y, SEARCHED_M, ground) else 2
                 longer = cost[node] + h * math.hypot(a - i, b - j)
                 if state[other] == 1 and longer < cost[other] - 1e-9:
                     cost[other], parent[other] = longer, node
-                    heapq.heappush(queue, (longer + math.hypot(end[0] - x, end[1] - y), other))
+                    heapq.heappush(queue, (longer + math.hypot(end.x - x, end.y - y), other))
     return -1
 
 
 @kernel
-def _pull(
-    goal: int, parent: Ints, n_y: int, start: Pair, end: Pair, ground: Ground, via: Floats
+def _pull_tight(
+    goal: int, parent: Ints, n_y: int, start: Point, end: Point, ground: Ground, via: Floats
 ) -> int:
-    """Pull a chain of nodes tight, from its end to its start, into at most MAX_VIA corners."""
-    origin, h = ground.origin, STRIDE * CELL_M
-    at_x, at_y, last_x, last_y = end[0], end[1], end[0], end[1]
+    """Reduce a chain of nodes, from its end to its start, to the corners that are needed.
+
+    Args:
+        goal: last node of the chain.
+        parent: node before each node; -1 for the first one.
+        n_y: number of nodes along y.
+        start: first point of the path.
+        end: last point of the path.
+        ground: obstacles.
+        via: corners (`MAX_VIA`, 3), of which the first two columns are written.
+
+    Returns:
+        The number of corners; -1 if there are more than `MAX_VIA`.
+    """
+    origin, h = ground.grid.origin, STRIDE * CELL_M
+    at_x, at_y, last_x, last_y = end.x, end.y, end.x, end.y
     node, count = goal, 0
     while True:
         if node >= 0:
             x, y = origin[0] + (node // n_y) * h, origin[1] + (node % n_y) * h
         else:
-            x, y = start
-        if not clear(at_x, at_y, x, y, PULLED_M, ground):
+            x, y = start.x, start.y
+        if not is_line_free(at_x, at_y, x, y, PULLED_M, ground):
             if count == via.shape[0] or (last_x == at_x and last_y == at_y):
                 return -1
             via[count, 0], via[count, 1] = last_x, last_y

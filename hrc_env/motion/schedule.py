@@ -1,107 +1,170 @@
-"""What workers do, one thing after another: a small graph of jobs at kinds of workplaces."""
+"""The order of the workers' activities: a small graph of jobs at kinds of workplaces."""
 
 import itertools
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.motion.state import ACTIVITY_NAMES, WAYS
 from hrc_env.worker.props import PROP_NAMES
 from hrc_env.world import WORKPLACE_KINDS
 
-HERE, ROUTES = "here", ("walk", "push")
-"""As a kind of place: wherever the worker is; how workers go to a job."""
+HERE = "here"
+"""Kind of place of a job that is done wherever the worker is."""
+ROUTES = ("walk", "push")
+"""Ways to go to a job."""
 DONE_THERE = tuple(name for k, name in enumerate(ACTIVITY_NAMES) if k not in WAYS)
-"""What jobs can be."""
+"""Activities that a job can have."""
 HIGHEST_M = 2.2
-"""Hands work no higher [m]."""
+"""Greatest height at which hands work [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """One thing to do, and what may follow; weights are shares of their sum."""
+    """One thing to do, and the jobs that may follow; weights are shares of their sum."""
 
     name: str
+    """Name of the job, which other jobs refer to."""
     activity: str
-    """One of `DONE_THERE`."""
+    """Name of the activity, one of `DONE_THERE`."""
     at: str
-    """Kind of workplace (`WORKPLACE_KINDS`), or "here"."""
+    """Kind of the workplace (`WORKPLACE_KINDS`), or "here"."""
     then: tuple[tuple[str, float], ...] = ()
-    """What may follow, with weights; nothing, or the same place for too long: it is over."""
+    """Jobs that may follow, with weights; without any the errand ends."""
     begins: float = 0.0
-    """Weight with which an errand begins with this job; 0: none does."""
+    """Weight with which an errand begins with this job; 0 for never."""
     prop: str = "nothing"
-    """What is picked up, stood before, or pushed on the way; a job to which they walk is done
-    where it lies at places of its kind, as long as there is any."""
+    """Prop that is picked up, used, or pushed on the way.
+
+    A job that workers walk to is done where its prop lies at places of its kind, as long as there
+    is any.
+    """
     by: str = "walk"
-    """How workers go there: "walk", or "push" the prop."""
+    """Way to go there: "walk", or "push" the prop."""
     height_m: float = 0.0
-    """How high above the floor the work is [m]; 0: as high as the place says."""
+    """Height of the work above the floor [m]; 0 for the height of the place."""
     waits: bool = False
-    """Whether it begins only when the task says so; until then the job before is done again."""
+    """Whether the job waits for the task's signal, while the job before it is repeated.
+    """
 
 
 JOBS: tuple[Job, ...] = (
-    Job("work with the robot", "reach", "robot",
-         (("work with the robot", 0.78), ("wait for the robot", 0.16), ("show where", 0.03),
-          ("watch the robot", 0.03))),
+    Job(
+        "work with the robot",
+        "reach",
+        "robot",
+        (
+            ("work with the robot", 0.78),
+            ("wait for the robot", 0.16),
+            ("show where", 0.03),
+            ("watch the robot", 0.03),
+        ),
+    ),
     Job("wait for the robot", "stand", "robot", (("work with the robot", 1.0),)),
     Job("watch the robot", "look round", "robot", (("work with the robot", 1.0),)),
     Job("show where", "point", "robot", (("work with the robot", 1.0),)),
     Job("fetch a board", "pick up", "pile", (("bring it to the wall", 1.0),), 1.0, "board"),
-    Job("bring it to the wall", "set down", "wall",
-         (("nail it", 0.6), ("screw it on", 0.4))),
-    Job("fetch a box", "pick up", "pile",
-         (("put it on the bench", 0.6), ("put it on the floor", 0.4)), 0.7, "box"),
+    Job("bring it to the wall", "set down", "wall", (("nail it", 0.6), ("screw it on", 0.4))),
+    Job(
+        "fetch a box",
+        "pick up",
+        "pile",
+        (("put it on the bench", 0.6), ("put it on the floor", 0.4)),
+        0.7,
+        "box",
+    ),
     Job("put it on the bench", "set down", "bench", (("work at the bench", 1.0),)),
     Job("put it on the floor", "set down", "floor", (("look about", 1.0),)),
-    Job("move a load", "lift", "floor", (("look about", 0.4), ("move a load", 0.3),
-         ("work on the floor", 0.3)), 0.6),
-    Job("nail it", "hammer", "wall", (("nail it", 0.3), ("measure the wall", 0.3),
-         ("screw it on", 0.2), ("look about", 0.2)), 0.5),
-    Job("screw it on", "drill", "wall", (("nail it", 0.3), ("measure the wall", 0.3),
-         ("look about", 0.4)), 0.4),
-    Job("measure the wall", "measure", "wall", (("nail it", 0.4), ("screw it on", 0.4),
-         ("look about", 0.2)), 0.5),
-    Job("work overhead", "drill overhead", "overhead", (("work overhead", 0.5),
-         ("look about", 0.5)), 0.6),
-    Job("work at the bench", "saw", "bench", (("work at the bench", 0.4), ("tidy the bench", 0.6)),
-         0.5),
-    Job("tidy the bench", "reach", "bench", (("tidy the bench", 0.5), ("work at the bench", 0.3),
-         ("look about", 0.2)), 0.5),
+    Job(
+        "move a load",
+        "lift",
+        "floor",
+        (("look about", 0.4), ("move a load", 0.3), ("work on the floor", 0.3)),
+        0.6,
+    ),
+    Job(
+        "nail it",
+        "hammer",
+        "wall",
+        (("nail it", 0.3), ("measure the wall", 0.3), ("screw it on", 0.2), ("look about", 0.2)),
+        0.5,
+    ),
+    Job(
+        "screw it on",
+        "drill",
+        "wall",
+        (("nail it", 0.3), ("measure the wall", 0.3), ("look about", 0.4)),
+        0.4,
+    ),
+    Job(
+        "measure the wall",
+        "measure",
+        "wall",
+        (("nail it", 0.4), ("screw it on", 0.4), ("look about", 0.2)),
+        0.5,
+    ),
+    Job(
+        "work overhead",
+        "drill overhead",
+        "overhead",
+        (("work overhead", 0.5), ("look about", 0.5)),
+        0.6,
+    ),
+    Job(
+        "work at the bench",
+        "saw",
+        "bench",
+        (("work at the bench", 0.4), ("tidy the bench", 0.6)),
+        0.5,
+    ),
+    Job(
+        "tidy the bench",
+        "reach",
+        "bench",
+        (("tidy the bench", 0.5), ("work at the bench", 0.3), ("look about", 0.2)),
+        0.5,
+    ),
     Job("work on the floor", "kneel", "floor", (("look about", 1.0),), 0.4),
     Job("look at the floor", "squat", "floor", (("look about", 1.0),), 0.3),
     Job("take the cart", "stand", "cart", (("bring the cart", 1.0),), 0.4, "cart"),
     Job("bring the cart", "look round", "cart", (("look about", 1.0),), 0.0, "cart", "push"),
     Job("climb up", "climb", "step", (("look about", 0.6), ("climb up", 0.4)), 0.3),
-    Job("stand about", "stand", "open", (("look about", 0.4), ("stand about", 0.3),
-         ("do something", 0.3)), 0.8),
+    Job(
+        "stand about",
+        "stand",
+        "open",
+        (("look about", 0.4), ("stand about", 0.3), ("do something", 0.3)),
+        0.8,
+    ),
     Job("do something", "reach", "open", (("stand about", 0.5), ("do something", 0.5)), 0.4),
     Job("look about", "look round", HERE),
-)  # fmt: skip
-"""Judgement: framing work beside a robot that holds what is worked on."""
+)
+"""Default jobs: framing work beside a robot that holds the workpiece; judgement."""
 
 _LOW = tuple(
     Job(name, activity, "robot", ((JOBS[0].name, 1.0),), height_m=height_m)
     for name, activity, height_m in (
-        ("screw it on below", "drill", 0.35), ("nail it below", "hammer", 0.3),
-        ("fit it below", "kneel", 0.25), ("sort what lies there", "squat", 0.2),
+        ("screw it on below", "drill", 0.35),
+        ("nail it below", "hammer", 0.3),
+        ("fit it below", "kneel", 0.25),
+        ("sort what lies there", "squat", 0.2),
         ("lift what lies there", "lift", 0.0),
     )
-)  # fmt: skip
-"""What hands do at knee height or lower: kneeling, on the haunches, bent."""
+)
+"""Jobs at knee height or lower: kneeling, on the haunches, bent."""
 _BOARD = (
     Job("wait for the board", "stand", "robot", (("screw the board on", 1.0),)),
     Job("screw the board on", "screw", "task", (("step aside", 1.0),), waits=True),
     Job("step aside", "look round", "robot", (("step aside", 1.0),)),
 )
-"""Who helps to fix a board: `HRCDrywall-v0`."""
+"""Jobs of helping to fix a board: `HRCDrywall-v0`."""
 _TOOL = (
     Job("wait for the tool", "stand", "robot", (("take the tool", 1.0),)),
     Job("take the tool", "take", "task", (("go on", 1.0),), waits=True),
     Job("go on", "look round", "robot", (("go on", 1.0),)),
 )
-"""Who is brought a tool: `HRCHandover-v0`."""
+"""Jobs of receiving a tool: `HRCHandover-v0`."""
 _STACK = (
     Job("look at the work", "look round", "robot", (("take from the stack", 1.0),)),
     Job("take from the stack", "pick up", "task", (("lay it down", 1.0),), 1.0, "stud"),
@@ -112,30 +175,34 @@ _STACK = (
         (("take from the stack", 0.9), ("look at the work", 0.1)),
     ),
 )
-"""Who takes from the stack from which the robot takes: `HRCPickPlace-v0`."""
+"""Jobs of taking from the robot's stack: `HRCPickPlace-v0`."""
 WORK: dict[str, tuple[Job, ...]] = {
     "framing": JOBS,
     "low_work": (
         replace(JOBS[0], then=(*JOBS[0].then, *((job.name, 0.06) for job in _LOW))),
-        *_LOW, *JOBS[1:],
+        *_LOW,
+        *JOBS[1:],
     ),
     "drywall": _BOARD,
     "handover": _TOOL,
     "stack": _STACK,
-}  # fmt: skip
-"""Named choices of jobs: upright at the robot, or now and then at its foot, too (judgement); those
-of tasks that workers take part in."""
+}
+"""Named choices of jobs.
+
+"framing" keeps workers upright at the robot, "low_work" also has jobs at its foot (judgement); the
+others belong to tasks in which workers take part.
+"""
 
 
 def check_jobs(jobs: Sequence[Job]) -> None:
-    """Refuse unknown names of activities, places, jobs and props, bad numbers, and no robot."""
+    """Refuse unknown names, numbers out of bounds, and jobs of which none is at the robot."""
     names = [job.name for job in jobs]
     if len(set(names)) < len(names):
         raise ConfigError(f"Jobs must have different names, got {names}.")
     if not any(job.at == "robot" for job in jobs):
         raise ConfigError("Some job must be at the robot: at='robot'.")
     for job in jobs:
-        for what, got, valid in (
+        for noun, got, valid in (
             ("activity of", job.activity, DONE_THERE),
             ("kind of place of", job.at, (*WORKPLACE_KINDS, HERE)),
             ("prop of", job.prop, PROP_NAMES),
@@ -143,7 +210,7 @@ def check_jobs(jobs: Sequence[Job]) -> None:
             *(("job after", name, names) for name, _ in job.then),
         ):
             if got not in valid:
-                raise unknown(f"{what} {job.name!r}", got, valid)
+                raise unknown(f"{noun} {job.name!r}", got, valid)
         if not 0.0 <= job.height_m <= HIGHEST_M:
             raise ConfigError(
                 f"{job.name!r}: height_m must be 0 to {HIGHEST_M} m, got {job.height_m}."
@@ -155,39 +222,49 @@ def check_jobs(jobs: Sequence[Job]) -> None:
             )
 
 
+class Choice(NamedTuple):
+    """A job that may be next."""
+
+    job: int
+    """Index into the schedule's jobs."""
+    share: float
+    """Weight of the job; in a `Schedule`, cumulative share up to 1."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Schedule:
-    """The graph where only some kinds of places are: indices into `jobs`."""
+    """The graph of the jobs that a scene has places for."""
 
     jobs: tuple[Job, ...]
-    then: tuple[tuple[tuple[int, float], ...], ...]
-    """After each job: what may follow, with running shares up to 1."""
+    """The jobs."""
+    then: tuple[tuple[Choice, ...], ...]
+    """For each job the jobs that may follow."""
     robot: int
-    """The first job at the robot."""
-    begins: tuple[tuple[int, float], ...]
-    """How errands elsewhere begin, with running shares; empty where there is nowhere else."""
+    """Index of the first job at the robot."""
+    begins: tuple[Choice, ...]
+    """Jobs with which errands elsewhere begin; empty where there is nowhere else."""
 
 
-def schedule_at(jobs: Sequence[Job], kinds: Collection[str]) -> Schedule:
-    """The jobs that can be done at these kinds of places; places at the robot always are."""
+def make_schedule(jobs: Sequence[Job], kinds: Collection[str]) -> Schedule:
+    """Return the jobs that can be done at some kinds of places; those at the robot always are."""
     kept = tuple(job for job in jobs if job.at in (*kinds, "robot", HERE))
     index = {job.name: k for k, job in enumerate(kept)}
     then = tuple(
-        _shares([(index[name], weight) for name, weight in job.then if name in index])
+        _accumulate([Choice(index[name], weight) for name, weight in job.then if name in index])
         for job in kept
     )
     robot = next(k for k, job in enumerate(kept) if job.at == "robot")
-    begins = [(index[job.name], job.begins) for job in kept if job.begins > 0.0]
-    return Schedule(kept, then, robot, _shares(begins))
+    begins = [Choice(index[job.name], job.begins) for job in kept if job.begins > 0.0]
+    return Schedule(kept, then, robot, _accumulate(begins))
 
 
-def _shares(weights: list[tuple[int, float]]) -> tuple[tuple[int, float], ...]:
-    """Weights as running shares of their sum."""
+def _accumulate(weights: list[Choice]) -> tuple[Choice, ...]:
+    """Return weights of jobs as cumulative shares of their sum."""
     total = sum(weight for _, weight in weights)
     running = itertools.accumulate(weight / total for _, weight in weights)
-    return tuple((k, share) for (k, _), share in zip(weights, running, strict=True))
+    return tuple(Choice(k, share) for (k, _), share in zip(weights, running, strict=True))
 
 
-def picked(shares: tuple[tuple[int, float], ...], draw: float) -> int:
-    """The job that a uniform draw in [0, 1) falls on; shares are not empty."""
-    return next((k for k, share in shares if draw < share), shares[-1][0])
+def pick_job(choices: tuple[Choice, ...], draw: float) -> int:
+    """Return the job that a uniform draw in [0, 1) falls on; the choice is not empty."""
+    return next((job for job, share in choices if draw < share), choices[-1].job)

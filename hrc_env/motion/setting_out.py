@@ -1,7 +1,8 @@
-"""Setting out: to a place by a way that meets nobody, a few steps back, into a clip."""
+"""Setting out: to a place by a path clear of other workers, a few steps back, into a clip."""
 
 import math
 from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,197 +10,240 @@ from hrc_env.core.typing import Floats
 from hrc_env.motion import lying
 from hrc_env.motion import state as st
 from hrc_env.motion.activities.falling import plan_fall
-from hrc_env.motion.activities.pieces import TURNS_RAD, following, piece_of
+from hrc_env.motion.activities.pieces import TURNS_RAD, find_next_piece, find_piece
 from hrc_env.motion.activities.playing import start_clip
-from hrc_env.motion.activities.running import fastest, plan_run
-from hrc_env.motion.decision import BOW, DWELL, EVENT, Decision, free_stages, in_the_way, wished
-from hrc_env.motion.floorplan import slack_at
-from hrc_env.motion.routes import route
+from hrc_env.motion.activities.running import limit_run_speed, plan_run
+from hrc_env.motion.decision import (
+    BOW,
+    DWELL,
+    EVENT,
+    Decision,
+    list_obstacles,
+    list_places,
+    list_stages,
+)
+from hrc_env.motion.floorplan import read_slack
+from hrc_env.motion.points import Place, Point
+from hrc_env.motion.routes import find_route
 from hrc_env.motion.schedule import HERE
 from hrc_env.motion.starting import start_going, start_here
-from hrc_env.motion.state import N_START, NOWHERE, ON_STAGE, THERE, UNDER_WAY, WAITING, Place
-from hrc_env.motion.traffic import APART_M, meets
+from hrc_env.motion.state import N_START, NOWHERE, ON_STAGE, THERE, UNDER_WAY, WAITING
+from hrc_env.motion.traffic import APART_M, Meeting, find_meeting
 from hrc_env.worker.props import PROP_NAMES
 from hrc_env.world import WORKPLACE_KINDS
 
-WISHED_CLIP, WHICH_CLIP = N_START - 2, N_START - 1
-"""Of an activity's own draws: whether to play a clip instead of it, and which."""
+WANTS_CLIP, WHICH_CLIP = N_START - 2, N_START - 1
+"""Draws of an activity: whether to play a clip instead of it, and which."""
 FALLS, RUNS, HOW_FAST, HOW_LONG, STAYS_DOWN = range(8, 13)
-"""Of a walk's own draws: whether they fall or run on it, how fast, how long they lie."""
-ARRIVED_M, HURRY = 0.12, (1.0, 0.75)
-"""So near to a place a worker is there [m]; shares of their pace at which walkers set out."""
+"""Draws of a walk: whether to fall or run, how fast, how long to lie, whether to stay down."""
+ARRIVED_M = 0.12
+"""Distance to a place within which a worker has arrived [m]."""
+HURRY = (1.0, 0.75)
+"""Shares of the walking speed that are tried in turn."""
 STAY_DOWN_S = (15.0, 40.0)
-"""How long those lie who do not get up soon [s]; judgement."""
+"""Time on the floor without getting up soon [s]; judgement."""
 STUMBLE_TO = ("robot", "open", "floor")
-"""Kinds of places with room ahead for the arms of who stumbles."""
-Begun = tuple[int, float] | None
-"""The activity that was begun and how long it takes [s]; None: it cannot be."""
+"""Kinds of places with room ahead for the arms of a stumbling worker."""
 
 
-def go(who: Decision) -> Begun:
-    """Begin to walk to a place of the job, if there is a free one and a free way to it."""
-    job, me = who.job, who.me
-    if me["going"] == UNDER_WAY and me["at"] == ON_STAGE:
-        spot: Place = tuple(me["spot"].tolist())  # type: ignore[assignment]
-        if begun := _go_to(who, [spot], ON_STAGE):
-            return begun
-        me["at"] = NOWHERE
-        who.go(WAITING)
-    return _go_to(who, wished(who), WORKPLACE_KINDS.index(job.at if job.at != HERE else "open"))
+class Action(NamedTuple):
+    """An activity that begins."""
+
+    activity: int
+    """Index into `ACTIVITY_NAMES`."""
+    duration_s: float
+    """Duration [s]."""
 
 
-def _go_to(who: Decision, places: Iterable[Place], at: int) -> Begun:
-    """Begin to walk to one of some places, `at` which is that."""
-    mind, me = who.mind, who.me
+def set_out(decision: Decision) -> Action | None:
+    """Begin to walk to a place of the job, if there are a free one and a free path to it."""
+    job, worker = decision.job, decision.worker
+    if worker.travel == UNDER_WAY and worker.place_kind == ON_STAGE:
+        place = Place(*worker.place.tolist())
+        if action := _set_out_to(decision, [place], ON_STAGE):
+            return action
+        worker.place_kind = NOWHERE
+        decision.set_travel(WAITING)
+    kind = WORKPLACE_KINDS.index(job.at if job.at != HERE else "open")
+    return _set_out_to(decision, list_places(decision), kind)
+
+
+def _set_out_to(decision: Decision, places: Iterable[Place], kind: int) -> Action | None:
+    """Begin to walk to one of some places.
+
+    Args:
+        decision: inputs of the decision.
+        places: places in the order in which they are tried.
+        kind: their kind, an index into `WORKPLACE_KINDS`, or `ON_STAGE`.
+    """
+    mind, worker = decision.mind, decision.worker
     for place in places:
-        obstacles = in_the_way(who)
+        obstacles = list_obstacles(decision)
         for share in HURRY:
-            begun = _set_out(who, place, obstacles, share, at != ON_STAGE)
-            if begun is None:
+            action = _plan_way(decision, place, obstacles, share, kind != ON_STAGE)
+            if action is None:
                 break
-            when, at_x, at_y = meets_somebody(who, *begun)
-            if when < 0.0:
-                me["spot"] = place
-                me["at"] = at
-                dwell = who.draw(DWELL, mind.config.dwell_s) * mind.config.people.tempo
-                me["until_s"] = who.now + begun[1] + dwell
-                who.go(UNDER_WAY)
-                if begun[0] == st.PUSH:
-                    _take_wheels(who)
-                return begun
-            obstacles = np.vstack([obstacles, (at_x, at_y, APART_M + 0.1)])
-            stay(who)
-    stay(who)
+            meeting = check_traffic(decision, action)
+            if meeting.time_s < 0.0:
+                worker.place[:] = place
+                worker.place_kind = kind
+                dwell = decision.draw(DWELL, mind.config.dwell_s) * mind.config.people.tempo
+                worker.stay_until_s = decision.clock_s + action.duration_s + dwell
+                decision.set_travel(UNDER_WAY)
+                if action.activity == st.PUSH:
+                    _take_wheels(decision)
+                return action
+            obstacles = np.vstack([obstacles, (meeting.x, meeting.y, APART_M + 0.1)])
+            cancel_plan(decision)
+    cancel_plan(decision)
     return None
 
 
-def _set_out(who: Decision, place: Place, obstacles: Floats, share: float, to_work: bool) -> Begun:
-    """Plan to go to a place round obstacles (n, 3) at a share of one's pace, if there is a way."""
-    mind, job, me = who.mind, who.job, who.me
-    start, end = (float(me["start_x"]), float(me["start_y"])), (place[0], place[1])
-    bow = 2.0 * who.draws.item(BOW) - 1.0
-    if not route(start, end, bow, obstacles, mind.plan.slack, mind.plan.origin, me):
+def _plan_way(
+    decision: Decision, place: Place, obstacles: Floats, share: float, to_work: bool
+) -> Action | None:
+    """Plan to go to a place, if there is a path.
+
+    Args:
+        decision: inputs of the decision.
+        place: the place.
+        obstacles: discs (n, 3) that the path goes around: x, y, radius [m].
+        share: share of the worker's walking speed.
+        to_work: whether there is a job to be done at the place.
+    """
+    mind, job, worker = decision.mind, decision.job, decision.worker
+    start = Point(float(worker.start_x), float(worker.start_y))
+    end = Point(place.x, place.y)
+    bow = 2.0 * decision.draws.item(BOW) - 1.0
+    if not find_route(start, end, bow, obstacles, mind.plan.grid, worker):
         return None
-    pace = share * float(me["speed_m_s"])
-    free = not who.loaded and job.by == "walk"
-    if free and (hastened := _fall_or_run(who, place[2], pace)):
-        return hastened
+    pace = share * float(worker.speed_m_s)
+    free = not decision.is_loaded and job.by == "walk"
+    if free and (action := _plan_fall_or_run(decision, place.yaw, pace)):
+        return action
     activity, prop = st.WALK, 0
-    stumbles = who.draws[EVENT] > 1.0 - mind.config.people.stumble_probability
-    if who.loaded:
+    stumbles = decision.draws[EVENT] > 1.0 - mind.config.people.stumble_probability
+    if decision.is_loaded:
         activity = st.CARRY
-    elif to_work and job.by == "push" and _has_wheels(who):
+    elif to_work and job.by == "push" and _has_wheels(decision):
         activity, prop = st.PUSH, PROP_NAMES.index(job.prop)
     elif job.at in STUMBLE_TO and stumbles:
         activity = st.STUMBLE
-    return activity, start_going(activity, who.draws, place[2], pace, prop, me)
+    duration_s = start_going(activity, decision.draws, place.yaw, pace, prop, worker)
+    return Action(activity, duration_s)
 
 
-def _has_wheels(who: Decision) -> bool:
-    """Whether what is to be pushed is where the worker stands, or is none of what lies about."""
-    kind = PROP_NAMES.index(who.job.prop)
-    return lying.at_hand(who.loads, kind, who.me) >= 0 or not lying.is_any(who.loads, kind)
+def _has_wheels(decision: Decision) -> bool:
+    """Return whether the cart to be pushed is within reach, or none lies about."""
+    kind = PROP_NAMES.index(decision.job.prop)
+    row = lying.find_load_at_hand(decision.loads, kind, decision.worker)
+    return row >= 0 or not lying.has_load(decision.loads, kind)
 
 
-def _take_wheels(who: Decision) -> None:
-    """What is pushed lies about no longer."""
-    row = lying.at_hand(who.loads, PROP_NAMES.index(who.job.prop), who.me)
+def _take_wheels(decision: Decision) -> None:
+    """Take the cart that is pushed from the loads that lie about."""
+    kind = PROP_NAMES.index(decision.job.prop)
+    row = lying.find_load_at_hand(decision.loads, kind, decision.worker)
     if row >= 0:
-        lying.take(who.loads, row)
+        lying.remove_load(decision.loads, row)
 
 
-def _fall_or_run(who: Decision, yaw_rad: float, pace_m_s: float) -> Begun:
-    """Begin to fall on the way or to run it, if it is to be and there is room."""
-    people, plan, me, draws = who.mind.config.people, who.mind.plan, who.me, who.draws
+def _plan_fall_or_run(decision: Decision, yaw_rad: float, pace_m_s: float) -> Action | None:
+    """Plan to fall on the way or to run it, if that is drawn and there is room."""
+    people, grid = decision.mind.config.people, decision.mind.plan.grid
+    worker, draws = decision.worker, decision.draws
     if draws[FALLS] < people.fall_probability:
         stays = draws[STAYS_DOWN] < people.stay_down_probability
-        lie_s = who.draw(HOW_LONG, STAY_DOWN_S if stays else people.lie_s)
-        lasts = plan_fall(draws, yaw_rad, pace_m_s, lie_s, plan.slack, plan.origin, me)
-        if lasts > 0.0:
-            return st.FALL, lasts
+        lie_s = decision.draw(HOW_LONG, STAY_DOWN_S if stays else people.lie_s)
+        duration_s = plan_fall(draws, yaw_rad, pace_m_s, lie_s, grid, worker)
+        if duration_s > 0.0:
+            return Action(st.FALL, duration_s)
     if draws[RUNS] < people.run_probability:
-        speed_m_s = fastest(who.draw(HOW_FAST, people.run_m_s), me)
+        speed_m_s = limit_run_speed(decision.draw(HOW_FAST, people.run_m_s), worker)
         if speed_m_s >= people.run_m_s[0]:
-            return st.RUN, plan_run(yaw_rad, speed_m_s, me)
+            return Action(st.RUN, plan_run(yaw_rad, speed_m_s, worker))
     return None
 
 
-def step_back(who: Decision) -> Begun:
+def step_back(decision: Decision) -> Action | None:
     """Begin to step back, if there is room behind."""
-    if who.loaded:
+    if decision.is_loaded:
         return None
-    plan, me = who.mind.plan, who.me
-    lasts = start_here(who, st.STEP_BACK, 0.0)
-    room = slack_at(float(me["end_x"]), float(me["end_y"]), plan.slack, plan.origin)
-    if room < 0.0 or meets_somebody(who, st.STEP_BACK, lasts)[0] >= 0.0:
-        stay(who)
+    plan, worker = decision.mind.plan, decision.worker
+    action = Action(st.STEP_BACK, start_here(decision, st.STEP_BACK, 0.0))
+    room = read_slack(float(worker.end_x), float(worker.end_y), plan.grid)
+    if room < 0.0 or check_traffic(decision, action).time_s >= 0.0:
+        cancel_plan(decision)
         return None
-    if me["going"] == THERE and who.kind_here:
-        who.go(UNDER_WAY)
-    return st.STEP_BACK, lasts
+    if worker.travel == THERE and decision.kind_here:
+        decision.set_travel(UNDER_WAY)
+    return action
 
 
-def stay(who: Decision) -> None:
-    """Forget what was planned: end where the worker stands, with what they hold."""
-    me = who.me
-    me["end_x"], me["end_y"], me["end_yaw"] = me["start_x"], me["start_y"], me["start_yaw"]
-    me["step_count"], me["load_prop"] = 0, who.load
-    me["undo_at"] = me["flight_s"] = 0.0
+def cancel_plan(decision: Decision) -> None:
+    """Cancel the plan: the worker ends where they stand, with the load that they hold."""
+    worker = decision.worker
+    worker.end_x, worker.end_y, worker.end_yaw = worker.start_x, worker.start_y, worker.start_yaw
+    worker.step_count, worker.load_prop = 0, decision.held_prop
+    worker.undo_at = worker.flight_s = 0.0
 
 
-def arrived(who: Decision) -> bool:
-    """Whether the worker stands at their place."""
-    me, (x, y, yaw, _) = who.me, who.me["spot"].tolist()
-    off, turned = math.hypot(me["start_x"] - x, me["start_y"] - y), me["start_yaw"] - yaw
-    if PROP_NAMES.index(who.job.prop) in lying.WHEELED and who.job.by == "walk":
+def has_arrived(decision: Decision) -> bool:
+    """Return whether the worker stands at their place."""
+    worker, (x, y, yaw, _) = decision.worker, decision.worker.place.tolist()
+    off, turned = math.hypot(worker.start_x - x, worker.start_y - y), worker.start_yaw - yaw
+    if PROP_NAMES.index(decision.job.prop) in lying.WHEELED and decision.job.by == "walk":
         return off < lying.EXACT_M and math.cos(turned) > lying.EXACT_COS
     return off < ARRIVED_M and math.cos(turned) > 0.9
 
 
-def meets_somebody(who: Decision, activity: int, lasts: float) -> tuple[float, float, float]:
-    """When and where an activity that the worker begins now comes too near to another's."""
-    if len(who.workers) == 1:
-        return -1.0, 0.0, 0.0
-    me = who.me
-    me["activity"], me["time_s"], me["duration_s"] = activity, 0.0, lasts
-    return meets(who.w, who.workers)
+def check_traffic(decision: Decision, action: Action) -> Meeting:
+    """Return when and where an action that the worker begins now comes too close to another's."""
+    if len(decision.workers) == 1:
+        return Meeting(-1.0, 0.0, 0.0)
+    worker = decision.worker
+    worker.activity, worker.time_s, worker.duration_s = action.activity, 0.0, action.duration_s
+    return find_meeting(decision.w, decision.workers)
 
 
-def play(who: Decision) -> Begun:
-    """Begin to play a clip, if it is wished, or to go where there is room for it; after one follows
-    the next, if there is room."""
-    mind, me, n_clips = who.mind, who.me, len(who.mind.clips.count)
-    was_clip, on_stage = me["activity"] == st.CLIP, me["at"] == ON_STAGE and arrived(who)
-    if n_clips == 0 or who.loaded or not (was_clip or on_stage or me["going"] == THERE):
+def begin_clip(decision: Decision) -> Action | None:
+    """Begin to play a clip if one is drawn, or to go where there is room for it.
+
+    The next clip follows a clip, if there is room.
+    """
+    mind, worker, n_clips = decision.mind, decision.worker, len(decision.mind.clips.count)
+    was_clip = worker.activity == st.CLIP
+    on_stage = worker.place_kind == ON_STAGE and has_arrived(decision)
+    if n_clips == 0 or decision.is_loaded or not (was_clip or on_stage or worker.travel == THERE):
         return None
-    if not on_stage and who.draws[WISHED_CLIP] >= mind.config.motions_probability:
+    if not on_stage and decision.draws[WANTS_CLIP] >= mind.config.motions_probability:
         return None
-    piece = int(who.draws.item(WHICH_CLIP) * n_clips)
+    piece = int(decision.draws.item(WHICH_CLIP) * n_clips)
     if was_clip:
-        piece = following(mind.clips, me)
+        piece = find_next_piece(mind.clips, worker)
     elif on_stage:
-        piece, me["at"] = piece_of(mind.clips, me), NOWHERE
-    if begun := _play_here(who, piece):
-        return begun
+        piece, worker.place_kind = find_piece(mind.clips, worker), NOWHERE
+    if action := _begin_clip_here(decision, piece):
+        return action
     if was_clip or on_stage:
         return None
-    me["clip_row"] = mind.clips.row[piece]
-    return _go_to(who, free_stages(who, mind.clips.starts[piece]), ON_STAGE)
+    worker.clip_row = mind.clips.row[piece]
+    return _set_out_to(decision, list_stages(decision, mind.clips.starts[piece]), ON_STAGE)
 
 
-def _play_here(who: Decision, piece: int) -> Begun:
-    """Begin to play a piece of a clip, if there is room."""
-    mind, me = who.mind, who.me
+def _begin_clip_here(decision: Decision, piece: int) -> Action | None:
+    """Begin to play a piece of a clip on the spot, if there is room."""
+    mind, worker = decision.mind, decision.worker
     for turn_rad in TURNS_RAD:
-        lasts = start_clip(piece, turn_rad, mind.clips, me)
-        roots = me["roots"].tolist()
-        room = min(slack_at(x, y, mind.plan.slack, mind.plan.origin) for x, y in roots)
-        if room >= 0.0 and meets_somebody(who, st.CLIP, lasts)[0] < 0.0:
-            if who.kind_here:
-                who.go(UNDER_WAY)  # that is, back to the place afterwards
+        action = Action(st.CLIP, start_clip(piece, turn_rad, mind.clips, worker))
+        roots = worker.roots.tolist()
+        room = min(read_slack(x, y, mind.plan.grid) for x, y in roots)
+        if room >= 0.0 and check_traffic(decision, action).time_s < 0.0:
+            if decision.kind_here:
+                decision.set_travel(UNDER_WAY)  # that is, back to the place afterwards
             else:
-                who.go(THERE)
-                me["spot"] = me["end_x"], me["end_y"], me["end_yaw"], 0.0
-            return st.CLIP, lasts
-    stay(who)
+                decision.set_travel(THERE)
+                worker.place[:] = worker.end_x, worker.end_y, worker.end_yaw, 0.0
+            return action
+    cancel_plan(decision)
     return None

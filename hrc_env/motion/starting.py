@@ -1,116 +1,173 @@
-"""Starting an activity by its number, whatever start functions it has (`activities`)."""
+"""Starting an activity by its number, with the start function of its kind (`activities`)."""
 
 import math
 from collections.abc import Callable
 
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Floats
+from hrc_env.core.typing import Floats, Vector3
 from hrc_env.motion import state as st
 from hrc_env.motion.activities import loads
 from hrc_env.motion.activities import work_plans as wp
 from hrc_env.motion.activities.climb import start_climb, start_look_round
 from hrc_env.motion.activities.going import start_push, start_step_back, start_stumble
-from hrc_env.motion.activities.planning import between, blank, dominant, finish
-from hrc_env.motion.config import Numbers
+from hrc_env.motion.activities.planning import choose_hand, clear_plan, finish_plan, scale_draw
+from hrc_env.motion.config import HandParams
 from hrc_env.motion.curves import wrap
 from hrc_env.motion.decision import Decision
-from hrc_env.motion.feet import feet
-from hrc_env.motion.hands import plan_lift, plan_reach
-from hrc_env.motion.posture import from_here
-from hrc_env.motion.state import Pair, Triple, Worker
+from hrc_env.motion.feet import place_feet
+from hrc_env.motion.hands import LiftTimes, plan_lift, plan_reach
+from hrc_env.motion.points import Point, Sides
+from hrc_env.motion.posture import locate_ahead
+from hrc_env.motion.state import Worker
 from hrc_env.motion.walk import plan_walk
 from hrc_env.worker.props import PROP_NAMES
 
-TAKE_M, TAKE_S = 0.52, 0.8
-"""Hands are put out so far ahead for what is brought [m]; they hold it there for so long [s]."""
-BODY_M, OWN_SIDE_M = 0.36, 0.30
-"""Hands keep so far from their own root, and from the middle to another worker [m]."""
+TAKE_M = 0.52
+"""Distance ahead at which a hand is held out for a tool that is brought [m]."""
+TAKE_S = 0.8
+"""Time that the hand holds the tool there [s]."""
+BODY_M = 0.36
+"""Least distance of hands from their own root [m]."""
+OWN_SIDE_M = 0.30
+"""Least distance of hands from the middle to another worker [m]."""
 
 
 def start_going(
-    activity: int, draws: Floats, end_yaw: float, pace_m_s: float, prop: int, me: Worker
+    activity: int, draws: Floats, end_yaw: float, pace_m_s: float, prop: int, worker: Worker
 ) -> float:
-    """Start to walk, carry, push or stumble along the path that is laid; how long [s]."""
+    """Start to walk, carry, push or stumble along the path that is laid.
+
+    Args:
+        activity: index into `ACTIVITY_NAMES`.
+        draws: uniform draws (N_START,) in [0, 1).
+        end_yaw: heading at the end [rad].
+        pace_m_s: walking speed [m/s].
+        prop: cart that is pushed, an index into `PROPS`.
+        worker: record with the path; the plan is written into it.
+
+    Returns:
+        The duration [s].
+    """
     if activity == st.PUSH:
-        return start_push(end_yaw, pace_m_s, prop, me)
+        return start_push(end_yaw, pace_m_s, prop, worker)
     if activity == st.STUMBLE:
-        return start_stumble(draws, end_yaw, pace_m_s, me)
-    return plan_walk(end_yaw, pace_m_s, me)
+        return start_stumble(draws, end_yaw, pace_m_s, worker)
+    return plan_walk(end_yaw, pace_m_s, worker)
 
 
 @kernel
-def start_take(draws: Floats, height: float, me: Worker) -> float:
-    """Put out a hand at the height for what somebody brings, and hold it there."""
-    blank(me)
-    me.side = dominant(draws[0], me)
-    used = (0.0, 1.0) if me.side == 1 else (1.0, 0.0)
-    at = from_here((TAKE_M, (1.0 - 2.0 * me.side) * 0.10, height), me)
-    me.out_at = 0.1 + 0.3 * draws[1]
-    lasts = plan_reach(at, used, 1.1, TAKE_S, (0.0, 1.0), me)
+def start_take(draws: Floats, height: float, worker: Worker) -> float:
+    """Hold out a hand for a tool that is brought, and hold it there.
+
+    Args:
+        draws: uniform draws (N_START,) in [0, 1).
+        height: height of the hand [m].
+        worker: record that the plan is written into.
+
+    Returns:
+        The duration [s].
+    """
+    clear_plan(worker)
+    worker.side = choose_hand(draws[0], worker)
+    used = Sides(0.0, 1.0) if worker.side == 1 else Sides(1.0, 0.0)
+    at = locate_ahead(TAKE_M, (1.0 - 2.0 * worker.side) * 0.10, height, worker)
+    worker.out_at = 0.1 + 0.3 * draws[1]
+    duration_s = plan_reach(at, used, 1.1, TAKE_S, 0.0, 1.0, worker)
     for i in range(3):
-        me.tool_pose[i] = me.target[3 * me.side + i]
-    return lasts
+        worker.tool_pose[i] = worker.target[3 * worker.side + i]
+    return duration_s
 
 
 Start = Callable[[Floats, float, Worker], float]
-"""Begins an activity from N_START draws in [0, 1) at a height [m]; how long it lasts [s]."""
+"""Begins an activity from draws (N_START,) in [0, 1) and a height [m]; returns its duration [s]."""
 
 
-def _work(plan: Start) -> Start:
-    return lambda draws, height, me: finish(plan(draws, height, me), me)
+def _finish_work(plan: Start) -> Start:
+    """Return a start function that plans and finishes work in place."""
+    return lambda draws, height, worker: finish_plan(plan(draws, height, worker), worker)
 
 
-def _load(plan: Start) -> Start:
-    return lambda draws, height, me: loads.finish_lift(plan(draws, height, me), me)
+def _finish_load(plan: Start) -> Start:
+    """Return a start function that plans and finishes the lift of a load."""
+    return lambda draws, height, worker: loads.finish_lift(plan(draws, height, worker), worker)
 
 
 STARTS: dict[int, Start] = {
-    st.LOOK_ROUND: start_look_round, st.CLIMB: start_climb, st.STEP_BACK: start_step_back,
-    st.SET_DOWN: _load(loads.plan_set_down), st.HAND_OVER: _load(loads.plan_hand_over),
-    st.RECEIVE: _load(loads.plan_receive), st.HAMMER: _work(wp.plan_hammer),
-    st.DRILL: _work(wp.plan_drill), st.OVERHEAD: _work(wp.plan_drill), st.SAW: _work(wp.plan_saw),
-    st.MEASURE: _work(wp.plan_measure), st.POINT: _work(wp.plan_point),
-    st.SQUATTING: _work(wp.plan_squat), st.KNEELING: _work(wp.plan_kneel),
-    st.LUNGE: _work(wp.plan_lunge), st.SCREW: _work(wp.plan_screw), st.TAKE: start_take,
-}  # fmt: skip
-"""What is begun where the worker stands: each compiled by itself when it is first wanted."""
+    st.LOOK_ROUND: start_look_round,
+    st.CLIMB: start_climb,
+    st.STEP_BACK: start_step_back,
+    st.SET_DOWN: _finish_load(loads.plan_set_down),
+    st.HAND_OVER: _finish_load(loads.plan_hand_over),
+    st.RECEIVE: _finish_load(loads.plan_receive),
+    st.HAMMER: _finish_work(wp.plan_hammer),
+    st.DRILL: _finish_work(wp.plan_drill),
+    st.OVERHEAD: _finish_work(wp.plan_drill),
+    st.SAW: _finish_work(wp.plan_saw),
+    st.MEASURE: _finish_work(wp.plan_measure),
+    st.POINT: _finish_work(wp.plan_point),
+    st.SQUATTING: _finish_work(wp.plan_squat),
+    st.KNEELING: _finish_work(wp.plan_kneel),
+    st.LUNGE: _finish_work(wp.plan_lunge),
+    st.SCREW: _finish_work(wp.plan_screw),
+    st.TAKE: start_take,
+}
+"""Start functions of activities on the spot; each is compiled when it is first needed."""
 
 
-def start_here(who: Decision, activity: int, height: float, at_rest: Floats | None = None) -> float:
-    """Start an activity where the worker stands; how long it takes [s], 0 of standing. What is
-    picked up or set down is `at_rest` (6,) before or after."""
-    draws, config, me = who.draws, who.mind.numbers, who.me
-    feet(0.0, me)
+def start_here(
+    decision: Decision, activity: int, height: float, at_rest: Floats | None = None
+) -> float:
+    """Start an activity where the worker stands.
+
+    Args:
+        decision: inputs of the decision.
+        activity: index into `ACTIVITY_NAMES`.
+        height: height of the work [m].
+        at_rest: pose (6,) of a load before it is picked up or after it is set down.
+
+    Returns:
+        The duration [s]; 0 for standing.
+    """
+    draws, params, worker = decision.draws, decision.mind.hand_params, decision.worker
+    place_feet(0.0, worker)
     if activity == st.REACH:
-        others = who.workers["spot"][who.others(), :2]
-        return start_reach(draws, config, who.kind_here == "robot", height, others, me)
+        others = decision.workers["place"][decision.find_others(), :2]
+        near = decision.kind_here == "robot"
+        return start_reach(draws, params, near, height, others, worker)
     if activity == st.LIFT:
-        return start_lift(draws, config, me)
+        return start_lift(draws, params, worker)
     if at_rest is not None:
-        return _start_load(who, activity, at_rest)
+        return _start_load(decision, activity, at_rest)
     if activity == st.DRILL:  # below the head, and above it for drilling overhead
         height = min(height, wp.OVERHEAD_M - 0.1)
     elif activity == st.OVERHEAD:
         height = max(height, wp.OVERHEAD_M + 0.1)
-    return STARTS[activity](draws, height, me) if activity in STARTS else 0.0
+    return STARTS[activity](draws, height, worker) if activity in STARTS else 0.0
 
 
-def _start_load(who: Decision, activity: int, at_rest: Floats) -> float:
-    """Start to pick up what is at rest, or to lay it down so."""
-    draws, me = who.draws, who.me
+def _start_load(decision: Decision, activity: int, at_rest: Floats) -> float:
+    """Start to pick up a load from its pose at rest, or to lay it down there."""
+    draws, worker = decision.draws, decision.worker
     if activity == st.PICK_UP:
-        prop, on_shoulder = PROP_NAMES.index(who.job.prop), bool(draws[8] < 0.5)
-        raise_s = loads.plan_pick_up(draws, 0.0, prop, on_shoulder, me)
+        prop, on_shoulder = PROP_NAMES.index(decision.job.prop), bool(draws[8] < 0.5)
+        raise_s = loads.plan_pick_up(draws, 0.0, prop, on_shoulder, worker)
     else:
-        raise_s = loads.plan_set_down(draws, 0.0, me)
-    loads.put_load(at_rest, me)
-    return loads.finish_lift(raise_s, me)
+        raise_s = loads.plan_set_down(draws, 0.0, worker)
+    loads.plan_load_pose(at_rest, worker)
+    return loads.finish_lift(raise_s, worker)
 
 
 @kernel
-def own_side(x: float, y: float, others: Floats, me: Worker) -> Pair:
-    """A target, moved over to the worker's own side of the middle to every other worker."""
-    mx, my = me.start_x, me.start_y
+def keep_to_own_side(x: float, y: float, others: Floats, worker: Worker) -> Point:
+    """Move a target to the worker's own side of the middle to every other worker.
+
+    Args:
+        x: world x of the target [m].
+        y: world y of the target [m].
+        others: places (n, 2) of the other workers [m].
+        worker: record of the worker.
+    """
+    mx, my = worker.start_x, worker.start_y
     for k in range(others.shape[0]):
         dx, dy = others[k, 0] - mx, others[k, 1] - my
         apart = math.hypot(dx, dy)
@@ -119,50 +176,87 @@ def own_side(x: float, y: float, others: Floats, me: Worker) -> Pair:
             over = (x - mx) * dx + (y - my) * dy - (0.5 * apart - OWN_SIDE_M)
             if over > 0.0:
                 x, y = x - over * dx, y - over * dy
-    return x, y
+    return Point(x, y)
 
 
 @kernel
-def _target(draws: Floats, config: Numbers, near: bool, height: float, me: Worker) -> Triple:
-    """A world point for the hands: in the robot's workspace if `near`, else ahead."""
-    z = between(draws[3], *config.target_z_m)
+def _draw_target(
+    draws: Floats, params: HandParams, near: bool, height: float, worker: Worker
+) -> Vector3:
+    """Draw a target of the hands in the world [m].
+
+    Args:
+        draws: uniform draws (N_START,) in [0, 1).
+        params: settings of reaches.
+        near: whether the target is in the robot's workspace, else it is ahead of the worker.
+        height: least height of a target ahead [m].
+        worker: record of the worker.
+    """
+    z = scale_draw(draws[3], *params.target_z_m)
     if not near:
-        return from_here((0.36 + 0.3 * draws[1], 0.7 * (draws[2] - 0.5), max(z, height)), me)
-    bx, by = config.robot_xy_m
-    dx, dy = me.start_x - bx, me.start_y - by
+        ahead, left = 0.36 + 0.3 * draws[1], 0.7 * (draws[2] - 0.5)
+        return locate_ahead(ahead, left, max(z, height), worker)
+    base = params.robot_xy_m
+    dx, dy = worker.start_x - base.x, worker.start_y - base.y
     farthest = math.hypot(dx, dy) - BODY_M
-    low, high = config.target_radius_m
-    radius = between(draws[1], min(low, farthest), min(high, farthest))
-    azimuth = math.atan2(dy, dx) + config.target_spread_rad * (2.0 * draws[2] - 1.0)
-    return bx + radius * math.cos(azimuth), by + radius * math.sin(azimuth), z
+    low, high = params.target_radius_m
+    radius = scale_draw(draws[1], min(low, farthest), min(high, farthest))
+    azimuth = math.atan2(dy, dx) + params.target_spread_rad * (2.0 * draws[2] - 1.0)
+    x, y = base.x + radius * math.cos(azimuth), base.y + radius * math.sin(azimuth)
+    return Vector3(x, y, z)
 
 
 @kernel
 def start_reach(
-    draws: Floats, config: Numbers, near: bool, height: float, others: Floats, me: Worker
+    draws: Floats, params: HandParams, near: bool, height: float, others: Floats, worker: Worker
 ) -> float:
-    """Draw a reach: where to (above `height`), with which hand, how fast, for how long."""
-    x, y, z = _target(draws, config, near, height, me)
-    x, y = own_side(x, y, others, me)
-    side = wrap(math.atan2(y - me.start_y, x - me.start_x) - me.start_yaw)
-    right = 0.5 + (me.right_handed - 0.5) * math.exp(-((side / 0.2) ** 2))
+    """Draw a reach: its target, hands, speed and duration.
+
+    Args:
+        draws: uniform draws (N_START,) in [0, 1).
+        params: settings of reaches.
+        near: whether the target is in the robot's workspace, else it is ahead of the worker.
+        height: least height of a target ahead [m].
+        others: places (n, 2) of the other workers [m].
+        worker: record that the plan is written into.
+
+    Returns:
+        The duration [s].
+    """
+    x, y, z = _draw_target(draws, params, near, height, worker)
+    x, y = keep_to_own_side(x, y, others, worker)
+    side = wrap(math.atan2(y - worker.start_y, x - worker.start_x) - worker.start_yaw)
+    right = 0.5 + (worker.right_handed - 0.5) * math.exp(-((side / 0.2) ** 2))
     right = min(max(right - side / 0.4, 0.0), 1.0)
-    used = (0.0, 1.0) if draws[4] < right else (1.0, 0.0)
-    if draws[5] < config.two_hands_probability and abs(side) < 0.6:
-        used = (1.0, 1.0)
-    sudden = draws[6] < config.sudden_probability
-    peak = config.sudden_speed_m_s if sudden else between(draws[7], *config.hand_speed_m_s)
-    hold = 0.15 + 0.2 * draws[8] if sudden else between(draws[8], *config.hold_s)
-    fidget = (0.035 * draws[9] * draws[9], 0.6 + 0.8 * draws[10])
-    me.out_at = 0.05 if sudden else 0.1 + 0.5 * draws[11]
-    return plan_reach((x, y, z), used, peak, hold, fidget, me)
+    used = Sides(0.0, 1.0) if draws[4] < right else Sides(1.0, 0.0)
+    if draws[5] < params.two_hands_probability and abs(side) < 0.6:
+        used = Sides(1.0, 1.0)
+    sudden = draws[6] < params.sudden_probability
+    peak = params.sudden_speed_m_s if sudden else scale_draw(draws[7], *params.hand_speed_m_s)
+    hold = 0.15 + 0.2 * draws[8] if sudden else scale_draw(draws[8], *params.hold_s)
+    fidget_m, fidget_hz = 0.035 * draws[9] * draws[9], 0.6 + 0.8 * draws[10]
+    worker.out_at = 0.05 if sudden else 0.1 + 0.5 * draws[11]
+    return plan_reach(Vector3(x, y, z), used, peak, hold, fidget_m, fidget_hz, worker)
 
 
 @kernel
-def start_lift(draws: Floats, config: Numbers, me: Worker) -> float:
-    """Draw a lift: where the load stands and how long bending, raising and holding take."""
-    me.out_at = 0.1 + 0.4 * draws[11]
-    times = (between(draws[1], *config.lift_s), between(draws[2], *config.lift_s), 0.3 + draws[3])
-    z = between(draws[4], *config.load_z_m)
+def start_lift(draws: Floats, params: HandParams, worker: Worker) -> float:
+    """Draw a lift: where the load stands, and the times to bend, raise and hold.
+
+    Args:
+        draws: uniform draws (N_START,) in [0, 1).
+        params: settings of lifts.
+        worker: record that the plan is written into.
+
+    Returns:
+        The duration [s].
+    """
+    worker.out_at = 0.1 + 0.4 * draws[11]
+    times = LiftTimes(
+        scale_draw(draws[1], *params.lift_s),
+        scale_draw(draws[2], *params.lift_s),
+        0.3 + draws[3],
+    )
+    z = scale_draw(draws[4], *params.load_z_m)
     ahead = 0.38 + 0.08 * draws[5]
-    return plan_lift(ahead, z, times, me)
+    return plan_lift(ahead, z, times, worker)

@@ -1,4 +1,4 @@
-"""How episodes begin: robots apart from people."""
+"""How episodes begin: with the robots away from people."""
 
 from collections.abc import Callable, Mapping
 
@@ -13,12 +13,12 @@ from hrc_env.motion import generator
 from hrc_env.worker.body import Body, worker_truth
 
 APART_M = 0.10
-"""No robot begins nearer to a worker's true surface than this [m]."""
+"""Least distance of a robot's start from a worker's true surface [m]."""
 ROBOT_TRIES, TRIES = 8, 40
-"""So often a robot's start is drawn again before workers' are, too; and all together."""
+"""Number of draws of a robot's start before the workers are drawn again, and of draws in all."""
 
 
-def apart(
+def begin_apart(
     ids: Ints,
     draw: Callable[[Ints], JointAngles],
     motion: generator.MotionState,
@@ -27,20 +27,30 @@ def apart(
     bodies: Body,
     casts: Mapping[int, generator.Cast] = generator.NOBODY_CAST,
 ) -> JointAngles:
-    """(len(ids), N) where robots of environments `ids` begin, whose workers' motion begins, too.
+    """Begin episodes in which the robots start away from the workers.
 
-    Robots are drawn again where that is too near, and after a while workers. `ConfigError` where
-    all draws were too near.
+    The start of a robot that is too close to a worker is drawn again, and after a while the workers
+    are.
 
     Args:
-        draw: of these environments a start each.
-        rngs: of the workers, one of each environment of the batch.
-        casts: what of the workers is not drawn, by environment.
+        ids: environments (N,).
+        draw: returns a start for each of some environments [rad].
+        motion: state of the workers, which begins anew.
+        rngs: generators of the workers, one for each environment of the batch.
+        chain: the robot.
+        bodies: bodies of the workers.
+        casts: by environment, what of the workers is not drawn.
+
+    Returns:
+        Joint angles (N, n_joints) at which the robots start [rad].
+
+    Raises:
+        ConfigError: all draws were too close.
     """
     generator.reset(motion, ids, rngs, casts)
     q, near = draw(ids), np.arange(len(ids))
     for k in range(TRIES):
-        near = near[gap_m(ids[near], q[near], motion, chain, bodies) < APART_M]
+        near = near[measure_gap_m(ids[near], q[near], motion, chain, bodies) < APART_M]
         if not len(near):
             return q
         if k >= ROBOT_TRIES:
@@ -54,16 +64,25 @@ def apart(
 
 
 def draw_near(home_q: JointAngles, spread_rad: Floats, rngs: Rngs) -> JointAngles:
-    """Draw joints (len(rngs), N), each within `spread_rad` (N,) of home."""
+    """Draw joint angles (len(rngs), N), each within `spread_rad` (N,) of home [rad]."""
     angles = [home_q + rng.uniform(-1, 1, len(spread_rad)) * spread_rad for rng in rngs]
     return np.array(angles).reshape(len(rngs), -1)
 
 
-def gap_m(
+def measure_gap_m(
     ids: Ints, q: JointAngles, motion: generator.MotionState, chain: SerialChain, bodies: Body
 ) -> Floats:
-    """(len(ids),) true separation of robots at `q` from the nearest of their workers [m]; infinite
-    without any."""
+    """Return the true distance (N,) of robots from the nearest of their workers [m].
+
+    It is infinite without any worker.
+
+    Args:
+        ids: environments (N,).
+        q: joint angles (N, n_joints) of their robots [rad].
+        motion: state of the workers.
+        chain: the robot.
+        bodies: bodies of the workers.
+    """
     truth = worker_truth(bodies, generator.current(motion, ids))
     arm, radius_m = chains.capsules(chain, q), chain.capsule_radius_m
     gap = least_separation(arm, radius_m, truth.capsules_world, truth.capsule_radius_m)

@@ -1,106 +1,148 @@
-"""Who is where when: nobody begins what meets somebody on theirs, so everybody stays clear."""
+"""Where workers will be, so that no activity begins in which two workers come too close."""
 
 import math
+from typing import NamedTuple
 
+from hrc_env.core.declared import Records1
 from hrc_env.core.kernels import kernel
 from hrc_env.motion import state as st
-from hrc_env.motion.activities.falling import fallen_root
-from hrc_env.motion.activities.playing import clip_root
-from hrc_env.motion.curves import placed
-from hrc_env.motion.paths import along
-from hrc_env.motion.state import Pair, Triple, Worker, Workers
-from hrc_env.motion.walk import travelled
+from hrc_env.motion.activities.falling import predict_fallen_root
+from hrc_env.motion.activities.playing import predict_clip_root
+from hrc_env.motion.curves import move_point
+from hrc_env.motion.paths import locate_on_path
+from hrc_env.motion.points import Point
+from hrc_env.motion.state import Worker
+from hrc_env.motion.walk import measure_travel
 
 APART_M = 0.80
-"""Roots keep so far from each other [m]: two half widths of people with arms, and some."""
-AHEAD_M, HANDS_M = 0.48, 0.76
-"""Who works has hands and head so far ahead [m]; others' roots keep so far from there."""
-PUSHING_M, CLIP_M, FALL_M = (1.0, 0.95), (0.01, 1.15), (0.01, 1.3)
-"""The same of who pushes a cart, of who plays a clip: an arm's length more to any side, and of who
-falls: head and feet of who lies are so far from their pelvis, and half a body."""
-BEHIND_M, SHANK_M = 0.40, 0.66
-"""Who kneels has a shank so far behind [m]; others' roots keep so far from there."""
+"""Least distance between two roots [m]: two half widths of people with arms, and a reserve."""
+AHEAD_M = 0.48
+"""Distance of hands and head of a working person ahead of the root [m]."""
+HANDS_M = 0.76
+"""Least distance of another root from those hands [m]."""
+FALL_APART_M = 1.3
+"""Least distance of another root from the root of a falling worker [m]."""
+
+
+class HandsClearance(NamedTuple):
+    """A point ahead of a worker that others keep clear of."""
+
+    ahead: float
+    """Distance of the point ahead of the root [m]; 0 for none."""
+    apart: float
+    """Least distance of another root from the point [m]."""
+
+
+class Meeting(NamedTuple):
+    """The first moment at which a worker comes too close to another."""
+
+    time_s: float
+    """Time from now [s]; -1 for never."""
+    x: float
+    """World x of the other root then [m]."""
+    y: float
+    """World y of the other root then [m]."""
+
+
+PUSHING = HandsClearance(1.0, 0.95)
+"""Clearance in pushing a cart."""
+PLAYING = HandsClearance(0.01, 1.15)
+"""Clearance in playing a clip: an arm's length more on every side."""
+FALLING = HandsClearance(0.01, FALL_APART_M)
+"""Clearance of a falling worker: head and feet from the pelvis, and half a body."""
+BEHIND_M = 0.40
+"""Distance of a kneeling worker's shank behind the root [m]."""
+SHANK_M = 0.66
+"""Least distance of another root from that shank [m]."""
 LOOK_S = 0.12
-"""Meetings are looked for in steps of this length [s]; at 2.8 m/s to each other 0.3 m."""
+"""Step in which meetings are looked for [s]; 0.3 m at a closing speed of 2.8 m/s."""
 
 
 @kernel
-def goes(activity: int) -> bool:
-    """Whether it moves along a path."""
+def is_on_path(activity: int) -> bool:
+    """Return whether an activity moves along a path."""
     return activity in st.GOING or activity in (st.PUSH, st.RUN)
 
 
 @kernel
-def ahead_of(activity: int) -> Pair:
-    """How far ahead of the root hands or cart are, and how near others may come to there [m]."""
+def get_hands_clearance(activity: int) -> HandsClearance:
+    """Return the point ahead of a worker in an activity that others keep clear of."""
     if activity == st.PUSH:
-        return PUSHING_M
+        return PUSHING
     if activity == st.CLIP:
-        return CLIP_M
+        return PLAYING
     if activity == st.FALL:
-        return FALL_M
-    if activity in st.IDLE or goes(activity):
-        return 0.0, 0.0
-    return AHEAD_M, HANDS_M
+        return FALLING
+    if activity in st.IDLE or is_on_path(activity):
+        return HandsClearance(0.0, 0.0)
+    return HandsClearance(AHEAD_M, HANDS_M)
 
 
 @kernel
-def root_at(t: float, me: Worker) -> Pair:
-    """Where someone's root is on the floor at time t of their activity, and after it."""
-    if goes(me.activity):
-        return along(travelled(t - me.taken_s, me), me)
-    if me.activity == st.CLIP:
-        return clip_root(t, me)
-    if me.activity == st.FALL:
-        return fallen_root(t, me)
-    return me.start_x, me.start_y
+def predict_root(t: float, worker: Worker) -> Point:
+    """Return the root on the floor at time t of a worker's activity, and after its end."""
+    if is_on_path(worker.activity):
+        return locate_on_path(measure_travel(t - worker.grasp_s, worker), worker)
+    if worker.activity == st.CLIP:
+        return predict_clip_root(t, worker)
+    if worker.activity == st.FALL:
+        return predict_fallen_root(t, worker)
+    return Point(worker.start_x, worker.start_y)
 
 
 @kernel
-def gap_to(x: float, y: float, t: float, me: Worker) -> float:
-    """How much farther a root at (x, y) is than it must be from someone's body and hands [m]."""
-    ox, oy = root_at(t, me)
+def measure_gap(x: float, y: float, t: float, worker: Worker) -> float:
+    """Return the distance of a root from a worker beyond the least allowed one [m].
+
+    Args:
+        x: world x of the other root [m].
+        y: world y of the other root [m].
+        t: time since the worker's activity began [s].
+        worker: record of the worker.
+    """
+    ox, oy = predict_root(t, worker)
     gap = math.hypot(x - ox, y - oy) - APART_M
-    ahead, apart = ahead_of(me.activity)
+    ahead, apart = get_hands_clearance(worker.activity)
     if ahead > 0.0:
-        nx, ny = (ox, oy) if not goes(me.activity) else root_at(t + 0.1, me)
-        yaw = me.start_yaw
-        if math.hypot(nx - ox, ny - oy) > 0.01:
-            yaw = math.atan2(ny - oy, nx - ox)
-        hx, hy = placed(ox, oy, yaw, ahead, 0.0)
+        yaw = worker.start_yaw
+        if is_on_path(worker.activity):
+            later = predict_root(t + 0.1, worker)
+            if math.hypot(later.x - ox, later.y - oy) > 0.01:
+                yaw = math.atan2(later.y - oy, later.x - ox)
+        hx, hy = move_point(ox, oy, yaw, ahead, 0.0)
         gap = min(gap, math.hypot(x - hx, y - hy) - apart)
-        if st.KNEELING <= me.activity <= st.POINT and me.kneel > 0.0:
-            hx, hy = placed(ox, oy, yaw, -BEHIND_M, 0.0)
+        if st.KNEELING <= worker.activity <= st.POINT and worker.kneel > 0.0:
+            hx, hy = move_point(ox, oy, yaw, -BEHIND_M, 0.0)
             gap = min(gap, math.hypot(x - hx, y - hy) - SHANK_M)
     return gap
 
 
 @kernel
-def meets(w: int, workers: Workers) -> Triple:
-    """When worker w first comes too near to another, from now [s] (-1: never), and x, y."""
-    found, fx, fy = -1.0, 0.0, 0.0
-    me = workers[w]
+def find_meeting(w: int, workers: Records1[Worker]) -> Meeting:
+    """Return when and where worker w first comes too close to another one."""
+    time_s, met_x, met_y = -1.0, 0.0, 0.0
+    worker = workers[w]
     for k in range(len(workers)):
         other = workers[k]
-        if k == w or not other.present:
+        if k == w or not other.is_present:
             continue
-        left = me.duration_s - me.time_s
-        if goes(other.activity) or other.activity == st.CLIP:
+        left = worker.duration_s - worker.time_s
+        if is_on_path(other.activity) or other.activity == st.CLIP:
             left = max(left, other.duration_s - other.time_s)
         allowed, n = 0.0, int(left / LOOK_S) + 1
         for i in range(n + 1):
             t = i * LOOK_S
-            if found >= 0.0 and t >= found:
+            if time_s >= 0.0 and t >= time_s:
                 break
-            x, y = root_at(me.time_s + t, me)
-            gap = gap_to(x, y, other.time_s + t, other)
-            ox, oy = root_at(other.time_s + t, other)
-            if ahead_of(me.activity)[0] > 0.0:
-                gap = min(gap, gap_to(ox, oy, me.time_s + t, me))
+            x, y = predict_root(worker.time_s + t, worker)
+            gap = measure_gap(x, y, other.time_s + t, other)
+            ox, oy = predict_root(other.time_s + t, other)
+            if get_hands_clearance(worker.activity).ahead > 0.0:
+                gap = min(gap, measure_gap(ox, oy, worker.time_s + t, worker))
             if i == 0:
                 allowed = min(gap - 0.02, 0.0)
             if gap < allowed:
-                found, fx, fy = t, ox, oy
+                time_s, met_x, met_y = t, ox, oy
                 break
             allowed = min(max(allowed, gap - 0.02), 0.0)
-    return found, fx, fy
+    return Meeting(time_s, met_x, met_y)

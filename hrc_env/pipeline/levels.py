@@ -87,9 +87,10 @@ def make_pipeline(
     settings = replace(config.tracker, longest_delay_s=memory_s)
     tracker = make_estimator(estimator, projections(scene.cameras), config.ctrl_dt, settings)
     if level == "truth":
-        return Oracle(config.tracker, oracle.nobody(batch, scene.n_workers, config.tracker))
+        absence = oracle.estimate_absence(batch, scene.n_workers, config.tracker)
+        return Oracle(config.tracker, absence)
     if level == "none":
-        prior = oracle.prior(batch, scene.n_workers, config.tracker)
+        prior = oracle.estimate_prior(batch, scene.n_workers, config.tracker)
         return NoPerception(prior, config.ctrl_dt)
     if level == "keypoints":
         return EmulatorPipeline(scene, batch, tracker, config, schedule)

@@ -16,7 +16,7 @@ from hrc_env.pipeline.worker_detector import WorkerDetector
 from hrc_env.scene.build import Scene
 from hrc_env.scene.domain_randomization import AS_BUILT, AppearanceConfig, Look, draw_look
 from hrc_env.scene.render import CropRenderer
-from hrc_env.scene.rigs import floor
+from hrc_env.scene.rigs import sample_floor
 from hrc_env.tracking.estimators import Estimator
 
 
@@ -106,7 +106,7 @@ class PixelPipeline(ImageTracking):
             scene.cameras,
             scene.n_workers,
             config.detector,
-            floor(scene.grounds),
+            sample_floor(scene.grounds),
             setup.calibration.sigma,
         )
         renderer = None if like is None else like.cameras.renderer

@@ -25,13 +25,13 @@ from hrc_env.tracking.calibration_monitor import forget_monitor, make_monitor, m
 from hrc_env.tracking.contradiction import find_unexplained
 from hrc_env.tracking.estimators import Estimator
 from hrc_env.tracking.frozen_frames import (
-    believed,
+    find_live_cameras,
     forget_frozen,
     leave_out_frozen,
     make_frozen,
 )
 from hrc_env.tracking.people.association import AssociationConfig, associate
-from hrc_env.tracking.presence import IMAGES, Looks, Presence
+from hrc_env.tracking.presence import IMAGES, ImageSearches, Presence
 
 
 class Detections(NamedTuple):
@@ -228,10 +228,10 @@ class PoseTracking(PerceptionPipeline):
         estimate = self.tracker.estimate(state)
         age_s = self._age_s(ids, keypoints)
         monitor(self.monitored, ids, keypoints, age_s, estimate, self.P, self.axes)
-        whole_images = self.searched_cameras(ids, age_s) & believed(self.frozen, ids)
+        whole_images = self.searched_cameras(ids, age_s) & find_live_cameras(self.frozen, ids)
         shown = find_unexplained(keypoints, age_s, estimate, self.P, self.axes[:, 2])
         shown.unexplained[:] |= whole_images & self.cameras_with_others(ids)
-        looks = Looks(whole_images, age_s, self.N_IMAGES, shown, self.others(ids))
+        looks = ImageSearches(whole_images, age_s, self.N_IMAGES, shown, self.others(ids))
         ours, config = our_joints(estimate, self.setup.calibration), self.tracker.config
         return self.presence.update(ids, ours, found, keypoints, looks, dt_s, config)
 

@@ -143,12 +143,12 @@ class Stage(Canvas):
 
     def box(self, camera: PinholeCamera) -> Box:
         """Where in the picture things that move are, and maybe a little more."""
-        return _box(camera, *self.movers())
+        return _box(camera, *self.find_moving_spheres())
 
     def shade(self) -> Shade | None:
         """What moves, as the sun sees it; None without a sun or without anything that moves."""
         self.show(BEFORE_THE_SUN)
-        axes, (middles, radii_m) = self.sun_axes(), self.movers()
+        axes, (middles, radii_m) = self.sun_axes(), self.find_moving_spheres()
         if axes is None or not len(middles):
             return None
         spots = middles @ axes

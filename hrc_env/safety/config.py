@@ -1,27 +1,57 @@
 """Settings of the built-in shields."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from hrc_env.core.errors import ConfigError, check_fields, check_names
 from hrc_env.core.mapping import answer_unknown_fields
-from hrc_env.core.typing import Records
+from hrc_env.core.skeleton import HAND_SEGMENTS, SEGMENT_ENDS
+from hrc_env.core.typing import Bools, Floats
 
 KINDS = ("qp", "ssm", "pfl")
-NUMBERS = (
-    "margin_m", "hand_margin_m", "sigmas", "least_sigmas_m", "predicted_m_s", "doubtful_m",
-    "doubtful_sigmas", "human_m_s", "human_margin_m_s", "human_s", "latency_s", "reaction_s",
-    "deceleration_m_s2", "gain_hz", "retreat_m_s", "unseen_s", "unknown_m_s", "welcome_m_s",
-    "still_m_s",
-)  # fmt: skip
-SETTINGS = np.dtype([(name, "f8") for name in NUMBERS], align=True)
-"""The same as kernels read them."""
-
-
 MARGINS = ("margin_m", "hand_margin_m")
-"""Numbers that may be negative."""
+"""Settings that may be negative."""
+IS_FOREARM_OR_HAND: Bools = np.array(
+    [False] * 6 + [True] * 2 + [False] * (len(SEGMENT_ENDS) - 8) + [True] * len(HAND_SEGMENTS)
+)
+"""(S,) the segments to which `ShieldConfig.hand_margin_m` applies."""
+
+
+class ShieldParams(NamedTuple):
+    """The numbers of a `ShieldConfig` as its kernels read them; names are those of its fields."""
+
+    margins_m: Floats
+    """(S,) `margin_m` or `hand_margin_m` of each segment of a body [m]."""
+    n_sigmas: float
+    """Z_d in standard deviations."""
+    min_uncertainty_m: float
+    """Lower bound on Z_d [m]."""
+    prediction_growth_m_s: float
+    """Share of the deviation that comes from prediction, per second without a detection [m/s]."""
+    single_view_std_m: float
+    """Standard deviation above which a single camera locates a part of the body [m]."""
+    single_view_sigmas: float
+    """Additional factor on the deviation above that."""
+    follows_estimate: bool
+    """Whether `worker_m_s` is added to the estimated speed of the worker, or replaces it."""
+    worker_m_s: float
+    """Speed of the worker towards the robot, or what is added to the estimated one [m/s]."""
+    travel_s: float
+    """Time for which the worker comes on [s]."""
+    reaction_s: float
+    """Time until a command of the robot takes effect [s]."""
+    deceleration_m_s2: float
+    """Greatest deceleration of a point of the robot [m/s^2]."""
+    gain_hz: float
+    """Speed of a retreat by depth of the violation [1/s]."""
+    retreat_m_s: float
+    """Upper bound on the speed of a retreat [m/s]."""
+    creep_m_s: float
+    """Speed of corrections next to segments that may be touched [m/s]."""
 
 
 @answer_unknown_fields
@@ -29,86 +59,116 @@ MARGINS = ("margin_m", "hand_margin_m")
 class ShieldConfig:
     """Settings of a built-in shield: its kind, margins and limits.
 
-    D is the clearance between a robot's capsule and a segment of an estimated body: the gap of
-    their surfaces, less a margin, less Z_d, less the worker's travel.
+    The clearance D is the gap between the surfaces of a robot's capsule and a segment of an
+    estimated body, less a margin, less the uncertainty margin Z_d, less the worker's travel until
+    the robot has stopped.
     """
 
+    RENAMED: ClassVar[Mapping[str, str]] = {
+        "sigmas": "n_sigmas", "least_sigmas_m": "min_uncertainty_m",
+        "predicted_m_s": "prediction_growth_m_s", "doubtful_m": "single_view_std_m",
+        "doubtful_sigmas": "single_view_sigmas", "human_m_s": "worker_speed_m_s",
+        "human_margin_m_s": "worker_speed_margin_m_s", "human_s": "worker_time_s",
+        "gain_hz": "retreat_gain_hz", "retreat_m_s": "max_retreat_m_s",
+        "unseen_s": "stale_after_s", "unknown_m_s": "unknown_speed_limit_m_s",
+        "welcome_m_s": "contact_speed_m_s", "still_m_s": "creep_m_s",
+    }  # fmt: skip
+    """Present names of fields that were renamed, by their old names."""
+
     kind: str = "qp"
-    """"qp": the nearest joint velocities that keep every row; "ssm": one factor on all joints;
-    "pfl": as "qp", but touches as slow as the region of the body bears are allowed."""
+    """Method: "qp" takes the nearest joint velocities that keep all constraints; "ssm" scales all
+    joint velocities by one factor; "pfl" is "qp" that allows touches as slow as the touched region
+    of the body bears."""
     margin_m: float = 0.05
-    """Taken off every gap: bodies are no capsules [m]. Below 0 the shield comes nearer than it
-    believes to be safe, as `experiment price` does to find an equal rate of contacts."""
+    """Distance subtracted from every gap, since bodies are not capsules [m]. With a negative value
+    the shield comes nearer than the estimate says is safe, as `experiment price` does to find an
+    equal rate of contacts."""
     hand_margin_m: float = 0.13
-    """The same of forearms and hands, which are nearly all that is touched [m]."""
-    sigmas: float = 2.0
-    """Z_d in standard deviations of the estimate along the line between the two,"""
-    least_sigmas_m: float = 0.05
-    """and at least this [m]."""
-    predicted_m_s: float = 0.7
-    """So much of the deviation for every second since the part of the body was seen is of the
-    prediction and counts once: late images that say so are reported with regions that are too wide
-    [m/s]."""
-    doubtful_m: float = 0.08
-    """A larger deviation is of a part that one camera carries, which is wrong by more than it says
-    [m]: what is above counts"""
-    doubtful_sigmas: float = 5.0
-    """so many times more."""
-    human_m_s: float | None = None
-    """The worker's speed towards the robot, as 1.6 of ISO 13855; None: as it is estimated, and
-    `human_margin_m_s` more [m/s]."""
-    human_margin_m_s: float = 0.2
-    """How much faster than estimated the worker may be [m/s]."""
-    human_s: float = 0.2
-    """How long the worker is thought to come on [s],"""
+    """Distance subtracted instead of `margin_m` for forearms and hands, which are involved in
+    nearly all contacts [m]."""
+    n_sigmas: float = 2.0
+    """Uncertainty margin Z_d, in standard deviations of the estimate along the line between robot
+    and worker."""
+    min_uncertainty_m: float = 0.05
+    """Lower bound on the uncertainty margin Z_d [m]."""
+    prediction_growth_m_s: float = 0.7
+    """Share of the standard deviation that comes from prediction, per second since a part of the
+    body was last detected [m/s]. It counts once instead of `n_sigmas` times: late images that carry
+    their time are predicted with regions that are too wide."""
+    single_view_std_m: float = 0.08
+    """Standard deviation above which a part of the body is taken to be located by a single camera,
+    whose errors exceed the reported ones [m]."""
+    single_view_sigmas: float = 5.0
+    """Additional factor on the standard deviation above `single_view_std_m`."""
+    worker_speed_m_s: float | None = None
+    """Speed of a worker towards the robot, 1.6 in ISO 13855; None: the estimated speed plus
+    `worker_speed_margin_m_s` [m/s]."""
+    worker_speed_margin_m_s: float = 0.2
+    """How much faster than estimated a worker may be [m/s]."""
+    worker_time_s: float = 0.2
+    """Time for which a worker is assumed to come on at that speed [s]."""
     latency_s: float = 0.0
-    """and for how long what is estimated is older than it says, as of late images that do not say
-    when they were taken [s]."""
+    """Additional age of the estimate, for late images that do not carry their time [s]."""
     reaction_s: float = 0.08
-    """Until the robot's command takes effect [s]."""
+    """Time until a command of the robot takes effect [s]."""
     deceleration_m_s2: float = 3.0
-    """How fast a point of the robot comes to rest, if its joints can [m/s^2]."""
-    gain_hz: float = 4.0
-    """How fast a robot that is too near gets away: D times this [1/s],"""
-    retreat_m_s: float = 1.0
-    """at most so fast; 0: it only comes no nearer ("ssm" never does more) [m/s]."""
-    unseen_s: float = 0.25
-    """Who was seen longer ago than this [s] may be as far from there as somebody walks since at
-    `human_m_s` (None: 1.6); within that the robot comes no nearer to where they were. They are
-    unknown, as who has no track: images that are later than this make robots slow."""
-    unknown_m_s: float = 0.25
-    """Speed limit of every point of the robot while a worker is lost, lower within 1 m of their
-    last place and 0 within 0.25 m, and near floor that one camera alone has seen empty [m/s].
-    Before any look the robot stands. 0: stop."""
-    welcome_m_s: float = 0.25
-    """To parts of people that a task lets come to the robot's hand, as to take what it brings
-    (`Task.allowed_contact`), the hand and what it carries may come so fast, and no faster than the
-    region bears; 0: not at all [m/s]."""
-    still_m_s: float = 0.02
-    """Other links may come to them so fast where nothing else allows it: corrections that keep in
-    its place what is held; with none they add up to a way [m/s]."""
+    """Greatest deceleration of a point of the robot, where its joints can achieve it [m/s^2]."""
+    retreat_gain_hz: float = 4.0
+    """Speed of a retreat divided by the amount by which the clearance is negative [1/s]."""
+    max_retreat_m_s: float = 1.0
+    """Upper bound on the speed of a retreat; 0: the robot only stops approaching, as "ssm" always
+    does [m/s]."""
+    stale_after_s: float = 0.25
+    """Time since the last detection after which a worker counts as lost, and may be as far from the
+    last detected place as walking allows, at `worker_speed_m_s` (None: 1.6 m/s) [s]. Within that
+    distance the robot does not approach the place. Lost workers are unknown, like those without a
+    track; images that are later than this make robots slow."""
+    unknown_speed_limit_m_s: float = 0.25
+    """Speed limit of every point of the robot while a worker is lost, and near floor that only one
+    camera has seen empty [m/s]. It falls from 1 m to 0.25 m before the lost worker's last place, to
+    zero. Before the first image the robot stands. 0: it stops."""
+    contact_speed_m_s: float = 0.25
+    """Greatest speed of the robot's hand and its load towards segments that a task allows to touch
+    them, as in a handover (`Task.allowed_contact`), and no faster than the region of the body
+    bears; 0: no touch is allowed [m/s]."""
+    creep_m_s: float = 0.02
+    """Speed at which other links may approach these segments where the clearance allows less: small
+    corrections hold in place what is handed over [m/s]."""
 
     def __post_init__(self) -> None:
         check_names("kind of shield", [self.kind], KINDS)
-        for each in fields(self):
-            value = getattr(self, each.name)
-            if each.name in NUMBERS and value is not None and not math.isfinite(value):
-                raise ConfigError(f"{each.name} must be a finite number, got {value}.")
-        check_fields(self, "be positive", "deceleration_m_s2", "gain_hz")
-        given = [
-            name for name in NUMBERS if getattr(self, name) is not None and name not in MARGINS
-        ]
-        check_fields(self, "not be negative", *given)
+        numbers = [each.name for each in fields(self) if each.name != "kind"]
+        given = [name for name in numbers if getattr(self, name) is not None]
+        for name in given:
+            if not math.isfinite(getattr(self, name)):
+                raise ConfigError(f"{name} must be a finite number, got {getattr(self, name)}.")
+        check_fields(self, "be positive", "deceleration_m_s2", "retreat_gain_hz")
+        check_fields(self, "not be negative", *(name for name in given if name not in MARGINS))
 
-    def record(self) -> Records:
-        """Return the settings as one row of `SETTINGS`; a speed that is None is NaN."""
-        numbers = (getattr(self, name) for name in NUMBERS)
-        return np.array([tuple(math.nan if x is None else x for x in numbers)], SETTINGS)
+    def make_params(self) -> ShieldParams:
+        """Return the settings as kernels read them."""
+        speed_m_s = self.worker_speed_m_s
+        return ShieldParams(
+            margins_m=np.where(IS_FOREARM_OR_HAND, self.hand_margin_m, self.margin_m),
+            n_sigmas=float(self.n_sigmas),
+            min_uncertainty_m=float(self.min_uncertainty_m),
+            prediction_growth_m_s=float(self.prediction_growth_m_s),
+            single_view_std_m=float(self.single_view_std_m),
+            single_view_sigmas=float(self.single_view_sigmas),
+            follows_estimate=speed_m_s is None,
+            worker_m_s=float(self.worker_speed_margin_m_s if speed_m_s is None else speed_m_s),
+            travel_s=float(self.worker_time_s + self.latency_s),
+            reaction_s=float(self.reaction_s),
+            deceleration_m_s2=float(self.deceleration_m_s2),
+            gain_hz=float(self.retreat_gain_hz),
+            retreat_m_s=float(self.max_retreat_m_s),
+            creep_m_s=float(self.creep_m_s),
+        )
 
 
 PRESETS = {
     "ssm": ShieldConfig("ssm"),
     "qp": ShieldConfig("qp"),
-    "pfl": ShieldConfig("pfl", retreat_m_s=0.0),
+    "pfl": ShieldConfig("pfl", max_retreat_m_s=0.0),
 }
-"""By the names that `shield=` takes."""
+"""The built-in shields, by the names that `shield=` takes."""

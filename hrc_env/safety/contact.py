@@ -1,16 +1,17 @@
-"""Power and force limiting: what a touch may be like, by the region of the body that is touched.
+"""Power and force limiting: limits of contacts by the region of the body that is touched.
 
 ISO/TS 15066:2016, Annex A, Tables A.2 and A.3 (now in ISO 10218-2:2025), as open literature has
-them. Verify against the standard before certification. Forces, not pressures: these hang on edges.
+them. Verify against the standard before certification. Pressures, which depend on edges, are not
+modelled.
 
 Model (A.3.6): two masses and the region's spring, F = v sqrt(mu k), 1 / mu = 1 / m_H + 1 / m_R. Of
 a robot that is bolted down m_R = M / 2 + m_L: half of its moving parts, and its load.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.core.typing import Floats
@@ -18,21 +19,22 @@ from hrc_env.core.typing import Floats
 
 @dataclass(frozen=True, slots=True)
 class BodyRegion:
-    """What a region of the body bears, and how it gives."""
+    """Limits and mechanical properties of a region of the body."""
 
     name: str
+    """Name of the region."""
     quasi_static_n: float
-    """Force at which it may be clamped [N]."""
+    """Greatest force with which it may be clamped [N]."""
     stiffness_n_m: float
-    """Its spring [N/m]."""
+    """Stiffness of the region's spring [N/m]."""
     mass_kg: float
-    """Its effective mass [kg]."""
+    """Effective mass of the region [kg]."""
     is_touched: bool = True
-    """Whether it may be hit at all; the head never."""
+    """Whether a contact with it is permitted at all; of the head, none is."""
 
     @property
     def transient_n(self) -> float:
-        """Greatest force of a hit it can give way to [N]: twice as much, or none."""
+        """Greatest force of a transient contact [N]: twice the quasi-static one, or none."""
         return 2.0 * self.quasi_static_n * self.is_touched
 
 
@@ -53,25 +55,39 @@ REGIONS: dict[str, BodyRegion] = {
         BodyRegion("lower leg", 130, 60e3, 75),
     )
 }
-"""By name."""
+"""Regions of the body, by name."""
 SEGMENT_REGIONS: tuple[str, ...] = (
-    "skull and forehead", "chest", "back and shoulders", "pelvis",
-    *2 * ("upper arm and elbow",), *2 * ("lower arm and wrist",), *2 * ("thigh and knee",),
-    *4 * ("lower leg",), *2 * ("hand and fingers",),
-)  # fmt: skip
-"""Of each segment of an estimated body (`core.skeleton.SEGMENT_RADIUS_M`); of several regions the
-one that bears least."""
+    "skull and forehead",
+    "chest",
+    "back and shoulders",
+    "pelvis",
+    *2 * ("upper arm and elbow",),
+    *2 * ("lower arm and wrist",),
+    *2 * ("thigh and knee",),
+    *4 * ("lower leg",),
+    *2 * ("hand and fingers",),
+)
+"""Region of each segment of an estimated body (`core.skeleton.SEGMENT_RADIUS_M`); where a segment
+has several, the one with the lowest limit."""
 
 
-def region_called(name: str) -> BodyRegion:
-    """A region by its name, or a `ConfigError`."""
+def find_region(name: str) -> BodyRegion:
+    """Return a region of the body by its name, or raise `ConfigError`."""
     if name not in REGIONS:
         raise unknown("region of the body", name, REGIONS)
     return REGIONS[name]
 
 
-def effective_mass(moving_kg: Any, load_kg: Any = 0.0) -> Floats:
-    """m_R [kg] of a robot that is bolted down: half of its moving parts, and its load."""
+def effective_mass(moving_kg: ArrayLike, load_kg: ArrayLike = 0.0) -> Floats:
+    """Return m_R of a robot that is bolted down [kg]: half of its moving parts, and its load.
+
+    Args:
+        moving_kg: mass of the robot's moving parts [kg].
+        load_kg: mass of its load [kg].
+
+    Raises:
+        ConfigError: a mass that is negative, or no moving mass.
+    """
     moving, load = np.asarray(moving_kg, float), np.asarray(load_kg, float)
     if not ((moving > 0.0).all() and (load >= 0.0).all()):
         raise ConfigError(
@@ -81,20 +97,38 @@ def effective_mass(moving_kg: Any, load_kg: Any = 0.0) -> Floats:
     return 0.5 * moving + load
 
 
-def contact_force(region: str, relative_m_s: Any, robot_kg: Any) -> Floats:
-    """F = v sqrt(mu k) [N] of a hit at a relative speed [m/s] by an effective mass [kg]."""
-    return np.asarray(relative_m_s, float) * _impedance(region_called(region), robot_kg)
+def contact_force(region: str, relative_m_s: ArrayLike, robot_kg: ArrayLike) -> Floats:
+    """Return the force of a transient contact, F = v sqrt(mu k) [N].
+
+    Args:
+        region: name of the region of the body.
+        relative_m_s: relative speed of robot and body [m/s].
+        robot_kg: effective mass of the robot [kg].
+
+    Raises:
+        ConfigError: no region has this name, or a mass is not positive.
+    """
+    return np.asarray(relative_m_s, float) * _impedance(find_region(region), robot_kg)
 
 
-def permitted_contact_speed(region: str, robot_kg: Any) -> Floats:
-    """v = F_max / sqrt(mu k) [m/s]: the greatest relative speed of a hit by an effective mass [kg]
-    that the region bears; 0 where it may not be hit."""
-    found = region_called(region)
-    return found.transient_n / _impedance(found, robot_kg)
+def permitted_contact_speed(region: str, robot_kg: ArrayLike) -> Floats:
+    """Return the greatest relative speed of a transient contact, v = F_max / sqrt(mu k) [m/s].
+
+    It is 0 where no contact is permitted.
+
+    Args:
+        region: name of the region of the body.
+        robot_kg: effective mass of the robot [kg].
+
+    Raises:
+        ConfigError: no region has this name, or a mass is not positive.
+    """
+    body_region = find_region(region)
+    return body_region.transient_n / _impedance(body_region, robot_kg)
 
 
-def _impedance(region: BodyRegion, robot_kg: Any) -> Floats:
-    """sqrt(mu k) [Ns/m]."""
+def _impedance(region: BodyRegion, robot_kg: ArrayLike) -> Floats:
+    """Return sqrt(mu k) [Ns/m]."""
     mass_kg = np.asarray(robot_kg, float)
     if not (mass_kg > 0.0).all():
         raise ConfigError(f"robot_kg must be a positive mass [kg], got {robot_kg}.")

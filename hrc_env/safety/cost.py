@@ -1,35 +1,36 @@
-"""Cost: what counts as unsafe in a step, on the true separations and what happened to people."""
+"""Cost: the unsafe events of a step, counted on the true separations and incidents."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from hrc_env.core.declared import Records2
 from hrc_env.core.errors import ConfigError, check_fields, check_names
-from hrc_env.core.typing import Floats, Records
-from hrc_env.safety import incidents
+from hrc_env.core.typing import Floats
+from hrc_env.safety.incidents import TOWARDS, Incident
 
-_BY_INCIDENT: dict[str, Callable[[Records], Floats]] = {
-    "towards": lambda happened: (happened["kind"] == incidents.TOWARDS).sum(1).astype(float),
-    "force": lambda happened: np.nansum(happened["force_ratio"], axis=1),
-    "too_near": lambda happened: happened["too_near"].any(1).astype(float),
-    "near_miss": lambda happened: happened["near_miss"].sum(1).astype(float),
+_BY_INCIDENT: dict[str, Callable[[Records2[Incident]], Floats]] = {
+    "towards": lambda incidents: (incidents["kind"] == TOWARDS).sum(1).astype(float),
+    "force": lambda incidents: np.nansum(incidents["force_ratio"], axis=1),
+    "too_near": lambda incidents: incidents["is_too_near"].any(1).astype(float),
+    "near_miss": lambda incidents: incidents["is_near_miss"].sum(1).astype(float),
 }
-"""Of (B, W) `incidents.INCIDENT`: contacts that begin while the robot comes towards who is touched;
-how hard those are that begin, as a share of what the body bears; nearness within the protective
-distance while the robot comes; near misses."""
+"""Components of the cost (B,) by incidents (B, W): contacts that begin while the robot moves
+towards the worker; the force of contacts that begin, as a share of what the body bears; 1 while the
+robot moves towards a worker within the protective distance; near misses."""
 COMPONENTS = ("proximity", "contact", *_BY_INCIDENT)
-"""What can count as cost: nearness, touch, and what happens to people."""
+"""Components that `CostConfig.components` may name."""
 
 
 @dataclass(frozen=True, slots=True)
 class CostConfig:
-    """What counts as unsafe, and what happens then."""
+    """The events that count as unsafe, and whether a contact ends the episode."""
 
     components: tuple[str, ...] = ("proximity", "contact")
-    """Summands: some of `COMPONENTS`; the sum of the default ones is in control steps."""
+    """Summands of the cost, some of `COMPONENTS`; the default ones sum to control steps."""
     proximity_m: float = 0.15
-    """A step costs 1 when the true surfaces come nearer than this [m]."""
+    """True separation of the surfaces below which a step costs 1 [m]."""
     contact_terminates: bool = False
     """Whether a contact ends the episode."""
 
@@ -45,19 +46,21 @@ class CostConfig:
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """The cost of one step, per environment (B,) [control steps]."""
+    """The cost of one step by separations, per environment."""
 
     proximity: Floats
+    """(B,) 1 where surfaces came nearer than `CostConfig.proximity_m`, else 0 [control steps]."""
     contact: Floats
+    """(B,) 1 where surfaces touched, else 0 [control steps]."""
     min_separation_m: Floats
-    """Smallest true separation of the step; infinite without workers."""
+    """(B,) smallest true separation of the step [m]; infinite without workers."""
 
 
-def cost(gaps_m: Floats, config: CostConfig) -> Cost:
-    """Cost of a step, of the true separations (B, T, W) at every substep [m].
+def measure_cost(gaps_m: Floats, config: CostConfig) -> Cost:
+    """Return the cost of a step by the true separations (B, T, W) of its physics steps [m].
 
-    Contact is decided by distance: a mocap hand can pass through a thin arm between two
-    substeps of the contact solver.
+    Contacts are found by distance: a hand that follows a recording can pass through a thin arm
+    between two steps of the contact solver.
     """
     nearest_m = gaps_m.min((1, 2), initial=np.inf)
     return Cost(
@@ -67,15 +70,22 @@ def cost(gaps_m: Floats, config: CostConfig) -> Cost:
     )
 
 
-def parts(cost: Cost, happened: Records, config: CostConfig) -> dict[str, Floats]:
-    """(B,) parts of the cost of a step, those of nearness and touch and whatever else is chosen;
-    (B, W) `incidents.INCIDENT` says that."""
-    found = {"proximity": cost.proximity, "contact": cost.contact}
-    return found | {
-        name: _BY_INCIDENT[name](happened) for name in config.components if name not in found
-    }
+def split_cost(cost: Cost, incidents: Records2[Incident], config: CostConfig) -> dict[str, Floats]:
+    """Return the components (B,) of a step's cost by name.
+
+    Proximity and contact are always among them.
+
+    Args:
+        cost: the cost by separations.
+        incidents: (B, W) the incidents of the step.
+        config: the components that are chosen.
+    """
+    components = {"proximity": cost.proximity, "contact": cost.contact}
+    chosen = (name for name in config.components if name not in components)
+    return components | {name: _BY_INCIDENT[name](incidents) for name in chosen}
 
 
-def total(costs: Mapping[str, Floats], config: CostConfig) -> Floats:
-    """(B,) the cost of a step: the sum of the chosen parts, by default in control steps."""
-    return sum((costs[name] for name in config.components[1:]), costs[config.components[0]])
+def sum_cost(components: Mapping[str, Floats], config: CostConfig) -> Floats:
+    """Return the cost (B,) of a step: the sum of the chosen components."""
+    first, *others = config.components
+    return sum((components[name] for name in others), components[first])

@@ -1,100 +1,148 @@
-"""What happened to people: contacts by kind and how hard, near misses, broken distances.
+"""Incidents: contacts by kind and force, near misses, violations of the protective distance.
 
-All of it is counted on the truth, from where bodies were in the physics steps of a control step. A
-*directed speed* is by how much one body's motion narrowed the separation while the other is held
-where it is at the end. A contact begins when surfaces touch that have not for `AGAIN_S`: an arm
-that was rammed bounces. Its kind is what the robot did in the control step before, as in the step
-itself the impact changes it: it came *towards* the worker, it was *fleeing*, or it was *standing*.
-Its closing speed is that speed and the worker's, whom no impact moves. How hard a contact is: the
-force of ISO/TS 15066, A.3, as a share of what the region that was hit bears (`safety.contact`).
+All of it is counted on the truth, from the bodies' places in the physics steps of a control step. A
+*directed speed* is the rate at which one body's motion narrowed the separation, with the other held
+where it is at the end. A contact begins when surfaces touch that have not touched for
+`CONTACT_GAP_S`, as an arm that was hit bounces. Its kind is the robot's motion in the control step
+before, since the impact changes the motion in the step itself: the robot moved *towards* the
+worker, it was *fleeing*, or it was *standing*. The closing speed is that speed plus the worker's,
+which no impact changes. The force of a contact follows ISO/TS 15066, A.3, as a share of what the
+touched region bears (`safety.contact`).
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from hrc_env.core.batching import Stateful
+from hrc_env.core.declared import Records1, Records2, dtype_of, make_records
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import RobotState
-from hrc_env.core.typing import Capsules, Floats, Ints, Records
+from hrc_env.core.typing import Capsules, Floats, Ints
 from hrc_env.geometry.distances import least_separation
 from hrc_env.geometry.robot_model import RobotModel
-from hrc_env.safety.contact import REGIONS, contact_force
+from hrc_env.safety.contact import REGIONS, BodyRegion, contact_force
 from hrc_env.safety.separation import protective_distance
 from hrc_env.world import World
 
 KINDS = ("towards", "fleeing", "standing")
 MOVING_M_S = 0.05
-"""From this directed speed on a robot comes or flees [m/s]; a judgement. One that stands or flees
-cannot help it when somebody walks into it."""
-AGAIN_S = 0.5
-"""Who touches again within this time is in the same contact [s]."""
+"""Directed speed above which a robot counts as moving towards a worker or fleeing [m/s]; a
+judgement. A robot that stands or flees cannot prevent that a worker walks into it."""
+CONTACT_GAP_S = 0.5
+"""Time without touch after which another touch is another contact [s]."""
 WATCHED_M = 1.0
-"""Farther away nothing is looked at [m]; bodies never close so much in a step."""
-CLOSE_M, CLEAR_M = 0.05, 0.10
-"""A near miss is nearer than the one, and ends beyond the other without a touch [m]; judgement."""
+"""Separation beyond which no speeds are measured [m]; bodies never close that much in a step."""
+NEAR_MISS_M, CLEAR_M = 0.05, 0.10
+"""Separations at which a near miss begins, and beyond which it ends without a touch [m];
+judgement."""
 REACTION_S = 0.1
-"""Between somebody's coming and the brakes, in the protective distance [s]; a usual value."""
+"""Reaction time in the protective distance [s]; a usual value."""
 TOWARDS, FLEEING, STANDING = range(len(KINDS))
 WITHIN, BEYOND, NEVER = 1, 2, 3
-"""A contact that its region bears, one that it does not, and the head, which is never to be hit."""
+"""Severities: within the limit of the region, beyond it, and the head, which must never be hit."""
 _SIDED = {
-    "shoulder": "back and shoulders", "upper_arm": "upper arm and elbow",
-    "forearm": "lower arm and wrist", "thigh": "thigh and knee", "shank": "lower leg",
-    "foot": "lower leg", "hand": "hand and fingers",
-}  # fmt: skip
+    "shoulder": "back and shoulders",
+    "upper_arm": "upper arm and elbow",
+    "forearm": "lower arm and wrist",
+    "thigh": "thigh and knee",
+    "shank": "lower leg",
+    "foot": "lower leg",
+    "hand": "hand and fingers",
+}
 CAPSULE_REGIONS: dict[str, str] = {
-    "head": "skull and forehead", "neck": "neck", "chest": "chest", "torso": "chest",
-    "abdomen": "abdomen", "pelvis": "pelvis",
+    "head": "skull and forehead",
+    "neck": "neck",
+    "chest": "chest",
+    "torso": "chest",
+    "abdomen": "abdomen",
+    "pelvis": "pelvis",
     **{f"{side}_{part}": region for part, region in _SIDED.items() for side in ("left", "right")},
-}  # fmt: skip
-"""Of a body's capsules (`worker.body.Body.capsule_names`)."""
+}
+"""Region of the body of each capsule (`worker.body.Body.capsule_names`)."""
 REGION_NAMES = tuple(REGIONS)
-WATCH = np.dtype(
-    [
-        # directed speed of the robot in the last step [m/s]; since they touched last [s]; whether
-        # they are as close as in a near miss
-        ("robot_m_s", "f8"), ("since_s", "f8"), ("close", "?"),
-        # contacts of each kind and near misses in this episode
-        ("contacts", "i8", (len(KINDS),)), ("near_misses", "i8"),
-    ],
-    align=True,
-)  # fmt: skip
-"""What an episode has known of one worker."""
-INCIDENT = np.dtype(
-    [
-        # at the end of the step [m]; directed speeds [m/s]; NaN beyond `WATCHED_M`
-        ("separation_m", "f8"), ("robot_m_s", "f8"), ("worker_m_s", "f8"),
-        # of a contact that begins: index into `KINDS`, into `REGION_NAMES`; -1: none begins
-        ("kind", "i8"), ("region", "i8"),
-        # its robot's directed speed before, its closing speed [m/s]; force as a share of what is
-        # permitted; `WITHIN`, `BEYOND`, `NEVER` or 0
-        ("came_m_s", "f8"), ("closing_m_s", "f8"), ("force_ratio", "f8"), ("severity", "i8"),
-        # nearer than the protective distance and coming; a near miss ends
-        ("too_near", "?"), ("near_miss", "?"),
-    ],
-    align=True,
-)  # fmt: skip
-"""What happened to one worker in a step."""
-SUMMARY = np.dtype(
-    [
-        # of the nearest worker [m/s]; whether the robot is too near to anybody
-        ("robot_towards_m_s", "f8"), ("worker_towards_m_s", "f8"), ("too_near", "f8"),
-        # of contacts that begin, the greatest of all workers
-        ("contact_came_m_s", "f8"), ("contact_closing_m_s", "f8"), ("contact_force_ratio", "f8"),
-        ("contact_severity", "f8"),
-        # in the episode so far
-        *((f"contacts_{kind}", "f8") for kind in KINDS), ("near_misses", "f8"),
-    ],
-    align=True,
-)  # fmt: skip
-"""What happened in one environment's step, NaN where there is nothing to say."""
-AT_TIMES = (
-    "robot_towards_m_s", "worker_towards_m_s", "contact_came_m_s", "contact_closing_m_s",
+
+
+class WorkerHistory:
+    """The history of one robot and worker in an episode."""
+
+    robot_m_s: float
+    """Directed speed of the robot in the last step [m/s]."""
+    since_s: float
+    """Time since they touched last [s]."""
+    is_close: bool
+    """Whether they are as close as in a near miss."""
+    contacts: Annotated[Ints, (len(KINDS),)]
+    """Contacts of each kind in this episode."""
+    near_misses: int
+    """Near misses in this episode."""
+
+
+class Incident:
+    """The events between one robot and one worker in a step."""
+
+    separation_m: float
+    """Separation at the end of the step [m]; NaN beyond `WATCHED_M`, as the speeds."""
+    robot_m_s: float
+    """Directed speed of the robot [m/s]."""
+    worker_m_s: float
+    """Directed speed of the worker [m/s]."""
+    kind: int
+    """Kind of a contact that begins, as an index into `KINDS`; -1: none begins."""
+    region: int
+    """Region of the body that is touched, as an index into `REGION_NAMES`; -1: none."""
+    came_m_s: float
+    """Directed speed of the robot before a contact that begins [m/s]; NaN: none begins."""
+    closing_m_s: float
+    """Closing speed of a contact that begins [m/s]; NaN: none begins."""
+    force_ratio: float
+    """Force of a contact that begins, as a share of what is permitted; NaN: none begins."""
+    severity: int
+    """`WITHIN`, `BEYOND` or `NEVER`; 0: no contact begins."""
+    is_too_near: bool
+    """Whether the robot moves towards the worker within the protective distance."""
+    is_near_miss: bool
+    """Whether a near miss ends."""
+
+
+class Summary:
+    """The events of one environment's step over all workers; NaN where nothing was measured."""
+
+    robot_towards_m_s: float
+    """Directed speed of the robot towards the nearest worker [m/s]."""
+    worker_towards_m_s: float
+    """Directed speed of the nearest worker towards the robot [m/s]."""
+    too_near: float
+    """1 if the robot moves towards any worker within the protective distance, else 0."""
+    contact_came_m_s: float
+    """Greatest directed speed of the robot before a contact that begins [m/s]."""
+    contact_closing_m_s: float
+    """Greatest closing speed of a contact that begins [m/s]."""
+    contact_force_ratio: float
+    """Greatest force of a contact that begins, as a share of what is permitted."""
+    contact_severity: float
+    """Greatest severity of a contact that begins; 0: none begins."""
+    contacts_towards: float
+    """Contacts in the episode so far in which the robot moved towards the worker."""
+    contacts_fleeing: float
+    """Contacts in the episode so far in which the robot was fleeing."""
+    contacts_standing: float
+    """Contacts in the episode so far in which the robot was standing."""
+    near_misses: float
+    """Near misses in the episode so far."""
+
+
+HISTORY, INCIDENT, SUMMARY = dtype_of(WorkerHistory), dtype_of(Incident), dtype_of(Summary)
+NOT_ALWAYS_MEASURED = (
+    "robot_towards_m_s",
+    "worker_towards_m_s",
+    "contact_came_m_s",
+    "contact_closing_m_s",
     "contact_force_ratio",
-)  # fmt: skip
-"""What there is not always something to say of."""
+)
+"""Fields of `Summary` that may be NaN."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,58 +161,80 @@ class Paths:
     """(B, T, W) separations [m]."""
 
 
-def measured(
+def measure_paths(
     robot_world: Capsules, robot_radius_m: Floats, workers_world: Capsules, worker_radius_m: Floats
 ) -> Paths:
-    """Bodies, as `Paths` has them, with their separations."""
+    """Return the paths of bodies with their separations.
+
+    Args:
+        robot_world: (B, T, K, 2, 3) the robot's capsules after every physics step [m].
+        robot_radius_m: (K,) their radii [m].
+        workers_world: (B, T, W, L, 2, 3) the workers' capsules [m].
+        worker_radius_m: (B, W, L) their radii [m].
+    """
     radii_m = np.repeat(worker_radius_m[:, None], robot_world.shape[1], axis=1)
     gaps_m = least_separation(robot_world, robot_radius_m, workers_world, radii_m).distance_m
     return Paths(robot_world, robot_radius_m, workers_world, worker_radius_m, gaps_m)
 
 
-def regions_of(capsule_names: Sequence[str]) -> Ints:
-    """(L,) index into `REGION_NAMES` of each capsule of a body."""
+def find_regions(capsule_names: Sequence[str]) -> Ints:
+    """Return the index into `REGION_NAMES` of each capsule of a body, (L,)."""
     return np.array([REGION_NAMES.index(CAPSULE_REGIONS[name]) for name in capsule_names])
 
 
-def nothing_yet(batch: int, n_workers: int) -> Records:
-    """(B, W) of `WATCH`, of episodes that begin."""
-    state = np.zeros((batch, n_workers), WATCH)
-    state["since_s"] = np.inf
-    return state
+def make_history(batch: int, n_workers: int) -> Records2[WorkerHistory]:
+    """Return the histories (B, W) at the beginning of an episode."""
+    history = make_records(WorkerHistory, (batch, n_workers))
+    history["since_s"] = np.inf
+    return history
 
 
-def noted(
-    state: Records, paths: Paths, regions: Ints, robot_kg: Floats, stop_s: Floats, dt_s: float
-) -> Records:
-    """(B, W) of `INCIDENT`, what happened in a step; `state` goes on by it in place.
+def detect_incidents(
+    history: Records2[WorkerHistory],
+    paths: Paths,
+    regions: Ints,
+    robot_kg: Floats,
+    stop_s: Floats,
+    dt_s: float,
+) -> Records2[Incident]:
+    """Detect the incidents (B, W) of a step.
 
     Args:
+        history: (B, W) changed in place: advanced by the step.
+        paths: places of the bodies in the physics steps.
         regions: (L,) index into `REGION_NAMES` of each capsule of a body.
         robot_kg: (B,) effective mass with which the robot hits [kg].
-        stop_s: (B,) how long it takes to stop [s].
+        stop_s: (B,) time that the robot takes to stop [s].
+        dt_s: duration of the step [s].
     """
-    found, n_steps = np.empty(state.shape, INCIDENT), paths.robot_world.shape[1]
+    incidents = make_records(Incident, (history.shape[0], history.shape[1]))
+    n_steps = paths.robot_world.shape[1]
     took_s = dt_s * (n_steps - 1) / n_steps if n_steps > 1 else np.nan
     touch = paths.gaps_m <= 0.0
     first = np.where(touch.any(1), touch.argmax(1), -1)
-    _note(state, found, _gaps_m(paths), first, took_s, dt_s)
-    for b, w in np.argwhere(found["kind"] >= 0).tolist():
-        hit = found[b, w]
-        hit["region"] = regions[_touched(paths, b, w, int(first[b, w]))]
-        _weigh(hit, float(robot_kg[b]))
-    b, w = np.nonzero(found["robot_m_s"] > MOVING_M_S)
+    _advance_history(history, incidents, _find_gaps(paths), first, took_s, dt_s)
+    for b, w in np.argwhere(incidents["kind"] >= 0).tolist():
+        region = regions[_find_touched_capsule(paths, b, w, int(first[b, w]))]
+        incidents["region"][b, w] = region
+        _rate_contact(incidents, b, w, REGIONS[REGION_NAMES[region]], float(robot_kg[b]))
+    b, w = np.nonzero(incidents["robot_m_s"] > MOVING_M_S)
     if len(b):
-        coming = found[b, w]
-        speeds = coming["robot_m_s"], coming["worker_m_s"]
-        least_m = protective_distance(*speeds, reaction_s=REACTION_S, stopping_s=stop_s[b])
-        found["too_near"][b, w] = coming["separation_m"] < least_m
-    return found
+        least_m = protective_distance(
+            incidents["robot_m_s"][b, w],
+            incidents["worker_m_s"][b, w],
+            reaction_s=REACTION_S,
+            stopping_s=stop_s[b],
+        )
+        incidents["is_too_near"][b, w] = incidents["separation_m"][b, w] < least_m
+    return incidents
 
 
-def _gaps_m(paths: Paths) -> Floats:
-    """(3, B, W) separations [m] at the end of a step, with the robot where it began, and with the
-    worker where they did; NaN where all are far."""
+def _find_gaps(paths: Paths) -> Floats:
+    """Return separations (3, B, W) [m]; NaN where all are far.
+
+    They are those at the end of a step, with the robot where it began, and with the worker where
+    the worker began.
+    """
     at_end = paths.gaps_m[:, -1]
     gaps_m = np.full((3, *at_end.shape), np.nan)
     near = np.flatnonzero(paths.gaps_m.min((1, 2), initial=np.inf) < WATCHED_M)
@@ -177,121 +247,160 @@ def _gaps_m(paths: Paths) -> Floats:
     return gaps_m
 
 
-def _touched(paths: Paths, b: int, w: int, t: int) -> int:
-    """Which capsule of a worker is deepest in the robot."""
+def _find_touched_capsule(paths: Paths, b: int, w: int, t: int) -> int:
+    """Return the index of the worker's capsule that is deepest in the robot at physics step `t`."""
     capsules, radius_m = paths.workers_world[b, t, w], paths.worker_radius_m[b, w]
-    ends = paths.robot_world[b : b + 1, t], paths.robot_radius_m
-    gaps = least_separation(*ends, capsules[None, :, None], radius_m[None, :, None])
+    gaps = least_separation(
+        paths.robot_world[b : b + 1, t],
+        paths.robot_radius_m,
+        capsules[None, :, None],
+        radius_m[None, :, None],
+    )
     return int(gaps.distance_m[0].argmin())
 
 
-def _weigh(hit: Records, robot_kg: float) -> None:
-    """How hard a contact is; of the head, against what it bears when it is clamped."""
-    region = REGIONS[REGION_NAMES[hit["region"]]]
+def _rate_contact(
+    incidents: Records2[Incident], b: int, w: int, region: BodyRegion, robot_kg: float
+) -> None:
+    """Write the force and the severity of a contact; the limit of the head is that of clamping."""
     bears_n = region.transient_n or region.quasi_static_n
-    hit["force_ratio"] = contact_force(region.name, hit["closing_m_s"], robot_kg) / bears_n
-    within = WITHIN if hit["force_ratio"] <= 1.0 else BEYOND
-    hit["severity"] = within if region.is_touched else NEVER
+    force_n = contact_force(region.name, incidents["closing_m_s"][b, w], robot_kg)
+    incidents["force_ratio"][b, w] = force_n / bears_n
+    within = WITHIN if incidents["force_ratio"][b, w] <= 1.0 else BEYOND
+    incidents["severity"][b, w] = within if region.is_touched else NEVER
 
 
 @kernel
-def _note(state, found, gaps, first, took, dt):
-    for b in range(state.shape[0]):
-        for w in range(state.shape[1]):
-            mine, now, gap = state[b, w], found[b, w], gaps[0, b, w]
-            now.separation_m, now.region, now.severity, now.too_near = gap, -1, 0, False
-            now.robot_m_s = (gaps[1, b, w] - gap) / took
-            now.worker_m_s = (gaps[2, b, w] - gap) / took
-            touching = first[b, w] >= 0
-            _begin(mine, now, touching and mine.since_s >= AGAIN_S)
-            mine.robot_m_s = _or_zero(now.robot_m_s)
-            mine.since_s = 0.0 if touching else mine.since_s + dt
-            calm, apart = mine.since_s >= AGAIN_S, not gap < CLEAR_M
-            now.near_miss = mine.close and apart and calm
-            mine.near_misses += now.near_miss
-            mine.close = (mine.close or (gap < CLOSE_M and calm)) and not (touching or apart)
+def _advance_history(
+    history: Records2[WorkerHistory],
+    incidents: Records2[Incident],
+    gaps_m: Floats,
+    first_touch: Ints,
+    took_s: float,
+    dt_s: float,
+) -> None:
+    """Write the incidents of a step but for the regions, and advance the histories.
+
+    Args:
+        history: (B, W) changed in place.
+        incidents: (B, W) written.
+        gaps_m: (3, B, W) separations, as `_find_gaps` returns them [m].
+        first_touch: (B, W) physics step of the first touch; -1: none.
+        took_s: time between the first and the last physics step [s].
+        dt_s: duration of the step [s].
+    """
+    for b in range(history.shape[0]):
+        for w in range(history.shape[1]):
+            past, now, gap = history[b, w], incidents[b, w], gaps_m[0, b, w]
+            now.separation_m, now.region, now.severity, now.is_too_near = gap, -1, 0, False
+            now.robot_m_s = (gaps_m[1, b, w] - gap) / took_s
+            now.worker_m_s = (gaps_m[2, b, w] - gap) / took_s
+            is_touching = first_touch[b, w] >= 0
+            now.kind, now.came_m_s, now.closing_m_s, now.force_ratio = -1, np.nan, np.nan, np.nan
+            if is_touching and past.since_s >= CONTACT_GAP_S:
+                speed = past.robot_m_s
+                now.kind = TOWARDS if speed > MOVING_M_S else STANDING
+                if speed < -MOVING_M_S:
+                    now.kind = FLEEING
+                now.came_m_s = speed
+                now.closing_m_s = max(speed + _replace_nan(now.worker_m_s), 0.0)
+                past.contacts[now.kind] += 1
+            past.robot_m_s = _replace_nan(now.robot_m_s)
+            past.since_s = 0.0 if is_touching else past.since_s + dt_s
+            is_calm, is_apart = past.since_s >= CONTACT_GAP_S, not gap < CLEAR_M
+            now.is_near_miss = past.is_close and is_apart and is_calm
+            past.near_misses += now.is_near_miss
+            begins = past.is_close or (gap < NEAR_MISS_M and is_calm)
+            past.is_close = begins and not (is_touching or is_apart)
 
 
 @kernel
-def _begin(mine, now, begins):
-    """A contact that begins, or none."""
-    now.kind, now.came_m_s, now.closing_m_s, now.force_ratio = -1, np.nan, np.nan, np.nan
-    if begins:
-        speed = mine.robot_m_s
-        now.kind = TOWARDS if speed > MOVING_M_S else STANDING
-        if speed < -MOVING_M_S:
-            now.kind = FLEEING
-        now.came_m_s = speed
-        now.closing_m_s = max(speed + _or_zero(now.worker_m_s), 0.0)
-        mine.contacts[now.kind] += 1
-
-
-@kernel
-def _or_zero(value):
+def _replace_nan(value: float) -> float:
+    """Return 0 instead of NaN: a speed beyond `WATCHED_M`, where no contact follows."""
     return value if value == value else 0.0
 
 
-def summed_up(found: Records, state: Records) -> Records:
-    """(B,) of `SUMMARY`, from what happened to each worker and what is known of them, (B, W)."""
-    told = np.empty(len(found), SUMMARY)
-    _sum_up(found, state, told)
-    return told
+def summarize(incidents: Records2[Incident], history: Records2[WorkerHistory]) -> Records1[Summary]:
+    """Return the summaries (B,) of incidents and histories (B, W)."""
+    summaries = make_records(Summary, len(incidents))
+    _write_summaries(incidents, history, summaries)
+    return summaries
 
 
 @kernel
-def _sum_up(found, state, told):
-    for b in range(len(found)):
-        all_, least = told[b], np.inf
-        all_.robot_towards_m_s = all_.worker_towards_m_s = np.nan
-        all_.contact_came_m_s = all_.contact_closing_m_s = all_.contact_force_ratio = np.nan
-        all_.contact_severity = all_.too_near = all_.near_misses = 0.0
-        all_.contacts_towards = all_.contacts_fleeing = all_.contacts_standing = 0.0
-        for w in range(found.shape[1]):
-            one, known = found[b, w], state[b, w]
+def _write_summaries(
+    incidents: Records2[Incident],
+    history: Records2[WorkerHistory],
+    summaries: Records1[Summary],
+) -> None:
+    """Write the summaries (B,) of incidents and histories (B, W)."""
+    for b in range(len(incidents)):
+        total, least = summaries[b], np.inf
+        total.robot_towards_m_s = total.worker_towards_m_s = np.nan
+        total.contact_came_m_s = total.contact_closing_m_s = total.contact_force_ratio = np.nan
+        total.contact_severity = total.too_near = total.near_misses = 0.0
+        total.contacts_towards = total.contacts_fleeing = total.contacts_standing = 0.0
+        for w in range(incidents.shape[1]):
+            one, past = incidents[b, w], history[b, w]
             if one.separation_m < least:
                 least = one.separation_m
-                all_.robot_towards_m_s, all_.worker_towards_m_s = one.robot_m_s, one.worker_m_s
-            all_.too_near = 1.0 if one.too_near else all_.too_near
-            all_.contact_came_m_s = _more(all_.contact_came_m_s, one.came_m_s)
-            all_.contact_closing_m_s = _more(all_.contact_closing_m_s, one.closing_m_s)
-            all_.contact_force_ratio = _more(all_.contact_force_ratio, one.force_ratio)
-            all_.contact_severity = max(all_.contact_severity, one.severity)
-            all_.contacts_towards += known.contacts[TOWARDS]
-            all_.contacts_fleeing += known.contacts[FLEEING]
-            all_.contacts_standing += known.contacts[STANDING]
-            all_.near_misses += known.near_misses
+                total.robot_towards_m_s = one.robot_m_s
+                total.worker_towards_m_s = one.worker_m_s
+            total.too_near = 1.0 if one.is_too_near else total.too_near
+            total.contact_came_m_s = _find_greater(total.contact_came_m_s, one.came_m_s)
+            total.contact_closing_m_s = _find_greater(total.contact_closing_m_s, one.closing_m_s)
+            total.contact_force_ratio = _find_greater(total.contact_force_ratio, one.force_ratio)
+            total.contact_severity = max(total.contact_severity, one.severity)
+            total.contacts_towards += past.contacts[TOWARDS]
+            total.contacts_fleeing += past.contacts[FLEEING]
+            total.contacts_standing += past.contacts[STANDING]
+            total.near_misses += past.near_misses
 
 
 @kernel
-def _more(value, other):
-    """The greater, of one that is no number the other."""
+def _find_greater(value: float, other: float) -> float:
+    """Return the greater of two values; if one is NaN, the other."""
     return other if not value >= other and other == other else value
 
 
 class IncidentMonitor(Stateful):
-    """Detects incidents step after step, and keeps what episodes have known of each worker."""
+    """Detects incidents step after step, and keeps the history of each worker."""
 
-    CHANGES = ("known",)
+    CHANGES = ("history",)
 
     def __init__(
-        self, batch: int, n_workers: int, capsule_names: tuple[str, ...], model: RobotModel,
+        self,
+        batch: int,
+        n_workers: int,
+        capsule_names: tuple[str, ...],
+        model: RobotModel,
         dt_s: float,
-    ) -> None:  # fmt: skip
-        self.known = nothing_yet(batch, n_workers)
-        """(B, W) of `WATCH`."""
-        self.regions, self.model, self.dt_s = regions_of(capsule_names), model, dt_s
+    ) -> None:
+        """Begin with empty histories.
+
+        Args:
+            batch: number of environments.
+            n_workers: number of workers in each.
+            capsule_names: names of a body's capsules (`worker.body.Body.capsule_names`).
+            model: the robot's constants.
+            dt_s: duration of a control step [s].
+        """
+        self.history = make_history(batch, n_workers)
+        """(B, W) histories of the episodes."""
+        self.regions, self.model, self.dt_s = find_regions(capsule_names), model, dt_s
 
     def reset(self, ids: Ints) -> None:
-        """Begin environments `ids` anew."""
-        self.known[ids] = nothing_yet(*self.known[ids].shape)
+        """Begin the episodes of environments `ids`."""
+        self.history[ids] = make_history(len(self.history[ids]), self.history.shape[1])
 
-    def step(self, world: World, paths: Paths) -> Records:
-        """(B, W) of `INCIDENT`: what happened in a step in which bodies went so."""
-        hits_kg, stop_s = np.full(len(self.known), self.model.mass_kg), self.stop_s(world.robot)
+    def step(self, world: World, paths: Paths) -> Records2[Incident]:
+        """Return the incidents (B, W) of a step in which bodies followed these paths."""
+        hits_kg = np.full(len(self.history), self.model.mass_kg)
         if world.objects is not None:
             hits_kg += world.objects.held @ self.model.load_kg
-        return noted(self.known, paths, self.regions, hits_kg, stop_s, self.dt_s)
+        stop_s = self.find_stop_time(world.robot)
+        return detect_incidents(self.history, paths, self.regions, hits_kg, stop_s, self.dt_s)
 
-    def stop_s(self, robot: RobotState) -> Floats:
-        """(B,) how long robots take to stand still [s], as fast as commands may change."""
+    def find_stop_time(self, robot: RobotState) -> Floats:
+        """Return the time (B,) in which robots come to rest [s], as fast as commands may change."""
         return (np.abs(robot.qd) / self.model.slew_rad_s2).max(axis=1)

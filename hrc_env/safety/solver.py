@@ -1,54 +1,75 @@
-"""The nearest joint velocities that keep rows of different softness, inside a hard box.
+"""The joint velocities nearest to the wanted ones that keep soft constraints inside a hard box.
 
     minimise |x - wanted|^2 + sum_r w_r max(J_r x - b_r, 0)^2,   low <= x <= high
 
-which always has one solution, and is that of the QP with a slack for each row. It is quadratic in
-pieces: Newton's steps, projected on the box (Bertsekas 1982, DOI 10.1137/0320018), end in it.
+The problem always has one solution, which is that of the QP with a slack for each constraint. The
+objective is piecewise quadratic: Newton's steps, projected on the box (Bertsekas 1982, DOI
+10.1137/0320018), end in it.
 """
 
 import math
+from typing import NamedTuple
 
 from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats, JointVelocities
 
-MOST_STEPS = 50
-HALVINGS = 30
-ENOUGH_RAD_S = 1e-9
-"""A step that is shorter than this is the last."""
+MAX_STEPS = 50
+MAX_HALVINGS = 30
+TOLERANCE_RAD_S = 1e-9
+"""Length of a Newton step below which the solver stops [rad/s]."""
+
+
+class Problem(NamedTuple):
+    """What `solve` minimises, for one robot."""
+
+    J: Floats
+    """(M, N) rows of the constraints."""
+    b: Floats
+    """(M,) bounds of the constraints."""
+    weight: Floats
+    """(M,) weights of squared violations, against squared changes of joint velocities."""
+    low: JointVelocities
+    """(N,) least joint velocities [rad/s]."""
+    high: JointVelocities
+    """(N,) greatest joint velocities [rad/s]."""
+    wanted: JointVelocities
+    """(N,) joint velocities of the agent [rad/s]."""
 
 
 @kernel
-def solve(J, b, weight, low, high, wanted, x, work):
-    """Write the solution into `x` (N,); the number of steps.
+def solve(problem: Problem, x: JointVelocities, scratch: Floats) -> int:
+    """Solve for the nearest joint velocities, and return the number of steps.
 
     Args:
-        J: (M, N). b, weight: (M,).
-        low, high, wanted: (N,).
-        work: (N + 3, N), scratch.
+        problem: objective, constraints and box.
+        x: (N,) written: the solution [rad/s].
+        scratch: (N + 3, N) working memory.
     """
-    m, n = len(b), len(x)
-    H, g, d, y = work[:n], work[n], work[n + 1], work[n + 2]
+    low, high, wanted = problem.low, problem.high, problem.wanted
+    n = len(x)
+    H, g, d, y = scratch[:n], scratch[n], scratch[n + 1], scratch[n + 2]
     for i in range(n):
         x[i] = min(high[i], max(low[i], wanted[i]))
-    value = _value(J, b, weight, m, wanted, x)
-    for step in range(MOST_STEPS):
-        _model(J, b, weight, m, wanted, x, g, H)
+    value = evaluate_objective(problem, x)
+    for step in range(MAX_STEPS):
+        expand_objective(problem, x, g, H)
         for i in range(n):
             if (x[i] <= low[i] and g[i] > 0.0) or (x[i] >= high[i] and g[i] < 0.0):
                 g[i] = 0.0
                 for j in range(n):
                     H[i, j] = H[j, i] = 1.0 if i == j else 0.0
-        _newton(H, g, d)
+        solve_newton_step(H, g, d)
         share, longest = 1.0, 0.0
         for i in range(n):
             longest = max(longest, abs(d[i]))
-        if longest < ENOUGH_RAD_S:
+        if longest < TOLERANCE_RAD_S:
             return step
-        for _ in range(HALVINGS):
+        for _ in range(MAX_HALVINGS):
             slope = 0.0
             for i in range(n):
                 y[i] = min(high[i], max(low[i], x[i] + share * d[i]))
                 slope += g[i] * (y[i] - x[i])
-            tried = _value(J, b, weight, m, wanted, y)
+            tried = evaluate_objective(problem, y)
             if tried <= value + 1e-4 * slope:
                 break
             share *= 0.5
@@ -57,25 +78,25 @@ def solve(J, b, weight, low, high, wanted, x, work):
         value = tried
         for i in range(n):
             x[i] = y[i]
-    return MOST_STEPS
+    return MAX_STEPS
 
 
 @kernel
-def _value(J, b, weight, m, wanted, x):
-    """Half of what is minimised."""
+def evaluate_objective(problem: Problem, x: Floats) -> float:
+    """Return half of the objective at joint velocities (N,)."""
     total = 0.0
     for i in range(len(x)):
-        total += (x[i] - wanted[i]) ** 2
-    for r in range(m):
-        over = exceeded(J[r], b[r], x)
+        total += (x[i] - problem.wanted[i]) ** 2
+    for r in range(len(problem.b)):
+        over = constraint_violation(problem.J[r], problem.b[r], x)
         if over > 0.0:
-            total += weight[r] * over * over
+            total += problem.weight[r] * over * over
     return 0.5 * total
 
 
 @kernel
-def exceeded(row, bound, x):
-    """row . x - bound."""
+def constraint_violation(row: Floats, bound: float, x: Floats) -> float:
+    """Return row . x - bound, of a row and joint velocities (N,); positive: violated."""
     total = -bound
     for i in range(len(x)):
         total += row[i] * x[i]
@@ -83,26 +104,26 @@ def exceeded(row, bound, x):
 
 
 @kernel
-def _model(J, b, weight, m, wanted, x, g, H):
-    """Gradient and curvature."""
+def expand_objective(problem: Problem, x: Floats, g: Floats, H: Floats) -> None:
+    """Write the gradient (N,) and the Hessian (N, N) of half of the objective at x (N,)."""
     n = len(x)
     for i in range(n):
-        g[i] = x[i] - wanted[i]
+        g[i] = x[i] - problem.wanted[i]
         for j in range(n):
             H[i, j] = 1.0 if i == j else 0.0
-    for r in range(m):
-        over = exceeded(J[r], b[r], x)
+    for r in range(len(problem.b)):
+        over = constraint_violation(problem.J[r], problem.b[r], x)
         if over > 0.0:
             for i in range(n):
-                stiff = weight[r] * J[r, i]
+                stiff = problem.weight[r] * problem.J[r, i]
                 g[i] += stiff * over
                 for j in range(n):
-                    H[i, j] += stiff * J[r, j]
+                    H[i, j] += stiff * problem.J[r, j]
 
 
 @kernel
-def _newton(H, g, d):
-    """d = -H^-1 g by Cholesky's factors, which replace H's lower half."""
+def solve_newton_step(H: Floats, g: Floats, d: Floats) -> None:
+    """Write d = -H^-1 g (N,) by Cholesky's factors, which replace the lower half of H (N, N)."""
     n = len(g)
     for i in range(n):
         for j in range(i + 1):

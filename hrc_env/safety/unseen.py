@@ -33,53 +33,54 @@ WRISTS, SHOULDERS = (
 class Undetected:
     """What follows from people that are not detected at present."""
 
-    lost: Bools
+    is_lost: Bools
     """(B, W) the workers that were detected once, but not lately."""
-    limit_m_s: Floats
+    speed_limit_m_s: Floats
     """(B,) the speed limit of every point of a robot [m/s]; infinite without a reason."""
 
 
-def find_undetected(now: Belief, config: ShieldConfig) -> Undetected:
+def find_undetected(belief: Belief, config: ShieldConfig) -> Undetected:
     """Return the workers that are lost, and the speed limit for people that are not detected."""
-    estimate = now.estimate
-    lately = estimate.tracked & (estimate.blind_s <= config.unseen_s)
+    estimate = belief.estimate
+    lately = estimate.tracked & (estimate.blind_s <= config.stale_after_s)
     lost = ~lately & np.isfinite(estimate.seen_world[..., 0, 0])
     never_seen = estimate.unknown & ~lost
-    limit = _of_hands(now, config)
+    limit = _limit_near_hidden_hands(belief, config)
     if lost.any():
-        limit = np.minimum(limit, _of_lost(now, lost, config))
+        limit = np.minimum(limit, _limit_near_lost(belief, lost, config))
     if never_seen.any():
-        limit = np.minimum(limit, _of_floor(now, never_seen, config))
+        limit = np.minimum(limit, _limit_near_floor(belief, never_seen, config))
     return Undetected(lost, limit)
 
 
-def _of_lost(now: Belief, lost: Bools, config: ShieldConfig) -> Floats:
+def _limit_near_lost(belief: Belief, lost: Bools, config: ShieldConfig) -> Floats:
     """Return (B,) the limit by the distance from the last places of lost workers."""
-    there = replace(now.estimate, mean_world=now.estimate.seen_world, tracked=lost)
-    near_m = estimated_separation(now.robot, there).distance_m.min(1)
+    there = replace(belief.estimate, mean_world=belief.estimate.seen_world, tracked=lost)
+    near_m = estimated_separation(belief.robot, there).distance_m.min(1)
     share = np.clip((near_m - NEAR_M) / (FAR_M - NEAR_M), 0.0, 1.0)
-    return np.where(lost.any(1), config.unknown_m_s * share, np.inf)
+    return np.where(lost.any(1), config.unknown_speed_limit_m_s * share, np.inf)
 
 
-def _of_floor(now: Belief, never_seen: Bools, config: ShieldConfig) -> Floats:
-    """Return (B,) the limit near floor that one camera alone has seen empty; 0 without any look.
+def _limit_near_floor(belief: Belief, never_seen: Bools, config: ShieldConfig) -> Floats:
+    """Return (B,) the limit near floor that one camera alone has seen empty; 0 before the first
+    image.
 
-    `rows.floor_rows` keeps the distance from floor that no camera has seen.
+    `constraints.add_floor_constraints` keeps the distance from floor that no camera has seen.
     """
-    if now.unseen is None:
+    if belief.unseen is None:
         return np.where(never_seen.any(1), 0.0, np.inf)
-    gap_m = now.unseen.probable_m - WALKING_M_S * now.unseen.age_s
-    return np.maximum(_in_time_m_s(gap_m, config), config.unknown_m_s)
+    gap_m = belief.unseen.probable_m - WALKING_M_S * belief.unseen.age_s
+    return np.maximum(_find_stoppable_speed(gap_m, config), config.unknown_speed_limit_m_s)
 
 
-def _of_hands(now: Belief, config: ShieldConfig) -> Floats:
+def _limit_near_hidden_hands(belief: Belief, config: ShieldConfig) -> Floats:
     """Return (B,) the limit for hidden hands of tracked workers.
 
-    They may be anywhere within an arm's length of their shoulders, in any direction.
+    These may be anywhere within an arm's length of the shoulders, in any direction.
     """
-    estimate, limit = now.estimate, np.full(len(now.estimate.tracked), np.inf)
+    estimate, limit = belief.estimate, np.full(len(belief.estimate.tracked), np.inf)
     cov = estimate.cov_world[:, :, WRISTS]
-    most_m = UNLOCATED_M + config.predicted_m_s * estimate.age_s[:, :, WRISTS]
+    most_m = UNLOCATED_M + config.prediction_growth_m_s * estimate.age_s[:, :, WRISTS]
     hidden = estimate.tracked[..., None] & (np.trace(cov, axis1=-2, axis2=-1) > 2 * most_m**2)
     hidden[hidden] = np.linalg.eigvalsh(cov[hidden])[:, 1] > most_m[hidden] ** 2
     hidden |= _is_vague(estimate, config)[..., None]
@@ -87,25 +88,31 @@ def _of_hands(now: Belief, config: ShieldConfig) -> Floats:
         return limit
     shoulders = estimate.mean_world[:, :, SHOULDERS]
     points = np.repeat(shoulders[..., None, None, :], 2, axis=-2)
-    robot = now.robot.capsules_world, now.robot.capsule_radius_m
+    robot = belief.robot.capsules_world, belief.robot.capsule_radius_m
     away_m = least_separation(*robot, points, np.zeros(1)).distance_m
     variance = np.trace(estimate.cov_world[:, :, SHOULDERS], axis1=-2, axis2=-1) / 3
-    gap_m = away_m - ARM_M - config.sigmas * np.sqrt(variance)
-    return np.where(hidden, _in_time_m_s(gap_m, config), np.inf).min((1, 2))
+    gap_m = away_m - ARM_M - config.n_sigmas * np.sqrt(variance)
+    return np.where(hidden, _find_stoppable_speed(gap_m, config), np.inf).min((1, 2))
 
 
 def _is_vague(estimate: PoseEstimate, config: ShieldConfig) -> Bools:
     """Return (B, W) the tracked workers whose shoulders are hardly located along some axis."""
     cov = estimate.cov_world[:, :, SHOULDERS]
-    most_m = VAGUE_M + config.predicted_m_s * estimate.age_s[:, :, SHOULDERS]
+    most_m = VAGUE_M + config.prediction_growth_m_s * estimate.age_s[:, :, SHOULDERS]
     vague = estimate.tracked[..., None] & (np.trace(cov, axis1=-2, axis2=-1) > most_m**2)
     vague[vague] = np.linalg.eigvalsh(cov[vague])[:, 2] > most_m[vague] ** 2
     return np.asarray(vague.any(-1))
 
 
-def _in_time_m_s(gap_m: Floats, config: ShieldConfig) -> Floats:
-    """Return the speed from which a robot can stop before a person who walks over this gap is
-    within `NEAR_M` of it: `separation.protective_distance` solved for the robot's speed."""
+def _find_stoppable_speed(gap_m: Floats, config: ShieldConfig) -> Floats:
+    """Return the speed from which a robot can stop before a walking person is `NEAR_M` away [m/s].
+
+    This is `separation.protective_distance` solved for the robot's speed.
+
+    Args:
+        gap_m: distances from the person, of any shape [m].
+        config: the reaction time and the deceleration.
+    """
     brake, walking = config.deceleration_m_s2, WALKING_M_S
     reaction_s = config.reaction_s + config.latency_s
     left_m = np.maximum(gap_m - NEAR_M - walking * reaction_s, 0.0)

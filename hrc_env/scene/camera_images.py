@@ -1,12 +1,12 @@
-"""Whole images of a rig's cameras for policies, small and quickly.
+"""Small whole images of a rig's cameras, for policies.
 
-Still and lying things are drawn once for each camera and kept; in every step only moving things
-are drawn, and laid over it by depth. Images have smooth edges and no shadows.
+Static geoms and props on the floor are drawn once for each camera and stored; in every step only
+the moving geoms are drawn over them, by depth. Images have smooth edges and no shadows.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -24,37 +24,41 @@ from hrc_env.scene.canvas import EVERYTHING, MOVING, STILL, Canvas, Part
 from hrc_env.scene.domain_randomization import Look
 from hrc_env.scene.primitives import ROBOT_LOOKS
 from hrc_env.scene.render import CROP_QUALITY
-from hrc_env.scene.worker_visuals import HIDDEN, SHOWN, rows_shown
+from hrc_env.scene.worker_visuals import HIDDEN, SHOWN, assign_props
 
-SMALLEST_PX, LARGEST_PX = 8, 1024
-"""Sides of images that an observation may hold [px]."""
+SMALLEST_PX = 8
+"""Least height and width of images in an observation [px]."""
+LARGEST_PX = 1024
+"""Greatest height and width of images in an observation [px]."""
 SMOOTHING = 2
-"""Whole images are drawn so many times as large, for smooth edges."""
+"""Factor by which whole images are drawn larger, for smooth edges."""
 SMALL_PX = 128
-"""Images with sides up to this are drawn with rounder things as coarse as `COARSE` [px]."""
+"""Height and width up to which round geoms are drawn with the quality `COARSE` [px]."""
 COARSE = {"numslices": 8, "numstacks": 2}
+"""MuJoCo's visual quality of round geoms in small images."""
 TOO_THIN = 0.2
-"""Rings and discs on what moves that are thinner than this share of a drawn pixel are left out."""
+"""Thickness of moving discs below which they are not drawn, as a share of a drawn pixel."""
 KEPT_BYTES = 2**28
-"""Memory in which views of still things are kept."""
+"""Memory for stored pictures of static geoms [bytes]."""
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class ImageConfig:
-    """Which images an observation holds beside the belief: `observe_images`.
+    """Images of cameras in an observation, beside the belief: `observe_images`.
 
-    Each is the view of a camera of the rig at that moment, lens and looks included, without faults,
-    delays and shadows, black if it does not hang in the episode; its whole image is squeezed into
-    `height` x `width`. A mapping of these fields, or (height, width), stands for it.
+    Each is the present view of a camera of the rig with its lens and the episode's appearance,
+    without faults, delays and shadows. It is the camera's whole image, scaled to `height` x
+    `width`, and black if the camera is not in the episode's rig. A mapping of these fields, or
+    (height, width), stands for it.
     """
 
     height: int = 84
-    """Of an image [px], from 8 to 1024."""
+    """Height of an image [px], from 8 to 1024."""
     width: int = 84
-    """Of an image [px], from 8 to 1024."""
+    """Width of an image [px], from 8 to 1024."""
     cameras: tuple[int | str, ...] | None = None
-    """Names, or indices from 0, of the cameras of the environment's rig; None: all of them."""
+    """Names, or indices from 0, of cameras of the environment's rig; None for all of them."""
 
     def __post_init__(self) -> None:
         for name in ("height", "width"):
@@ -66,69 +70,88 @@ class ImageConfig:
             )
 
 
-def images_called(given: Any) -> ImageConfig | None:
-    """Return what `observe_images=` says: None, (height, width), a mapping or an `ImageConfig`.
+def parse_images(value: Any) -> ImageConfig | None:
+    """Return the settings of images for a value of `observe_images=`.
+
+    Args:
+        value: None, (height, width), a mapping or an `ImageConfig`.
 
     Raises:
-        ConfigError: it is none of these, or a size that cannot be.
+        ConfigError: it is none of these, or has an invalid size.
     """
-    if given is None or isinstance(given, ImageConfig):
-        return given
-    if isinstance(given, np.ndarray):
-        given = given.tolist()
+    if value is None or isinstance(value, ImageConfig):
+        return value
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
     try:
-        if isinstance(given, Mapping):
-            one = isinstance(given.get("cameras"), int | str)
-            given = {**given, "cameras": [given["cameras"]]} if one else given
-            return from_mapping(ImageConfig, given)
-        if isinstance(given, Sequence) and not isinstance(given, str) and len(given) == 2:
-            return ImageConfig(*given)
+        if isinstance(value, Mapping):
+            is_one = isinstance(value.get("cameras"), int | str)
+            fields = {**value, "cameras": [value["cameras"]]} if is_one else value
+            return from_mapping(ImageConfig, fields)
+        if isinstance(value, Sequence) and not isinstance(value, str) and len(value) == 2:
+            return ImageConfig(*value)
     except ConfigError as error:
         raise ConfigError(f"observe_images: {error}") from error
     raise ConfigError(
         "observe_images must be (height, width) [px], a mapping such as "
         '{"height": 84, "width": 84, "cameras": ["camera_1"]}, an ImageConfig or None, '
-        f"got {given!r}."
+        f"got {value!r}."
     )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Backdrop:
-    """The still things of a view."""
+    """A stored view of the static geoms."""
 
     look: Look | None
-    """With which it was drawn."""
+    """Look with which it was drawn."""
     rgb: Image
-    """As it was drawn, bottom row first as OpenGL has it."""
+    """Colours as drawn, bottom row first."""
     z: NDArray[np.float32]
-    """Likewise: 1 is near, 0 is far."""
+    """Depths as drawn, from 1 near to 0 far, bottom row first."""
     mean: Image
-    """As the image shows it, top row first."""
+    """Colours of the final size, top row first."""
+
+
+class Layer(NamedTuple):
+    """A drawn part of the scene."""
+
+    rgb: Image
+    """Colours, bottom row first."""
+    z: NDArray[np.float32]
+    """Depths from 1 near to 0 far, bottom row first."""
 
 
 class CameraImages(Canvas):
-    """Draws whole images of pinhole cameras, (height, width, 3), and square windows of them.
+    """Renderer of whole images of pinhole cameras, (height, width, 3), and square windows of them.
 
-    Environments that look alike share still things; with looks of their own each has its own.
+    Environments with the same look share the stored views of static geoms.
     """
 
     def __init__(self, scene: Scene, height_px: int, width_px: int, size_px: int = 1) -> None:
-        """Images are `height_px` x `width_px`, windows (`view`) `size_px` x `size_px`."""
+        """Make a renderer.
+
+        Args:
+            scene: the scene.
+            height_px: height of whole images [px].
+            width_px: width of whole images [px].
+            size_px: side of windows (`view`) [px].
+        """
         gl.draw_on_one_thread()
         width, height = (max(SMOOTHING * side, size_px) for side in (width_px, height_px))
         coarse = COARSE if max(height_px, width_px) <= SMALL_PX else {}
         super().__init__(scene, width, height, {**CROP_QUALITY, **coarse})
         self.shape, self.size_px = (height_px, width_px), size_px
-        self._wearer: int | None = None
-        self._backdrops: dict[Any, _Backdrop] = {}
-        self._model.geom_group[self._thin()] = HIDDEN
-        self._of_geom = self._model.body_mocapid[self._model.geom_bodyid]
+        self._owner: int | None = None  # environment with a look of its own
+        self._backdrops: dict[Hashable, _Backdrop] = {}
+        self._model.geom_group[self._find_thin()] = HIDDEN
+        self._geom_rows = self._model.body_mocapid[self._model.geom_bodyid]
         self._lying, self._placement = np.zeros(0, np.int64), b""
-        self._of_lying = mujoco.MjvOption()
-        self._of_lying.flags[int(mujoco.mjtVisFlag.mjVIS_SKIN)] = 0
+        self._without_skins = mujoco.MjvOption()
+        self._without_skins.flags[int(mujoco.mjtVisFlag.mjVIS_SKIN)] = 0
 
-    def _thin(self) -> Ints:
-        """Round things on what moves that are too thin for any camera's images to show."""
+    def _find_thin(self) -> Ints:
+        """Return the moving discs that are too thin to be seen in any camera's images."""
         foot = np.array([*self.scene.grounds.robot_xy_m, 1.0])
         pixels_m = [
             np.linalg.norm(camera.eye_world - foot) / camera.K[0, 0] * camera.width_px / side
@@ -143,46 +166,50 @@ class CameraImages(Canvas):
         return np.flatnonzero(moving & discs & thin & looks)
 
     def pose(self, q: JointAngles, motion: WorkerMotion | None) -> None:
-        """Pose moving things, as `Canvas` does; things that lie about count as still."""
+        """Pose the moving geoms, as `Canvas` does; props on the floor count as static."""
         super().pose(q, motion)
         if motion is None or not self._visuals.props.size:
             return
-        shown = rows_shown(self._visuals.props, motion.held)[len(self._visuals.segments) :]
+        shown = assign_props(self._visuals.props, motion.held)[len(self._visuals.segments) :]
         rows = shown[shown >= 0]
         places = self._data.mocap_pos[rows], self._data.mocap_quat[rows]
         placement = b"".join(each.tobytes() for each in (rows, *places))
         if placement != self._placement:
             self._placement = placement
-            self._lying = np.flatnonzero(np.isin(self._of_geom, rows))
+            self._lying = np.flatnonzero(np.isin(self._geom_rows, rows))
         self._model.geom_group[self._lying] = HIDDEN
 
-    def show(self, what: Part = EVERYTHING, shadows: bool = False) -> None:
-        """Choose the parts of the next pictures, as `Canvas` does."""
-        known = what in self._fresh
-        super().show(what, shadows)
-        if what is not MOVING and not known and len(self._lying):
+    def show(self, part: Part = EVERYTHING, shadows: bool = False) -> None:
+        """Choose the part of the scene for the next pictures, as `Canvas` does."""
+        is_fresh = part in self._fresh
+        super().show(part, shadows)
+        if part is not MOVING and not is_fresh and len(self._lying):
             groups = self._model.geom_group.copy()
             self._model.geom_group[:] = HIDDEN
             self._model.geom_group[self._lying] = SHOWN
-            moving = int(mujoco.mjtCatBit.mjCAT_DYNAMIC)
             mujoco.mjv_addGeoms(
-                self._model, self._data, self._of_lying, mujoco.MjvPerturb(), moving, self._shown
+                self._model,
+                self._data,
+                self._without_skins,
+                mujoco.MjvPerturb(),
+                int(mujoco.mjtCatBit.mjCAT_DYNAMIC),
+                self._shown,
             )
             self._model.geom_group[:] = groups
 
     def dress(self, b: int, look: Look | None) -> None:
-        """Draw environment `b` from the next pose on, with its look; None: as it was built."""
-        self._wearer = None if look is None else b
+        """Draw environment `b` with its look from the next pose on; None for the scene as built."""
+        self._owner = None if look is None else b
         self.randomize(look)
 
     def image(self, camera: PinholeCamera) -> Image:
-        """Return the whole image of a camera, squeezed into (height, width, 3), top row first."""
+        """Return the whole image of a camera, scaled to (height, width, 3), top row first."""
         middle = Roi((camera.width_px / 2, camera.height_px / 2), float(camera.width_px), 0.0)
         fine = SMOOTHING * self.shape[0], SMOOTHING * self.shape[1]
         return self._layered(camera, middle, float(camera.height_px), fine, SMOOTHING)
 
     def view(self, camera: PinholeCamera, window: Roi) -> Image:
-        """Return a square window of what a pinhole sees, (size, size, 3), top row first."""
+        """Return a square window (size, size, 3) of a camera's pinhole image, top row first."""
         return self._layered(camera, window, window.side_px, (self.size_px, self.size_px), 1)
 
     def _layered(
@@ -193,48 +220,65 @@ class CameraImages(Canvas):
         fine: tuple[int, int],
         smoothing: int,
     ) -> Image:
-        """Return moving things before still ones; pixels are means of `smoothing` x `smoothing`."""
+        """Return an image of the moving geoms in front of the static ones, top row first.
+
+        Args:
+            camera: the camera.
+            window: centre, rotation and width of a rectangle of its image [px].
+            height_px: height of that rectangle [px].
+            fine: height and width with which it is drawn [px].
+            smoothing: side of the squares of drawn pixels that are averaged to one pixel.
+        """
         numbers = camera.K.tobytes(), camera.T_world_from_cam.tobytes()
-        key = (self._wearer, self._placement, numbers, window, height_px)
+        key = (self._owner, self._placement, numbers, window, height_px)
         behind = self._backdrops.get(key)
         if behind is None or behind.look is not self._look:
-            rgb, z = self._seen(STILL, camera, window, height_px, fine)
+            still = self._draw(STILL, camera, window, height_px, fine)
             mean = np.empty((fine[0] // smoothing, fine[1] // smoothing, 3), np.uint8)
-            _mean_behind(rgb, smoothing, mean)
-            behind = _Backdrop(self._look, rgb, z, mean)
+            _average(still.rgb, smoothing, mean)
+            behind = _Backdrop(self._look, still.rgb, still.z, mean)
         self._remember(key, behind)
-        rgb, z = self._seen(MOVING, camera, window, height_px, fine)
+        moving = self._draw(MOVING, camera, window, height_px, fine)
         image = behind.mean.copy()
-        _lay_smoothly(rgb, z, behind.rgb, behind.z, smoothing, image)
+        _lay_smoothly(moving.rgb, moving.z, behind.rgb, behind.z, smoothing, image)
         return image
 
-    def _remember(self, key: Any, behind: _Backdrop) -> None:
-        """Keep a view of still things, the latest last; the oldest make room."""
+    def _remember(self, key: Hashable, behind: _Backdrop) -> None:
+        """Store a view of the static geoms as the latest one; the oldest make room."""
         self._backdrops.pop(key, None)
         self._backdrops[key] = behind
         most = max(KEPT_BYTES // (behind.rgb.nbytes + behind.z.nbytes), len(self.scene.cameras))
         while len(self._backdrops) > most:
             del self._backdrops[next(iter(self._backdrops))]
 
-    def _seen(
-        self, what: Part, camera: PinholeCamera, window: Roi, height_px: float,
+    def _draw(
+        self,
+        part: Part,
+        camera: PinholeCamera,
+        window: Roi,
+        height_px: float,
         shape: tuple[int, int],
-    ) -> tuple[Image, NDArray[np.float32]]:  # fmt: skip
-        """Colours and depths of a part of the scene, bottom row first."""
-        rgb, z = np.empty((*shape, 3), np.uint8), np.empty(shape, np.float32)
-        self.show(what)
+    ) -> Layer:
+        """Return a picture of a part of the scene, of this height and width [px]."""
+        layer = Layer(np.empty((*shape, 3), np.uint8), np.empty(shape, np.float32))
+        self.show(part)
         self.aim(camera, window, height_px)
-        self.read(rgb, z)
-        return rgb, z
+        self.read(layer.rgb, layer.z)
+        return layer
 
     def __reduce__(self) -> tuple[Any, ...]:
         return CameraImages, (self.scene, *self.shape, self.size_px)
 
 
 @kernel
-def _mean_behind(rgb, smoothing, out):
-    """Means over squares of `smoothing` pixels of a picture whose bottom row comes first; `out` is
-    top row first."""
+def _average(rgb: Image, smoothing: int, out: Image) -> None:
+    """Write the means over squares of pixels of a picture.
+
+    Args:
+        rgb: (smoothing * H, smoothing * W, 3) the picture, bottom row first.
+        smoothing: side of the squares [px].
+        out: (H, W, 3) written, top row first.
+    """
     height, width = out.shape[0], out.shape[1]
     count = smoothing * smoothing
     for row in range(height):
@@ -248,9 +292,24 @@ def _mean_behind(rgb, smoothing, out):
 
 
 @kernel
-def _lay_smoothly(rgb, z, rgb_behind, z_behind, smoothing, out):
-    """Write over `out`, as of `_mean_behind`, the means of what is nearer (1 is near) of a picture
-    and what is behind it, where any of the picture is."""
+def _lay_smoothly(
+    rgb: Image,
+    z: NDArray[np.float32],
+    rgb_behind: Image,
+    z_behind: NDArray[np.float32],
+    smoothing: int,
+    out: Image,
+) -> None:
+    """Write the means over squares of pixels in which a picture is before the one behind it.
+
+    Args:
+        rgb: (smoothing * H, smoothing * W, 3) the picture, bottom row first.
+        z: its depths from 1 near to 0 far, bottom row first.
+        rgb_behind: the picture behind it, of the same shape, bottom row first.
+        z_behind: depths of the picture behind it, bottom row first.
+        smoothing: side of the squares [px].
+        out: (H, W, 3) means of the picture behind it, top row first, which is written.
+    """
     height, width = out.shape[0], out.shape[1]
     count = smoothing * smoothing
     for row in range(height):

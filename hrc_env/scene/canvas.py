@@ -1,13 +1,13 @@
-"""One OpenGL context with a scene in it: pose it, aim it, read the picture.
+"""An OpenGL context with a scene: pose it, aim it, read the picture.
 
-The context is made when the first picture is drawn, and current only while one is: threads may
-take turns, and several canvases never draw into each other.
+The context is made when the first picture is drawn, and is current only while a picture is drawn:
+threads may take turns, and several canvases never draw into each other.
 """
 
 import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -15,11 +15,17 @@ from numpy.typing import NDArray
 
 from hrc_env.core.errors import RenderingError, check_shape
 from hrc_env.core.records import Roi, WorkerMotion
-from hrc_env.core.typing import Capsules, Floats, Image, JointAngles
+from hrc_env.core.typing import Capsules, Floats, Image, JointAngles, Points3
 from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.scene import gl
-from hrc_env.scene.build import Scene, drawing_model, visuals
-from hrc_env.scene.domain_randomization import Look, randomize, restore, strew, take_off_hats
+from hrc_env.scene.build import Scene, drawing_model, find_visuals
+from hrc_env.scene.domain_randomization import (
+    Look,
+    add_litter,
+    hide_hats,
+    randomize,
+    restore,
+)
 from hrc_env.scene.primitives import (
     DECORATION,
     OVERHEAD,
@@ -32,42 +38,65 @@ from hrc_env.scene.rig import glcam_axes
 from hrc_env.scene.worker_visuals import PARKED_M, show_bodies, show_workers
 
 SPHERE_M = 1e-6
-"""A capsule whose half length is less is drawn as a sphere [m]."""
+"""Half length of a capsule below which it is drawn as a sphere [m]."""
 ALL_GROUPS = (SOLID, DECORATION, ROBOT_LOOKS, OVERHEAD)
+"""Groups of geoms that pictures show."""
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """Which things a picture holds."""
+    """A part of the scene that a picture shows."""
 
     category: mujoco.mjtCatBit
+    """MuJoCo's category of geoms: all, static or dynamic."""
     sky: bool
-    """Behind all else; False: black."""
+    """Whether the background is the sky; else it is black."""
     sunny: bool = True
-    """With the light that casts shadows."""
+    """Whether the lights that cast shadows are on."""
 
 
 EVERYTHING = Part(mujoco.mjtCatBit.mjCAT_ALL, True)
+"""The whole scene."""
 STILL = Part(mujoco.mjtCatBit.mjCAT_STATIC, True)
+"""The static geoms."""
 MOVING = Part(mujoco.mjtCatBit.mjCAT_DYNAMIC, False)
+"""The moving geoms."""
 IN_THE_SHADE = Part(mujoco.mjtCatBit.mjCAT_STATIC, True, sunny=False)
+"""The static geoms without the lights that cast shadows."""
 BEFORE_THE_SUN = Part(mujoco.mjtCatBit.mjCAT_DYNAMIC, False, sunny=False)
+"""The moving geoms without these lights."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Marks:
-    """Capsules that a picture shows and that are no part of the scene; of length 0: spheres."""
+    """Capsules that a picture shows and that are no part of the scene; with length 0 spheres."""
 
     ends_world: Capsules
-    """(N, 2, 3) [m]."""
+    """(N, 2, 3) end points of their axes [m]."""
     radius_m: Floats
-    """(N,)."""
+    """(N,) radii [m]."""
     rgb: Floats
-    """(N, 3) in [0, 1]."""
+    """(N, 3) colours in [0, 1]."""
+
+
+class Spheres(NamedTuple):
+    """Spheres in the world."""
+
+    centre_world: Points3
+    """(N, 3) middles [m]."""
+    radius_m: Floats
+    """(N,) radii [m]."""
 
 
 class Canvas:
-    """A picture of fixed size; `quality` are fields of MuJoCo's visual.quality."""
+    """A picture of fixed size.
+
+    Args:
+        scene: the scene.
+        width_px: width of the picture [px].
+        height_px: height of the picture [px].
+        quality: fields of MuJoCo's visual.quality by name.
+    """
 
     def __init__(
         self, scene: Scene, width_px: int, height_px: int, quality: dict[str, int]
@@ -80,7 +109,7 @@ class Canvas:
         view = self._model.vis.global_
         view.offwidth, view.offheight = width_px, height_px
         self._data = mujoco.MjData(self._model)
-        self._visuals = visuals(scene)
+        self._visuals = find_visuals(scene)
         self._look: Look | None = None
         show_bodies(self._model, self._visuals, None)
         self._option = mujoco.MjvOption()
@@ -91,12 +120,12 @@ class Canvas:
         self._lists: dict[Part, Any] = {}
         self._shown: Any = None
         self._fresh: set[Part] = set()
-        self._kept: dict[Any, Any] = {}  # what stands still, for subclasses; looks change it
+        self._kept: dict[Any, Any] = {}  # pictures of static geoms, for subclasses; looks clear it
         self._closed = False
         self.groups(ALL_GROUPS)
 
     def randomize(self, look: Look | None) -> None:
-        """Draw with this look from the next pose on; None: as it was built."""
+        """Draw with this look from the next pose on; None for the scene as built."""
         if look is self._look:
             return
         self._look = look
@@ -108,46 +137,50 @@ class Canvas:
         self._take_over_textures()
 
     def pose(self, q: JointAngles, motion: WorkerMotion | None) -> None:
-        """Put the arm at q (N,), or all that moves at q (nq,), the workers and what they hold where
-        `motion` (W, S, ...) says."""
+        """Pose the robot, the workers and the objects.
+
+        Args:
+            q: (N,) joint angles of the robot [rad], or (nq,) with fingers and loose objects.
+            motion: poses of the workers and their props, arrays (W, S, ...); None keeps them.
+        """
         if len(q) != self._model.nq:
             check_shape("q", np.shape(q), self.scene.home_q.shape, "one angle per joint")
         self._data.qpos[: len(q)] = q
         if motion is not None:
             show_workers(self._model, self._data, self._visuals, motion)
             if self._look is not None:
-                take_off_hats(self._model, self._visuals, self._look)
+                hide_hats(self._model, self._visuals, self._look)
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_comPos(self._model, self._data)
         mujoco.mj_camlight(self._model, self._data)
         self._fresh.clear()
 
-    def show(self, what: Part = EVERYTHING, shadows: bool = False) -> None:
-        """Choose what the next pictures hold; the pose is taken over if it has changed since."""
+    def show(self, part: Part = EVERYTHING, shadows: bool = False) -> None:
+        """Choose the part of the scene for the next pictures, in the present pose."""
         self._open()
-        if what not in self._lists:
-            self._lists[what] = mujoco.MjvScene(self._model, maxgeom=self._model.ngeom + 64)
-        self._shown = self._lists[what]
-        if what in self._fresh:
+        if part not in self._lists:
+            self._lists[part] = mujoco.MjvScene(self._model, maxgeom=self._model.ngeom + 64)
+        self._shown = self._lists[part]
+        if part in self._fresh:
             return
-        self._fresh.add(what)
+        self._fresh.add(part)
+        category = int(part.category)
         mujoco.mjv_updateScene(
-            self._model, self._data, self._option, None, self._camera,
-            int(what.category), self._shown,
-        )  # fmt: skip
-        if self._look is not None and what.sky:
-            strew(self._shown, self.scene.grounds, self._look)
-        for light in self._shown.lights[: 0 if what.sunny else self._shown.nlight]:
+            self._model, self._data, self._option, None, self._camera, category, self._shown
+        )
+        if self._look is not None and part.sky:
+            add_litter(self._shown, self.scene.grounds, self._look)
+        for light in self._shown.lights[: 0 if part.sunny else self._shown.nlight]:
             if light.castshadow:
                 light.diffuse, light.specular = np.zeros(3), np.zeros(3)
         flags = self._shown.flags
         flags[mujoco.mjtRndFlag.mjRND_SHADOW.value] = shadows
-        flags[mujoco.mjtRndFlag.mjRND_SKYBOX.value] = what.sky
+        flags[mujoco.mjtRndFlag.mjRND_SKYBOX.value] = part.sky
         flags[mujoco.mjtRndFlag.mjRND_REFLECTION.value] = 0
         flags[mujoco.mjtRndFlag.mjRND_HAZE.value] = 0
 
     def show_marks(self, marks: Marks) -> None:
-        """Choose marks alone for the next pictures, in the light of the scene."""
+        """Choose marks alone for the next pictures, with the lights of the scene."""
         self._open()
         self._shown = mujoco.MjvScene(self._model, maxgeom=len(marks.radius_m) + 64)
         category = int(mujoco.mjtCatBit.mjCAT_DECOR)
@@ -170,14 +203,19 @@ class Canvas:
             self._shown.ngeom += 1
 
     def groups(self, groups: Sequence[int]) -> None:
-        """Draw the geoms of these groups only."""
+        """Restrict the next pictures to geoms of these groups."""
         self._option.geomgroup[:] = 0
         self._option.geomgroup[list(groups)] = 1
         self._fresh.clear()
 
     def aim(self, camera: PinholeCamera, window: Roi, height_px: float) -> None:
-        """Look through a turned rectangle of a camera's image, `side_px` wide and `height_px` high
-        [px of that image]."""
+        """Draw the next pictures from a camera, within a rotated rectangle of its image.
+
+        Args:
+            camera: the camera.
+            window: centre, rotation and width (`side_px`) of the rectangle [px of the image].
+            height_px: height of the rectangle [px of the image].
+        """
         c, s = np.cos(window.rotation_rad), np.sin(window.rotation_rad)
         dx = window.centre_px[0] - camera.K[0, 2]
         dy = window.centre_px[1] - camera.K[1, 2]
@@ -191,8 +229,14 @@ class Canvas:
             eye.frustum_bottom = (-height_px / 2 - v) * scale
 
     def aim_along(self, axes: Floats, middle_world: Floats, half_m: float, far_m: float) -> None:
-        """Look along parallel rays, as a sun shines, `far_m` far: a square of 2 `half_m` round the
-        point `middle_world` (3,) of the near plane; axes (3, 3) are right, down and along."""
+        """Draw the next pictures by a parallel projection, as a sun shines.
+
+        Args:
+            axes: (3, 3) columns right, down and along the rays.
+            middle_world: (3,) middle of the square in the near plane [m].
+            half_m: half side of that square [m].
+            far_m: distance of the far plane from the near plane [m].
+        """
         _, down, direction = axes.T
         for eye in self._shown.camera:
             eye.orthographic = 1
@@ -202,7 +246,10 @@ class Canvas:
             eye.frustum_top, eye.frustum_bottom = half_m, -half_m
 
     def sun_axes(self) -> Floats | None:
-        """(3, 3) columns right, down and along the light that casts shadows, if there is one."""
+        """Return (3, 3) the columns right, down and along the first light that casts shadows.
+
+        None if there is no such light.
+        """
         shining = np.flatnonzero(self._model.light_castshadow & self._model.light_active)
         if not len(shining):
             return None
@@ -211,17 +258,21 @@ class Canvas:
         right /= np.linalg.norm(right)
         return np.stack([right, np.cross(along, right), along], -1)
 
-    def movers(self) -> tuple[Floats, Floats]:
-        """Middles (N, 3) and radii (N,) [m] of spheres round all that moves; skins by capsules."""
-        model, of = self._model, self._model.geom_bodyid
-        moving = (model.body_weldid[of] != 0) | (model.body_mocapid[of] >= 0)
+    def find_moving_spheres(self) -> Spheres:
+        """Return bounding spheres of all moving geoms; those of skins are round the capsules."""
+        model, bodies = self._model, self._model.geom_bodyid
+        moving = (model.body_weldid[bodies] != 0) | (model.body_mocapid[bodies] >= 0)
         moving &= self._data.geom_xpos[:, 2] > PARKED_M[2] / 2
         moving &= model.geom_group != ROBOT_CAPSULES
-        return self._data.geom_xpos[moving], model.geom_rbound[moving]
+        return Spheres(self._data.geom_xpos[moving], model.geom_rbound[moving])
 
     def read(self, rgb: NDArray[np.uint8] | None, z: NDArray[np.float32] | None) -> None:
-        """Draw into rgb (H, W, 3) and z (H, W; 1 near, 0 far), which may be smaller than the
-        canvas, bottom row first as OpenGL has them."""
+        """Draw a picture, bottom row first as OpenGL has it.
+
+        Args:
+            rgb: (H, W, 3) written; may be smaller than the canvas, None for no colours.
+            z: (H, W) depths written, from 1 near to 0 far; None for none.
+        """
         shapes = [each.shape for each in (rgb, z) if each is not None]
         rect = mujoco.MjrRect(0, 0, shapes[0][1], shapes[0][0])
         with self._open().current() as looks:
@@ -229,25 +280,28 @@ class Canvas:
             mujoco.mjr_readPixels(rgb, z, rect, looks)
 
     def paint(self) -> Image:
-        """The picture (H, W, 3), top row first."""
+        """Return the picture (H, W, 3), top row first."""
         rgb = np.empty((self.height_px, self.width_px, 3), np.uint8)
         self.read(rgb, None)
         return np.ascontiguousarray(rgb[::-1])
 
     def depth_m(self) -> NDArray[np.float32]:
-        """(H, W) distance along the optical axis [m], top row first; of nothing the far plane's."""
+        """Return (H, W) the distances along the optical axis [m], top row first.
+
+        Where there is nothing, it is the distance of the far plane.
+        """
         z = np.empty((self.height_px, self.width_px), np.float32)
         self.read(None, z)
         return self.distance_m(z[::-1])
 
     def distance_m(self, z: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Distance along the optical axis [m] of what `read` has found."""
+        """Return distances along the optical axis [m] for depths that `read` has written."""
         eye = self._shown.camera[0]
         near, far = float(eye.frustum_near), float(eye.frustum_far)
         return (near * far / (near + z.astype(float) * (far - near))).astype(np.float32)
 
     def close(self) -> None:
-        """Free the context; the canvas cannot draw any more. Twice does no harm."""
+        """Free the context, after which the canvas cannot draw; a second call does nothing."""
         if self._drawing is not None:
             self._drawing.free()
         self._drawing = self._shown = None
@@ -255,18 +309,19 @@ class Canvas:
         self._closed = True
 
     def __del__(self) -> None:
-        try:  # without a helper: at exit there may be none any more
+        try:  # at exit, modules may have gone already
             self.close()
         except Exception:
             return
 
     def _take_over_textures(self) -> None:
-        """Which material has which picture: the context keeps a copy of its own."""
+        """Copy the materials' textures to the context, which keeps a copy of its own."""
         if self._drawing is not None:
-            of_material = self._model.mat_texid.ravel()
-            self._drawing.looks.mat_texid[: len(of_material)] = of_material
+            textures = self._model.mat_texid.ravel()
+            self._drawing.looks.mat_texid[: len(textures)] = textures
 
     def _open(self) -> gl.Drawing:
+        """Return the context, which is made at the first call."""
         if self._closed:
             raise RenderingError("This renderer has been closed: make a new one.")
         if self._drawing is None:

@@ -1,7 +1,7 @@
-"""Suction: what cups touch sticks to them until they are vented, or it is torn off."""
+"""Suction cups: an object sticks to them from contact until they are vented or it is torn off."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
@@ -10,32 +10,47 @@ from hrc_env.core.typing import Bools, Floats, Ints, Transforms
 from hrc_env.geometry.rotations import matrix
 from hrc_env.scene.objects import Objects
 
+if TYPE_CHECKING:
+    from hrc_env.scene.robot import Robot
+
 CUPS = "cups_"
-"""What the name of the weld begins with that stands for cups on an object, which follows."""
-NEAR_M, NEAR_RAD = 0.004, 0.03
-"""Cups that are so near to a face, and so little askew, seal."""
+"""Prefix of the name of a weld between cups and an object; the object's name follows."""
+SEAL_M = 0.004
+"""Distance of the cups from their place on a face below which they seal [m]."""
+SEAL_RAD = 0.03
+"""Angle between cups and face below which they seal [rad]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cups:
-    """An arm's cups and what can hang on them; C of the objects."""
+    """The suction cups of an arm, and the C objects that they can hold."""
 
     objects: Ints
-    """(C,) which."""
+    """(C,) index of each object in `Objects`."""
     welds: Ints
-    """(C,) equalities that stand for it."""
+    """(C,) index of the equality constraint that holds each object."""
     T_object_from_site: Transforms
-    """(C, 4, 4) where they sit on it."""
+    """(C, 4, 4) place of the cups on each object."""
     gauge: int
-    """The first of three entries of `sensordata`: what hangs on them [N]."""
+    """First of three entries of `sensordata` with the force on the cups [N]."""
     limit_n: float
+    """Load above which an object is torn off [N]."""
 
 
-def cups_of(robot: Any, model: mujoco.MjModel, objects: Objects, prefix: str) -> Cups | None:
-    """The numbers of a robot's cups in a scene; None: it has none."""
+def find_cups(robot: "Robot", model: mujoco.MjModel, objects: Objects, prefix: str) -> Cups | None:
+    """Return a robot's cups in a compiled scene; None if it has none.
+
+    Args:
+        robot: the robot.
+        model: the compiled scene.
+        objects: loose objects of the scene.
+        prefix: prefix of the robot's names in the model.
+    """
     if robot.suction is None:
         return None
-    rows, welds, frames = [], [], []
+    rows: list[int] = []
+    welds: list[int] = []
+    frames: list[Transforms] = []
     for equality in range(model.neq):
         name = model.equality(equality).name
         if name.startswith(CUPS):
@@ -46,24 +61,37 @@ def cups_of(robot: Any, model: mujoco.MjModel, objects: Objects, prefix: str) ->
             T[:3, :3], T[:3, 3] = matrix(model.site_quat[site]), model.site_pos[site]
             frames.append(T)
     return Cups(
-        np.array(rows, int), np.array(welds, int), np.array(frames).reshape(-1, 4, 4),
-        int(model.sensor(prefix + robot.suction.gauge).adr[0]), robot.suction.limit_n,
-    )  # fmt: skip
+        objects=np.array(rows, int),
+        welds=np.array(welds, int),
+        T_object_from_site=np.array(frames).reshape(-1, 4, 4),
+        gauge=int(model.sensor(prefix + robot.suction.gauge).adr[0]),
+        limit_n=robot.suction.limit_n,
+    )
 
 
-def seals(cups: Cups, T_world_from_tool: Transforms, poses: Floats) -> Bools:
-    """(B, C) on which objects, at poses (B, O, 7), cups at (B, 4, 4) sit so that they hold."""
-    own = poses[:, cups.objects]
-    R = matrix(own[..., 3:]) @ cups.T_object_from_site[:, :3, :3]
-    at = own[..., :3] + (matrix(own[..., 3:]) @ cups.T_object_from_site[:, :3, 3:])[..., 0]
-    off_m = np.linalg.norm(at - T_world_from_tool[:, None, :3, 3], axis=-1)
-    turned = np.einsum("bij,bcij->bc", T_world_from_tool[:, :3, :3], R)
-    askew_rad = np.arccos(np.clip((turned - 1.0) / 2.0, -1.0, 1.0))
-    return (off_m < NEAR_M) & (askew_rad < NEAR_RAD)
+def find_sealed(cups: Cups, T_world_from_tool: Transforms, poses: Floats) -> Bools:
+    """Return (B, C) whether the cups sit on each object so that they seal.
+
+    Args:
+        cups: the arm's cups.
+        T_world_from_tool: (B, 4, 4) poses of the cups.
+        poses: (B, O, 7) poses of the objects, position [m] and quaternion (w, x, y, z).
+    """
+    candidates = poses[:, cups.objects]
+    rotation = matrix(candidates[..., 3:])
+    R = rotation @ cups.T_object_from_site[:, :3, :3]
+    place = candidates[..., :3] + (rotation @ cups.T_object_from_site[:, :3, 3:])[..., 0]
+    off_m = np.linalg.norm(place - T_world_from_tool[:, None, :3, 3], axis=-1)
+    trace = np.einsum("bij,bcij->bc", T_world_from_tool[:, :3, :3], R)
+    angle_rad = np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0))
+    return (off_m < SEAL_M) & (angle_rad < SEAL_RAD)
 
 
-def load_n(cups: Cups, sensordata: Floats) -> Floats:
-    """(...,) what tears at the cups [N], of sensordata (..., n): along the arm's end and aside; a
-    push does not. The hand's own weight is part of it."""
+def measure_load_n(cups: Cups, sensordata: Floats) -> Floats:
+    """Return (...) the force that pulls at the cups [N], from sensordata (..., n).
+
+    It is the pull along the cups' axis and the shear across it; a push counts 0 along the axis. The
+    weight of the cups is part of it.
+    """
     x, y, z = np.moveaxis(sensordata[..., cups.gauge : cups.gauge + 3], -1, 0)
     return np.sqrt(x * x + y * y + np.square(np.minimum(z, 0.0)))

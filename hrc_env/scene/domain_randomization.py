@@ -1,11 +1,11 @@
-"""How scene and workers look, drawn anew for every episode: light, colours, hats, litter.
+"""Visual domain randomization, drawn for every episode: light, colours, hats and litter.
 
-Looks change images and nothing else: where things are, what hides what, how workers move, goals
-and faults are those of the same seed without. They are drawn from a stream of their own.
+It changes images and nothing else: places, occlusion, the workers' motion, goals and faults are
+those of the same seed without it. It is drawn from a random stream of its own.
 """
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -19,43 +19,44 @@ from hrc_env.scene.worker_visuals import HIDDEN, WorkerVisuals
 from hrc_env.world import Grounds
 
 LEAST_FALL = 0.4
-"""Light comes from above: it falls by at least this share of its way."""
+"""Least downward component of the light's direction, a unit vector."""
 PLAIN_RGB = (0.78, 0.76, 0.72)
-"""A surface that has lost its picture, before it is tinted."""
+"""Colour of a surface without its texture, before it is tinted."""
 LITTER_M = (0.06, 0.35)
-"""Half sizes of what lies on the floor [m]."""
+"""Range of the half sides of litter [m]."""
 LITTER_THICK_M = 0.002
+"""Half thickness of litter [m]."""
 CLOTH = "cloth"
-"""How the names of the skins that are clothes end."""
+"""Suffix of the names of skins that are clothes."""
 STREAM = 0x10075
-"""Tells the stream for looks from those that a generator's `spawn` gives: these count from 0."""
+"""Key of the random stream for looks; those of a generator's `spawn` count from 0."""
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class AppearanceConfig:
-    """Between what looks are drawn; as it stands, everything looks as it was built."""
+    """Ranges of the visual domain randomization; with the defaults nothing is randomized."""
 
     light: tuple[float, float] = (1.0, 1.0)
     """Least and greatest factor on the strength of all light."""
     light_turn_deg: float = 0.0
-    """Lamps and sun come from directions turned by at most so much about the vertical [deg]."""
+    """Largest rotation of the directions of lamps and sun about the vertical [deg]."""
     light_tilt_deg: float = 0.0
-    """And tilted by at most so much [deg]."""
+    """Largest tilt of the directions of lamps and sun [deg]."""
     warmth: float = 0.0
-    """Light is redder and less blue by at most this share, or the other way round."""
+    """Largest share by which light is redder and less blue, or less red and bluer."""
     plain: float = 0.0
-    """Share of the surfaces of the scene that lose their pictures (wood, concrete, plaster)."""
+    """Share of the scene's surfaces that lose their texture (wood, concrete, plaster)."""
     tint: float = 0.0
-    """Each channel of each surface of the scene is darker by at most this share."""
+    """Largest share by which each colour channel of each surface of the scene is darker."""
     clothing: float = 0.0
-    """The same of each worker's clothes."""
+    """Largest share by which each colour channel of each worker's clothes is darker."""
     skin: float = 0.0
-    """Workers' skins are darker by at most this share."""
+    """Largest share by which the workers' skins are darker."""
     hat: float = 1.0
-    """How probable it is that a worker who has a hat wears it."""
+    """Probability that a worker with a hat wears it."""
     litter: int = 0
-    """At most so many flat things of any colour lie on the floor, too thin to hide anything."""
+    """Largest number of flat objects of any colour on the floor, too thin to occlude anything."""
 
     def __post_init__(self) -> None:
         low, high = self.light
@@ -72,12 +73,22 @@ class AppearanceConfig:
 
 
 MOST_LITTER = 60
+"""Upper limit of `AppearanceConfig.litter`."""
 AS_BUILT = AppearanceConfig()
+"""No randomization."""
 VARIED = AppearanceConfig(
-    light=(0.5, 1.3), light_turn_deg=180.0, light_tilt_deg=25.0, warmth=0.2, plain=0.3, tint=0.5,
-    clothing=0.6, skin=0.5, hat=0.6, litter=25,
-)  # fmt: skip
-"""What one may meet; a judgement."""
+    light=(0.5, 1.3),
+    light_turn_deg=180.0,
+    light_tilt_deg=25.0,
+    warmth=0.2,
+    plain=0.3,
+    tint=0.5,
+    clothing=0.6,
+    skin=0.5,
+    hat=0.6,
+    litter=25,
+)
+"""Randomization of everything, by ranges that were judged to be plausible."""
 APPEARANCES: dict[str, AppearanceConfig] = {
     "as_built": AS_BUILT,
     "varied": VARIED,
@@ -87,39 +98,46 @@ APPEARANCES: dict[str, AppearanceConfig] = {
     "surfaces": AppearanceConfig(plain=0.5, tint=0.7, litter=40),
     "people": AppearanceConfig(clothing=0.8, skin=0.6, hat=0.5),
 }
-"""By name: everything as it was built, everything varied, and one thing at a time."""
+"""Randomizations by name: none, all, and of one kind at a time."""
 
 
 class Look(NamedTuple):
-    """One episode's looks: numbers from which a scene of any size is dressed."""
+    """The drawn appearance of one episode."""
 
     light: float
     """Factor on all light."""
     turn_rad: float
-    """Turn of its directions about the vertical."""
+    """Rotation of the light's directions about the vertical [rad]."""
     tilt_rad: float
-    """Their tilt, about the horizontal direction `tilt_about_rad`."""
+    """Tilt of the light's directions about the horizontal direction `tilt_about_rad` [rad]."""
     tilt_about_rad: float
+    """Angle of the axis of the tilt, from world +x [rad]."""
     light_rgb: Floats
-    """(3,) its colour."""
+    """(3,) colour of the light."""
     clothing_rgb: Floats
     """(W, 3) factors on the colours of clothes."""
     skin_rgb: Floats
-    """(W, 3) the same of skins."""
+    """(W, 3) factors on the colours of skins."""
     has_hat: Floats
-    """(W,) 1 or 0."""
+    """(W,) 1 for a worker with a hat on, else 0."""
     plain: float
-    """Share of surfaces without pictures."""
+    """Share of surfaces without their textures."""
     tint: float
-    """By how much surfaces' channels are darker at most."""
+    """Largest share by which the colour channels of surfaces are darker."""
     n_litter: int
+    """Number of flat objects on the floor."""
     seed: int
-    """For the surfaces and for what lies on the floor."""
+    """Seed of the surfaces' colours and of the objects on the floor."""
 
 
 def draw_look(config: AppearanceConfig, n_workers: int, rng: np.random.Generator) -> Look:
-    """An episode's looks, for as many workers as there is room for; `rng` is the environment's
-    sensor generator and stays as it is."""
+    """Draw the appearance of an episode.
+
+    Args:
+        config: ranges of the draws.
+        n_workers: number of workers for which the scene has room.
+        rng: the environment's sensor generator, whose state is not changed.
+    """
     own = aside(rng, STREAM)
     low, high = config.light
     warmth = config.warmth * own.uniform(-1, 1)
@@ -142,7 +160,14 @@ def draw_look(config: AppearanceConfig, n_workers: int, rng: np.random.Generator
 def randomize(
     model: mujoco.MjModel, built: mujoco.MjModel, visuals: WorkerVisuals, look: Look
 ) -> None:
-    """Put a look on a drawing model of the caller's own, of which `built` is the original."""
+    """Apply a look to a drawing model.
+
+    Args:
+        model: a drawing model of the caller's own, which is changed.
+        built: the original model.
+        visuals: indices of the workers' skins.
+        look: the look.
+    """
     _randomize_light(model, built, look)
     _randomize_surfaces(model, built, look)
     for k, worker in enumerate(visuals.skins[:, 0]):
@@ -152,28 +177,22 @@ def randomize(
 
 
 def restore(model: mujoco.MjModel, built: mujoco.MjModel) -> None:
-    """Take every look off a drawing model of the caller's own."""
-    for name in (
-        "light_dir",
-        "light_diffuse",
-        "light_specular",
-        "mat_rgba",
-        "mat_texid",
-        "skin_rgba",
-    ):
+    """Restore the appearance of the original model in a drawing model of the caller's own."""
+    fields = "light_dir", "light_diffuse", "light_specular", "mat_rgba", "mat_texid", "skin_rgba"
+    for name in fields:
         getattr(model, name)[:] = getattr(built, name)
     for name in ("ambient", "diffuse"):
         getattr(model.vis.headlight, name)[:] = getattr(built.vis.headlight, name)
 
 
-def take_off_hats(model: mujoco.MjModel, visuals: WorkerVisuals, look: Look) -> None:
-    """Put the hats away of those who wear none in this episode; after `show_bodies`."""
+def hide_hats(model: mujoco.MjModel, visuals: WorkerVisuals, look: Look) -> None:
+    """Hide the hats of workers that wear none in this episode; call it after `show_bodies`."""
     bare = visuals.hats[look.has_hat[visuals.hats[:, 0]] == 0.0, 2]
     model.geom_group[bare] = HIDDEN
 
 
-def strew(scene: Any, grounds: Grounds, look: Look) -> None:
-    """Add what lies on the floor to a list of what is drawn (an MjvScene)."""
+def add_litter(scene: mujoco.MjvScene, grounds: Grounds, look: Look) -> None:
+    """Add the objects on the floor to MuJoCo's list of drawn geoms."""
     draws = np.random.default_rng(look.seed)
     low, high = np.array([grounds.walkable_x_m, grounds.walkable_y_m]).T
     for k in range(min(look.n_litter, scene.maxgeom - scene.ngeom)):
@@ -191,7 +210,7 @@ def strew(scene: Any, grounds: Grounds, look: Look) -> None:
 
 
 def _randomize_light(model: mujoco.MjModel, built: mujoco.MjModel, look: Look) -> None:
-    """Strength, colour and direction of all light."""
+    """Set strength, colour and direction of all light."""
     factor = look.light * look.light_rgb
     axis = np.array([np.cos(look.tilt_about_rad), np.sin(look.tilt_about_rad), 0.0])
     towards = built.light_dir @ about_axis("z", look.turn_rad).T
@@ -207,7 +226,7 @@ def _randomize_light(model: mujoco.MjModel, built: mujoco.MjModel, look: Look) -
 
 
 def _randomize_surfaces(model: mujoco.MjModel, built: mujoco.MjModel, look: Look) -> None:
-    """Tints of the materials of what stands still, and some of them without pictures."""
+    """Tint the materials of fixed geoms, and remove the textures of some of them."""
     draws = np.random.default_rng([look.seed, 1])
     still = np.unique(built.geom_matid[(built.geom_bodyid == 0) & (built.geom_matid >= 0)])
     tint = 1.0 - look.tint * draws.uniform(0, 1, (len(still), 3))

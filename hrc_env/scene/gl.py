@@ -1,7 +1,7 @@
-"""The only access to OpenGL: which there is, contexts of it, and what to do where there is none.
+"""The only access to OpenGL: its backends, its contexts, and the errors without it.
 
-mujoco reads MUJOCO_GL when it is imported. Unless the user has set it, Linux draws through EGL
-where its library is (no display is needed), else through OSMesa, else in a hidden window.
+mujoco reads MUJOCO_GL when it is imported. Unless the user has set it, Linux draws through EGL if
+its library is installed (no display is needed), else through OSMesa, else in a hidden window.
 
 A context is current on a thread only while that thread draws: any thread may draw or close next.
 """
@@ -18,7 +18,7 @@ import threading
 import weakref
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     import mujoco
 
 APT_LINE = "sudo apt-get install -y libegl1 libgl1 libglx-mesa0 libegl-mesa0"
-"""What gives a bare Debian or Ubuntu a software OpenGL."""
+"""Command that installs a software OpenGL on Debian or Ubuntu."""
 LIBRARIES = {"egl": "EGL", "osmesa": "OSMesa"}
 """Shared library of a backend that needs no window system, best first."""
 WINDOWS = ("", "glfw", "glx", "enable", "enabled", "on", "true", "1")
@@ -36,36 +36,43 @@ WINDOWS = ("", "glfw", "glx", "enable", "enabled", "on", "true", "1")
 OFF = ("disable", "disabled", "off", "false", "0")
 """Values of MUJOCO_GL that switch rendering off."""
 VARIABLES = ("PYOPENGL_PLATFORM", "MUJOCO_EGL_DEVICE_ID", "CUDA_VISIBLE_DEVICES", "EGL_PLATFORM")
-"""Variables that decide, too, whether a context can be made."""
+"""Further variables on which it depends whether a context can be made."""
 EXIT_PATIENCE_S = 2.0
-"""How long a picture that another thread draws may keep the process from ending [s]."""
+"""Longest time for which another thread's picture keeps the process from ending [s]."""
 _MAKING = threading.Lock()
+"""Lock of the threads that make contexts."""
 _OPEN: weakref.WeakSet["Drawing"] = weakref.WeakSet()
+"""Contexts that have not been freed."""
 
 
 class Drawing:
-    """A GL context with a model's looks in it, for any thread, one at a time."""
+    """A GL context with a model's textures and meshes, for any thread, one at a time."""
 
     def __init__(self, context: Any, looks: "mujoco.MjrContext") -> None:
-        """Keep a context of one of mujoco's classes, and the looks that were made in it."""
+        """Hold a context.
+
+        Args:
+            context: a context of one of mujoco's classes.
+            looks: textures and meshes that were made in it.
+        """
         self._gl, self.looks = context, looks
         self._lock, self._freed = threading.RLock(), False
 
     @contextlib.contextmanager
     def current(self) -> Iterator["mujoco.MjrContext"]:
-        """Make the context current on this thread; the one before is current again afterwards."""
+        """Make the context current on this thread; afterwards the previous one is current again."""
         with self._lock:
             if self._freed:
                 raise RenderingError("This graphics context has been freed: make a new renderer.")
-            go_back = _way_back(type(self._gl))
+            restore = _find_restore(type(self._gl))
             self._gl.make_current()
             try:
                 yield self.looks
             finally:
-                go_back()
+                restore()
 
     def free(self) -> None:
-        """Free the context, which cannot draw any more; twice does no harm."""
+        """Free the context, after which it cannot draw; a second call does nothing."""
         with self._lock:
             if not self._freed:
                 with self.current():
@@ -74,17 +81,17 @@ class Drawing:
                 self._freed = True
 
     def free_at_exit(self) -> None:
-        """Free the context and keep its lock: a thread that still wants to draw waits for ever."""
+        """Free the context and keep its lock, so that no other thread draws with it."""
         if self._lock.acquire(timeout=EXIT_PATIENCE_S):
             self.free()
 
 
 def import_mujoco() -> None:
-    """Import mujoco, also where MUJOCO_GL names what it cannot load: only pictures need that."""
+    """Import mujoco even if the backend of MUJOCO_GL cannot be loaded, as only pictures need it."""
     chosen = choose_backend()
     try:
         importlib.import_module("mujoco")
-    except Exception:  # what PyOpenGL says of a missing library is any of several errors
+    except Exception:  # PyOpenGL raises several errors for a missing library
         os.environ["MUJOCO_GL"] = OFF[0]
         try:
             importlib.import_module("mujoco")
@@ -93,7 +100,7 @@ def import_mujoco() -> None:
 
 
 def choose_backend() -> str:
-    """Set MUJOCO_GL where nobody has; returns the backend's name ("" is mujoco's default)."""
+    """Set MUJOCO_GL if it is not set, and return the backend's name ("" is mujoco's default)."""
     chosen = os.environ.get("MUJOCO_GL", "").lower().strip()
     if chosen or not sys.platform.startswith("linux"):
         return chosen
@@ -105,18 +112,23 @@ def choose_backend() -> str:
 
 
 def draw_on_one_thread() -> None:
-    """Let Mesa's software OpenGL draw in the thread that asks, unless LP_NUM_THREADS is set: its
-    own threads, one a core, would take turns with the thread that detects."""
+    """Let Mesa's software OpenGL draw in the calling thread, unless LP_NUM_THREADS is set.
+
+    Its own threads, one a core, would compete with the thread of the detector.
+    """
     os.environ.setdefault("LP_NUM_THREADS", "0")
 
 
 @functools.cache
 def load_triton_first() -> None:
-    """Load the library of triton, if it is installed, before Mesa's first context or window: loaded
-    after that (`torch.optim` does it), it takes Mesa's LLVM for its own and crashes."""
-    with contextlib.suppress(OSError, ValueError):  # no triton that anybody could load later
+    """Load the library of triton, if it is installed, before Mesa's first context or window.
+
+    If it is loaded later, as `torch.optim` does, it uses Mesa's LLVM instead of its own and
+    crashes.
+    """
+    with contextlib.suppress(OSError, ValueError):  # without triton nothing can go wrong
         triton = importlib.util.find_spec("triton")
-        late = "libLLVM" in Path("/proc/self/maps").read_text()  # somebody has drawn already
+        late = "libLLVM" in Path("/proc/self/maps").read_text()  # a picture was drawn already
         mode = ctypes.DEFAULT_MODE | (os.RTLD_DEEPBIND if late else 0)
         for folder in (triton and triton.submodule_search_locations) or ():
             for library in (Path(folder) / "_C").glob("libtriton*.so"):
@@ -134,14 +146,23 @@ def require_display() -> None:
         )
 
 
-def gl_status() -> tuple[bool, str]:
-    """Whether a pixel can be drawn here, and a sentence that says with what or what to do."""
+class GlStatus(NamedTuple):
+    """State of OpenGL on this machine."""
+
+    works: bool
+    """Whether a pixel can be drawn."""
+    message: str
+    """Sentence with the backend, or with the error and its remedy."""
+
+
+def gl_status() -> GlStatus:
+    """Draw a picture, and return whether OpenGL works."""
     import mujoco
 
     try:
         drawing = new_context(16, 16, mujoco.MjModel.from_xml_string("<mujoco/>"))
     except RenderingError as error:
-        return False, str(error)
+        return GlStatus(False, str(error))
     rectangle, seen = mujoco.MjrRect(0, 0, 16, 16), np.zeros((16, 16, 3), np.uint8)
     with drawing.current() as looks:
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, looks)
@@ -151,13 +172,21 @@ def gl_status() -> tuple[bool, str]:
     drawing.free()
     backend = os.environ.get("MUJOCO_GL") or "the default"
     if tuple(seen[8, 8]) != (255, 0, 255):
-        return False, f"OpenGL (MUJOCO_GL={backend}, {renderer}) does not draw what it is told."
-    return True, f"OpenGL works (MUJOCO_GL={backend}, {renderer})."
+        return GlStatus(False, f"OpenGL (MUJOCO_GL={backend}, {renderer}) draws wrong pixels.")
+    return GlStatus(True, f"OpenGL works (MUJOCO_GL={backend}, {renderer}).")
 
 
 def new_context(width_px: int, height_px: int, model: "mujoco.MjModel") -> Drawing:
-    """A GL context of the chosen backend with the model's looks in it, current nowhere. Raises
-    `RenderingError`, which says how to get OpenGL."""
+    """Return a GL context of the chosen backend, which is not current on any thread.
+
+    Args:
+        width_px: width of its pictures [px].
+        height_px: height of its pictures [px].
+        model: the drawing model, whose textures and meshes it holds.
+
+    Raises:
+        RenderingError: no context could be made; the error names the remedy.
+    """
     import mujoco
 
     backend = choose_backend()
@@ -167,17 +196,17 @@ def new_context(width_px: int, height_px: int, model: "mujoco.MjModel") -> Drawi
     try:
         with _MAKING:  # libraries are loaded, and displays opened, by one thread
             kind = _context_class(backend)
-            go_back = _way_back(kind)
+            restore = _find_restore(kind)
             try:
                 context = kind(width_px, height_px)
                 context.make_current()
                 font = mujoco.mjtFontScale.mjFONTSCALE_100.value
                 made = Drawing(context, mujoco.MjrContext(model, font))
             finally:
-                go_back()
+                restore()
             if not _OPEN:
                 atexit.unregister(_free_all)
-                atexit.register(_free_all)  # after mujoco has, so that this comes before it
+                atexit.register(_free_all)  # after mujoco, so that this runs before its function
             _OPEN.add(made)
             return made
     except Exception as error:
@@ -189,7 +218,7 @@ def new_context(width_px: int, height_px: int, model: "mujoco.MjModel") -> Drawi
 
 
 def _settings(backend: str) -> str:
-    """The variables that decide how pictures are drawn, as they are set."""
+    """Return the variables on which drawing depends, with their values."""
     others = [f"{name}={os.environ[name]!r}" for name in VARIABLES if name in os.environ]
     return ", ".join([f"MUJOCO_GL={backend or 'not set'!r}", *others])
 
@@ -201,13 +230,13 @@ def _free_all() -> None:
             drawing.free_at_exit()
 
 
-def _way_back(context_class: type) -> Callable[[], Any]:
-    """Return the call that makes the context current again that is current on this thread now."""
+def _find_restore(context_class: type) -> Callable[[], Any]:
+    """Return a function that makes this thread's present context current again."""
     kind = context_class.__module__
     if kind == "mujoco.egl":
         egl = sys.modules[kind]
         library, nothing = egl.EGL, (egl.EGL.EGL_NO_SURFACE,) * 2
-        library.eglBindAPI(library.EGL_OPENGL_API)  # a new thread has it not
+        library.eglBindAPI(library.EGL_OPENGL_API)  # a new thread has none
         before = library.eglGetCurrentContext()
         if not before:
             none = library.EGL_NO_CONTEXT
@@ -229,7 +258,7 @@ def _way_back(context_class: type) -> Callable[[], Any]:
 
 
 def _context_class(backend: str) -> Any:
-    """The backend's class itself: mujoco.GLContext is fixed at mujoco's first import."""
+    """Return the backend's class; mujoco.GLContext is fixed at mujoco's first import."""
     if not sys.platform.startswith("linux"):
         return importlib.import_module("mujoco").GLContext
     if backend in WINDOWS:
@@ -246,17 +275,19 @@ def _context_class(backend: str) -> Any:
 
 
 def _renderer() -> str:
-    """What OpenGL calls itself in the context that is current."""
+    """Return the name of OpenGL's renderer in the current context."""
     try:
         from OpenGL.GL import GL_RENDERER, glGetString
 
         name: Any = glGetString(GL_RENDERER)
         return name.decode()
     except Exception as error:  # a name to print, no reason to fail
-        return f"which does not tell its name: {error}"
+        return f"renderer without a name: {error}"
 
 
 def _has_library(name: str) -> bool:
+    """Return whether a shared library can be loaded."""
+    """Return whether a shared library can be loaded."""
     if ctypes.util.find_library(name):
         return True
     for suffix in (".so.1", ".so.8", ".so"):

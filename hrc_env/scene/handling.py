@@ -1,36 +1,46 @@
-"""What a robot handles: the task's loose objects, and what it knows of them.
+"""The task's loose objects: their state, their measurement, and the load of the robot.
 
-Objects are not what this project asks about: they are known by their true pose plus noise.
+Objects are not tracked by cameras: the robot knows their true poses plus noise.
 """
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from hrc_env.core.errors import check_fields
 from hrc_env.core.records import ObjectState, RobotState
-from hrc_env.core.typing import Bools, Capsules, Floats, Ints, Rngs
+from hrc_env.core.typing import Bools, Capsules, Floats, Ints, QuaternionsWxyz, Rngs
 from hrc_env.scene.build import Scene
-from hrc_env.scene.objects import object_state, with_load
+from hrc_env.scene.objects import attach_objects, make_object_state
 from hrc_env.scene.physics import Physics
 from hrc_env.world import World
 
 
 @dataclass(frozen=True, slots=True)
 class ObjectsConfig:
-    """How well the robot knows the task's loose objects."""
+    """Noise of the robot's measurement of the task's loose objects."""
 
     noise_m: float = 0.001
-    """Standard deviation of each coordinate, drawn in every step [m]."""
+    """Standard deviation of each coordinate of an object's position, drawn in every step [m]."""
     noise_rad: float = 0.005
-    """The same of the turn about each axis [rad]."""
+    """Standard deviation of an object's rotation about each axis, drawn in every step [rad]."""
 
     def __post_init__(self) -> None:
         check_fields(self, "not be negative", "noise_m", "noise_rad")
 
 
-def world_of(physics: Physics, ids: Ints, robot: RobotState) -> World:
-    """Robots of environments `ids` with what they handle."""
+class LoadedRobot(NamedTuple):
+    """Robots with the objects that they carry as part of them."""
+
+    world: World
+    """The world, whose robot has the carried objects' capsules."""
+    path_world: Capsules
+    """(B, T, K, 2, 3) capsules of robot and carried objects after every substep [m]."""
+
+
+def make_world(physics: Physics, ids: Ints, robot: RobotState) -> World:
+    """Return the true state of robots, hands and objects of environments `ids`."""
     hand, objects = physics.hand_state(ids), physics.scene.objects
     if not objects.names:
         return World(robot, hand)
@@ -38,36 +48,49 @@ def world_of(physics: Physics, ids: Ints, robot: RobotState) -> World:
     held = np.zeros((len(ids), len(objects.names)), bool)
     if hand is not None:
         held = physics.held(ids, robot.tool_world, hand)
-    return World(robot, hand, object_state(objects, qpos, qvel, held))
+    return World(robot, hand, make_object_state(objects, qpos, qvel, held))
 
 
-def loaded(
-    scene: Scene, world: World, arm_world: Capsules, q_path: Floats, loads: Bools | bool = True
-) -> tuple[World, Capsules]:
-    """What a robot carries is part of it, now and along capsules (B, T, K, 2, 3) where qpos is
-    q_path (B, T, nq): all objects, or those that are `loads` (B, O)."""
+def attach_load(
+    scene: Scene, world: World, path_world: Capsules, q_path: Floats, is_load: Bools | bool = True
+) -> LoadedRobot:
+    """Return the robots with the objects that they carry as part of them.
+
+    Args:
+        scene: the scene.
+        world: robots and objects, B of them.
+        path_world: (B, T, K, 2, 3) capsules of the robots after every substep [m].
+        q_path: (B, T, nq) `qpos` after every substep.
+        is_load: (B, O) whether each object counts as part of the robot while it is held.
+    """
     if world.objects is None:
-        return world, arm_world
-    held = world.objects.held & loads
-    robot, arm = with_load(world.robot, arm_world, scene.objects, q_path, held)
-    return replace(world, robot=robot), arm
+        return LoadedRobot(world, path_world)
+    held = world.objects.held & is_load
+    robot, path_world = attach_objects(world.robot, path_world, scene.objects, q_path, held)
+    return LoadedRobot(replace(world, robot=robot), path_world)
 
 
-def measured(objects: ObjectState, rngs: Rngs, config: ObjectsConfig) -> ObjectState:
-    """Objects as the robot knows them, with a generator for each environment."""
+def measure_objects(objects: ObjectState, rngs: Rngs, config: ObjectsConfig) -> ObjectState:
+    """Return a noisy measurement of objects.
+
+    Args:
+        objects: (B, O) true states.
+        rngs: B generators.
+        config: standard deviations of the noise.
+    """
     shape = objects.position_world.shape[1:]
     noise = np.array([rng.standard_normal((2, *shape)) for rng in rngs]).reshape(-1, 2, *shape)
     shift_m, half_turn = config.noise_m * noise[:, 0], 0.5 * config.noise_rad * noise[:, 1]
     return replace(
         objects,
         position_world=objects.position_world + shift_m,
-        quaternion_wxyz=_turned(objects.quaternion_wxyz, half_turn),
+        quaternion_wxyz=_rotate(objects.quaternion_wxyz, half_turn),
     )
 
 
-def _turned(quaternion: Floats, half_turn: Floats) -> Floats:
-    """Quaternions (..., 4) turned a little about world axes: half angles (..., 3) [rad]."""
+def _rotate(quaternion: QuaternionsWxyz, half_turn: Floats) -> QuaternionsWxyz:
+    """Return quaternions (..., 4) after small rotations by twice (..., 3) [rad] in the world."""
     w, v = quaternion[..., :1], quaternion[..., 1:]
-    aside = (half_turn * v).sum(-1, keepdims=True)
-    turned = np.concatenate([w - aside, v + w * half_turn + np.cross(half_turn, v)], axis=-1)
-    return turned / np.linalg.norm(turned, axis=-1, keepdims=True)
+    dot = (half_turn * v).sum(-1, keepdims=True)
+    rotated = np.concatenate([w - dot, v + w * half_turn + np.cross(half_turn, v)], axis=-1)
+    return rotated / np.linalg.norm(rotated, axis=-1, keepdims=True)

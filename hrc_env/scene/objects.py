@@ -1,12 +1,13 @@
-"""A task's loose objects: bodies of boxes with a free joint in the MJCF that the task adds.
+"""A task's loose objects: bodies of boxes with a free joint in the task's MJCF.
 
-Free joints follow the robot's own in `qpos`, seven numbers each: place [m] and quaternion.
+Their free joints follow the robot's joints in `qpos`, seven numbers each: position [m] and
+quaternion (w, x, y, z).
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -18,175 +19,269 @@ from hrc_env.core.typing import Bools, Capsules, Floats, Points3
 from hrc_env.geometry.rotations import rotate
 from hrc_env.geometry.shapes import BOX, WIDTH, absent_shape, shape
 from hrc_env.scene.primitives import DECORATION, OBJECT_BIT
-from hrc_env.worker.props import placed
+from hrc_env.worker.props import place_shapes
 from hrc_env.world import TaskScene
 
 PREFIX = "task/"
-"""What the names of a task's parts begin with in a scene."""
-POSE, RATE = 7, 6
-"""Numbers that say where an object is, and how it moves."""
-PITCH_M, THINNEST_M = 0.10, 0.019
-"""A carried box counts as capsules: so far apart at most, so thick at least [m]."""
+"""Prefix of the names of a task's parts in a scene."""
+POSE = 7
+"""Numbers of an object's pose in `qpos`."""
+RATE = 6
+"""Numbers of an object's velocity in `qvel`."""
+PITCH_M = 0.10
+"""Greatest distance of neighbouring capsules of a carried box [m]."""
+THINNEST_M = 0.019
+"""Least radius of such a capsule [m]."""
 AWAY_M = 1e4
-"""Where the capsules are of what is not carried [m]."""
+"""Coordinate at which capsules of objects are placed that are not carried [m]."""
 GRIP_M = 0.01
-"""What the fingers hold has the tool point inside, or so near [m]."""
+"""Greatest distance of the tool point from an object that closed fingers hold [m]."""
 
 
-def add_task_scene(spec: Any, task_scene: TaskScene, foot_world: Sequence[float]) -> None:
-    """Put them into a scene that is being built. Grips slip least with elliptic cones (5 kg shaken
-    at 3 m/s^2: 8 mm in 6 s; with MuJoCo's defaults 31)."""
+def add_task_scene(spec: mujoco.MjSpec, task_scene: TaskScene, foot_world: Sequence[float]) -> None:
+    """Add a task's bodies to a scene that is being built.
+
+    Friction cones are elliptic, with which grips slip least: 8 mm in 6 s for 5 kg shaken at 3
+    m/s^2, instead of 31 mm with MuJoCo's defaults.
+
+    Args:
+        spec: the scene.
+        task_scene: the task's bodies.
+        foot_world: place of the robot's foot [m].
+    """
     if task_scene.mjcf:
         spec.option.cone, spec.option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 10.0
         child = mujoco.MjSpec.from_string(task_scene.mjcf)
         for geom in (each for body in child.bodies if _is_free(body) for each in body.geoms):
-            geom.group = DECORATION  # what is solid stands still
+            geom.group = DECORATION  # solid geoms must not move
         frame = spec.worldbody.add_frame(pos=list(foot_world))
         spec.attach(child, prefix=PREFIX, frame=frame)
 
 
-def add_welds(spec: Any, task_scene: TaskScene) -> None:
-    """Its welds, when all sites are there."""
+def add_welds(spec: mujoco.MjSpec, task_scene: TaskScene) -> None:
+    """Add a task's welds to a scene that has all of their sites."""
     kinds = {True: mujoco.mjtEq.mjEQ_WELD, False: mujoco.mjtEq.mjEQ_CONNECT}
     for weld in task_scene.welds:
-        one, other = weld.sites
         spec.add_equality(
-            type=kinds[weld.turns], objtype=mujoco.mjtObj.mjOBJ_SITE, name=weld.name, name1=one,
-            name2=other, solref=list(weld.solref), active=False,
-        )  # fmt: skip
+            type=kinds[weld.turns],
+            objtype=mujoco.mjtObj.mjOBJ_SITE,
+            name=weld.name,
+            name1=weld.sites[0],
+            name2=weld.sites[1],
+            solref=list(weld.solref),
+            active=False,
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Objects:
-    """What is loose in a scene, in the objects' own frames; O of them."""
+    """The O loose objects of a scene, in their own frames."""
 
     names: tuple[str, ...]
+    """Names of the objects."""
     first: int
-    """Where they begin in `qpos` and `qvel`, after the robot's joints."""
+    """Index of the first object in `qpos` and `qvel`, after the robot's joints."""
     half_size_m: Points3
-    """(O, 3) half edges of the box round each, whose middle is the object's origin [m]."""
+    """(O, 3) half edges of each object's bounding box, whose middle is the object's origin [m]."""
     parts: Floats
-    """(O, n, `shapes.WIDTH`) the boxes of each; rows that are left over are absent."""
+    """(O, n, `shapes.WIDTH`) boxes of each object; surplus rows are absent shapes."""
     capsules: Capsules
-    """(O, n, 2, 3) the same as capsules, [m]; not a number: left over."""
+    """(O, n, 2, 3) capsules that represent each object [m]; surplus rows are NaN."""
     capsule_radius_m: Floats
-    """(O, n) [m]."""
+    """(O, n) radii of these capsules [m]."""
 
     def poses(self, qpos: Floats) -> Floats:
-        """(..., O, 7) place and quaternion of each, of qpos (..., nq)."""
-        own = qpos[..., self.first : self.first + POSE * len(self.names)]
-        return own.reshape(*qpos.shape[:-1], len(self.names), POSE)
+        """Return (..., O, 7) position [m] and quaternion of each object, from qpos (..., nq)."""
+        rows = qpos[..., self.first : self.first + POSE * len(self.names)]
+        return rows.reshape(*qpos.shape[:-1], len(self.names), POSE)
 
 
-def objects_of(spec: Any, first: int) -> Objects:
-    """The free bodies of a scene, after `first` joints of the robot. Raises `ConfigError` for one
-    that holds anything but boxes, or whose boxes' middle is not its origin."""
+class BoxCapsule(NamedTuple):
+    """A capsule that represents a part of a box, in the frame of the box."""
+
+    ends: Points3
+    """(2, 3) end points of its axis [m]."""
+    radius_m: float
+    """Radius [m]."""
+
+
+class PaddedCapsules(NamedTuple):
+    """Capsules of several objects in one array."""
+
+    ends: Capsules
+    """(O, n, 2, 3) end points of their axes [m]; surplus rows are NaN."""
+    radius_m: Floats
+    """(O, n) radii [m]; 0 in surplus rows."""
+
+
+class LoadedArm(NamedTuple):
+    """Robots with the objects that they hold as part of them."""
+
+    robot: RobotState
+    """State of the robots, with the objects' capsules."""
+    path_world: Capsules
+    """(B, T, K, 2, 3) capsules of robot and objects along a path [m]."""
+
+
+def find_objects(spec: mujoco.MjSpec, first: int) -> Objects:
+    """Return the free bodies of a scene, after `first` joints of the robot.
+
+    Raises:
+        ConfigError: a body has other shapes than boxes, or its boxes' middle is not its origin.
+    """
     bodies = [body for body in spec.bodies if _is_free(body)]
-    boxes = [[geom for geom in body.geoms if geom.contype & OBJECT_BIT] for body in bodies]
-    half, parts, rods = np.zeros((len(bodies), 3)), [], []
-    for row, (body, own) in enumerate(zip(bodies, boxes, strict=True)):
-        if not own or any(geom.type != mujoco.mjtGeom.mjGEOM_BOX for geom in own):
+    half = np.zeros((len(bodies), 3))
+    parts: list[list[Floats]] = []
+    capsules: list[list[BoxCapsule]] = []
+    for row, body in enumerate(bodies):
+        boxes = [geom for geom in body.geoms if geom.contype & OBJECT_BIT]
+        if not boxes or any(geom.type != mujoco.mjtGeom.mjGEOM_BOX for geom in boxes):
             raise ConfigError(f"Object {body.name!r} must be of boxes with contype {OBJECT_BIT}.")
-        low = np.min([geom.pos - geom.size for geom in own], axis=0)
-        high = np.max([geom.pos + geom.size for geom in own], axis=0)
+        low = np.min([geom.pos - geom.size for geom in boxes], axis=0)
+        high = np.max([geom.pos + geom.size for geom in boxes], axis=0)
         if np.abs(low + high).max() > 1e-6:
             raise ConfigError(f"Object {body.name!r} must have its middle at its origin.")
         half[row] = high
-        parts.append([shape(BOX, geom.pos, np.eye(3), geom.size) for geom in own])
-        rods.append([rod for geom in own for rod in box_capsules(geom.pos, geom.size)])
-    ends, radius_m = _padded(rods)
+        parts.append([shape(BOX, geom.pos, np.eye(3), geom.size) for geom in boxes])
+        capsules.append([each for geom in boxes for each in fit_capsules(geom.pos, geom.size)])
+    padded = _pad_capsules(capsules)
     return Objects(
-        tuple(body.name.removeprefix(PREFIX) for body in bodies), first, half, _filled(parts),
-        ends, radius_m,
-    )  # fmt: skip
+        names=tuple(body.name.removeprefix(PREFIX) for body in bodies),
+        first=first,
+        half_size_m=half,
+        parts=_pad_parts(parts),
+        capsules=padded.ends,
+        capsule_radius_m=padded.radius_m,
+    )
 
 
-def box_capsules(centre: Points3, half_size: Points3) -> list[tuple[Capsules, float]]:
-    """Capsules (2, 3) with radii that stand for a box: along its longest edges, side by side along
-    the second, as thick as the third; nowhere off by more than 1 cm for boxes up to 4 cm thick."""
+def fit_capsules(centre: Points3, half_size: Points3) -> list[BoxCapsule]:
+    """Return capsules that represent a box.
+
+    They lie along its longest edges, side by side along the second, as thick as the third. They
+    deviate from boxes up to 4 cm thick by at most 1 cm.
+
+    Args:
+        centre: (3,) middle of the box [m].
+        half_size: (3,) half edges [m].
+    """
     long, wide, thin = np.argsort(half_size)[::-1]
     radius = max(float(half_size[thin]), THINNEST_M)
     inset = max(float(half_size[wide]) - radius, 0.0)
     n = 1 + math.ceil(2 * inset / PITCH_M) if inset > 0 else 1
-    rods = []
+    capsules: list[BoxCapsule] = []
     for aside in np.linspace(-inset, inset, n) if n > 1 else [0.0]:
         ends = np.tile(np.asarray(centre, float), (2, 1))
         ends[:, wide] += aside
         ends[:, long] += np.array([-1.0, 1.0]) * max(float(half_size[long]) - radius, 0.0)
-        rods.append((ends, radius))
-    return rods
+        capsules.append(BoxCapsule(ends, radius))
+    return capsules
 
 
-def surfaces(objects: Objects, qpos: Floats) -> Floats:
-    """(B, O * n, `shapes.WIDTH`) the boxes of all objects where they are, of qpos (B, nq)."""
+def place_parts(objects: Objects, qpos: Floats) -> Floats:
+    """Return (B, O * n, `shapes.WIDTH`) the boxes of all objects in the world, at qpos (B, nq)."""
     poses = objects.poses(qpos)
     kinds = np.tile(np.arange(len(objects.names)), (len(qpos), 1))
-    return placed(kinds, poses[..., :3], poses[..., 3:], objects.parts)
+    return place_shapes(kinds, poses[..., :3], poses[..., 3:], objects.parts)
 
 
-def object_state(objects: Objects, qpos: Floats, qvel: Floats, held: Bools) -> ObjectState:
-    """Where objects are, of qpos (B, nq) and qvel (B, nv)."""
+def make_object_state(objects: Objects, qpos: Floats, qvel: Floats, held: Bools) -> ObjectState:
+    """Return the true state of the objects.
+
+    Args:
+        objects: the O objects.
+        qpos: (B, nq) positions.
+        qvel: (B, nv) velocities.
+        held: (B, O) whether the robot holds each object.
+    """
     poses, n = objects.poses(qpos), len(objects.names)
     rates = qvel[:, objects.first : objects.first + RATE * n].reshape(len(qvel), n, RATE)
     places, turns = poses[..., :3].copy(), poses[..., 3:].copy()
     return ObjectState(places, turns, rates[..., :3].copy(), rates[..., 3:].copy(), held)
 
 
-def held_by(objects: Objects, qpos: Floats, tool_world: Points3, hand: HandState) -> Bools:
-    """(B, O) what closed fingers hold: that in which, or nearly, the tool point (B, 3) is."""
+def find_held(objects: Objects, qpos: Floats, tool_world: Points3, hand: HandState) -> Bools:
+    """Return (B, O) whether closed fingers hold each object.
+
+    They hold the object that contains the tool point, or is within `GRIP_M` of it.
+
+    Args:
+        objects: the O objects.
+        qpos: (B, nq) positions.
+        tool_world: (B, 3) tool points [m].
+        hand: the grippers.
+    """
     held = np.zeros((len(qpos), len(objects.names)), bool)
-    _holding(objects.poses(qpos), objects.half_size_m, tool_world, hand.closed_on, held)
+    _find_held(objects.poses(qpos), objects.half_size_m, tool_world, hand.closed_on, held)
     return held
 
 
-def with_load(
+def attach_objects(
     robot: RobotState, path_world: Capsules, objects: Objects, q_path: Floats, held: Bools
-) -> tuple[RobotState, Capsules]:
-    """A robot with what it holds as part of it, now and along paths of capsules (B, T, K, 2, 3)
-    where qpos is q_path (B, T, nq)."""
+) -> LoadedArm:
+    """Return the robots with the objects that they hold as part of them.
+
+    Args:
+        robot: state of the robots.
+        path_world: (B, T, K, 2, 3) capsules of the robots along a path [m].
+        objects: the O objects.
+        q_path: (B, T, nq) `qpos` along the path.
+        held: (B, O) whether the robot holds each object.
+    """
     if not objects.names:
-        return robot, path_world
+        return LoadedArm(robot, path_world)
     batch, n_steps = q_path.shape[:2]
     loads = np.empty((batch, n_steps, *objects.capsules.shape))
-    _carry(objects.poses(q_path), objects.capsules, held, loads)
+    _place_loads(objects.poses(q_path), objects.capsules, held, loads)
     loads = loads.reshape(batch, n_steps, -1, 2, 3)
     radius_m = np.concatenate([robot.capsule_radius_m, objects.capsule_radius_m.ravel()])
     path_world = np.concatenate([path_world, loads], axis=2)
     carrying = replace(robot, capsules_world=path_world[:, -1], capsule_radius_m=radius_m)
-    return carrying, path_world
+    return LoadedArm(carrying, path_world)
 
 
-def _is_free(body: Any) -> bool:
+def _is_free(body: mujoco.MjsBody) -> bool:
     return any(joint.type == mujoco.mjtJoint.mjJNT_FREE for joint in body.joints)
 
 
-def _filled(parts: list[list[Floats]]) -> Floats:
-    """(O, n, `shapes.WIDTH`) with rows that are absent where an object has fewer."""
+def _pad_parts(parts: list[list[Floats]]) -> Floats:
+    """Return (O, n, `shapes.WIDTH`) the boxes of each object; surplus rows are absent shapes."""
     n = max(map(len, parts), default=0)
     table = np.broadcast_to(absent_shape(), (len(parts), n, WIDTH)).copy()
-    for row, own in zip(table, parts, strict=True):
-        row[: len(own)] = own
+    for row, boxes in zip(table, parts, strict=True):
+        row[: len(boxes)] = boxes
     return table
 
 
-def _padded(rods: list[list[tuple[Capsules, float]]]) -> tuple[Capsules, Floats]:
-    n = max(map(len, rods), default=0)
-    ends, radius_m = np.full((len(rods), n, 2, 3), np.nan), np.zeros((len(rods), n))
-    for row, own in enumerate(rods):
-        for k, (pair, radius) in enumerate(own):
-            ends[row, k], radius_m[row, k] = pair, radius
-    return ends, radius_m
+def _pad_capsules(capsules: list[list[BoxCapsule]]) -> PaddedCapsules:
+    """Return the capsules of each object in one array."""
+    n = max(map(len, capsules), default=0)
+    padded = PaddedCapsules(np.full((len(capsules), n, 2, 3), np.nan), np.zeros((len(capsules), n)))
+    for row, of_object in enumerate(capsules):
+        for k, each in enumerate(of_object):
+            padded.ends[row, k], padded.radius_m[row, k] = each.ends, each.radius_m
+    return padded
 
 
 @kernel
-def _holding(poses, half_size, tool_world, closed_on, held):
-    """The nearest box that the tool point is in, or nearly."""
+def _find_held(
+    poses: Floats, half_size: Points3, tool_world: Points3, closed_on: Bools, held: Bools
+) -> None:
+    """Mark the nearest box that contains the tool point or is within `GRIP_M` of it.
+
+    Args:
+        poses: (B, O, 7) poses of the boxes, position [m] and quaternion (w, x, y, z).
+        half_size: (O, 3) half edges of the boxes [m].
+        tool_world: (B, 3) tool points [m].
+        closed_on: (B,) whether the fingers have closed on something.
+        held: (B, O) of which the held box is set to true.
+    """
     for b in range(len(poses)):
         nearest, chosen = GRIP_M, -1
         for o in range(poses.shape[1] if closed_on[b] else 0):
-            at, tool = poses[b, o], tool_world[b]
-            away = tool[0] - at[0], tool[1] - at[1], tool[2] - at[2]
-            x, y, z = rotate((at[3], -at[4], -at[5], -at[6]), away)
+            pose, tool = poses[b, o], tool_world[b]
+            offset = tool[0] - pose[0], tool[1] - pose[1], tool[2] - pose[2]
+            x, y, z = rotate((pose[3], -pose[4], -pose[5], -pose[6]), offset)
             half = half_size[o]
             out_m = max(abs(x) - half[0], abs(y) - half[1], abs(z) - half[2])
             if out_m < nearest:
@@ -196,8 +291,15 @@ def _holding(poses, half_size, tool_world, closed_on, held):
 
 
 @kernel
-def _carry(poses, capsules, held, loads):
-    """Capsules where they are carried; far away where they are not, or there is none."""
+def _place_loads(poses: Floats, capsules: Capsules, held: Bools, loads: Floats) -> None:
+    """Write the capsules of held objects in the world; those of others are at `AWAY_M`.
+
+    Args:
+        poses: (B, T, O, 7) poses of the objects, position [m] and quaternion (w, x, y, z).
+        capsules: (O, n, 2, 3) their capsules in their own frames [m]; surplus rows are NaN.
+        held: (B, O) whether the robot holds each object.
+        loads: (B, T, O, n, 2, 3) written [m].
+    """
     for b, t, o in np.ndindex(poses.shape[:3]):
         pose = poses[b, t, o]
         for k in range(capsules.shape[1]):

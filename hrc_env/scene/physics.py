@@ -1,66 +1,110 @@
-"""Many copies of one scene, stepped together: the arm obeys, the workers walk.
+"""Physics of many copies of one scene, stepped together: robots follow commands, workers walk.
 
-Everything that changes lives in the state rows of one `mujoco.batch.Batch`, whatever the batch
-size: copying them copies the simulation, and results do not depend on neighbours.
+The whole state is in the rows of one `mujoco.batch.Batch`, for any batch size: a copy of the rows
+is a copy of the simulation, and results do not depend on the other environments of a batch.
 """
 
 import math
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
+from hrc_env.core.declared import Records1, dtype_of, make_records
 from hrc_env.core.errors import ConfigError, HRCError, check_shape
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import HandState, WorkerPath
-from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, JointVelocities, Points3, Records
+from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, JointVelocities, Points3
 from hrc_env.geometry.chains import tool_frame
 from hrc_env.scene.build import Scene, without_workers
-from hrc_env.scene.cups import Cups, load_n, seals
+from hrc_env.scene.cups import Cups, find_sealed, measure_load_n
 from hrc_env.scene.limits import slew_rad_s2
-from hrc_env.scene.objects import held_by
+from hrc_env.scene.objects import find_held
 from hrc_env.scene.robot import PREFIX
 from hrc_env.scene.worker import CAPSULE_FIELDS, capsule_shapes
 from hrc_env.world import Effects
 
 COMMANDS = int(mujoco.mjtState.mjSTATE_CTRL)
-"""What a substep without workers is given: servo commands."""
+"""Inputs of a substep without workers: servo commands."""
 INPUTS = COMMANDS | int(mujoco.mjtState.mjSTATE_MOCAP_POS | mujoco.mjtState.mjSTATE_MOCAP_QUAT)
-"""And with workers: then the places, then the turns of their bodies."""
-OF_THE_ARM = ("time", "qpos", "qvel", "act", "qacc_warmstart")
-OF_THINGS = ("eq_active", "xfrc_applied")
-"""What of an environment's state the motion of the arm, and of what it handles, hangs on."""
-SERVO = np.dtype(
-    [(name, "f8") for name in ("low", "high", "fastest", "slew", "lead", "clamp")], align=True
-)
-"""A joint's lowest and highest angle [rad], velocity limit [rad/s], fastest change of the command
-[rad/s^2], lead of its rate servo [s], and how far its holding servo may be ahead [rad]; a slide's
-in metres."""
-PRESSING_N, RESTING_M_S = 40.0, 0.01
-"""Fingers that press with more [N] and move less [m/s] have closed on something."""
+"""Inputs of a substep with workers: servo commands, positions and rotations of their bodies."""
+ARM_FIELDS = ("time", "qpos", "qvel", "act", "qacc_warmstart")
+"""Fields of the state that determine the motion of the robot."""
+OBJECT_FIELDS = ("eq_active", "xfrc_applied")
+"""Further fields that determine the motion of loose objects."""
+PRESSING_N = 40.0
+"""Force above which fingers press on an object [N]."""
+RESTING_M_S = 0.01
+"""Speed below which fingers are at rest [m/s]; fingers that press and rest have closed."""
 END_MARGIN_RAD = 0.02
-"""Where a robot comes to rest before the end of a joint's range; a slide [m]."""
+"""Distance from the end of a joint's range at which it comes to rest [rad], of a slide [m]."""
 BRAKE_SHARE = 0.7
-"""Share of the slew limit that stopping before an end counts on."""
+"""Share of the slew limit with which joints brake before the ends of their ranges."""
+
+
+class Servo:
+    """Limits and servos of a joint; the units are of a hinge, of a slide they are in metres."""
+
+    low: float
+    """Lower end of the joint's range [rad]."""
+    high: float
+    """Upper end of the joint's range [rad]."""
+    fastest: float
+    """Velocity limit [rad/s]."""
+    slew: float
+    """Limit on the change of the commanded velocity [rad/s^2]."""
+    lead: float
+    """Lead of the rate servo [s]."""
+    clamp: float
+    """Limit on the lead of the holding servo's angle over the joint's [rad]."""
+
+
+SERVO = dtype_of(Servo)
+
+
+class SharedField(NamedTuple):
+    """A field of the same environments without and with workers."""
+
+    alone: Floats
+    """(B, ...) in the simulations without workers."""
+    beside: Floats
+    """(B, ...) the same entries in the simulations with workers, whose bodies come last."""
+
+
+class Saved(NamedTuple):
+    """Simulations in a pickle."""
+
+    scene: Scene
+    """The scene."""
+    batch: int
+    """Number of simulations, B."""
+    state: Floats
+    """(B, n) the whole state."""
 
 
 class Physics:
-    """B simulations of a scene."""
+    """B simulations of a scene.
+
+    Args:
+        scene: the scene.
+        batch: number of simulations, B.
+    """
 
     def __init__(self, scene: Scene, batch: int) -> None:
         if batch < 1:
             raise ConfigError(f"Physics needs at least one environment, got {batch}.")
         self.scene, self.batch = scene, batch
-        self._n, self._servos = scene.chain.n_joints, _servos(scene)
+        self._n, self._servos = scene.chain.n_joints, _make_servos(scene)
         self._sims = Batch(scene.model, nsim=batch, nthread=1)
         self._alone = Batch(without_workers(scene).model, nsim=batch, nthread=1)
-        fields = OF_THE_ARM + (OF_THINGS if scene.objects.names else ())
-        self._shared = [_both(self._alone, self._sims, field) for field in fields]
+        fields = ARM_FIELDS + (OBJECT_FIELDS if scene.objects.names else ())
+        self._shared = [_bind_shared(self._alone, self._sims, field) for field in fields]
         self._qpos, self._qvel = self._sims.bind("qpos"), self._sims.bind("qvel")
         self._welded = self._sims.bind("eq_active")
         self._push = self._sims.bind("xfrc_applied") if scene.objects.names else np.zeros(0)
         self._records = ("qpos", "sensordata") if scene.cups else ("qpos",)
-        self._parts = self._alone.bind("eq_active").shape == self._welded.shape
+        self._is_separable = self._alone.bind("eq_active").shape == self._welded.shape
         self._act, kept = self._sims.bind("act"), self._sims.bind("userdata")
         self._command, self._body = kept[:, : self._n], kept[:, self._n : self._n + scene.n_workers]
         self._grip = kept[:, self._n + scene.n_workers :]
@@ -71,31 +115,31 @@ class Physics:
 
     @property
     def q(self) -> JointAngles:
-        """(B, N) the arm's angles [rad], a copy."""
+        """(B, N) joint angles of the robots [rad], a copy."""
         return self._qpos[:, : self._n].copy()
 
     @property
     def qd(self) -> JointVelocities:
-        """(B, N) the arm's velocities [rad/s], a copy."""
+        """(B, N) joint velocities of the robots [rad/s], a copy."""
         return self._qvel[:, : self._n].copy()
 
     @property
     def command(self) -> JointVelocities:
-        """(B, N) the joint velocities that are commanded now [rad/s], a copy."""
+        """(B, N) commanded joint velocities [rad/s], a copy."""
         return self._command.copy()
 
     @property
     def qpos(self) -> Floats:
-        """(B, nq) the arm's angles [rad], its fingers' ways [m], loose objects' poses, a copy."""
+        """(B, nq) joint angles [rad], fingers' displacements [m] and objects' poses, a copy."""
         return self._qpos.copy()
 
     @property
     def qvel(self) -> Floats:
-        """(B, nv) their rates, a copy."""
+        """(B, nv) velocities of joints, fingers and objects, a copy."""
         return self._qvel.copy()
 
     def hand_state(self, ids: Ints) -> HandState | None:
-        """What hands of environments `ids` feel; None: there are none."""
+        """Return the state of the hands of environments `ids`; None if the robot has none."""
         hand, cups = self.scene.grip, self.scene.cups
         if cups is not None:
             load, sealed = self._grip[ids, 0], self._welded[ids][:, cups.welds].any(1)
@@ -110,35 +154,47 @@ class Physics:
         return HandState(opening_m, force_n, (force_n > PRESSING_N) & still)
 
     def held(self, ids: Ints, tool_world: Points3, hand: HandState) -> Bools:
-        """(len(ids), O) what hands hold."""
+        """Return (n, O) whether the hands of environments `ids` (n,) hold each object.
+
+        Args:
+            ids: (n,) the environments in question.
+            tool_world: (n, 3) their tool points [m].
+            hand: state of their hands.
+        """
         objects, cups = self.scene.objects, self.scene.cups
         if cups is None:
-            return held_by(objects, self._qpos[ids], tool_world, hand)
+            return find_held(objects, self._qpos[ids], tool_world, hand)
         held = np.zeros((len(ids), len(objects.names)), bool)
         held[:, cups.objects] = self._welded[ids][:, cups.welds] > 0.0
         return held
 
     def apply(self, effects: Effects | None) -> None:
-        """Do to loose objects what a task does, until it does something else; None: go on."""
+        """Apply a task's welds and forces to loose objects until the next call; None keeps them."""
         if effects is None:
             return
-        for name, on in effects.welded.items():
-            self._welded[:, self.scene.model.equality(name).id] = on
+        for name, is_on in effects.welded.items():
+            self._welded[:, self.scene.model.equality(name).id] = is_on
         self._push[:, self.scene.object_bodies] = effects.push_world
 
-    def _suck(self, cups: Cups, on: Bools) -> None:
-        """Vent the cups, or let them seal; what is too heavy is torn off."""
+    def _switch_cups(self, cups: Cups, is_on: Bools) -> None:
+        """Vent cups, or let them seal where `is_on` (B,); a load above the limit is torn off."""
         q, welded = self._qpos[:, : self._n], self._welded[:, cups.welds] > 0.0
-        near = seals(cups, tool_frame(self.scene.chain, q), self.scene.objects.poses(self._qpos))
+        tool, poses = tool_frame(self.scene.chain, q), self.scene.objects.poses(self._qpos)
+        near = find_sealed(cups, tool, poses)
         torn = self._grip[:, :1] > cups.limit_n
-        self._welded[:, cups.welds] = on[:, None] & (welded | near) & ~(welded & torn)
+        self._welded[:, cups.welds] = is_on[:, None] & (welded | near) & ~(welded & torn)
 
     def reset(
         self, ids: Ints, q: JointAngles, body: Ints | None = None, poses: Floats | None = None
     ) -> None:
-        """Put environments `ids` (sorted) to rest at angles q (len(ids), N) [rad], hands open;
-        their workers have bodies (len(ids), W) of the scene's, None: the first; objects lie at
-        poses (len(ids), O, 7), None: as the task's MJCF has them."""
+        """Put environments to rest, with open hands.
+
+        Args:
+            ids: (n,) the environments in question, sorted.
+            q: (n, N) their joint angles [rad].
+            body: (n, W) index of each worker's body among the scene's; None for the first.
+            poses: (n, O, 7) poses of loose objects; None for those of the task's MJCF.
+        """
         ids = np.asarray(ids, int)
         check_shape("q", np.shape(q), (len(ids), self._n), "one row per id, one angle per joint")
         for sims in (self._sims, self._alone):
@@ -159,44 +215,57 @@ class Physics:
         out_of_reach: Bools | None = None,
         grip: Floats | None = None,
     ) -> Floats:
-        """One control step of every environment: (B, T, nq), `qpos` after every substep.
+        """Advance every environment by one control step.
 
         Args:
-            qd_command: (B, N) wanted joint velocities [rad/s]; limited in size and slew, and
-                braked before the joints' ends, here.
-            workers: after every substep, arrays (B, T, W, S, ...); W may be 0.
-            out_of_reach: (B,) where no worker can touch the arm in this step (None: nowhere); it
-                then moves as it would alone, bit for bit, and is quicker so.
-            grip: (B,) from -1, open, to 1, closed; of cups, above 0 they suck. None: open.
+            qd_command: (B, N) wanted joint velocities [rad/s]; they are limited here in size and
+                slew, and braked before the ends of the joints' ranges.
+            workers: poses of the workers after every substep, arrays (B, T, W, S, ...); W may be 0.
+            out_of_reach: (B,) whether no worker can touch the robot in this step; None for no
+                environment. The robot then moves as without workers, bit for bit, and faster.
+            grip: (B,) command of the hands from -1, open, to 1, closed; cups are on above 0. None
+                for open hands.
+
+        Returns:
+            (B, T, nq) `qpos` after every substep.
 
         Raises:
-            ConfigError: wrong shapes. HRCError: the physics broke down, with the reason.
+            ConfigError: the arrays have wrong shapes.
+            HRCError: the physics broke down; the error names the reason.
         """
         check_shape("qd_command", np.shape(qd_command), (self.batch, self._n), "batch, joints")
-        self._fit(workers)
+        self._check_workers(workers)
         n = self._n
         _substep_commands(
-            self._qpos[:, :n], self._qvel[:, :n], self._act[:, :n], self._command,
-            np.asarray(qd_command, float), self._servos, self.scene.config.sim_dt,
+            self._qpos[:, :n],
+            self._qvel[:, :n],
+            self._act[:, :n],
+            self._command,
+            np.asarray(qd_command, float),
+            self._servos,
+            self.scene.config.sim_dt,
             self._control,
-        )  # fmt: skip
+        )
         wanted = np.full(self.batch, -1.0) if grip is None else np.nan_to_num(grip, nan=-1.0)
         if self.scene.grip is not None:
             share = 0.5 * (1.0 - np.clip(wanted, -1.0, 1.0))
             self._grip[:, 0] = share * self.scene.grip.open_m
         if self.scene.cups is not None:
-            self._suck(self.scene.cups, wanted > 0.0)
+            self._switch_cups(self.scene.cups, wanted > 0.0)
         alone = np.zeros(self.batch, bool)
-        if out_of_reach is not None and self._parts:
+        if out_of_reach is not None and self._is_separable:
             alone = out_of_reach
-        self._roll(~alone, workers)
-        self._roll(alone, None)
+        self._simulate(~alone, workers)
+        self._simulate(alone, None)
         self._check_health()
         return self._trace.copy()
 
-    def touched_at(self, q: JointAngles) -> str | None:
-        """Return the name of what still stands or lies in the way of the robot at angles q (N,)
-        [rad], its own other parts included; None: nothing. Loose objects are as in the MJCF."""
+    def find_contact(self, q: JointAngles) -> str | None:
+        """Return the names of two geoms that touch with the robot at angles q (N,) [rad].
+
+        Contacts of the robot with itself count, too. Loose objects have the poses of the MJCF, and
+        there are no workers. None if nothing touches.
+        """
         model = without_workers(self.scene).model
         data = mujoco.MjData(model)
         data.qpos[: self._n] = q
@@ -208,32 +277,31 @@ class Physics:
         return None
 
     def get_state(self) -> Floats:
-        """(B, n) everything that changes; `set_state` brings it back bit for bit."""
+        """Return (B, n) the whole state; `set_state` restores it bit for bit."""
         return self._sims.state.copy()
 
     def set_state(self, state: Floats) -> None:
-        """Continue from a state that `get_state` gave (same scene and batch)."""
+        """Restore a state that `get_state` returned, of the same scene and batch size."""
         check_shape("state", np.shape(state), self._sims.state.shape, "batch, state")
         self._sims.state[:] = state
         self._set_capsules(np.arange(self.batch))
 
-    def __getstate__(self) -> tuple[Scene, int, Floats]:
-        return self.scene, self.batch, self.get_state()
+    def __getstate__(self) -> "Saved":
+        return Saved(self.scene, self.batch, self.get_state())
 
-    def __setstate__(self, saved: tuple[Scene, int, Floats]) -> None:
-        scene, batch, state = saved
-        self.__init__(scene, batch)
-        self.set_state(state)
+    def __setstate__(self, saved: "Saved") -> None:
+        self.__init__(saved.scene, saved.batch)
+        self.set_state(saved.state)
 
     def _set_capsules(self, ids: Ints) -> None:
-        """Give the workers of environments `ids` the capsules of their bodies."""
+        """Set the capsules of the workers of environments `ids` to those of their bodies."""
         body, geoms = self._body[ids].astype(np.int64), self.scene.worker_capsules
         known = capsule_shapes(self.scene.bodies) if self._shapes else {}
         for name, shapes in self._shapes.items():
             shapes[ids[:, None, None], geoms] = known[name][body]
 
-    def _fit(self, workers: WorkerPath) -> None:
-        """Check the path's axes; make the buffers when the number of substeps is new."""
+    def _check_workers(self, workers: WorkerPath) -> None:
+        """Check the axes of a path, and resize the buffers for its number of substeps."""
         rows, n_substeps = self.scene.worker_mocap, workers.position_world.shape[1]
         expected = (self.batch, max(n_substeps, 1), *rows.shape[:1])
         meaning = "batch, substeps (at least one), workers"
@@ -243,13 +311,13 @@ class Physics:
             self._control = np.zeros((self.batch, n_substeps, 2 * self._n))
             self._trace = np.zeros((self.batch, n_substeps, model.nq))
 
-    def _roll(self, which: Bools, workers: WorkerPath | None) -> None:
-        """The substeps of some environments (B,), beside workers or (None) with nobody there."""
-        n = np.count_nonzero(which)
+    def _simulate(self, is_selected: Bools, workers: WorkerPath | None) -> None:
+        """Simulate the substeps of some environments (B,), beside workers or (None) without."""
+        n = np.count_nonzero(is_selected)
         if n == 0:
             return
-        ids = None if n == len(which) else np.flatnonzero(which)
-        rows = slice(None) if ids is None else ids  # all need no copy
+        ids = None if n == len(is_selected) else np.flatnonzero(is_selected)
+        rows = slice(None) if ids is None else ids  # a slice needs no copy
         sims, inputs, control = self._alone, COMMANDS, self._control[rows]
         if self.scene.grip is not None:
             grip = np.broadcast_to(self._grip[rows, None], (*control.shape[:2], 1))
@@ -264,37 +332,37 @@ class Physics:
         trace = sims.rollout(control.shape[1], control, inputs, self._records, ids)
         self._trace[rows] = trace["qpos"]
         if (cups := self.scene.cups) is not None:
-            self._grip[rows, 0] = load_n(cups, trace["sensordata"]).max(axis=1)
+            self._grip[rows, 0] = measure_load_n(cups, trace["sensordata"]).max(axis=1)
         for alone, beside in shared:
             beside[rows] = alone[rows]
 
     def _check_health(self) -> None:
-        """MuJoCo answers an exploding state or a full memory with a warning: raise it."""
+        """Raise `HRCError` for MuJoCo's warnings of an exploding state or a full memory."""
         for sims in (self._sims, self._alone):
             if np.count_nonzero(sims.warning):
                 environment, kind, _ = np.argwhere(sims.warning)[0]
                 raise HRCError(
                     f"The physics of environment {environment} broke down "
                     f"({mujoco.mjtWarning(int(kind)).name}): expected finite states and bounded "
-                    "contacts; reset it, and look at what it was commanded."
+                    "contacts; reset it, and check its commands."
                 )
 
 
-def _both(alone: Batch, beside: Batch, field: str) -> tuple[Floats, Floats]:
-    """A field of the same environments without workers and with them, whose bodies come last."""
+def _bind_shared(alone: Batch, beside: Batch, field: str) -> SharedField:
+    """Return views of a field in simulations without and with workers."""
     less, more = alone.bind(field), beside.bind(field)
-    return less, more[:, : less.shape[1]] if less.ndim > 1 else more
+    return SharedField(less, more[:, : less.shape[1]] if less.ndim > 1 else more)
 
 
-def no_workers(batch: int, n_substeps: int) -> WorkerPath:
-    """The path of nobody, for scenes without workers: arrays (B, T, 0, 22, ...)."""
-    lead = (batch, n_substeps, 0, 22)
-    return WorkerPath(np.zeros((*lead, 3)), np.zeros((*lead, 4)))
+def make_empty_path(batch: int, n_substeps: int) -> WorkerPath:
+    """Return the path of no workers, arrays (B, T, 0, 22, ...), for scenes without them."""
+    shape = (batch, n_substeps, 0, 22)
+    return WorkerPath(np.zeros((*shape, 3)), np.zeros((*shape, 4)))
 
 
-def _servos(scene: Scene) -> Records:
-    """(N,) `SERVO` of a scene's arm."""
-    servos, config, chain = np.zeros(scene.chain.n_joints, SERVO), scene.config, scene.chain
+def _make_servos(scene: Scene) -> Records1[Servo]:
+    """Return (N,) limits and servos of a scene's robot."""
+    servos, config, chain = make_records(Servo, scene.chain.n_joints), scene.config, scene.chain
     servos["low"], servos["high"] = chain.range_rad.T
     servos["fastest"], servos["lead"] = chain.velocity_limit_rad_s, scene.servo_lead_s
     servos["slew"] = slew_rad_s2(scene)
@@ -303,43 +371,55 @@ def _servos(scene: Scene) -> Records:
 
 
 @kernel
-def _substep_commands(q, qd, held, command, wanted, servos, sim_dt, control):
-    """Commands of one control step: limited in size, slew and before the joints' ends.
+def _substep_commands(
+    q: JointAngles,
+    qd: JointVelocities,
+    held: JointAngles,
+    command: JointVelocities,
+    wanted: JointVelocities,
+    servos: Records1[Servo],
+    sim_dt: float,
+    control: Floats,
+) -> None:
+    """Write the commands of one control step, limited in size, slew and before the joints' ends.
 
-    The rate servo's command runs ahead by its lead: its torque then pays for the acceleration, and
-    the holding servo need not lag.
+    The rate servo's command runs ahead by its lead, so that its torque provides the acceleration
+    and the holding servo does not lag.
 
     Args:
-        q, qd: (B, N) angles [rad] and velocities [rad/s] now.
-        held, command: (B, N) angles that the holding servos hold [rad] and the command in force
-            [rad/s], kept near a blocked arm so that it leaves at once; the command is advanced.
-        wanted: (B, N) wanted velocities [rad/s]; what is not finite counts as 0.
-        servos: (N,) `SERVO`.
-        sim_dt: how long a substep is [s].
+        q: (B, N) joint angles [rad].
+        qd: (B, N) joint velocities [rad/s].
+        held: (B, N) angles of the holding servos [rad]; they are kept near those of a blocked
+            robot, so that it moves on at once.
+        command: (B, N) command in force [rad/s], which is advanced by the control step.
+        wanted: (B, N) wanted velocities [rad/s]; values that are not finite count as 0.
+        servos: (N,) limits and servos of the joints.
+        sim_dt: duration of a substep [s].
         control: (B, T, 2 N) written [rad/s]: each substep's mean velocity for the holding servos,
-            so that their integral is exact however time is cut; that at its end for the others.
+            so that their integral does not depend on the length of a substep, then the velocity at
+            its end for the rate servos.
     """
     n_substeps, n = control.shape[1], q.shape[1]
     ctrl_dt = sim_dt * n_substeps
     for b in range(q.shape[0]):
         for i in range(n):
-            servo, at = servos[i], q[b, i]
-            held[b, i] = min(max(held[b, i], at - servo.clamp), at + servo.clamp)
+            servo, angle = servos[i], q[b, i]
+            held[b, i] = min(max(held[b, i], angle - servo.clamp), angle + servo.clamp)
             most, brake = servo.slew * sim_dt, BRAKE_SHARE * servo.slew
             reach = most * n_substeps
-            now = min(max(command[b, i], qd[b, i] - reach), qd[b, i] + reach)
+            velocity = min(max(command[b, i], qd[b, i] - reach), qd[b, i] + reach)
             target = wanted[b, i] if math.isfinite(wanted[b, i]) else 0.0
             target = min(servo.fastest, max(-servo.fastest, target))
-            # v ctrl_dt + v^2 / (2 brake) = room: the speed that still stops in time.
-            room_up = max(0.0, servo.high - END_MARGIN_RAD - at)
-            room_down = max(0.0, at - servo.low - END_MARGIN_RAD)
+            # v ctrl_dt + v^2 / (2 brake) = room: the greatest speed that still stops in time.
+            room_up = max(0.0, servo.high - END_MARGIN_RAD - angle)
+            room_down = max(0.0, angle - servo.low - END_MARGIN_RAD)
             fastest_up = brake * (math.sqrt(ctrl_dt**2 + 2 * room_up / brake) - ctrl_dt)
             fastest_down = brake * (math.sqrt(ctrl_dt**2 + 2 * room_down / brake) - ctrl_dt)
             target = min(fastest_up, max(-fastest_down, target))
             for t in range(n_substeps):
-                change = min(most, max(-most, target - now))
+                change = min(most, max(-most, target - velocity))
                 # Ramp for |change| / slew, then constant: the mean over the substep.
-                control[b, t, i] = now + change * (1.0 - 0.5 * (abs(change) / most))
-                now += change
-                control[b, t, n + i] = now + servo.lead * change / sim_dt
-            command[b, i] = now
+                control[b, t, i] = velocity + change * (1.0 - 0.5 * (abs(change) / most))
+                velocity += change
+                control[b, t, n + i] = velocity + servo.lead * change / sim_dt
+            command[b, i] = velocity

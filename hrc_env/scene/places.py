@@ -1,5 +1,4 @@
-"""The scenes by name: cameras, where people stand, walk and work (`assets/scenes/NAME.toml`), and
-what stands still in them as plain numbers."""
+"""Scenes by name: cameras, floor plan and workplaces (`assets/scenes/NAME.toml`), and obstacles."""
 
 import math
 from dataclasses import dataclass, replace
@@ -29,10 +28,11 @@ from hrc_env.worker.props import BOUNDS_M, PROP_NAMES
 from hrc_env.world import Grounds, Workplace
 
 ROBOT_CLEARANCE_M = 0.8
+"""Distance that workers' paths keep from the axis of the robot's first joint [m]."""
 HEADROOM_M = 2.1
-"""What begins higher than this does not stand in anybody's way [m]; a tall worker with a hat."""
+"""Height of a shape's lower end above which it blocks nobody [m]: a tall worker with a hat."""
 STEP_OVER_M = 0.02
-"""Nor does what ends lower than this [m]."""
+"""Height of a shape's upper end below which it blocks nobody [m]."""
 UPRIGHT = 0.999
 """Cosine from which on a box counts as standing upright."""
 KINDS = {
@@ -42,43 +42,52 @@ KINDS = {
     mujoco.mjtGeom.mjGEOM_CAPSULE: CAPSULE,
     mujoco.mjtGeom.mjGEOM_SPHERE: CAPSULE,
 }
-"""Of what blocks sight."""
+"""Kinds of shapes that block sight, by MuJoCo's kinds of geoms."""
 LEFT_AT = {"pile": "box", "floor": "box", "cart": "cart"}
-"""What of loads may stand on the floor, by the kinds of places."""
+"""Props that may stand on the floor, by the kinds of workplaces."""
 Footprint = tuple[float, float, float, float, float]
-"""As a row of `Grounds.blocked`."""
+"""A row of `Grounds.blocked`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Room:
-    """What a scene is beside its MJCF, `NAME.xml`, or `NAME_bare.xml` without clutter."""
+    """Description of a scene beside its MJCF, `NAME.xml`, or `NAME_bare.xml` without clutter."""
 
     mount_world: tuple[float, float, float]
-    """Where the robot's foot stands [m]."""
+    """Place of the robot's foot [m]."""
     walkable_x_m: tuple[float, float]
+    """Least and greatest x of the area where workers stand and walk [m]."""
     walkable_y_m: tuple[float, float]
+    """Least and greatest y of that area [m]."""
     cameras: tuple[CameraConfig, ...]
-    """Those that hang there unless the settings say otherwise."""
+    """Cameras of the scene, if the settings have none."""
     places: tuple[Workplace, ...]
+    """Workplaces."""
     clutter_places: tuple[Workplace, ...]
-    """Further ones, with clutter."""
+    """Further workplaces with clutter."""
     ceiling_m: float | None = None
-    """Height of its ceiling [m]; None: it is open to the sky."""
+    """Height of the ceiling [m]; None for a scene that is open to the sky."""
     open_walls: tuple[Footprint, ...] = ()
-    """With clutter: what nobody walks through; stands for all footprints that it holds."""
+    """Footprints with clutter that people do not walk through; each replaces the footprints of the
+    shapes that it contains."""
     flat: tuple[Footprint, ...] = ()
-    """With clutter: what stands in the way and hides nobody."""
+    """Footprints with clutter that block the floor and occlude nothing."""
 
     def grounds(
         self, obstacles: Floats, clutter: bool, further: tuple[Workplace, ...] = ()
     ) -> Grounds:
-        """Where people can be between shapes (G, `shapes.WIDTH`) that stand there; `further` places
-        are given from the robot's foot on."""
+        """Return the floor plan.
+
+        Args:
+            obstacles: (G, `shapes.WIDTH`) fixed shapes.
+            clutter: whether furniture and building material stand there.
+            further: workplaces of a task, relative to the robot's foot.
+        """
         robot_xy_m = self.mount_world[:2]
-        blocked = footprints(obstacles, robot_xy_m)
+        blocked = find_footprints(obstacles, robot_xy_m)
         if clutter:
             walls, flat = (np.reshape(each, (-1, 5)) for each in (self.open_walls, self.flat))
-            blocked = np.concatenate([blocked[~within(blocked, walls)], walls, flat])
+            blocked = np.concatenate([blocked[~is_within(blocked, walls)], walls, flat])
         x, y, z = self.mount_world
         moved = tuple(
             replace(each, xy_m=(x + each.xy_m[0], y + each.xy_m[1]), height_m=z + each.height_m)
@@ -98,20 +107,25 @@ SCENES: dict[str, Room] = {
     path.stem: from_mapping(Room, read_toml(path))
     for path in sorted((assets_dir() / "scenes").glob("*.toml"))
 }
+"""Scenes by name."""
 
 
-def to_drive_in(grounds: Grounds, obstacles: Floats) -> Grounds:
-    """The same for a robot that drives: what stands on the pedestal's axis is in its way, and so is
-    where loads lie on the floor or may be left."""
+def block_loads(grounds: Grounds, obstacles: Floats) -> Grounds:
+    """Return the floor plan for a mobile base, which the pedestal and the places of loads block.
+
+    Args:
+        grounds: the floor plan for workers.
+        obstacles: (G, `shapes.WIDTH`) fixed shapes, the pedestal among them.
+    """
     x, y = grounds.robot_xy_m
-    standing = footprints(obstacles, (math.inf, math.inf))
-    own = standing[np.hypot(standing[:, 0] - x, standing[:, 1] - y) < 1e-3]
-    left = np.reshape([_left_at(p) for p in grounds.places if p.kind in LEFT_AT], (-1, 5))
-    return replace(grounds, blocked=np.concatenate([grounds.blocked, own, left]))
+    standing = find_footprints(obstacles, (math.inf, math.inf))
+    pedestal = standing[np.hypot(standing[:, 0] - x, standing[:, 1] - y) < 1e-3]
+    loads = np.reshape([_load_footprint(p) for p in grounds.places if p.kind in LEFT_AT], (-1, 5))
+    return replace(grounds, blocked=np.concatenate([grounds.blocked, pedestal, loads]))
 
 
-def _left_at(place: Workplace) -> Footprint:
-    """What a load takes up that lies at a place."""
+def _load_footprint(place: Workplace) -> Footprint:
+    """Return the footprint of a load at a workplace."""
     low, high = BOUNDS_M[PROP_NAMES.index(LEFT_AT[place.kind])]
     middle, half = (low + high) / 2, (high - low) / 2
     (x, y), (cos, sin) = place.xy_m, (math.cos(place.yaw_rad), math.sin(place.yaw_rad))
@@ -119,9 +133,12 @@ def _left_at(place: Workplace) -> Footprint:
     return x + cos * ahead, y + sin * ahead, float(half[0]), float(half[1]), place.yaw_rad
 
 
-def obstacles(model: mujoco.MjModel) -> Floats:
-    """The solid geoms of a scene, (G, `shapes.WIDTH`). Raises `HRCError` for one that moves, or of
-    a kind that `KINDS` does not have."""
+def find_obstacles(model: mujoco.MjModel) -> Floats:
+    """Return the solid geoms of a scene, (G, `shapes.WIDTH`).
+
+    Raises:
+        HRCError: a solid geom moves, or is of a kind that is not in `KINDS`.
+    """
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     solid = np.flatnonzero(model.geom_group == SOLID)
@@ -130,6 +147,7 @@ def obstacles(model: mujoco.MjModel) -> Floats:
 
 
 def _shape_of(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Floats:
+    """Return the shape (`shapes.WIDTH`,) of a geom."""
     form = mujoco.mjtGeom(model.geom_type[geom])
     kind = KINDS.get(form)
     if kind is None or model.body_weldid[model.geom_bodyid[geom]] != 0:
@@ -143,14 +161,21 @@ def _shape_of(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Floats:
     if form == mujoco.mjtGeom.mjGEOM_SPHERE:
         half_size[1] = 0.0
     if kind == PLANE:
-        half_size[:2][half_size[:2] <= 0] = np.inf  # MuJoCo's way to say endless
+        half_size[:2][half_size[:2] <= 0] = np.inf  # MuJoCo marks an infinite plane by 0
     axes = data.geom_xmat[geom].reshape(3, 3)
     return shape(kind, data.geom_xpos[geom], axes, half_size)
 
 
-def footprints(obstacles: Floats, robot_xy_m: tuple[float, float]) -> Floats:
-    """(N, 5) of shapes (G, `shapes.WIDTH`) that stand in the way, as `Grounds.blocked`: upright
-    boxes exactly, all else as rectangles along x and y. What stands on the robot's axis is its."""
+def find_footprints(obstacles: Floats, robot_xy_m: tuple[float, float]) -> Floats:
+    """Return (N, 5) the footprints of the shapes that block the floor, as in `Grounds.blocked`.
+
+    Footprints of upright boxes are exact, those of other shapes are rectangles along x and y. A
+    shape on the robot's axis is its pedestal, and is left out.
+
+    Args:
+        obstacles: (G, `shapes.WIDTH`) fixed shapes.
+        robot_xy_m: axis of the robot's first joint, x and y [m].
+    """
     rows = []
     for row in obstacles[obstacles[:, KIND] != PLANE]:
         half = _half_extent(row)
@@ -165,16 +190,16 @@ def footprints(obstacles: Floats, robot_xy_m: tuple[float, float]) -> Floats:
 
 
 def _half_extent(row: Floats) -> Floats:
-    """(3,) half size of the box along x, y and z that holds a shape [m]."""
+    """Return (3,) the half size of the bounding box of a shape along x, y and z [m]."""
     axes, half = np.abs(row[AXES:HALF_SIZE].reshape(3, 3)), row[HALF_SIZE : HALF_SIZE + 3]
     if row[KIND] == BOX:
         return half @ axes
     return half[1] * axes[2] + half[0]
 
 
-def within(points: Floats, wholes: Floats) -> Bools:
-    """(N,) which points x, y, ... (N, 2 or more) are in one of the footprints (M, 5)."""
-    x, y, half_length, half_width, yaw = wholes.T
+def is_within(points: Floats, footprints: Floats) -> Bools:
+    """Return (N,) whether points x, y, ... (N, 2 or more) are in one of the footprints (M, 5)."""
+    x, y, half_length, half_width, yaw = footprints.T
     dx, dy = points[:, :1] - x, points[:, 1:2] - y
     along, aside = np.cos(yaw) * dx + np.sin(yaw) * dy, np.cos(yaw) * dy - np.sin(yaw) * dx
     return ((np.abs(along) <= half_length) & (np.abs(aside) <= half_width)).any(1)

@@ -1,35 +1,59 @@
 """Groups and collision bits of geoms, and capsules.
 
-Groups: 0 solid (drawn, collides, hides), 1 decoration (drawn only), 2 the robot's looks, 3 the
-robot's capsules (not drawn, hide), 4 the workers' (not drawn, do not hide), 5 ceiling and lamps.
+Groups: 0 solid (drawn, collides, occludes), 1 decoration (drawn only), 2 the robot's visual geoms,
+3 the robot's capsules (not drawn, occlude), 4 the workers' capsules (not drawn, do not occlude),
+5 ceiling and lamps.
 """
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 
+from hrc_env.core.typing import Floats, Points3, QuaternionsWxyz
+
 SOLID, DECORATION, ROBOT_LOOKS, ROBOT_CAPSULES, WORKER_CAPSULES, OVERHEAD = range(6)
-
+"""Groups of geoms."""
 SCENE_BIT, ROBOT_BIT, WORKER_BIT, PAD_BIT, OBJECT_BIT = 1, 2, 4, 8, 16
-"""contype bits; what can touch what is written in the conaffinity of the second."""
-
-Vector = Sequence[float] | np.ndarray
-
+"""Bits of `contype`; a geom touches another one if it has the other's bit in its `conaffinity`."""
+Vector = Sequence[float] | Floats
+"""A vector (3,)."""
 LOOKS_ONLY = {"contype": 0, "conaffinity": 0, "density": 0, "group": DECORATION}
+"""Fields of a geom that is drawn and touches nothing."""
 
 
-def rod_pose(start: Vector, end: Vector) -> tuple[np.ndarray, np.ndarray, float]:
-    """Centre, quaternion (z along the rod) and half length of a rod between two points."""
+class RodPose(NamedTuple):
+    """Pose of a rod between two points."""
+
+    centre: Points3
+    """(3,) middle between the two points [m]."""
+    quaternion_wxyz: QuaternionsWxyz
+    """(4,) rotation of the rod, whose axis is its z axis."""
+    half_length: float
+    """Half of the distance between the two points [m]."""
+
+
+def rod_pose(start: Vector, end: Vector) -> RodPose:
+    """Return the pose of a rod between two points (3,) [m]."""
     start, end = np.asarray(start, float), np.asarray(end, float)
     length, quaternion = float(np.linalg.norm(end - start)), np.zeros(4)
     mujoco.mju_quatZ2Vec(quaternion, (end - start) / max(length, 1e-9))
-    return (start + end) / 2, quaternion, length / 2
+    return RodPose((start + end) / 2, quaternion, length / 2)
 
 
-def capsule(body: Any, start: Vector, end: Vector, radius: float, **more: Any):
-    """A capsule whose axis runs between two points."""
-    pos, quat, half = rod_pose(start, end)
-    kind, size = mujoco.mjtGeom.mjGEOM_CAPSULE, [radius, half, 0]
-    return body.add_geom(type=kind, size=size, pos=pos, quat=quat, **more)
+def add_capsule(
+    body: mujoco.MjsBody, start: Vector, end: Vector, radius: float, **fields: Any
+) -> mujoco.MjsGeom:
+    """Add a capsule to a body of an MJCF specification, and return its geom.
+
+    Args:
+        body: the body.
+        start: (3,) one end of the capsule's axis, in the body's frame [m].
+        end: (3,) the other end [m].
+        radius: radius of the capsule [m].
+        fields: further fields of the geom.
+    """
+    pose, kind = rod_pose(start, end), mujoco.mjtGeom.mjGEOM_CAPSULE
+    size = [radius, pose.half_length, 0]
+    return body.add_geom(type=kind, size=size, pos=pose.centre, quat=pose.quaternion_wxyz, **fields)

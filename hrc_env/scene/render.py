@@ -1,10 +1,11 @@
-"""Pictures of the scene: plain crops for the detector, pretty ones for people.
+"""Pictures of the scene: plain crops for the detector, and pictures with shadows for people.
 
-A crop is drawn through an off-centre frustum: the same pixels as if cut from the camera's whole
-image. Shadows and antialiasing, two thirds of the time, would change no landmark.
+A crop is drawn through an off-centre frustum and has the same pixels as a crop of the camera's
+whole image. It has no shadows and no antialiasing, which take two thirds of the time and change no
+landmark.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,14 +21,35 @@ from hrc_env.scene.canvas import ALL_GROUPS, EVERYTHING, MOVING, STILL, Canvas, 
 from hrc_env.scene.primitives import OVERHEAD
 
 CROP_PX = 256
+"""Side of a crop [px]."""
 CROP_QUALITY = {
-    "offsamples": 0, "shadowsize": 0, "numslices": 12, "numstacks": 3, "numquads": 1,
-}  # fmt: skip
+    "offsamples": 0,
+    "shadowsize": 0,
+    "numslices": 12,
+    "numstacks": 3,
+    "numquads": 1,
+}
+"""MuJoCo's visual quality of crops."""
 PICTURE_QUALITY = {
-    "offsamples": 4, "shadowsize": 8192, "numslices": 40, "numstacks": 20, "numquads": 4,
-}  # fmt: skip
+    "offsamples": 4,
+    "shadowsize": 8192,
+    "numslices": 40,
+    "numstacks": 20,
+    "numquads": 4,
+}
+"""MuJoCo's visual quality of pictures for people."""
 WINDOWS_KEPT = 40
-"""Windows per camera whose background is kept: those of a search too."""
+"""Largest number of windows of a camera with a stored background, those of a search included."""
+
+
+class StillPicture(NamedTuple):
+    """A picture of the static geoms."""
+
+    rgb: Image
+    """(H, W, 3) colours, top row first."""
+    z: NDArray[np.float32]
+    """(H, W) depths from 1 near to 0 far, bottom row first."""
+
 
 VIEWPOINTS: dict[str, tuple[tuple[float, float, float], tuple[float, float, float], float]] = {
     "beside": ((0.45, -2.62, 1.95), (0.12, 0.0, 0.95), 68.0),
@@ -39,20 +61,27 @@ VIEWPOINTS: dict[str, tuple[tuple[float, float, float], tuple[float, float, floa
     "yard": ((4.6, -8.6, 14.6), (0.3, -0.3, 0.0), 56.0),
     "overview": ((8.9, -6.4, 4.3), (-0.7, 0.6, 1.3), 68.0),
 }
-"""Eye [m], target [m], horizontal field of view [degrees] of pictures for people."""
+"""Viewpoints of pictures for people: eye [m], target [m], horizontal field of view [deg]."""
 OPEN_ROOF = ("outside", "top", "overview", "yard")
 """Viewpoints from which ceiling and lamps are left out."""
 
 
 def viewpoint_camera(name: str, width: int, height: int) -> PinholeCamera:
-    """The camera of one of `VIEWPOINTS`, for pictures of this size [px]."""
+    """Return the camera of one of `VIEWPOINTS`, for pictures of this size [px]."""
     eye, target, hfov_deg = VIEWPOINTS[name]
     return pinhole(name, np.array(eye), np.array(target), hfov_deg, width, height)
 
 
 class CropRenderer(Canvas):
-    """Square crops of the cameras' images: what the detector sees. Where a window comes again, what
-    moves is laid by depth over what does not, drawn once: the same pixels in half the time."""
+    """Renderer of square crops of the cameras' images, for the detector.
+
+    From the second picture of a window on, the moving geoms are drawn over a stored picture of the
+    static ones, by depth: the same pixels in half the time.
+
+    Args:
+        scene: the scene.
+        size_px: side of the crops [px].
+    """
 
     def __init__(self, scene: Scene, size_px: int = CROP_PX) -> None:
         gl.draw_on_one_thread()
@@ -62,13 +91,21 @@ class CropRenderer(Canvas):
         self._z = np.empty((size_px, size_px), np.float32)
 
     def crop(self, camera_index: int, window: Roi) -> Image:
-        """(size, size, 3) of a turned square of a camera's image, top row first, as without its
-        lens. Raises `ConfigError` for no such camera, `RenderingError` without OpenGL."""
+        """Return a rotated square (size, size, 3) of a camera's pinhole image, top row first.
+
+        Args:
+            camera_index: index of the camera among those of the scene.
+            window: the square.
+
+        Raises:
+            ConfigError: there is no such camera.
+            RenderingError: there is no OpenGL.
+        """
         index = whole("Camera index", camera_index, 0, len(self.scene.cameras) - 1)
         return self.view(self.scene.cameras[index], window)
 
     def view(self, camera: PinholeCamera, window: Roi) -> Image:
-        """The same of any camera, as a pinhole sees."""
+        """Return a rotated square (size, size, 3) of any camera's pinhole image, top row first."""
         key = _key(camera, window)
         if key not in self._kept:
             self._remember(key, None)
@@ -79,26 +116,24 @@ class CropRenderer(Canvas):
             z = np.empty_like(self._z)
             self._show(STILL, camera, window)
             self.read(self._rgb, z)
-            still = np.ascontiguousarray(self._rgb[::-1]), z
+            still = StillPicture(np.ascontiguousarray(self._rgb[::-1]), z)
         self._remember(key, still)
         self._show(MOVING, camera, window)
         self.read(self._rgb, self._z)
-        crop = still[0].copy()
-        _lay_over(self._rgb, self._z, still[1], crop)
+        crop = still.rgb.copy()
+        _lay_over(self._rgb, self._z, still.z, crop)
         return crop
 
     def __reduce__(self) -> tuple[Any, ...]:
         return CropRenderer, (self.scene, self.size_px)
 
-    def _show(self, what: Part, camera: PinholeCamera, window: Roi) -> None:
-        self.show(what)
+    def _show(self, part: Part, camera: PinholeCamera, window: Roi) -> None:
+        """Choose a part of the scene and a window of a camera for the next picture."""
+        self.show(part)
         self.aim(camera, window, window.side_px)
 
-    def _remember(
-        self, key: tuple[float, ...], still: tuple[Image, NDArray[np.float32]] | None
-    ) -> None:
-        """Keep a window, the latest last: colours (top row first) and depths (bottom row first) of
-        what stands still; None until it comes again."""
+    def _remember(self, key: tuple[float, ...], still: StillPicture | None) -> None:
+        """Store a window as the latest one; its picture is None after its first use."""
         self._kept.pop(key, None)
         self._kept[key] = still
         while len(self._kept) > WINDOWS_KEPT * len(self.scene.cameras):
@@ -106,15 +141,24 @@ class CropRenderer(Canvas):
 
 
 def _key(camera: PinholeCamera, window: Roi) -> tuple[float, ...]:
-    """The numbers of a camera and of a window."""
+    """Return the numbers of a camera and of a window, by which a picture is stored."""
     numbers = (*camera.K.ravel(), *camera.T_world_from_cam.ravel())
     side = (*window.centre_px, window.side_px, window.rotation_rad)
     return tuple(map(float, (*numbers, *side)))
 
 
 @kernel
-def _lay_over(rgb, z, z_behind, out):
-    """What is nearer than what is behind (1 is near), laid over `out`, which is top row first."""
+def _lay_over(
+    rgb: Image, z: NDArray[np.float32], z_behind: NDArray[np.float32], out: Image
+) -> None:
+    """Write the pixels of a picture that are nearer than those behind it.
+
+    Args:
+        rgb: (H, W, 3) the picture, bottom row first.
+        z: (H, W) its depths from 1 near to 0 far, bottom row first.
+        z_behind: (H, W) depths of the picture behind it, bottom row first.
+        out: (H, W, 3) the picture behind it, top row first, which is written.
+    """
     height, width = z.shape
     for row in range(height):
         n_nearer = 0
@@ -129,7 +173,7 @@ def _lay_over(rgb, z, z_behind, out):
 
 
 class PictureRenderer(Canvas):
-    """Pictures for people: shadows, smooth edges, named viewpoints."""
+    """Renderer of pictures for people: with shadows, smooth edges and named viewpoints."""
 
     def __init__(
         self,
@@ -138,7 +182,14 @@ class PictureRenderer(Canvas):
         height_px: int = 720,
         quality: dict[str, int] = PICTURE_QUALITY,
     ) -> None:
-        """A renderer of pictures of one size."""
+        """Make a renderer of pictures of one size.
+
+        Args:
+            scene: the scene.
+            width_px: width of the pictures [px].
+            height_px: height of the pictures [px].
+            quality: fields of MuJoCo's visual.quality by name.
+        """
         super().__init__(scene, width_px, height_px, quality)
 
     def picture(
@@ -149,16 +200,19 @@ class PictureRenderer(Canvas):
         depth: bool = False,
         shadows: bool = True,
     ) -> Image | NDArray[np.float32]:
-        """The scene from a viewpoint: (H, W, 3) uint8, or (H, W) float32 `depth` along the optical
-        axis [m].
+        """Return a picture of the scene.
 
         Args:
-            q: (N,) angles of the arm [rad].
-            motion: the workers of one environment, arrays (W, S, ...).
-            viewpoint: a name of `VIEWPOINTS` or of the rig, or any camera, which keeps its
-                horizontal field of view; the picture's shape says how much of its height is seen.
-            depth: distances instead of colours.
-            shadows: whether lamps cast them; without is several times faster in software.
+            q: (N,) joint angles of the robot [rad].
+            motion: poses of the workers of one environment, arrays (W, S, ...).
+            viewpoint: a name of `VIEWPOINTS`, the name of a camera of the rig, or any camera; the
+                picture has its horizontal field of view.
+            depth: whether to return distances instead of colours.
+            shadows: whether lamps cast shadows; without them, drawing in software is several times
+                faster.
+
+        Returns:
+            (H, W, 3) colours, or (H, W) distances along the optical axis [m], top row first.
         """
         camera = self.camera(viewpoint)
         self.pose(q, motion)
@@ -170,7 +224,7 @@ class PictureRenderer(Canvas):
         return self.depth_m() if depth else self.paint()
 
     def camera(self, viewpoint: str | PinholeCamera) -> PinholeCamera:
-        """The camera of a viewpoint; its image is as wide as the picture, or the rig's own."""
+        """Return the camera of a viewpoint, a name of `VIEWPOINTS` or of the rig, or a camera."""
         if isinstance(viewpoint, PinholeCamera):
             return viewpoint
         rig = {camera.name: camera for camera in self.scene.cameras}

@@ -1,11 +1,10 @@
-"""The camera rig: from settings to pinhole cameras and to MuJoCo's cameras.
+"""The camera rig: pinhole cameras and MuJoCo's cameras from settings.
 
-The only place that turns between OpenCV's camera axes (+X right, +Y down, +Z forward) and
-OpenGL's (+X right, +Y up, -Z forward).
+This is the only module that converts between OpenCV's camera axes (+X right, +Y down, +Z forward)
+and OpenGL's (+X right, +Y up, -Z forward).
 """
 
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -17,16 +16,25 @@ from hrc_env.geometry.cameras import PinholeCamera
 from hrc_env.scene.places import SCENES
 
 OPENCV_FROM_OPENGL: Floats = np.diag([1.0, -1.0, -1.0])
-"""Its own inverse."""
-LAB_CAMERAS, SITE_CAMERAS = (SCENES[name].cameras for name in ("lab", "site"))
-"""Under the ceiling, one in each corner, as in the paper's laboratory; on masts in the corners."""
+"""Rotation from OpenGL's to OpenCV's camera axes, which is its own inverse."""
+LAB_CAMERAS = SCENES["lab"].cameras
+"""Four cameras under the ceiling, one in each corner, as in the paper's laboratory."""
+SITE_CAMERAS = SCENES["site"].cameras
+"""Four cameras on masts in the corners of the site."""
 
 
 def select(
     cameras: tuple[CameraConfig, ...], use: Sequence[int | str] | None = None
 ) -> tuple[CameraConfig, ...]:
-    """The cameras that are switched on, in the order of `use`: names or indices from 0; None: all.
-    Raises `ConfigError` for an unknown name, an index outside the rig, a camera twice, or none."""
+    """Return the cameras in use.
+
+    Args:
+        cameras: all cameras of a scene.
+        use: names or indices from 0, in the order of the result; None for all.
+
+    Raises:
+        ConfigError: an unknown name, an index outside the rig, a camera twice, or no camera.
+    """
     names = [camera.name for camera in cameras]
     for name in names:
         if names.count(name) > 1:
@@ -51,6 +59,7 @@ def select(
 
 
 def _index(choice: int | str, names: list[str]) -> int:
+    """Return the index of a camera among the names, or raise `ConfigError` if there is none."""
     if not isinstance(choice, str):
         return whole(f"Camera index (of {', '.join(names)})", choice, 0, len(names) - 1)
     if choice not in names:
@@ -64,11 +73,11 @@ def make_cameras(cameras: Iterable[CameraConfig]) -> tuple[PinholeCamera, ...]:
     Each has `K` (3, 3) [px], `T_world_from_cam` (4, 4), `P` (3, 4), which projects world points [m]
     to pinhole pixels, and the lens between these and the pixels of its image.
     """
-    return tuple(map(_hung, cameras))
+    return tuple(map(_make_camera, cameras))
 
 
-def _hung(camera: CameraConfig) -> PinholeCamera:
-    """A camera at its place; it has a lens if a plain pinhole would show another image."""
+def _make_camera(camera: CameraConfig) -> PinholeCamera:
+    """Return a camera; it has a lens if a plain pinhole would show another image."""
     K, T_world_from_cam = intrinsics(camera), np.eye(4)
     T_world_from_cam[:3, :3], T_world_from_cam[:3, 3] = axes_of(camera), camera.eye_world
     plain = camera.lens.model == "none" and K[0, 0] == K[1, 1]
@@ -77,12 +86,12 @@ def _hung(camera: CameraConfig) -> PinholeCamera:
 
 
 def glcam_axes(camera: PinholeCamera) -> Rotations:
-    """R_world_from_glcam: columns right, up and back of a pinhole camera."""
+    """Return R_world_from_glcam: the columns right, up and back of a pinhole camera."""
     return camera.T_world_from_cam[:3, :3] @ OPENCV_FROM_OPENGL
 
 
-def add_cameras(spec: Any, cameras: tuple[PinholeCamera, ...]) -> None:
-    """Hang the cameras into a MuJoCo scene, under their names."""
+def add_cameras(spec: mujoco.MjSpec, cameras: tuple[PinholeCamera, ...]) -> None:
+    """Add cameras to a scene that is being built, under their names."""
     quaternion = np.zeros(4)
     for camera in cameras:
         mujoco.mju_mat2Quat(quaternion, glcam_axes(camera).ravel())

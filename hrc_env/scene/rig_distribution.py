@@ -1,50 +1,60 @@
-"""Rigs that are drawn anew for every episode: how far cameras, lenses and their number differ."""
+"""Distribution of camera rigs, from which one is drawn for every episode."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
 from hrc_env.core.brought import check_kinds
 from hrc_env.core.errors import ConfigError, check_fields, unknown, whole
 from hrc_env.core.streams import children
+from hrc_env.core.typing import Floats
 from hrc_env.geometry.camera_config import MOST_CAMERAS, CameraConfig, axes_of, intrinsics
 from hrc_env.geometry.lens import Lens
 from hrc_env.geometry.rotations import from_rotation_vector, look_at
 from hrc_env.scene.build import Scene, with_rig
-from hrc_env.scene.rigs import RIGS, poor_cameras
+from hrc_env.scene.rigs import RIGS, describe_poor_cameras
 
 TRIES = 100
-"""A camera is drawn at most so often until it sees the workspace."""
+"""Largest number of draws of a camera until it sees the workspace."""
 STREAM = 0x10076
-"""Tells the stream for rigs from those that a generator's `spawn` gives: these count from 0."""
+"""Key of the random stream for rigs; those of a generator's `spawn` count from 0."""
+
+
+class CameraCounts(NamedTuple):
+    """Bounds on the number of cameras of an episode."""
+
+    fewest: int
+    """Least number of cameras."""
+    most: int
+    """Greatest number of cameras."""
 
 
 @dataclass(frozen=True, slots=True)
 class RigDistribution:
-    """Rigs round one rig: in every episode cameras hang, look and are as many as is drawn.
+    """Rigs around a nominal rig: poses, lenses and number of cameras are drawn in every episode.
 
-    Estimators know the rig of their episode, as after a calibration; what they are told wrongly is
-    a fault ("wrong_rotation", "wrong_translation", "wrong_focal"). A camera that hangs in
-    or behind something, outside of the room, or sees little of the workspace, is drawn again.
+    Estimators know the rig of their episode, as after a calibration; errors of a calibration are
+    faults ("wrong_rotation", "wrong_translation", "wrong_focal"). A camera inside or behind an
+    obstacle, outside of the room, or with little of the workspace in its view is drawn again.
     Levels without cameras draw none.
     """
 
     around: str | tuple[CameraConfig, ...] = ()
-    """The rig in the middle: its name ("lab_gopro") or its cameras; none: the scene's own."""
+    """Nominal rig: its name ("lab_gopro") or its cameras; empty for the scene's own."""
     place_m: float = 0.0
-    """Each camera hangs at most so far from its place along each axis [m]."""
+    """Largest shift of each camera from its nominal place along each axis [m]."""
     turn_rad: float = 0.0
-    """And is turned by at most so much, about any axis [rad]."""
+    """Largest rotation of each camera about any axis [rad]."""
     focal_share: float = 0.0
-    """Its focal length is longer or shorter by at most this share."""
+    """Largest share by which a focal length is longer or shorter."""
     lenses: tuple[Lens, ...] = ()
-    """Each camera has one of these lenses; none: its own."""
+    """Lenses of which each camera has one; empty for the nominal lenses."""
     n_cameras: int | tuple[int, int] | None = None
-    """How many of the cameras there are; (fewest, most): drawn, too; None: all of them. Which ones
-    is drawn; images of the others (`observe_images`) are black."""
+    """Number of cameras, or (fewest, most) between which it is drawn; None for all. The cameras are
+    drawn, too; images of the others (`observe_images`) are black."""
 
     def __post_init__(self) -> None:
         if isinstance(self.around, str) and self.around not in RIGS:
@@ -62,39 +72,44 @@ class RigDistribution:
                 )
 
     def possible(self, rig: Sequence[CameraConfig]) -> list[CameraConfig]:
-        """Return every camera of the rig in the middle with every lens that it may have."""
+        """Return every camera of the nominal rig with every lens that it may have."""
         return [replace(each, lens=lens) for each in rig for lens in self.lenses or (each.lens,)]
 
     @property
     def bends(self) -> bool:
-        """Whether a camera may get a lens that is no pinhole."""
+        """Whether a camera may have a lens with distortion."""
         return any(lens.model != "none" for lens in self.lenses)
 
     @property
     def rig(self) -> tuple[CameraConfig, ...]:
-        """The rig in the middle; empty: the scene's own."""
+        """The nominal rig; empty for the scene's own."""
         return RIGS[self.around] if isinstance(self.around, str) else self.around
 
-    def counts(self, n_cameras: int) -> tuple[int, int]:
-        """Return the fewest and the most cameras of an episode, of a rig that has so many."""
+    def counts(self, n_cameras: int) -> CameraCounts:
+        """Return the fewest and the most cameras of an episode, for a rig of `n_cameras`."""
         if self.n_cameras is None:
-            return n_cameras, n_cameras
+            return CameraCounts(n_cameras, n_cameras)
         low, high = self.n_cameras if isinstance(self.n_cameras, tuple) else (self.n_cameras,) * 2
         if high > n_cameras:
             raise ConfigError(
                 f"RigDistribution.n_cameras={self.n_cameras}: the rig that it is around has "
                 f"{n_cameras} cameras. Name no more, or give `around` more of them."
             )
-        return low, high
+        return CameraCounts(low, high)
 
 
 def draw_rig(
     distribution: RigDistribution, scene: Scene, rng: np.random.Generator
 ) -> tuple[CameraConfig, ...]:
-    """Draw an episode's rig; the scene has the rig that it is around.
+    """Draw an episode's rig.
+
+    Args:
+        distribution: the distribution.
+        scene: the scene with the nominal rig.
+        rng: generator of the episode.
 
     Raises:
-        ConfigError: no draw of `TRIES` gave a camera that sees the workspace.
+        ConfigError: none of `TRIES` draws of a camera sees the workspace.
     """
     rig = scene.rig
     fewest, most = distribution.counts(len(rig))
@@ -107,7 +122,14 @@ def draw_rig(
 def _draw_camera(
     distribution: RigDistribution, scene: Scene, camera: CameraConfig, rng: np.random.Generator
 ) -> CameraConfig:
-    """Draw a camera until it hangs in the room and sees the workspace."""
+    """Draw a camera until it is in the room and sees the workspace.
+
+    Args:
+        distribution: the distribution.
+        scene: the scene with the nominal rig.
+        camera: the nominal camera.
+        rng: generator of this camera.
+    """
     refused = ""
     for _ in range(TRIES):
         lens, axis = camera.lens, rng.standard_normal(3)
@@ -117,11 +139,11 @@ def _draw_camera(
         if distribution.lenses:
             lens = distribution.lenses[rng.integers(len(distribution.lenses))]
         try:
-            drawn = _moved(replace(camera, lens=lens), by_m, turn_rad, focal)
-        except ConfigError as error:  # a camera that cannot be
+            drawn = _move(replace(camera, lens=lens), by_m, turn_rad, focal)
+        except ConfigError as error:  # an invalid camera
             refused = str(error)
             continue
-        poor = poor_cameras(with_rig(scene, (drawn,)))
+        poor = describe_poor_cameras(with_rig(scene, (drawn,)))
         if not poor:
             return drawn
         refused = poor[0]
@@ -132,9 +154,15 @@ def _draw_camera(
     )
 
 
-def _moved(camera: CameraConfig, by_m: Any, turn_rad: Any, focal: float) -> CameraConfig:
-    """A camera `by_m` (3,) from its place, turned by a rotation vector (3,), of a focal length so
-    many times as long."""
+def _move(camera: CameraConfig, by_m: Floats, turn_rad: Floats, focal: float) -> CameraConfig:
+    """Return a camera at another pose with another focal length.
+
+    Args:
+        camera: the nominal camera.
+        by_m: (3,) shift [m].
+        turn_rad: (3,) rotation vector [rad].
+        focal: factor on the focal length.
+    """
     eye = np.array(camera.eye_world) + by_m
     R_world_from_cam = from_rotation_vector(turn_rad) @ axes_of(camera)
     away_m = math.dist(camera.eye_world, camera.target_world)

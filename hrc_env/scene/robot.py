@@ -1,9 +1,9 @@
-"""Robots: an MJCF file and a record that says what in it the environment moves and watches.
+"""Robots: an MJCF file and a record of the names in it.
 
-A robot's file has the middle of its foot at the origin, looks to +x, and holds for each joint two
-servos on one command [rad/s]: first all that hold its integral (`intvelocity`), then all that
-follow it (`velocity`); one of them alone has 3-20 mm of tool error instead of 0.1. What is an
-angle [rad] of a hinge is a way [m] of a slide, here and everywhere.
+A robot's file has the middle of its foot at the origin, faces +x, and has two servos for each joint
+on one command [rad/s]: first all that hold its integral (`intvelocity`), then all that follow it
+(`velocity`); one of them alone has 3-20 mm of tool error instead of 0.1. An angle [rad] of a hinge
+is a displacement [m] of a slide, here and everywhere.
 """
 
 from collections.abc import Mapping, Sequence
@@ -29,88 +29,89 @@ from hrc_env.scene.primitives import (
     SCENE_BIT,
     WORKER_BIT,
 )
-from hrc_env.scene.robot_chain import chain_of, parsed
+from hrc_env.scene.robot_chain import make_chain, parse_mjcf
 from hrc_env.scene.robot_looks import bare_capsules
 from hrc_env.worker.body import assets_dir
 
 PREFIX = "robot/"
-"""What the names of a robot's parts begin with in a scene."""
+"""Prefix of the names of a robot's parts in a scene."""
 DEFAULT = "ur10e_like"
+"""Name of the default robot."""
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class Hand:
-    """A gripper at the end of an arm, after whose joints and motors its own come in the MJCF."""
+    """A gripper at the end of an arm; its joints and motor follow those of the arm in the MJCF."""
 
     joints: tuple[str, ...]
-    """Its fingers' slides; 0 is closed, and they open by the same way."""
+    """Slides of the fingers; 0 is closed, and all open by the same distance."""
     pads: tuple[str, ...]
-    """The geoms that touch what is gripped."""
+    """Geoms that touch a gripped object."""
     motor: str
-    """The `position` actuator whose command is how far each finger is from the middle [m]."""
+    """The `position` actuator that commands the distance of each finger from the middle [m]."""
     spans: tuple[str, ...]
-    """Those of the robot's capsules that stand for the fingers, wherever they are: in distances
-    and sight; they touch people only."""
+    """Those of the robot's capsules that enclose the fingers in any position, for distances and
+    occlusion; they collide with people only."""
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class Suction:
-    """Cups at the end of an arm: what they touch sticks to them until it is torn off."""
+    """Suction cups at the end of an arm: objects stick to them until they are torn off."""
 
     site: str
-    """At the middle of the cups, z away from the arm; objects have sites of that pose."""
+    """Site at the middle of the cups, z away from the arm; objects have sites of that pose."""
     gauge: str
-    """The `force` sensor of what hangs on them."""
+    """The `force` sensor of the load on the cups."""
     limit_n: float
-    """Above this load they let go [N]."""
+    """Load above which the cups let go [N]."""
     pads: tuple[str, ...]
-    """The geoms that touch."""
+    """Geoms that touch an object."""
     spans: tuple[str, ...]
-    """Those of the robot's capsules that stand for the cups; they touch people only."""
+    """Those of the robot's capsules that enclose the cups; they collide with people only."""
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """A serial arm, or a base that drives; names are those of its MJCF."""
+    """A serial arm, or a mobile base; names are those of its MJCF."""
 
     name: str
-    """By which `robot=` knows it."""
+    """Name of the robot in `robot=`."""
     mjcf: str | Path
-    """Its file's path, or the text itself."""
+    """Path of the MJCF file, or its text."""
     joints: tuple[str, ...]
-    """Its N hinges and slides, from the foot to the tool."""
+    """The N hinges and slides, from the foot to the tool."""
     capsules: tuple[str, ...]
-    """The capsule geoms that stand for its surface: in contacts, distances and sight."""
+    """Capsule geoms that represent the surface in contacts, distances and occlusion."""
     watched: tuple[str, ...]
-    """Those of them whose far ends workers keep an eye on."""
+    """Capsules whose far ends workers watch."""
     tool_site: str
-    """The site at the tool point."""
+    """Site at the tool point."""
     home_q: tuple[float, ...]
-    """The pose at rest, one angle a joint [rad]."""
+    """Home pose, one angle a joint [rad]."""
     spread_rad: tuple[float, ...]
-    """At reset each joint is drawn within so much of `home_q`."""
+    """Largest distance of each joint from `home_q` at a reset [rad]."""
     never_touch: tuple[tuple[str, str], ...] = ()
-    """(capsule, geom of a scene) that no pose brings together, near as they may always be."""
+    """Pairs (capsule, geom of a scene) that are close in every pose and never touch."""
     hand: Hand | None = None
-    """The fingers that it grips with; None: none."""
+    """The gripper; None for a robot without."""
     suction: Suction | None = None
-    """The cups that it grips with; None: none."""
+    """The suction cups; None for a robot without."""
     drives: bool = False
-    """Whether it moves about on the floor, its foot the world's origin; else its foot is on the
-    scene's pedestal."""
+    """Whether the robot drives on the floor, with its foot at the world's origin; else its foot is
+    on the scene's pedestal."""
     girth_m: float = 0.0
-    """Of one that drives: how far it reaches to any side of the far ends of `watched` [m]; people
-    look out for all of it, from the floor upwards."""
+    """Radius of a mobile base round the far ends of `watched` [m]; people keep clear of all of it,
+    from the floor upwards."""
     slew: tuple[float, ...] = ()
-    """Fastest change of each joint's commanded velocity [rad/s^2]; none: `SceneConfig.slew_rad_s2`
-    for all."""
+    """Limit on the change of each joint's commanded velocity [rad/s^2]; empty for
+    `SceneConfig.slew_rad_s2` at every joint."""
 
     @property
     def grips(self) -> bool:
-        """Whether it can hold something."""
+        """Whether the robot can hold an object."""
         return bool(self.hand or self.suction)
 
     def __post_init__(self) -> None:
@@ -131,37 +132,43 @@ class Robot:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Grip:
-    """A hand's numbers."""
+    """Columns and motor of a hand in a compiled scene."""
 
     fingers: Ints
-    """Columns of its fingers in `qpos` and `qvel`."""
+    """Columns of the fingers in `qpos` and `qvel`."""
     open_m: float
-    """How far each finger is from the middle at most [m]."""
+    """Greatest distance of each finger from the middle [m]."""
     stiffness_n_m: float
+    """Stiffness of the motor [N/m]."""
     damping_n_s_m: float
+    """Damping of the motor [N s/m]."""
     most_n: float
-    """Of its motor: force for a way, for a speed, and at most."""
+    """Greatest force of the motor [N]."""
 
 
-def _read(path: Path) -> Robot:
-    """A robot that comes with the package: a record in TOML beside its MJCF."""
-    own = {"name": path.stem, "mjcf": str(path.with_suffix(".xml"))}
-    return from_mapping(Robot, read_toml(path) | own)
+def _read_robot(path: Path) -> Robot:
+    """Return a robot of the package, whose record is in a TOML file beside its MJCF."""
+    names = {"name": path.stem, "mjcf": str(path.with_suffix(".xml"))}
+    return from_mapping(Robot, read_toml(path) | names)
 
 
 ROBOTS: Registry[Robot] = Registry(
-    "robot", {path.stem: _read(path) for path in sorted((assets_dir() / "robots").glob("*.toml"))}
+    "robot",
+    {path.stem: _read_robot(path) for path in sorted((assets_dir() / "robots").glob("*.toml"))},
 )
-"""By name: those in `assets/robots`, and those that were registered."""
+"""Robots by name: those in `assets/robots`, and the registered ones."""
 BUILT_IN = frozenset(ROBOTS.data.values())
-"""Those in `assets/robots`; none of their capsules reaches out of the looks by `BARE_M`."""
+"""Robots in `assets/robots`; none of their capsules reaches out of the visual geoms by `BARE_M`."""
 
 
-def robot_called(robot: str | Robot | Mapping[str, Any]) -> Robot:
-    """A robot by its name, or itself, as a record or a mapping of its fields.
+def find_robot(robot: str | Robot | Mapping[str, Any]) -> Robot:
+    """Return a robot.
+
+    Args:
+        robot: its name, or itself, as a record or a mapping of its fields.
 
     Raises:
-        ConfigError: there is no such name, or something is missing or wrong in a robot.
+        ConfigError: there is no such name, or a part of the robot is missing or wrong.
     """
     if isinstance(robot, str):
         check_names("robot", [robot], ROBOTS)
@@ -177,17 +184,23 @@ def robot_called(robot: str | Robot | Mapping[str, Any]) -> Robot:
     return typed
 
 
-def add_robot(spec: Any, robot: Robot, mount_world: Sequence[float]) -> None:
-    """Put a robot into a scene that is being built, its foot at a point [m]."""
-    child, hand = parsed(robot), robot.hand or robot.suction
+def add_robot(spec: mujoco.MjSpec, robot: Robot, mount_world: Sequence[float]) -> None:
+    """Add a robot to a scene that is being built.
+
+    Args:
+        spec: the scene.
+        robot: the robot.
+        mount_world: place of its foot [m].
+    """
+    child, hand = parse_mjcf(robot), robot.hand or robot.suction
     pads, spans = (hand.pads, hand.spans) if hand else ((), ())
     drawn = () if robot in BUILT_IN else bare_capsules(robot)
     for geom in child.geoms:
         if geom.name in robot.capsules:
             geom.group = ROBOT_LOOKS if geom.name in drawn else ROBOT_CAPSULES
             geom.contype = ROBOT_BIT
-            things = 0 if geom.name in spans else SCENE_BIT | OBJECT_BIT
-            geom.conaffinity = WORKER_BIT | things
+            objects = 0 if geom.name in spans else SCENE_BIT | OBJECT_BIT
+            geom.conaffinity = WORKER_BIT | objects
         elif geom.name in pads:
             geom.group, geom.contype = ROBOT_CAPSULES, PAD_BIT
             geom.conaffinity = SCENE_BIT | OBJECT_BIT
@@ -197,7 +210,7 @@ def add_robot(spec: Any, robot: Robot, mount_world: Sequence[float]) -> None:
 
 
 def servo_lead_s(robot: Robot, model: mujoco.MjModel) -> Floats:
-    """(N,) inertia at rest over damping: by how much the rate servos run ahead [s]."""
+    """Return (N,) the lead of the rate servos [s]: inertia at the home pose over damping."""
     data, n = mujoco.MjData(model), len(robot.joints)
     data.qpos[:n] = robot.home_q
     mujoco.mj_forward(model, data)
@@ -208,7 +221,7 @@ def servo_lead_s(robot: Robot, model: mujoco.MjModel) -> Floats:
 
 @lru_cache(maxsize=64)
 def check_robot(robot: Robot) -> None:
-    """Raise `ConfigError` for what is missing or wrong in a robot."""
+    """Raise `ConfigError` for a missing or wrong part of a robot."""
     if not isinstance(robot, Robot):
         raise ConfigError(f"A robot must be a Robot, got {type(robot).__name__}.")
     if not isinstance(robot.name, str) or not robot.name.strip():
@@ -217,7 +230,7 @@ def check_robot(robot: Robot) -> None:
         )
     if not (robot.joints and robot.capsules):
         raise ConfigError(f"{robot.name}: joints and capsules must name at least one each.")
-    chain = chain_of(robot, (0.0, 0.0, 0.0))
+    chain = make_chain(robot, (0.0, 0.0, 0.0))
     check_names(f"watched capsule of {robot.name}", robot.watched, robot.capsules)
     if grips := robot.hand or robot.suction:
         check_names(f"capsule for the hand of {robot.name}", grips.spans, robot.capsules)
@@ -235,19 +248,22 @@ def check_robot(robot: Robot) -> None:
         )
     if robot.slew and min(robot.slew) <= 0:
         raise ConfigError(f"{robot.name}: slew must be positive [rad/s^2], got {robot.slew}.")
-    spec = parsed(robot)  # its bodies do not keep it
+    spec = parse_mjcf(robot)  # its bodies do not keep it alive
     for body in spec.bodies[1:]:
         if body.joints and not body.explicitinertial:
             raise ConfigError(f"{robot.name}: link {body.name!r} needs an <inertial>.")
 
 
-def grip_of(robot: Robot, model: mujoco.MjModel) -> Grip | None:
-    """The numbers of a robot's hand in a scene; None: it has none."""
+def find_grip(robot: Robot, model: mujoco.MjModel) -> Grip | None:
+    """Return the columns and the motor of a robot's hand in a scene; None if it has none."""
     if robot.hand is None:
         return None
     fingers = [model.joint(PREFIX + name).qposadr[0] for name in robot.hand.joints]
     motor = model.actuator(PREFIX + robot.hand.motor)
     return Grip(
-        np.array(fingers), float(motor.ctrlrange[1]), float(motor.gainprm[0]),
-        float(-motor.biasprm[2]), float(motor.forcerange[1]),
-    )  # fmt: skip
+        fingers=np.array(fingers),
+        open_m=float(motor.ctrlrange[1]),
+        stiffness_n_m=float(motor.gainprm[0]),
+        damping_n_s_m=float(-motor.biasprm[2]),
+        most_n=float(motor.forcerange[1]),
+    )

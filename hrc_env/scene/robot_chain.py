@@ -1,7 +1,8 @@
-"""What an MJCF file says of a robot: its links, joints, servos and capsules."""
+"""Read a robot's links, joints, servos and capsules from its MJCF."""
 
+from collections.abc import Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NamedTuple
 
 import mujoco
 import numpy as np
@@ -15,48 +16,67 @@ if TYPE_CHECKING:
 
 
 @lru_cache(maxsize=8)
-def chain_of(robot: "Robot", mount_world: tuple[float, float, float]) -> SerialChain:
-    """A robot's numbers as a chain of joints. Raises `ConfigError` where something that `Robot`
-    names is missing in the MJCF or of another kind."""
+def make_chain(robot: "Robot", mount_world: tuple[float, float, float]) -> SerialChain:
+    """Return the kinematic chain of a robot.
+
+    Args:
+        robot: the robot.
+        mount_world: place of its foot [m].
+
+    Raises:
+        ConfigError: a part that `Robot` names is missing in the MJCF or of another kind.
+    """
     try:
-        return _chain(robot, mount_world)
+        return _read_chain(robot, mount_world)
     except ConfigError as error:
         raise ConfigError(f"{robot.name}: {error}") from error
     except ValueError as error:
         raise ConfigError(f"{robot.name}: its MJCF cannot be used: {error}") from error
 
 
-def reach_m(chain: SerialChain) -> Floats:
-    """(K,) no point of a capsule is ever farther from the robot's foot than this [m]."""
-    ways = np.where(chain.slides, np.abs(chain.range_rad).max(-1), 0.0)
-    before = np.cumsum(np.linalg.norm(chain.parent_from_joint[:, :3, 3], axis=-1) + ways)
-    own = np.linalg.norm(chain.capsule_ends, axis=-1).max(-1)
-    return before[chain.capsule_link] + own + chain.capsule_radius_m
+def capsule_reach_m(chain: SerialChain) -> Floats:
+    """Return (K,) an upper bound on the distance of each capsule from the robot's foot [m]."""
+    strokes = np.where(chain.slides, np.abs(chain.range_rad).max(-1), 0.0)
+    to_link = np.cumsum(np.linalg.norm(chain.parent_from_joint[:, :3, 3], axis=-1) + strokes)
+    on_link = np.linalg.norm(chain.capsule_ends, axis=-1).max(-1)
+    return to_link[chain.capsule_link] + on_link + chain.capsule_radius_m
 
 
-def parsed(robot: "Robot") -> Any:
-    """Return the MJCF of a robot as a specification that can be changed."""
+class LinkCapsules(NamedTuple):
+    """The K capsules of a robot."""
+
+    link: Ints
+    """(K,) index of the link that carries each capsule."""
+    ends: Floats
+    """(K, 2, 3) end points of its axis in the frame of the link [m]."""
+    radius_m: Floats
+    """(K,) radius [m]."""
+
+
+def parse_mjcf(robot: "Robot") -> mujoco.MjSpec:
+    """Return the MJCF of a robot as a specification that can be edited."""
     text = str(robot.mjcf)
     read = mujoco.MjSpec.from_string if text.lstrip().startswith("<") else mujoco.MjSpec.from_file
     return read(text)
 
 
-def _chain(robot: "Robot", mount_world: tuple[float, float, float]) -> SerialChain:
-    model, n = parsed(robot).compile(), len(robot.joints)
+def _read_chain(robot: "Robot", mount_world: tuple[float, float, float]) -> SerialChain:
+    """Return the kinematic chain of a robot, or raise `ConfigError` without the robot's name."""
+    model, n = parse_mjcf(robot).compile(), len(robot.joints)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)  # all joints at 0
-    joints = [id_of(model, "joint", name) for name in robot.joints]
+    joints = [find_id(model, "joint", name) for name in robot.joints]
     _check_servos(model, joints, robot.hand)
     bodies = model.jnt_bodyid[joints].tolist()
     parents = model.body_parentid[bodies].tolist()
-    if [link_of(model, bodies, parent) for parent in parents] != list(range(-1, n - 1)):
+    if [find_link(model, bodies, parent) for parent in parents] != list(range(-1, n - 1)):
         raise ConfigError("its joints must be a single chain.")
-    site = id_of(model, "site", robot.tool_site)
-    if link_of(model, bodies, model.site_bodyid[site]) != n - 1:
+    site = find_id(model, "site", robot.tool_site)
+    if find_link(model, bodies, model.site_bodyid[site]) != n - 1:
         raise ConfigError(f"site {robot.tool_site!r} must be on the last link.")
     foot = _pose(data.xpos[parents[0]], data.xmat[parents[0]])
     links = np.stack([_joint_frame(model, data, joint) for joint in joints])
-    carriers, ends, radius_m = _capsules(model, data, bodies, links, robot)
+    capsules = _read_capsules(model, data, bodies, links, robot)
     return SerialChain(
         T_world_from_base=_pose(mount_world, np.eye(3)) @ foot,
         parent_from_joint=np.linalg.inv([foot, *links[:-1]]) @ links,
@@ -64,14 +84,14 @@ def _chain(robot: "Robot", mount_world: tuple[float, float, float]) -> SerialCha
         range_rad=model.jnt_range[joints],
         velocity_limit_rad_s=model.actuator_ctrlrange[n : 2 * n, 1].copy(),
         slides=model.jnt_type[joints] == mujoco.mjtJoint.mjJNT_SLIDE,
-        capsule_link=carriers,
-        capsule_ends=ends,
-        capsule_radius_m=radius_m,
+        capsule_link=capsules.link,
+        capsule_ends=capsules.ends,
+        capsule_radius_m=capsules.radius_m,
     )
 
 
-def id_of(model: mujoco.MjModel, kind: str, name: str) -> int:
-    """Return the number of something by its kind and name; `ConfigError` if it is missing."""
+def find_id(model: mujoco.MjModel, kind: str, name: str) -> int:
+    """Return the id of a named element of a kind, or raise `ConfigError` if it is missing."""
     number = mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), name)
     if number < 0:
         raise ConfigError(f"its MJCF has no {kind} {name!r}.")
@@ -79,18 +99,29 @@ def id_of(model: mujoco.MjModel, kind: str, name: str) -> int:
 
 
 def _check_servos(model: mujoco.MjModel, joints: list[int], hand: "Hand | None") -> None:
-    """Only hinges and slides with ranges, and their servos in order; then the hand's slides and
-    motor."""
-    n, fingers = len(joints), [id_of(model, "joint", each) for each in hand.joints] if hand else []
+    """Raise `ConfigError` unless joints and servos have the kinds and the order of a robot.
+
+    The joints are hinges and slides with ranges, then the hand's slides; the actuators are the
+    joints' servos, then the hand's motor.
+
+    Args:
+        model: the compiled MJCF.
+        joints: ids of the robot's joints.
+        hand: the robot's hand; None if it has none.
+    """
+    n, fingers = (
+        len(joints),
+        [find_id(model, "joint", each) for each in hand.joints] if hand else [],
+    )
     kinds = {mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE}
-    own = kinds.issuperset(model.jnt_type[:n].tolist()) and model.jnt_limited.all()
-    slides = (model.jnt_type[n:] == mujoco.mjtJoint.mjJNT_SLIDE).all()
-    if joints + fingers != list(range(model.njnt)) or not (own and slides):
+    has_joints = kinds.issuperset(model.jnt_type[:n].tolist()) and model.jnt_limited.all()
+    has_fingers = (model.jnt_type[n:] == mujoco.mjtJoint.mjJNT_SLIDE).all()
+    if joints + fingers != list(range(model.njnt)) or not (has_joints and has_fingers):
         raise ConfigError(
             "joints must be all of its MJCF, in its order: hinges and slides with a range; then "
             "its hand's: slides with a range."
         )
-    motors = [id_of(model, "actuator", hand.motor)] if hand else []
+    motors = [find_id(model, "actuator", hand.motor)] if hand else []
     integrates = model.actuator_dyntype == mujoco.mjtDyn.mjDYN_INTEGRATOR
     if not (
         model.actuator_trnid[: 2 * n, 0].tolist() == 2 * joints
@@ -104,22 +135,22 @@ def _check_servos(model: mujoco.MjModel, joints: list[int], hand: "Hand | None")
         )
 
 
-def link_of(model: mujoco.MjModel, bodies: list[int], body: int) -> int:
-    """Which of the links, whose bodies are given, carries a body; -1: none."""
+def find_link(model: mujoco.MjModel, bodies: list[int], body: int) -> int:
+    """Return the index of the link among `bodies` that carries a body; -1 if none does."""
     while body and body not in bodies:
         body = model.body_parentid[body]
     return bodies.index(body) if body in bodies else -1
 
 
-def _pose(pos: Any, rotation: Floats) -> Transforms:
-    """(4, 4) of a place (3,) and a rotation of 9 numbers."""
+def _pose(pos: Sequence[float] | Floats, rotation: Floats) -> Transforms:
+    """Return the transform (4, 4) of a position (3,) and a rotation of 9 numbers."""
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = rotation.reshape(3, 3), pos
     return T
 
 
 def _joint_frame(model: mujoco.MjModel, data: mujoco.MjData, joint: int) -> Transforms:
-    """(4, 4) in the world: z is the axis."""
+    """Return the frame (4, 4) of a joint in the world; its z axis is the joint's axis."""
     quaternion, turn = np.zeros(4), np.zeros(9)
     mujoco.mju_quatZ2Vec(quaternion, model.jnt_axis[joint])
     mujoco.mju_quat2Mat(turn, quaternion)
@@ -127,12 +158,20 @@ def _joint_frame(model: mujoco.MjModel, data: mujoco.MjData, joint: int) -> Tran
     return _pose(data.xanchor[joint], body @ turn.reshape(3, 3))
 
 
-def _capsules(
+def _read_capsules(
     model: mujoco.MjModel, data: mujoco.MjData, bodies: list[int], links: Transforms, robot: "Robot"
-) -> tuple[Ints, Floats, Floats]:
-    """Links (K,), ends (K, 2, 3) and radii (K,) of the capsules."""
-    geoms = [id_of(model, "geom", name) for name in robot.capsules]
-    carriers = [link_of(model, bodies, model.geom_bodyid[geom]) for geom in geoms]
+) -> LinkCapsules:
+    """Return the capsules of a robot.
+
+    Args:
+        model: the compiled MJCF.
+        data: its state with all joints at 0.
+        bodies: bodies of the links.
+        links: (N, 4, 4) frames of the links in the world.
+        robot: the robot.
+    """
+    geoms = [find_id(model, "geom", name) for name in robot.capsules]
+    carriers = [find_link(model, bodies, model.geom_bodyid[geom]) for geom in geoms]
     ends = np.empty((len(geoms), 2, 3))
     for k, (name, geom, link) in enumerate(zip(robot.capsules, geoms, carriers, strict=True)):
         if model.geom_type[geom] != mujoco.mjtGeom.mjGEOM_CAPSULE:
@@ -142,5 +181,5 @@ def _capsules(
         T = np.linalg.inv(links[link]) @ _pose(data.geom_xpos[geom], data.geom_xmat[geom])
         along = T[:3, 2] * model.geom_size[geom, 1]
         ends[k] = T[:3, 3] - along, T[:3, 3] + along
-    # As the MJCF's quaternions are rounded.
-    return np.array(carriers), np.round(ends, 12), model.geom_size[geoms, 0].copy()
+    # The MJCF's quaternions are rounded.
+    return LinkCapsules(np.array(carriers), np.round(ends, 12), model.geom_size[geoms, 0].copy())

@@ -1,19 +1,19 @@
-"""A `Robot` from the MJCF of somebody's arm, whatever its servos, looks and collision shapes are.
+"""Import a `Robot` from any MJCF of an arm, whatever its servos, visual and collision geoms are.
 
 robot = robot_from_mjcf("ur5e/robot.xml", home_q=(0, -1.6, 1.9, -1.9, -1.6, 0))
 env = gymnasium.make("HRCReach-v0", robot=robot)
 
-Its actuators are replaced by two servos a joint on one velocity command (`scene.robot`), with
-gains by the inertia that each moves; gravity is compensated, as robot controllers do. What is drawn
-stays; shapes that collide go where others are drawn, and capsules are fitted to what is drawn of
-each link.
+Its actuators are replaced by two servos a joint on one velocity command (`scene.robot`), with gains
+by the inertia that each moves; gravity is compensated, as robot controllers do. Visual geoms are
+kept; collision geoms are removed from links that have visual ones, and capsules are fitted to the
+geoms of each link.
 """
 
 from collections import Counter
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -22,20 +22,33 @@ from hrc_env.core.brought import check_kind, positive
 from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.core.typing import Floats
 from hrc_env.scene.capsule_fit import CELL_M, Rod, fit_rods
-from hrc_env.scene.primitives import capsule
+from hrc_env.scene.primitives import add_capsule
 from hrc_env.scene.robot import Robot
-from hrc_env.scene.robot_looks import surface_of
+from hrc_env.scene.robot_looks import sample_surface
 
-DAMPING_1_S, STIFFNESS_1_S2 = 100.0, 1600.0
-"""Gains of the servos per inertia: an eigenfrequency of 40 rad/s, more than critically damped."""
+DAMPING_1_S = 100.0
+"""Damping of the rate servos per inertia [1/s]."""
+STIFFNESS_1_S2 = 1600.0
+"""Stiffness of the holding servos per inertia [1/s^2]: an eigenfrequency of 40 rad/s, more than
+critically damped."""
 POSES = 64
-"""Number of poses over which the greatest inertia of each joint is looked for."""
+"""Number of poses over which the greatest inertia of each joint is determined."""
 LEAST_ARMATURE = 0.1
-"""Least share of that inertia which is the motor's own, so that light joints do not jump."""
+"""Least armature of a joint as a share of that inertia, so that light joints do not jump."""
 TURN = 2 * np.pi
-"""Range of a joint without one, to both sides [rad]."""
+"""Range of a joint without limits, to both sides [rad]."""
 HINGE, SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 FREE, BALL = int(mujoco.mjtJoint.mjJNT_FREE), int(mujoco.mjtJoint.mjJNT_BALL)
+"""MuJoCo's kinds of joints."""
+
+
+class Chain(NamedTuple):
+    """Names of a serial chain in an MJCF."""
+
+    joints: list[str]
+    """Names of the joints."""
+    links: list[str]
+    """Names of the bodies that they move."""
 
 
 def robot_from_mjcf(
@@ -47,36 +60,36 @@ def robot_from_mjcf(
     fastest_rad_s: Sequence[float] | float = 2.0,
     tool_site: str = "",
 ) -> Robot:
-    """Return a robot of an arm's MJCF.
+    """Return a robot from the MJCF of an arm.
 
     Args:
-        mjcf: the file's path, or the text.
-        name: by which `robot=` is to know it; "": the model's own.
-        home_q: the pose at rest, one angle a joint [rad]; (): its first keyframe, or the middle of
-            the joints' ranges.
-        spread_rad: at reset each joint is drawn within so much of `home_q` [rad].
+        mjcf: path of the file, or its text.
+        name: name of the robot in `robot=`; "" for the name of the model.
+        home_q: home pose, one angle a joint [rad]; () for the first keyframe, or the middle of the
+            joints' ranges.
+        spread_rad: largest distance of each joint from `home_q` at a reset [rad].
         fastest_rad_s: greatest speed of each joint [rad/s], of slides [m/s].
-        tool_site: the site at the tool point; "": the last one on the last link, or that link's
+        tool_site: site at the tool point; "" for the last one on the last link, or that link's
             origin.
 
     Raises:
-        ConfigError: the MJCF cannot be read, or is not that of one serial arm of hinges and slides.
+        ConfigError: the MJCF cannot be read, or is not of one serial arm of hinges and slides.
     """
     check_kind("mjcf", mjcf, str, Path)
     spec = _read(mjcf)
-    model = _compiled(spec)
+    model = _compile(spec)
     name = name or spec.modelname or "imported"
-    joints, links = _chain(model, name)
+    joints, links = _find_chain(model, name)
     n = len(joints)
-    fastest = _each("fastest_rad_s", fastest_rad_s, n)
+    fastest = _one_a_joint("fastest_rad_s", fastest_rad_s, n)
     for each in fastest:
         positive("fastest_rad_s", each, "rad/s")
-    home = tuple(home_q) or _home(model, n)
+    home = tuple(home_q) or _find_home(model, n)
     _keep_files(spec)
     _keep_inertia(spec, model)
     _drop_colliding(spec)
     _replace_servos(spec, model, joints, fastest)
-    site = _tool(spec, model, links[-1], tool_site)
+    site = _find_tool(spec, model, links[-1], tool_site)
     capsules = _add_capsules(spec, links)
     names = [each for link in links for each in capsules[link]]
     watched = [each for link in links[n // 2 :] for each in capsules[link]]
@@ -88,42 +101,44 @@ def robot_from_mjcf(
         watched=tuple(watched or names),
         tool_site=site,
         home_q=home,
-        spread_rad=_within(_each("spread_rad", spread_rad, n), spec, joints),
+        spread_rad=_limit_spread(_one_a_joint("spread_rad", spread_rad, n), spec, joints),
     )
 
 
-def _read(mjcf: str | Path) -> Any:
+def _read(mjcf: str | Path) -> mujoco.MjSpec:
+    """Return the specification of an MJCF, or raise `ConfigError` if it cannot be read."""
     is_text = isinstance(mjcf, str) and mjcf.lstrip().startswith("<")
     try:
         if is_text:
             return mujoco.MjSpec.from_string(str(mjcf))
         return mujoco.MjSpec.from_file(str(mjcf))
     except ValueError as error:
-        what = "This text" if is_text else f"The file {mjcf}"
-        raise ConfigError(f"{what} must be an MJCF that MuJoCo reads: {error}") from error
+        source = "This text" if is_text else f"The file {mjcf}"
+        raise ConfigError(f"{source} must be an MJCF that MuJoCo reads: {error}") from error
 
 
-def _compiled(spec: Any) -> mujoco.MjModel:
+def _compile(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    """Return the compiled model of a specification, or raise `ConfigError`."""
     try:
         return spec.compile()
     except ValueError as error:
         raise ConfigError(f"The MJCF must compile: {error}") from error
 
 
-def _joints_said(model: mujoco.MjModel) -> str:
-    """Return how many joints of which kinds there are, in words."""
+def _describe_joints(model: mujoco.MjModel) -> str:
+    """Return the numbers of joints of each kind in words, such as "6 hinge joints"."""
     names = {FREE: "free", BALL: "ball", HINGE: "hinge", SLIDE: "slide"}
     counts = Counter(names[int(kind)] for kind in model.jnt_type)
     return ", ".join(f"{n} {name} joint{'s' * (n > 1)}" for name, n in counts.items()) or "no joint"
 
 
-def _chain(model: mujoco.MjModel, name: str) -> tuple[list[str], list[str]]:
-    """Return the names of joints and of their bodies; `ConfigError` unless they are one chain."""
+def _find_chain(model: mujoco.MjModel, name: str) -> Chain:
+    """Return the names of a serial chain, or raise `ConfigError` if the joints are not one."""
     kinds = {int(kind) for kind in model.jnt_type}
     if not model.njnt or not kinds <= {HINGE, SLIDE}:
         raise ConfigError(
             f"{name}: an arm has hinges and slides only, with its foot fixed; this MJCF has "
-            f"{_joints_said(model)}. Take free joints out, and a gripper or a second arm."
+            f"{_describe_joints(model)}. Take free joints out, and a gripper or a second arm."
         )
     bodies = model.jnt_bodyid.tolist()
     for before, body in pairwise(bodies):
@@ -140,64 +155,75 @@ def _chain(model: mujoco.MjModel, name: str) -> tuple[list[str], list[str]]:
     links = [model.body(body).name for body in bodies]
     if not all(names) or not all(links):
         raise ConfigError(f"{name}: joints and the bodies that they move need names.")
-    return names, links
+    return Chain(names, links)
 
 
-def _each(what: str, value: Sequence[float] | float, n: int) -> tuple[float, ...]:
+def _one_a_joint(name: str, value: Sequence[float] | float, n: int) -> tuple[float, ...]:
+    """Return an argument as one value for each of n joints, or raise `ConfigError`."""
     values = (float(value),) * n if isinstance(value, int | float) else tuple(value)
     if len(values) != n:
-        raise ConfigError(f"{what} must be one number, or one of each of {n} joints, got {value}.")
+        raise ConfigError(f"{name} must be one number, or one of each of {n} joints, got {value}.")
     return values
 
 
-def _home(model: mujoco.MjModel, n: int) -> tuple[float, ...]:
+def _find_home(model: mujoco.MjModel, n: int) -> tuple[float, ...]:
+    """Return the first keyframe of n joints, or else the middle of their ranges."""
     if model.nkey:
         return tuple(model.key_qpos[0, :n].tolist())
     limited = model.jnt_limited[:n].astype(bool)
     return tuple(np.where(limited, model.jnt_range[:n].mean(-1), 0.0).tolist())
 
 
-def _within(spread: tuple[float, ...], spec: Any, joints: list[str]) -> tuple[float, ...]:
+def _limit_spread(
+    spread: tuple[float, ...], spec: mujoco.MjSpec, joints: list[str]
+) -> tuple[float, ...]:
+    """Return the spread of each joint, at most the width of its range."""
     widths = (float(np.ptp(spec.joint(each).range)) for each in joints)
     return tuple(min(each, width) for each, width in zip(spread, widths, strict=True))
 
 
-def _keep_files(spec: Any) -> None:
-    """Name the files of meshes and textures by whole paths: the text has no folder."""
+def _keep_files(spec: mujoco.MjSpec) -> None:
+    """Make the paths of meshes and textures absolute, as the text of an MJCF has no folder."""
     folder = Path(spec.modelfiledir or ".")
-    for parts, own in ((spec.meshes, spec.meshdir), (spec.textures, spec.texturedir)):
+    for parts, subfolder in ((spec.meshes, spec.meshdir), (spec.textures, spec.texturedir)):
         for part in parts:
             if part.file:
-                part.file = str((folder / own / part.file).resolve())
+                part.file = str((folder / subfolder / part.file).resolve())
     spec.meshdir = spec.texturedir = ""
 
 
-def _keep_inertia(spec: Any, model: mujoco.MjModel) -> None:
-    """Write down the masses of links, which shapes that go may have made."""
+def _keep_inertia(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
+    """Make the inertia of links explicit, as geoms that determine it may be removed."""
     for body in spec.bodies[1:]:
         k = model.body(body.name).id if body.name else body.id
-        body.mass, body.ipos, body.iquat = (
-            float(model.body_mass[k]), model.body_ipos[k], model.body_iquat[k],
-        )  # fmt: skip
+        body.mass = float(model.body_mass[k])
+        body.ipos, body.iquat = model.body_ipos[k], model.body_iquat[k]
         body.inertia, body.explicitinertial, body.gravcomp = model.body_inertia[k], True, 1.0
 
 
-def _drop_colliding(spec: Any) -> None:
-    """Delete shapes that collide on bodies where others are only drawn; keep the rest as looks."""
+def _drop_colliding(spec: mujoco.MjSpec) -> None:
+    """Delete the collision geoms of bodies with visual ones; the other geoms become visual."""
     for body in spec.bodies:
         geoms = list(body.geoms)
-        drawn = [each for each in geoms if not (each.contype or each.conaffinity)]
-        for each in geoms:
-            if drawn and each not in drawn:
-                spec.delete(each)
+        visual = [geom for geom in geoms if not (geom.contype or geom.conaffinity)]
+        for geom in geoms:
+            if visual and geom not in visual:
+                spec.delete(geom)
             else:
-                each.mass = 0.0
+                geom.mass = 0.0
 
 
 def _replace_servos(
-    spec: Any, model: mujoco.MjModel, joints: list[str], fastest: tuple[float, ...]
+    spec: mujoco.MjSpec, model: mujoco.MjModel, joints: list[str], fastest: tuple[float, ...]
 ) -> None:
-    """Put the two servos of each joint in place of all actuators."""
+    """Replace all actuators by the two servos of each joint.
+
+    Args:
+        spec: the specification, which is changed.
+        model: its compiled model.
+        joints: names of the joints.
+        fastest: greatest speed of each joint [rad/s].
+    """
     most_n = _forces(model)
     inertia = _inertia(model)
     for each in [*spec.actuators, *spec.sensors, *spec.keys, *spec.tendons]:
@@ -226,7 +252,7 @@ def _replace_servos(
 
 
 def _inertia(model: mujoco.MjModel) -> Floats:
-    """Return the greatest inertia that each joint moves, over seeded poses."""
+    """Return (N,) the greatest inertia that each joint moves, over seeded random poses."""
     rng, data = np.random.default_rng(0), mujoco.MjData(model)
     limited = model.jnt_limited.astype(bool)[:, None]
     low, high = np.where(limited, model.jnt_range, [-TURN, TURN]).T
@@ -240,7 +266,7 @@ def _inertia(model: mujoco.MjModel) -> Floats:
 
 
 def _forces(model: mujoco.MjModel) -> Floats:
-    """Return the greatest torque or force of each joint, infinite where none is given [N m, N]."""
+    """Return (N,) the greatest torque or force of each joint [N m, N]; infinite if not given."""
     most = np.full(model.njnt, np.inf)
     for k in range(model.nu):
         joint = int(model.actuator_trnid[k, 0])
@@ -252,8 +278,15 @@ def _forces(model: mujoco.MjModel) -> Floats:
     return np.where(limited, np.minimum(most, model.jnt_actfrcrange[:, 1]), most)
 
 
-def _tool(spec: Any, model: mujoco.MjModel, last: str, wanted: str) -> str:
-    """Return the site at the tool point, which is added if there is none."""
+def _find_tool(spec: mujoco.MjSpec, model: mujoco.MjModel, last: str, wanted: str) -> str:
+    """Return the name of the site at the tool point, which is added if there is none.
+
+    Args:
+        spec: the specification.
+        model: its compiled model.
+        last: name of the last link.
+        wanted: name of the site; "" for the last one on that link.
+    """
     names = [site.name for site in spec.sites if site.name]
     if wanted and wanted not in names:
         raise unknown("tool_site", wanted, names)
@@ -279,22 +312,22 @@ def _is_on(model: mujoco.MjModel, body: int, link: int) -> bool:
     return body == link
 
 
-def _add_capsules(spec: Any, links: list[str]) -> dict[str, list[str]]:
-    """Fit capsules to what is drawn of each link and add them; return their names by link."""
-    model = _compiled(spec)
+def _add_capsules(spec: mujoco.MjSpec, links: list[str]) -> dict[str, list[str]]:
+    """Fit capsules to the geoms of each link and add them; return their names by link."""
+    model = _compile(spec)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     bodies = [model.body(link).id for link in links]
     added: dict[str, list[str]] = {}
     for k, (link, body) in enumerate(zip(links, bodies, strict=True)):
         after = bodies[k + 1 :]
-        own = [
+        geoms = [
             geom
             for geom in range(model.ngeom)
             if _is_on(model, int(model.geom_bodyid[geom]), body)
             and not any(_is_on(model, int(model.geom_bodyid[geom]), each) for each in after)
         ]
-        points = [surface_of(model, data, geom, CELL_M / 2) for geom in own]
+        points = [sample_surface(model, data, geom, CELL_M / 2) for geom in geoms]
         if not points or not sum(map(len, points)):
             added[link] = []
             continue
@@ -302,5 +335,5 @@ def _add_capsules(spec: Any, links: list[str]) -> dict[str, list[str]]:
         rods: list[Rod] = fit_rods(world @ data.xmat[body].reshape(3, 3))
         added[link] = [f"{link}_capsule_{i}" for i in range(len(rods))]
         for name, rod in zip(added[link], rods, strict=True):
-            capsule(spec.body(link), rod.start_m, rod.end_m, rod.radius_m, name=name, mass=0.0)
+            add_capsule(spec.body(link), rod.start_m, rod.end_m, rod.radius_m, name=name, mass=0.0)
     return added

@@ -1,113 +1,129 @@
-"""How far what is drawn of a robot and the capsules that stand for it are apart.
+"""Comparison of a robot's visual geoms with the capsules that represent it.
 
-Cameras see a robot's looks; distances, contacts and shields take its capsules. Points all over both
-surfaces are compared, in the pose in which every joint is at 0.
+Cameras see the visual geoms; distances, contacts and shields use the capsules. Points on both
+surfaces are compared in the home pose.
 """
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import mujoco
 import numpy as np
 from scipy.spatial import ConvexHull, KDTree, QhullError
 
 from hrc_env.core.typing import Bools, Floats, Points3
-from hrc_env.scene.robot_chain import id_of, link_of, parsed
+from hrc_env.scene.robot_chain import find_id, find_link, parse_mjcf
 
 if TYPE_CHECKING:
     from hrc_env.scene.robot import Robot
 
 BARE_M = 0.1
-"""A capsule that reaches out of the looks by more than this is drawn [m]."""
+"""Distance of a capsule's surface from the visual geoms above which the capsule is drawn [m]."""
 INSIDE_M = 0.005
-"""Points of a capsule that are deeper in another one are on no surface [m]."""
+"""Depth in another capsule from which on points of a capsule are on no surface [m]."""
 UNLIKE_M = 0.05
-"""Looks and capsules that differ by more are worth a warning [m]."""
+"""Difference of visual geoms and capsules that causes a warning [m]."""
 SPACING_M = 0.02
 """Distance of neighbouring points on a surface [m]."""
 MOST_POINTS = 4000
-"""Of one mesh at that spacing."""
+"""Largest number of points on one mesh at that spacing."""
 
 
 class Mismatch(NamedTuple):
-    """How far one capsule and the looks on the links around it are apart."""
+    """Difference of a capsule and the visual geoms on the links around it."""
 
     bare_m: float
-    """How far the capsule reaches out of all looks at most [m]; infinite without any."""
+    """Largest distance of the capsule's surface from all visual geoms [m]; infinite without any."""
     outside_m: float
-    """How far looks of its link reach out of all capsules at most [m]."""
+    """Largest distance of visual geoms of its link out of all capsules [m]."""
 
 
 @lru_cache(maxsize=64)
 def bare_capsules(robot: "Robot") -> frozenset[str]:
-    """Return the capsules that reach out of all looks around them by more than `BARE_M`: these are
-    drawn, so that cameras see what distances count. The fingers' and cups' own are not."""
-    gripped = robot.hand or robot.suction
-    spans = gripped.spans if gripped else ()
+    """Return the capsules that are farther than `BARE_M` from all visual geoms around them.
+
+    These are drawn, so that cameras see the surface of which distances are measured. Capsules of
+    fingers and cups are never among them.
+    """
+    hand = robot.hand or robot.suction
+    spans = hand.spans if hand else ()
     return frozenset(
         name
-        for name, each in compare_looks(robot).items()
-        if name not in spans and each.bare_m > BARE_M
+        for name, mismatch in compare_looks(robot).items()
+        if name not in spans and mismatch.bare_m > BARE_M
     )
 
 
 def compare_looks(robot: "Robot", spacing_m: float = SPACING_M) -> dict[str, Mismatch]:
-    """Return how far each capsule and what is drawn on its link and the next ones are apart, in the
-    pose at rest; points on surfaces are `spacing_m` apart."""
-    model = parsed(robot).compile()
-    data, gripped = mujoco.MjData(model), robot.hand or robot.suction
+    """Compare each capsule with the visual geoms on its link and the next ones, in the home pose.
+
+    Args:
+        robot: the robot.
+        spacing_m: distance of neighbouring points on a surface [m].
+    """
+    model = parse_mjcf(robot).compile()
+    data, hand = mujoco.MjData(model), robot.hand or robot.suction
     data.qpos[: len(robot.joints)] = robot.home_q
     mujoco.mj_kinematics(model, data)
-    bodies = model.jnt_bodyid[[id_of(model, "joint", name) for name in robot.joints]].tolist()
-    carrier = [link_of(model, bodies, body) for body in model.geom_bodyid]
-    capsules = [id_of(model, "geom", name) for name in robot.capsules]
-    pads = [id_of(model, "geom", name) for name in gripped.pads] if gripped else []
+    bodies = model.jnt_bodyid[[find_id(model, "joint", name) for name in robot.joints]].tolist()
+    carrier = [find_link(model, bodies, body) for body in model.geom_bodyid]
+    capsules = [find_id(model, "geom", name) for name in robot.capsules]
+    pads = [find_id(model, "geom", name) for name in hand.pads] if hand else []
     looks = [geom for geom in range(model.ngeom) if geom not in (*capsules, *pads)]
-    points = {geom: surface_of(model, data, geom, spacing_m) for geom in (*looks, *capsules)}
+    geoms = (*looks, *capsules)
+    points = {geom: sample_surface(model, data, geom, spacing_m) for geom in geoms}
     along = data.geom_xmat[capsules].reshape(-1, 3, 3)[..., 2] * model.geom_size[capsules, 1:2]
     middle = data.geom_xpos[capsules]
     ends, radius_m = np.stack([middle - along, middle + along], 1), model.geom_size[capsules, 0]
-    solids = [solid_of(model, data, geom) for geom in looks]
-    found = {}
+    solids = [make_solid(model, data, geom) for geom in looks]
+    mismatches: dict[str, Mismatch] = {}
     for k, (name, geom) in enumerate(zip(robot.capsules, capsules, strict=True)):
         link, others = carrier[geom], np.arange(len(capsules)) != k
         hull = points[geom]
         hull = hull[_outside_m(hull, ends[others], radius_m[others]) > -INSIDE_M]
         near = [points[each] for each in looks if abs(carrier[each] - link) <= 1]
-        own = [points[each] for each in looks if carrier[each] == link]
-        hidden = np.any([solid.holds(hull) for solid in solids], axis=0)
-        found[name] = Mismatch(
-            bare_m(hull[~hidden] if solids else hull, near), outside_capsules_m(own, ends, radius_m)
+        of_link = [points[each] for each in looks if carrier[each] == link]
+        hidden = np.any([solid.contains(hull) for solid in solids], axis=0)
+        mismatches[name] = Mismatch(
+            bare_m=distance_from_looks_m(hull[~hidden] if solids else hull, near),
+            outside_m=distance_from_capsules_m(of_link, ends, radius_m),
         )
-    return found
+    return mismatches
 
 
-def warn_of_looks(robot: "Robot") -> None:
-    """Warn where looks and capsules of a robot differ by more than `UNLIKE_M`."""
+def warn_of_mismatch(robot: "Robot") -> None:
+    """Warn if visual geoms and capsules of a robot differ by more than `UNLIKE_M`."""
     drawn = bare_capsules(robot)
-    for name, each in compare_looks(robot).items():
-        if name not in drawn and each.bare_m > UNLIKE_M:
+    for name, mismatch in compare_looks(robot).items():
+        if name not in drawn and mismatch.bare_m > UNLIKE_M:
             warnings.warn(
-                f"{robot.name}: capsule {name!r} reaches {100 * each.bare_m:.0f} cm out of what is "
-                "drawn of the robot: cameras do not see what distances count. Draw it, or shorten "
-                "the capsule.",
+                f"{robot.name}: capsule {name!r} reaches {100 * mismatch.bare_m:.0f} cm out of "
+                "the robot's visual geoms: cameras do not see the surface of which distances are "
+                "measured. Add a visual geom, or shorten the capsule.",
                 stacklevel=4,
             )
-        if each.outside_m > UNLIKE_M:
+        if mismatch.outside_m > UNLIKE_M:
             warnings.warn(
-                f"{robot.name}: what is drawn on the link of capsule {name!r} reaches "
-                f"{100 * each.outside_m:.0f} cm out of all capsules: people may touch what shields "
-                "do not know of. Add a capsule to that link.",
+                f"{robot.name}: visual geoms on the link of capsule {name!r} reach "
+                f"{100 * mismatch.outside_m:.0f} cm out of all capsules: people may touch a part "
+                "that shields do not know. Add a capsule to that link.",
                 stacklevel=4,
             )
 
 
-def surface_of(
+def sample_surface(
     model: mujoco.MjModel, data: mujoco.MjData, geom: int, spacing_m: float = SPACING_M
 ) -> Points3:
-    """Return points (N, 3) all over the surface of a geom in the world [m]."""
+    """Return points (N, 3) on the surface of a geom in the world [m].
+
+    Args:
+        model: the model.
+        data: its state.
+        geom: the geom.
+        spacing_m: distance of neighbouring points [m].
+    """
     kind, size = int(model.geom_type[geom]), model.geom_size[geom]
     if kind == int(mujoco.mjtGeom.mjGEOM_MESH):
         local = _on_mesh(model, int(model.geom_dataid[geom]), spacing_m)
@@ -117,25 +133,30 @@ def surface_of(
 
 
 class Solid(NamedTuple):
-    """A geom, for asking what is in it."""
+    """A geom in its pose, which can be tested for points inside."""
 
     kind: int
+    """MuJoCo's kind of the geom."""
     size: Floats
-    at_world: Points3
-    turn_world: Floats
-    around_m: float
-    """No point of it is farther from its middle [m]."""
+    """(3,) MuJoCo's sizes of the geom [m]."""
+    position_world: Points3
+    """(3,) middle of the geom [m]."""
+    rotation: Floats
+    """(3, 3) world_from_geom."""
+    bounding_radius_m: float
+    """Radius of a sphere round the middle that contains the geom [m]."""
     sides: Floats
-    """(F, 4) of a mesh's convex hull; of none for other kinds."""
+    """(F, 4) sides of a mesh's convex hull; empty for other kinds."""
 
-    def holds(self, points_world: Points3) -> Bools:
-        """Return which points (N, 3) are inside; of a mesh, inside of its convex hull."""
-        off = points_world - self.at_world
-        near = np.linalg.norm(off, axis=-1) < self.around_m
-        near[near] = self._holds(off[near] @ self.turn_world)
-        return near
+    def contains(self, points_world: Points3) -> Bools:
+        """Return (N,) whether points (N, 3) are inside; of a mesh, inside of its convex hull."""
+        off = points_world - self.position_world
+        inside = np.linalg.norm(off, axis=-1) < self.bounding_radius_m
+        inside[inside] = self._contains(off[inside] @ self.rotation)
+        return inside
 
-    def _holds(self, local: Points3) -> Bools:
+    def _contains(self, local: Points3) -> Bools:
+        """Return (N,) whether points (N, 3) in the frame of the geom are inside."""
         flat, height, size = np.hypot(*local[:, :2].T), np.abs(local[:, 2]), self.size
         inside = {
             mujoco.mjtGeom.mjGEOM_MESH: lambda: _are_inside(self.sides, local),
@@ -147,24 +168,32 @@ class Solid(NamedTuple):
             mujoco.mjtGeom.mjGEOM_SPHERE: lambda: np.hypot(flat, height) < size[0],
             mujoco.mjtGeom.mjGEOM_ELLIPSOID: lambda: np.linalg.norm(local / size, axis=-1) < 1.0,
         }
-        found = {int(kind): test for kind, test in inside.items()}.get(self.kind)
-        return np.zeros(len(local), np.bool_) if found is None else np.asarray(found())
+        test = {int(kind): test for kind, test in inside.items()}.get(self.kind)
+        return np.zeros(len(local), np.bool_) if test is None else np.asarray(test())
 
 
-def solid_of(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Solid:
+def make_solid(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> Solid:
     """Return a geom in its pose in the world."""
     kind, sides = int(model.geom_type[geom]), np.zeros((0, 4))
     if kind == int(mujoco.mjtGeom.mjGEOM_MESH):
         corners = _triangles(model, int(model.geom_dataid[geom]))
         sides = _sides_of_hull(corners.reshape(-1, 3))
-    turn = data.geom_xmat[geom].reshape(3, 3).copy()
-    at, around_m = data.geom_xpos[geom].copy(), float(model.geom_rbound[geom])
-    return Solid(kind, model.geom_size[geom].copy(), at, turn, around_m, sides)
+    return Solid(
+        kind=kind,
+        size=model.geom_size[geom].copy(),
+        position_world=data.geom_xpos[geom].copy(),
+        rotation=data.geom_xmat[geom].reshape(3, 3).copy(),
+        bounding_radius_m=float(model.geom_rbound[geom]),
+        sides=sides,
+    )
 
 
 def _sides_of_hull(points_m: Points3) -> Floats:
-    """Return the sides (F, 4) of the convex hull of points (N, 3): normals outwards, and less their
-    distance from the origin; of points in a plane, a side that leaves nothing inside."""
+    """Return (F, 4) the sides of the convex hull of points (N, 3).
+
+    A side is its outward normal and minus its distance from the origin. For points in a plane there
+    is one side, with nothing inside.
+    """
     try:
         return np.asarray(ConvexHull(points_m).equations, np.float64)
     except (QhullError, ValueError):
@@ -172,19 +201,27 @@ def _sides_of_hull(points_m: Points3) -> Floats:
 
 
 def _are_inside(sides: Floats, points_m: Points3) -> Bools:
-    """Return which of some points (M, 3) are behind all sides (F, 4) of a hull."""
+    """Return (M,) whether points (M, 3) are behind all sides (F, 4) of a hull."""
     return np.asarray((points_m @ sides[:, :3].T + sides[:, 3] <= 0.0).all(-1))
 
 
-def outside_capsules_m(looks: Sequence[Points3], ends_world: Floats, radius_m: Floats) -> float:
-    """Return how far points (N, 3) of looks are outside of all capsules (K, 2, 3) at most [m]."""
+def distance_from_capsules_m(
+    looks: Sequence[Points3], ends_world: Floats, radius_m: Floats
+) -> float:
+    """Return the largest distance of points of visual geoms out of all capsules [m].
+
+    Args:
+        looks: points (N, 3) of each visual geom [m].
+        ends_world: (K, 2, 3) end points of the capsules' axes [m].
+        radius_m: (K,) their radii [m].
+    """
     if not looks:
         return 0.0
     return max(float(_outside_m(np.concatenate(looks), ends_world, radius_m).max()), 0.0)
 
 
 def _outside_m(points_world: Points3, ends_world: Floats, radius_m: Floats) -> Floats:
-    """Return how far points (N, 3) are out of the nearest of capsules (K, 2, 3) [m]."""
+    """Return (N,) the distance of points (N, 3) out of the nearest of capsules (K, 2, 3) [m]."""
     if not len(ends_world):
         return np.full(len(points_world), np.inf)
     start, along = ends_world[:, 0], ends_world[:, 1] - ends_world[:, 0]
@@ -195,8 +232,13 @@ def _outside_m(points_world: Points3, ends_world: Floats, radius_m: Floats) -> F
     return np.asarray(away.min(1))
 
 
-def bare_m(capsule_points: Points3, looks: Sequence[Points3]) -> float:
-    """Return how far a capsule's surface (N, 3) is from the nearest point of looks (M, 3) [m]."""
+def distance_from_looks_m(capsule_points: Points3, looks: Sequence[Points3]) -> float:
+    """Return the largest distance of a capsule's surface from the visual geoms [m].
+
+    Args:
+        capsule_points: (N, 3) points on the capsule's surface [m].
+        looks: points (M, 3) of each visual geom [m].
+    """
     points_world = np.concatenate([np.zeros((0, 3)), *looks])
     if not len(points_world):
         return np.inf
@@ -206,12 +248,14 @@ def bare_m(capsule_points: Points3, looks: Sequence[Points3]) -> float:
 
 
 def _grid(length_m: float, spacing_m: float) -> int:
+    """Return the number of points along a length."""
     return int(np.clip(np.ceil(length_m / spacing_m), 1, 60 * SPACING_M / spacing_m)) + 1
 
 
 def _on_box(size: Floats, spacing_m: float) -> Points3:
+    """Return points (N, 3) on a box of half edges `size` (3,) [m]."""
     axes = [np.linspace(-half, half, _grid(2 * half, spacing_m)) for half in size]
-    faces = []
+    faces: list[Points3] = []
     for k in range(3):
         flat = np.stack(np.meshgrid(*(axes[i] for i in range(3) if i != k)), -1).reshape(-1, 2)
         for side in (-size[k], size[k]):
@@ -220,7 +264,14 @@ def _on_box(size: Floats, spacing_m: float) -> Points3:
 
 
 def _on_round(radius_m: float, half_m: float, cap: Floats, spacing_m: float) -> Points3:
-    """Return points on a tube about z and on its ends; `cap` (n, 2): radius and height of rings."""
+    """Return points (N, 3) on a tube about z and on its ends.
+
+    Args:
+        radius_m: radius of the tube [m].
+        half_m: half length of the tube [m].
+        cap: (n, 2) radius and height above the end of the rings of a cap [m].
+        spacing_m: distance of neighbouring points [m].
+    """
     around = np.linspace(0, 2 * np.pi, _grid(2 * np.pi * radius_m, spacing_m), endpoint=False)
     tube = [(radius_m, z) for z in np.linspace(-half_m, half_m, _grid(2 * half_m, spacing_m))]
     rings = np.array(
@@ -254,7 +305,7 @@ def _on_nothing(size: Floats, spacing_m: float) -> Points3:
     return np.zeros((0, 3))
 
 
-_ON_SHAPES: dict[int, Any] = {
+_ON_SHAPES: dict[int, Callable[[Floats, float], Points3]] = {
     int(mujoco.mjtGeom.mjGEOM_BOX): _on_box,
     int(mujoco.mjtGeom.mjGEOM_CAPSULE): _on_capsule,
     int(mujoco.mjtGeom.mjGEOM_CYLINDER): _on_cylinder,
@@ -264,7 +315,7 @@ _ON_SHAPES: dict[int, Any] = {
 
 
 def _on_mesh(model: mujoco.MjModel, mesh: int, spacing_m: float) -> Points3:
-    """Return points on a mesh: corners of its triangles, and more where these are large."""
+    """Return points (N, 3) on a mesh: corners of its triangles, and more on large triangles [m]."""
     corners = _triangles(model, mesh)
     n = len(corners)
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -280,7 +331,7 @@ def _on_mesh(model: mujoco.MjModel, mesh: int, spacing_m: float) -> Points3:
 
 
 def _triangles(model: mujoco.MjModel, mesh: int) -> Floats:
-    """Return the corners (T, 3, 3) of a mesh [m]."""
+    """Return (T, 3, 3) the corners of the triangles of a mesh [m]."""
     first, n = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
     faces = model.mesh_vertadr[mesh] + model.mesh_face[first : first + n]
     return np.asarray(model.mesh_vert[faces], np.float64)

@@ -9,20 +9,30 @@ from hrc_env.core.errors import RenderingError
 from hrc_env.core.records import WorkerMotion
 from hrc_env.core.typing import JointAngles
 from hrc_env.scene import gl
-from hrc_env.scene.build import Scene, drawing_model, visuals
+from hrc_env.scene.build import Scene, drawing_model, find_visuals
 from hrc_env.scene.worker_visuals import show_workers
 
 
 class Viewer:
-    """A window that shows one environment; drag to look round, close it to go on without."""
+    """A window that shows one environment.
+
+    Drag to look round; when the window is closed, the environment runs on.
+
+    Args:
+        scene: the scene.
+    """
 
     def __init__(self, scene: Scene) -> None:
-        """Open the window. Raises `RenderingError` where there is no display."""
+        """Open the window.
+
+        Raises:
+            RenderingError: there is no display.
+        """
         self._model = copy.copy(drawing_model(scene))
         self._data = mujoco.MjData(self._model)
-        self._visuals = visuals(scene)
+        self._visuals = find_visuals(scene)
         try:
-            gl.require_display()  # without one launch_passive would wait for ever
+            gl.require_display()  # without a display launch_passive waits for ever
             gl.load_triton_first()
             from mujoco import viewer
 
@@ -34,7 +44,12 @@ class Viewer:
             ) from error
 
     def show(self, q: JointAngles, motion: WorkerMotion) -> None:
-        """Pose the scene: arm q (N,) and the workers of one environment (W, S, ...)."""
+        """Pose the scene.
+
+        Args:
+            q: (N,) joint angles of the robot [rad].
+            motion: poses of the workers of one environment, arrays (W, S, ...).
+        """
         if not self._window.is_running():
             return
         with self._window.lock():

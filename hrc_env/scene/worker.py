@@ -1,31 +1,31 @@
-"""Put a baked worker into a MuJoCo model: mocap bodies, and capsules round them.
+"""Add a baked worker to a MuJoCo model: mocap bodies with capsules.
 
 The worker is moved, not simulated: 22 mocap bodies take positions and rotations from
-`WorkerMotion`. Nobody can touch what one sees (`worker_visuals`); no camera draws the capsules.
+`WorkerMotion`. Contacts are with the capsules, which no camera draws; cameras see the visual
+meshes of `worker_visuals`.
 """
 
 from functools import lru_cache
-from typing import Any
 
 import mujoco
 import numpy as np
 
 from hrc_env.core.typing import Floats, Ints
-from hrc_env.scene.primitives import WORKER_BIT, WORKER_CAPSULES, capsule
+from hrc_env.scene.primitives import WORKER_BIT, WORKER_CAPSULES, add_capsule
 from hrc_env.worker.body import SEGMENTS, Body, load_body
 
 CAPSULE_FIELDS = ("geom_pos", "geom_quat", "geom_size", "geom_rbound", "geom_aabb")
 """Fields of MuJoCo's model in which the capsules of two bodies differ."""
 
 
-def add_worker(spec: Any, body: Body, prefix: str) -> None:
-    """Add a worker in its rest pose to a model being built; names begin with the prefix."""
+def add_worker(spec: mujoco.MjSpec, body: Body, prefix: str) -> None:
+    """Add a worker in its rest pose to a specification; its names begin with the prefix."""
     segments = {
         name: spec.worldbody.add_body(name=prefix + name, pos=position, mocap=True)
         for name, position in zip(SEGMENTS, body.rest_position, strict=True)
     }
     for row, name in enumerate(body.capsule_names):
-        capsule(
+        add_capsule(
             segments[SEGMENTS[body.capsule_segment[row]]],
             body.capsule_ends[row, 0],
             body.capsule_ends[row, 1],
@@ -38,19 +38,19 @@ def add_worker(spec: Any, body: Body, prefix: str) -> None:
         )
 
 
-def mocap_ids(model: Any, prefix: str) -> Ints:
-    """(22,) rows of `data.mocap_pos` and `data.mocap_quat` that move a worker's segments."""
+def mocap_ids(model: mujoco.MjModel, prefix: str) -> Ints:
+    """Return (22,) the rows of `data.mocap_pos` and `data.mocap_quat` of a worker's segments."""
     return np.array([model.body(prefix + name).mocapid[0] for name in SEGMENTS], dtype=np.int64)
 
 
-def capsule_geom_ids(model: Any, body: Body, prefix: str) -> Ints:
-    """(K,) geoms of a worker's capsules, in the order of `body.capsule_names`."""
+def capsule_geom_ids(model: mujoco.MjModel, body: Body, prefix: str) -> Ints:
+    """Return (K,) the geoms of a worker's capsules, in the order of `body.capsule_names`."""
     return np.array([model.geom(prefix + name).id for name in body.capsule_names], dtype=np.int64)
 
 
 @lru_cache(maxsize=16)
 def capsule_shapes(bodies: tuple[str, ...]) -> dict[str, Floats]:
-    """The capsules of bodies as MuJoCo compiles them: (N, K, ...) by the names of its fields."""
+    """Return the compiled capsules of N bodies: (N, K, ...) by the names of MuJoCo's fields."""
     shapes: dict[str, list[Floats]] = {name: [] for name in CAPSULE_FIELDS}
     for name in bodies:
         spec = mujoco.MjSpec()

@@ -1,11 +1,10 @@
-"""What workers look like and hold, in the drawing model; physics knows capsules only.
+"""Skins, hats and props of workers in the drawing model; the physics has their capsules only.
 
-All of a worker's bodies hang on the same 22 mocap bodies, and a mocap body for each thing that can
-be held follows them. What nobody has or holds is in a group that is not drawn.
+All visual bodies of a worker are attached to the same 22 mocap bodies, which are followed by a
+mocap body for each prop. Bodies and props that are not in use are in a group that is not drawn.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -19,42 +18,59 @@ from hrc_env.worker.mesh import HatMesh, SkinMesh, WorkerMesh
 from hrc_env.worker.props import PROP_NAMES
 
 SKIN_SPECULAR, SKIN_SHININESS = 0.08, 0.15
+"""Material of skins and clothes."""
 HAT_SPECULAR, HAT_SHININESS = 0.45, 0.55
-SHOWN, HIDDEN = DECORATION, WORKER_CAPSULES
-"""Groups of skins, hats and task_scene."""
+"""Material of hats."""
+SHOWN = DECORATION
+"""Group of visual geoms that are drawn."""
+HIDDEN = WORKER_CAPSULES
+"""Group of visual geoms that are not drawn."""
 PARKED_M = (0.0, 0.0, -30.0)
-"""Where things are that nobody holds [m]."""
+"""Place of props that are not in use [m]."""
 LOAD = "load_"
-"""With what the names of bodies begin that lie about."""
+"""Prefix of the names of bodies for props that lie on the floor."""
 
 
 @dataclass(frozen=True, slots=True)
 class WorkerVisuals:
-    """Where the looks of W workers' N bodies, and what they can hold, are in a model."""
+    """Indices of the skins, hats and props of W workers in a drawing model."""
 
     segments: Ints
     """(W, S) mocap row of every body segment."""
     skins: Ints
-    """(nskin, 2) whose each skin is, and of which body."""
+    """(nskin, 2) index of the worker and of the body of each skin."""
     hats: Ints
-    """(H, 3) whose each hat is, of which body, and its geom."""
+    """(H, 3) index of the worker and of the body of each hat, and its geom."""
     props: Ints
-    """(N, len(PROPS) - 1) mocap rows of as many of each thing as are drawn at once, -1: there are
-    fewer; they follow the workers' rows."""
+    """(N, len(PROPS) - 1) mocap rows of the copies of each prop, in columns, which follow the
+    workers' rows; -1 where a prop has fewer copies."""
 
 
-def add_visuals(spec: Any, body: Body, looks: WorkerMesh, prefix: str) -> None:
-    """Add the skins and the hat of a body to the worker whom `add_worker` has added with this
-    prefix; workers who have the same body share its textures."""
+def add_visuals(spec: mujoco.MjSpec, body: Body, looks: WorkerMesh, prefix: str) -> None:
+    """Add the skins and the hat of a body to a worker; workers with the same body share textures.
+
+    Args:
+        spec: the scene, to which `add_worker` has added the worker.
+        body: the body.
+        looks: its meshes.
+        prefix: prefix of the worker's names.
+    """
     for skin in looks.skins:
         _add_skin(spec, skin, body, prefix)
     if looks.hat is not None:
         _add_hat(spec, looks.hat, body, prefix)
 
 
-def add_props(spec: Any, prefixes: tuple[str, ...], loads: tuple[str, ...]) -> None:
-    """Everything that can be held, once a worker, and loads (names of props) that lie about, all
-    parked; call after the workers are added. Without workers there is nothing."""
+def add_props(spec: mujoco.MjSpec, prefixes: tuple[str, ...], loads: tuple[str, ...]) -> None:
+    """Add every prop once for each worker, and the loads that lie on the floor, all parked.
+
+    Without workers nothing is added.
+
+    Args:
+        spec: the scene, to which the workers have been added.
+        prefixes: prefixes of the workers' names.
+        loads: names of the props that lie on the floor.
+    """
     for prefix in prefixes:
         props = mujoco.MjSpec.from_file(str(assets_dir() / "scenes" / "props.xml"))
         spec.attach(props, prefix=prefix, frame=spec.worldbody.add_frame())
@@ -62,24 +78,37 @@ def add_props(spec: Any, prefixes: tuple[str, ...], loads: tuple[str, ...]) -> N
         body = spec.worldbody.add_body(name=f"{LOAD}{k}/{name}", mocap=True, pos=PARKED_M)
         for geom in spec.body(prefixes[0] + name).geoms:
             body.add_geom(
-                type=geom.type, size=geom.size, pos=geom.pos, quat=geom.quat,
-                meshname=geom.meshname, material=geom.material, **LOOKS_ONLY,
-            )  # fmt: skip
+                type=geom.type,
+                size=geom.size,
+                pos=geom.pos,
+                quat=geom.quat,
+                meshname=geom.meshname,
+                material=geom.material,
+                **LOOKS_ONLY,
+            )
 
 
-def visuals_of(
+def index_visuals(
     model: mujoco.MjModel, prefixes: tuple[str, ...], bodies: tuple[str, ...]
 ) -> WorkerVisuals:
-    """Those in a model of workers with these prefixes, each with the looks of all these bodies."""
+    """Return the indices of skins, hats and props in a drawing model.
+
+    Args:
+        model: the drawing model.
+        prefixes: prefixes of the workers' names.
+        bodies: names of the bodies that each worker has.
+    """
     pairs = [(w, n) for w in range(len(prefixes)) for n in range(len(bodies))]
-    of = {(w, n): f"{prefixes[w]}{bodies[n]}_" for w, n in pairs}
+    starts = {(w, n): f"{prefixes[w]}{bodies[n]}_" for w, n in pairs}
     skins = np.zeros((model.nskin, 2), np.int64)
-    for pair, start in of.items():
+    for pair, start in starts.items():
         for k in range(model.nskin):
             if model.skin(k).name.startswith(start):
                 skins[k] = pair
-    known = {model.geom(geom).name: geom for geom in range(model.ngeom)}
-    hats = [(*pair, known[f"{start}hat"]) for pair, start in of.items() if f"{start}hat" in known]
+    geoms = {model.geom(geom).name: geom for geom in range(model.ngeom)}
+    hats = [
+        (*pair, geoms[f"{start}hat"]) for pair, start in starts.items() if f"{start}hat" in geoms
+    ]
     rows = [mocap_ids(model, prefix) for prefix in prefixes]
     return WorkerVisuals(
         np.array(rows, np.int64),
@@ -90,21 +119,27 @@ def visuals_of(
 
 
 def _prop_rows(model: mujoco.MjModel) -> Ints:
-    """`WorkerVisuals.props` of a model: a column for each thing, filled from above."""
+    """Return `WorkerVisuals.props` of a model: a column for each prop, filled from above."""
     moved = np.flatnonzero(model.body_mocapid >= 0)
     names = [model.body(body).name.rpartition("/")[2] for body in moved]
     ids = [
-        [model.body_mocapid[k] for k, found in zip(moved, names, strict=True) if found == name]
+        [model.body_mocapid[k] for k, other in zip(moved, names, strict=True) if other == name]
         for name in PROP_NAMES[1:]
     ]
     table = np.full((max(map(len, ids)), len(ids)), -1, np.int64)
-    for column, own in enumerate(ids):
-        table[: len(own), column] = own
+    for column, copies in enumerate(ids):
+        table[: len(copies), column] = copies
     return table
 
 
 def show_bodies(model: mujoco.MjModel, visuals: WorkerVisuals, body: Ints | None) -> None:
-    """Show each worker in a body (W,), None: the first, in a drawing model of the caller's own."""
+    """Show each worker in one of its bodies.
+
+    Args:
+        model: a drawing model of the caller's own, which is changed.
+        visuals: indices of skins and hats.
+        body: (W,) index of each worker's body; None for the first.
+    """
     if not len(visuals.skins):
         return
     chosen = np.zeros(visuals.skins[:, 0].max() + 1, np.int64) if body is None else body
@@ -116,8 +151,14 @@ def show_bodies(model: mujoco.MjModel, visuals: WorkerVisuals, body: Ints | None
 def show_workers(
     model: mujoco.MjModel, data: mujoco.MjData, visuals: WorkerVisuals, motion: WorkerMotion
 ) -> None:
-    """Pose the workers of one environment (W, S, ...), in their bodies and with what they hold, in
-    a drawing model of the caller's own and its state."""
+    """Pose the workers of one environment in their bodies, with the props that they hold.
+
+    Args:
+        model: a drawing model of the caller's own, which is changed.
+        data: its state, which is changed.
+        visuals: indices of skins, hats and props.
+        motion: the workers' poses, arrays (W, S, ...).
+    """
     rows = visuals.segments
     if not rows.size:
         return
@@ -128,33 +169,44 @@ def show_workers(
 
 
 def show_props(model: mujoco.MjModel, data: mujoco.MjData, rows: Ints, held: Held | None) -> None:
-    """Put what is held or lies about (W + L, ...) to where it is, all else under the floor, where
-    no camera draws it; rows: `WorkerVisuals.props`."""
+    """Pose the props that are held or lie on the floor, and park all others below it.
+
+    Args:
+        model: a drawing model of the caller's own, which is changed.
+        data: its state, which is changed.
+        rows: `WorkerVisuals.props`.
+        held: the props, arrays (W + L, ...); None for none.
+    """
     if not rows.size:
         return
     known = rows[rows >= 0]
     data.mocap_pos[known] = PARKED_M
-    shown = rows_shown(rows, held)
+    shown = assign_props(rows, held)
     if held is not None:
         data.mocap_pos[shown[shown >= 0]] = held.position_world[shown >= 0]
         data.mocap_quat[shown[shown >= 0]] = held.quaternion_wxyz[shown >= 0]
-    of_geom = model.body_mocapid[model.geom_bodyid]
-    things = of_geom >= known.min()
-    model.geom_group[things] = np.where(np.isin(of_geom[things], shown), SHOWN, HIDDEN)
+    geom_rows = model.body_mocapid[model.geom_bodyid]
+    is_prop = geom_rows >= known.min()
+    model.geom_group[is_prop] = np.where(np.isin(geom_rows[is_prop], shown), SHOWN, HIDDEN)
 
 
-def rows_shown(rows: Ints, held: Held | None) -> Ints:
-    """Return (W + L,) the mocap row that shows each thing that is held or lies about, -1 of none;
-    rows: `WorkerVisuals.props`."""
+def assign_props(rows: Ints, held: Held | None) -> Ints:
+    """Return (W + L,) the mocap row for each prop that is held or lies on the floor; -1 for none.
+
+    Args:
+        rows: `WorkerVisuals.props`.
+        held: the props, arrays (W + L, ...); None for none.
+    """
     kind = np.zeros(0, np.int64) if held is None else held.kind
     shown = np.full(len(kind), -1)
     for prop in np.unique(kind[kind > 0]):
-        of_kind = np.flatnonzero(kind == prop)[: len(rows)]
-        shown[of_kind] = rows[: len(of_kind), prop - 1]
+        same = np.flatnonzero(kind == prop)[: len(rows)]
+        shown[same] = rows[: len(same), prop - 1]
     return shown
 
 
-def _add_skin(spec: Any, skin: SkinMesh, body: Body, prefix: str) -> None:
+def _add_skin(spec: mujoco.MjSpec, skin: SkinMesh, body: Body, prefix: str) -> None:
+    """Add a skin of a body, with its material, to the worker with this prefix."""
     material = f"{body.names[0]}_{skin.name}"
     if spec.material(material) is None:
         _add_cloth(spec, skin, material)
@@ -174,8 +226,8 @@ def _add_skin(spec: Any, skin: SkinMesh, body: Body, prefix: str) -> None:
     )
 
 
-def _add_cloth(spec: Any, skin: SkinMesh, name: str) -> None:
-    """The material and the texture of a skin."""
+def _add_cloth(spec: mujoco.MjSpec, skin: SkinMesh, name: str) -> None:
+    """Add the material and the texture of a skin under a name."""
     height, width = skin.texture.shape[:2]
     texture = spec.add_texture(
         name=name, type=mujoco.mjtTexture.mjTEXTURE_2D, width=width, height=height, nchannel=3
@@ -185,7 +237,8 @@ def _add_cloth(spec: Any, skin: SkinMesh, name: str) -> None:
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
 
 
-def _add_hat(spec: Any, hat: HatMesh, body: Body, prefix: str) -> None:
+def _add_hat(spec: mujoco.MjSpec, hat: HatMesh, body: Body, prefix: str) -> None:
+    """Add the hat of a body to the head of the worker with this prefix."""
     name = f"{body.names[0]}_hat"
     if spec.mesh(name) is None:
         spec.add_mesh(

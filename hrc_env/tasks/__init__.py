@@ -1,18 +1,19 @@
-"""Tasks: what the robot is to achieve, one class a file. None of them reads a camera."""
+"""Tasks of the robot, one class a file. None of them reads a camera."""
 
 from dataclasses import dataclass
 
 EPISODE_STEPS = 250
-"""Time limit of an episode unless its task has another one: 10 s at 25 Hz."""
+"""Time limit of an episode unless its task has another one [control steps]: 10 s at 25 Hz."""
 
 
 @dataclass(frozen=True, slots=True)
 class BuiltIn:
     """A task of the package, known before its file is imported."""
 
-    where: str
-    """Module and class."""
+    path: str
+    """Module and class of the task, as "module:class"."""
     max_episode_steps: int = EPISODE_STEPS
+    """Time limit of an episode [control steps]."""
 
 
 BUILT_IN = {
@@ -26,3 +27,4 @@ BUILT_IN = {
 }
 """The package's tasks by their ids."""
 DEFAULT = next(iter(BUILT_IN))
+"""Id of the task that is taken where none is given."""

@@ -6,9 +6,11 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from difflib import get_close_matches
-from typing import Any
+from itertools import takewhile
+from typing import Any, TypeAlias, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hrc_env.core.brought import check_kind
 from hrc_env.core.errors import ConfigError, check_shape, whole
@@ -16,33 +18,42 @@ from hrc_env.core.lending import read_only, refuse_writing
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm
 from hrc_env.tasks.goal import Goal
-from hrc_env.tasks.hooks import check_places
-from hrc_env.tasks.task import Task, TaskType
+from hrc_env.tasks.hooks import check_targets
+from hrc_env.tasks.task import HOOKS, AnyTask, Task, TaskType, is_task_class
 from hrc_env.world import TaskScene
 
 _ID = re.compile(r"[A-Za-z]\w*-v\d+")
+Terms: TypeAlias = tuple[object, ...]
 REQUIRED = ("make_state", "reset", "advance", "view", "info")
 """The methods that every task must define."""
 RENAMED = {
-    "init": "make_state", "says": "the class's docstring", "config": "config_type",
-    "things": "make_scene", "spots": "reach_targets", "poses": "object_poses",
-    "loads": "is_load", "cue": "signal", "welcome": "allowed_contact", "over": "is_terminal",
-    "start": "draw_start", "grips": "needs_gripper", "drives": "needs_mobile_base",
-}  # fmt: skip
-"""Former names of a task's parts, and what they are called now."""
-_HOOKS = [name for name, _ in inspect.getmembers(Task, inspect.isfunction) if name[0] != "_"]
+    "init": "make_state",
+    "says": "the class's docstring",
+    "config": "config_type",
+    "things": "make_scene",
+    "spots": "reach_targets",
+    "poses": "object_poses",
+    "loads": "is_load",
+    "cue": "signal",
+    "welcome": "allowed_contact",
+    "over": "is_terminal",
+    "start": "draw_start",
+    "grips": "needs_gripper",
+    "drives": "needs_mobile_base",
+}
+"""Present names of a task's parts by their former names."""
 
 
-def check_task(task: TaskType) -> None:
-    """Raise `ConfigError` for what is missing or wrong in a task's class.
+def check_task(task: object) -> None:
+    """Raise `ConfigError` for a missing or wrong part of a task's class.
 
     Shapes and values of its terms are checked when an environment of it is reset and steps.
     """
-    if not (isinstance(task, type) and issubclass(task, Task)):
+    if not is_task_class(task):
         raise ConfigError(
-            f"A task must be a class that derives from hrc_env.Task, got {_described(task)}."
+            f"A task must be a class that derives from hrc_env.Task, got {_describe(task)}."
         )
-    if not isinstance(task.id, str) or not _ID.fullmatch(task.id):
+    if not isinstance(cast(object, task.id), str) or not _ID.fullmatch(task.id):
         raise ConfigError(f"A task's id must be like 'Name-v0', got {task.id!r}.")
     check_parts(task)
 
@@ -59,13 +70,12 @@ def check_parts(task: TaskType) -> None:
         made = task()
     except TypeError as error:
         raise ConfigError(f"{task.id}: every field of config needs a default ({error}).") from error
-    if task.goal is not None and not isinstance(task.goal, Goal):
-        raise ConfigError(f"{task.id}: goal must be a Goal, got {type(task.goal).__name__}.")
     if task.goal is not None:
+        check_kind(f"{task.id}: goal", task.goal, Goal)
         _check_goal(task.id, task.goal, made.config)
     _check_terms(made)
     check_kind(f"{task.id}: make_scene", made.make_scene(), TaskScene)
-    check_places(f"{task.id}: reach_targets", made.reach_targets())
+    check_targets(f"{task.id}: reach_targets", made.reach_targets())
     _check_state(made)
 
 
@@ -92,31 +102,34 @@ def _check_goal(who: str, goal: Goal, config: Any) -> None:
             raise ConfigError(f"{name} must judge each pair for itself, whatever stands beside it.")
 
 
-def _described(task: object) -> str:
+def _describe(task: object) -> str:
+    """Return a name for an object that is no class of a task, for an error."""
     if isinstance(task, Task):
-        return f"an object of it: register the class {type(task).__name__} itself"
-    return task.__name__ if isinstance(task, type) else type(task).__name__
+        name = cast(object, task).__class__.__name__
+        return f"an object of it: register the class {name} itself"
+    return task.__name__ if isinstance(task, type) else task.__class__.__name__
 
 
 def _check_names(task: TaskType) -> None:
-    """Refuse former names, and methods whose names are nearly those of hooks."""
-    own = [name for each in task.__mro__[: task.__mro__.index(Task)] for name in vars(each)]
-    for name in own:
+    """Refuse former names, and methods with names close to those of hooks."""
+    bases = takewhile(lambda base: base is not Task, task.__mro__)
+    names = [name for base in bases for name in vars(base)]
+    for name in names:
         if name in RENAMED:
             raise ConfigError(
                 f"{task.id}: {name} is called {RENAMED[name]} now (see hrc_env.Task)."
             )
-        unknown = name[0] != "_" and not hasattr(Task, name) and callable(getattr(task, name))
-        meant = get_close_matches(name, set(_HOOKS) - set(own), 1, 0.85) if unknown else []
-        if meant:
+        is_new = name[0] != "_" and not hasattr(Task, name) and callable(getattr(task, name))
+        similar = get_close_matches(name, set(HOOKS) - set(names), 1, 0.85) if is_new else []
+        if similar:
             raise ConfigError(
-                f"{task.id}: {name} is never called. Is {meant[0]} meant? A method that is your "
+                f"{task.id}: {name} is never called. Is {similar[0]} meant? A method that is your "
                 f"own needs a name that is farther from it."
             )
 
 
 def _check_attributes(task: TaskType) -> None:
-    """Refuse attributes of the class that are of a wrong kind."""
+    """Refuse attributes of the class with a wrong type."""
     for name in ("starts", "ends", "scene", "viewpoint"):
         check_kind(f"{task.id}: {name}", getattr(task, name), str)
     check_kind(f"{task.id}: robot", task.robot, str, None)
@@ -127,8 +140,8 @@ def _check_attributes(task: TaskType) -> None:
 
 
 def _check_methods(task: TaskType) -> None:
-    """Refuse hooks that are missing, no functions, or of other arguments."""
-    for name in _HOOKS:
+    """Refuse hooks that are missing, are no functions, or take other arguments."""
+    for name in HOOKS:
         hook, expected = getattr(task, name), getattr(Task, name)
         if name in REQUIRED and hook is expected:
             raise ConfigError(f"{task.id}: the method {name} is missing (see hrc_env.Task).")
@@ -137,7 +150,7 @@ def _check_methods(task: TaskType) -> None:
         wanted = list(inspect.signature(expected).parameters)
         try:
             signature = inspect.signature(inspect.getattr_static(task, name))
-        except (TypeError, ValueError):  # a static method, or one that is written in C
+        except (TypeError, ValueError):  # of a static method or a function in C
             continue
         try:
             signature.bind(*wanted)
@@ -148,10 +161,12 @@ def _check_methods(task: TaskType) -> None:
             ) from error
 
 
-def _check_terms(task: Task[Any, Any]) -> None:
+def _check_terms(task: AnyTask) -> None:
+    """Refuse terms of another type, and two terms of one name."""
     for name, kind in (("observations", ObservationTerm), ("rewards", RewardTerm)):
-        terms = getattr(task, name)
-        if not isinstance(terms, tuple) or not all(isinstance(term, kind) for term in terms):
+        terms: object = getattr(task, name)
+        is_tuple = isinstance(terms, tuple)
+        if not is_tuple or not all(isinstance(each, kind) for each in cast(Terms, terms)):
             raise ConfigError(f"{task.id}: {name} must be a tuple of {kind.__name__}.")
     for all_terms in (task.observation_terms, task.reward_terms):
         name, times = Counter(term.name for term in all_terms).most_common(1)[0]
@@ -159,26 +174,28 @@ def _check_terms(task: Task[Any, Any]) -> None:
             raise ConfigError(f"{task.id}: there is a term {name!r} already; choose another name.")
 
 
-def _check_state(task: Task[Any, Any]) -> None:
+def _check_state(task: AnyTask) -> None:
+    """Refuse a state that has not one row for each environment, and a wrong info of it."""
     state = task.make_state(2)
     if is_dataclass(state) and not isinstance(state, type):
         parts = {f"state.{each.name}": getattr(state, each.name) for each in fields(state)}
     elif isinstance(state, np.ndarray):
-        parts = {"state": state}
+        parts = {"state": cast(object, state)}
     else:
         raise ConfigError(
             f"{task.id}: make_state must give a structured array or a dataclass of arrays, "
             f"got {type(state).__name__}."
         )
     for name, part in parts.items():
-        check_shape(f"{task.id}: {name}", np.shape(part)[:1], (2,), "a row an environment")
+        shape = np.shape(cast(ArrayLike, part))
+        check_shape(f"{task.id}: {name}", shape[:1], (2,), "a row an environment")
     info = task.info(state)
     check_kind(f"{task.id}: info", info, Mapping)
     _check_info(task, info, 2)
 
 
-def _check_info(task: Task[Any, Any], info: Any, batch: int) -> None:
-    """Raise `ConfigError` for an info of a task that lacks names or has other shapes."""
+def _check_info(task: AnyTask, info: Mapping[str, Any], batch: int) -> None:
+    """Raise `ConfigError` for an info of a task with missing names or other shapes."""
     for part, counts in (("achieved", "successful"), ("failed", "failed")):
         if not isinstance(name := getattr(task, part), str) or not name.startswith("task/"):
             raise ConfigError(
@@ -200,11 +217,11 @@ def _check_info(task: Task[Any, Any], info: Any, batch: int) -> None:
         check_shape(f"{task.id}: info[{name!r}]", np.shape(value), (batch,), "one an environment")
 
 
-def check_counts(task: Task[Any, Any], info: Mapping[str, Any]) -> None:
-    """Raise `ConfigError` for attempts or a success that cannot be, in an info of a played step.
+def check_counts(task: AnyTask, info: Mapping[str, Any]) -> None:
+    """Raise `ConfigError` for an invalid count of attempts or success in the info of a step.
 
-    `achieved` and `failed` count attempts, 0 or more; `is_success` is 0 or 1 and says whether the
-    episode would be one if it ended now. They are two questions: tables show both.
+    `achieved` and `failed` count attempts, 0 or more. `is_success` is 1 if the episode would be a
+    success if it ended now, else 0. The two are different measures, and tables show both.
     """
     for name in (task.achieved, task.failed):
         values = np.asarray(info[name], float)

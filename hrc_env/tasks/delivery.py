@@ -1,22 +1,23 @@
-"""Delivering: a base that drives brings material across a site, among the people who work there.
+"""Delivery: a mobile base brings material across a site, among the people who work there.
 
-Zones lie where there is room and nobody's workplace; an episode has two of them, far enough apart.
-The material is on the bed from the start, and counts as delivered when the base stands in its
-zone; nothing is unloaded. The map of what stands there is known: the way to the zone, which leads
-round all of it, and the ranges of the base's scanner are of that map, not of pictures. People are
-not on it: they are known by the estimate only.
+Zones lie on free floor away from workplaces; an episode has two of them, a certain way apart. The
+material is on the bed from the start, and is delivered when the base stands in its zone; nothing is
+unloaded. The map of the obstacles is known: the way to the zone, which leads round all of them, and
+the ranges of the base's scanner follow from that map, not from pictures. People are not on it: they
+are known by the estimate only.
 """
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
+from hrc_env.core.declared import Records1, dtype_of, make_records
 from hrc_env.core.errors import ConfigError, check_fields
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import RobotState
-from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, Points3, Records, Rngs
+from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, Points3, Rngs
 from hrc_env.geometry.ways import (
     find_overlaps,
     gaps_m,
@@ -32,41 +33,54 @@ from hrc_env.tasks import BUILT_IN
 from hrc_env.tasks.task import Task
 from hrc_env.world import Grounds, World
 
-CELL_M, AROUND_M = 0.2, 3.0
-"""Grid of the map; how far beyond where people walk the base may drive [m]."""
-HALF_WIDTH_M, ROUND_M = 0.40, 0.66
-"""Nearer to anything the base's middle cannot be; from here on it may turn as it likes [m]."""
-TIGHT, ROOMY_M = 3.0, 0.75
-"""A metre of a way between the two counts so often; zones have so much room at least [m]."""
-OFF_WORK_M, APART_M = 1.6, 1.6
-"""Zones are so far from workplaces, and from each other [m]."""
-START_M, RAYS, RANGE_M = 0.2, 24, 6.0
-"""Bases start within so much of a zone's middle; rays of the scanner, and how far they reach."""
+CELL_M = 0.2
+"""Distance of neighbouring points of the map's grid [m]."""
+MAP_BORDER_M = 3.0
+"""Width of the map beyond the area where people walk, on which the base may drive, too [m]."""
+HALF_WIDTH_M = 0.40
+"""Least distance of the base's middle from an obstacle [m]."""
+TURNING_RADIUS_M = 0.66
+"""Distance from an obstacle from which on the base may have any heading [m]."""
+NARROW_COST = 3.0
+"""Cost of a metre of the way where the base is nearer to an obstacle than `TURNING_RADIUS_M`."""
+ZONE_CLEARANCE_M = 0.75
+"""Least distance of a zone's middle from an obstacle [m]."""
+ZONE_FROM_WORK_M = 1.6
+"""Least distance of a zone's middle from a workplace [m]."""
+ZONE_SPACING_M = 1.6
+"""Least distance of the middles of two zones [m]."""
+START_M = 0.2
+"""Largest shift of a base's start from the middle of its zone along x and along y [m]."""
+RAYS = 24
+"""Number of the scanner's rays."""
+RANGE_M = 6.0
+"""Maximum range of the scanner [m]."""
 ANGLES = 2 * np.pi * np.arange(RAYS) / RAYS
-AHEAD_M = 0.4
-"""The direction of the way is that of its fall over so much to each side [m]."""
-MARKED_M = 0.05
-"""Pictures show the zone so high [m]."""
+"""(RAYS,) direction of each ray from the world's x axis to the left [rad]."""
+GRADIENT_STEP_M = 0.4
+"""Distance to either side over which the gradient of the remaining way is taken [m]."""
+MARKER_HEIGHT_M = 0.05
+"""Height above the floor at which pictures show the zone [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class DeliveryConfig:
-    """What counts as delivered, and what that is worth."""
+    """Criteria and rewards of a delivery."""
 
     way_m: tuple[float, float] = (7.0, 16.0)
-    """Length of the way between start and destination [m]."""
+    """Least and greatest length of the way between start and destination [m]."""
     zone_m: float = 0.4
-    """The base is in its zone when its middle is nearer to the zone's than this [m],"""
+    """Radius of a zone, within which the base's middle must stand [m]."""
     standing_m_s: float = 0.05
-    """and stands there when it is slower than this [m/s]."""
+    """Speed below which the base stands [m/s]."""
     reward: str = "dense"
-    """"dense": coming nearer counts, too; "sparse": only the delivery."""
+    """"dense" rewards every metre of progress, too; "sparse" only the delivery."""
     progress_per_m: float = 1.0
-    """Dense reward for every metre of the way that the base leaves behind."""
+    """Dense reward for every metre by which the remaining way becomes shorter."""
     delivered_bonus: float = 20.0
     """Reward for the delivery."""
     hit_penalty: float = 5.0
-    """Taken off, dense and sparse, whenever the base begins to touch what stands there."""
+    """Penalty, dense and sparse, whenever the base begins to touch an obstacle."""
 
     def __post_init__(self) -> None:
         check_fields(self, "be positive", "zone_m", "standing_m_s")
@@ -79,122 +93,170 @@ class DeliveryConfig:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Site:
-    """What the task makes of a place."""
+    """The task's map of a place: obstacles, zones and the ways between them."""
 
     footprints: Floats
-    """(N, 5) of what stands there."""
+    """(N, 5) footprints of the obstacles, as in `Grounds.blocked`."""
     origin: Floats
-    """(2,) first point of the grids [m]."""
+    """(2,) first point of the grids, x and y [m]."""
     gaps: Floats
-    """(X, Y) distance from what stands there [m]."""
+    """(X, Y) distance of each grid point from the nearest obstacle, negative inside one [m]."""
     zones: Floats
-    """(Z, 2) where material may begin and go [m]."""
+    """(Z, 2) middles of the zones between which material is brought [m]."""
     ways: Floats
-    """(Z, X, Y) length of the way to each zone [m]."""
+    """(Z, X, Y) length of the way from each grid point to each zone [m]."""
     lengths: Floats
-    """(Z, Z) of the way from each zone to each [m]."""
+    """(Z, Z) length of the way from each zone (rows) to each (columns) [m]."""
 
 
-DELIVERY = np.dtype(
-    [
-        ("zone", "i8"),  # where the material goes
-        ("goal_world", "f8", (2,)),  # the same [m]
-        ("way_m", "f8"),  # what is left of the way [m]
-        ("way_direction", "f8", (2,)),  # where it leads
-        ("ranges_m", "f8", (RAYS,)),  # of the scanner [m]
-        ("touching", "?"),  # whether the base touches what stands there
-        ("people", "?"),  # whether it touches a worker
-        ("hits", "i8", (2,)),  # how often it began to: what stands there, people
-        ("delivered", "?"),
-    ],
-    align=True,
-)
-"""The task of one environment."""
-DELIVERY_STEP = np.dtype([("progress_m", "f8"), ("hit", "?"), ("delivered", "?")], align=True)
-"""Metres of the way that were gained in a step; whether something was hit, and the end."""
+class DeliveryState:
+    """State of one environment's delivery."""
+
+    zone: int
+    """Index of the zone to which the material goes."""
+    goal_world: Annotated[Floats, (2,)]
+    """Middle of that zone, x and y [m]."""
+    way_m: float
+    """Length of the remaining way [m]."""
+    way_direction: Annotated[Floats, (2,)]
+    """Unit vector along the way from the base, x and y."""
+    ranges_m: Annotated[Floats, (RAYS,)]
+    """Range of each of the scanner's rays [m]."""
+    touching: bool
+    """Whether the base touches an obstacle."""
+    people: bool
+    """Whether the base touches a worker."""
+    hits: Annotated[Ints, (2,)]
+    """Number of times it began to touch an obstacle, and a worker."""
+    delivered: bool
+    """Whether the material has been delivered."""
+
+
+class DeliveryStep:
+    """Results of one control step of one environment."""
+
+    progress_m: float
+    """Length by which the remaining way became shorter [m]."""
+    hit: bool
+    """Whether the base began to touch an obstacle."""
+    delivered: bool
+    """Whether the base stands in its zone."""
+
+
+DELIVERY = dtype_of(DeliveryState)
 
 
 @dataclass(frozen=True, slots=True)
 class DeliveryView:
-    """The robots' view of their task."""
+    """Knowledge of the robots about their task."""
 
     goal_world: Floats
-    """(B, 2) middle of the zone [m]."""
+    """(B, 2) middle of the zone, x and y [m]."""
     way_m: Floats
-    """(B,)."""
+    """(B,) length of the remaining way by the map [m]."""
     way_direction: Floats
-    """(B, 2)."""
+    """(B, 2) unit vector along that way, x and y."""
     ranges_m: Floats
-    """(B, RAYS)."""
+    """(B, RAYS) ranges of the scanner on the map [m]."""
 
 
-def _fit(site: Site, config: DeliveryConfig) -> Bools:
-    """(Z, Z) whether the way from one zone to another has the length that is wanted."""
+def _has_valid_length(site: Site, config: DeliveryConfig) -> Bools:
+    """Return (Z, Z) whether the way from one zone to another is within `config.way_m`."""
     low, high = config.way_m
     return (site.lengths >= low) & (site.lengths <= high)
 
 
-def _look(state: Records, robot: RobotState, site: Site) -> None:
-    """What is left of the way, where it leads, and what the scanner measures on the map."""
+def _measure(state: Records1[DeliveryState], robot: RobotState, site: Site) -> None:
+    """Write the remaining way, its direction and the scanner's ranges at the robots' places."""
     state["ranges_m"] = ranges_m(robot.q, ANGLES, site.gaps, site.origin, CELL_M, RANGE_M)
-    _follow(robot.q, site.ways, site.origin, state)
+    _follow_ways(robot.q, site.ways, site.origin, state)
 
 
 @kernel
-def _follow(q: Floats, ways: Floats, origin: Floats, state: Records) -> None:
+def _follow_ways(q: Floats, ways: Floats, origin: Floats, states: Records1[DeliveryState]) -> None:
+    """Write the length and the direction of each base's remaining way.
+
+    Args:
+        q: (B, 3) place of each base, x, y [m] and heading [rad].
+        ways: (Z, X, Y) length of the way from each grid point to each zone [m].
+        origin: (2,) first point of the grid [m].
+        states: (B,) with the zones; `way_m` and `way_direction` are written.
+    """
     for b in range(len(q)):
-        now, x, y = state[b], q[b, 0], q[b, 1]
-        field = ways[now.zone]
-        now.way_m = value_at(x, y, field, origin, CELL_M)
-        dx, dy = now.goal_world[0] - x, now.goal_world[1] - y
-        if now.way_m > 2 * AHEAD_M:
-            dx = value_at(x - AHEAD_M, y, field, origin, CELL_M)
-            dx -= value_at(x + AHEAD_M, y, field, origin, CELL_M)
-            dy = value_at(x, y - AHEAD_M, field, origin, CELL_M)
-            dy -= value_at(x, y + AHEAD_M, field, origin, CELL_M)
+        state, x, y = states[b], q[b, 0], q[b, 1]
+        field = ways[state.zone]
+        state.way_m = value_at(x, y, field, origin, CELL_M)
+        dx, dy = state.goal_world[0] - x, state.goal_world[1] - y
+        if state.way_m > 2 * GRADIENT_STEP_M:
+            dx = value_at(x - GRADIENT_STEP_M, y, field, origin, CELL_M)
+            dx -= value_at(x + GRADIENT_STEP_M, y, field, origin, CELL_M)
+            dy = value_at(x, y - GRADIENT_STEP_M, field, origin, CELL_M)
+            dy -= value_at(x, y + GRADIENT_STEP_M, field, origin, CELL_M)
         length = max(math.hypot(dx, dy), 1e-6)
-        now.way_direction[0], now.way_direction[1] = dx / length, dy / length
+        state.way_direction[0], state.way_direction[1] = dx / length, dy / length
 
 
-class Delivery(Task[DeliveryConfig, Records]):
+class Delivery(Task[DeliveryConfig, Records1[DeliveryState]]):
     """Bring material across a construction site, among the workers, and hit nothing."""
 
     id = "HRCDelivery-v0"
     config_type = DeliveryConfig
     observations = (
         ObservationTerm(
-            "zone_from_base", 2, "m", "world", 20.0, 5.0,
-            "From the middle of the base to that of its zone, x and y.",
-            lambda now: now.task.goal_world - now.robot.q[:, :2],
+            name="zone_from_base",
+            size=2,
+            unit="m",
+            frame="world",
+            bound=20.0,
+            scale=5.0,
+            doc="From the middle of the base to that of its zone, x and y.",
+            function=lambda belief: belief.task.goal_world - belief.robot.q[:, :2],
         ),
         ObservationTerm(
-            "way_left", 1, "m", "-", 30.0, 5.0,
-            "Length of the way to the zone round what stands there, by the map.",
-            lambda now: now.task.way_m,
+            name="way_left",
+            size=1,
+            unit="m",
+            frame="-",
+            bound=30.0,
+            scale=5.0,
+            doc="Length of the way to the zone round the obstacles, by the map.",
+            function=lambda belief: belief.task.way_m,
         ),
         ObservationTerm(
-            "way_direction", 2, "-", "world", 1.0, 1.0,
-            "Unit vector along that way from where the base is, x and y.",
-            lambda now: now.task.way_direction,
+            name="way_direction",
+            size=2,
+            unit="-",
+            frame="world",
+            bound=1.0,
+            scale=1.0,
+            doc="Unit vector along that way from the base, x and y.",
+            function=lambda belief: belief.task.way_direction,
         ),
         ObservationTerm(
-            "ranges", RAYS, "m", "world", RANGE_M, 2.0,
-            "From the middle of the base to what stands there by the map, at 24 angles from the x "
+            name="ranges",
+            size=RAYS,
+            unit="m",
+            frame="world",
+            bound=RANGE_M,
+            scale=2.0,
+            doc="From the middle of the base to the obstacles of the map, at 24 angles from the x "
             "axis to the left, 15 degrees apart; people are not on the map.",
-            lambda now: now.task.ranges_m,
+            function=lambda belief: belief.task.ranges_m,
         ),
-    )  # fmt: skip
+    )
     rewards = (
-        progress("Metres of the way that the base left behind"),
+        progress("Metres by which the remaining way became shorter"),
         RewardTerm(
-            "delivered",
-            "`task.delivered_bonus` for the step in which the base stands in its zone.",
-            lambda now, step, previous, config: config.delivered_bonus * step["delivered"],
+            name="delivered",
+            doc="`task.delivered_bonus` for the step in which the base stands in its zone.",
+            function=lambda belief, step, previous, config: (
+                config.delivered_bonus * step["delivered"]
+            ),
         ),
         RewardTerm(
-            "hit",
-            "Minus `task.hit_penalty` when the base begins to touch what stands there.",
-            lambda now, step, previous, config: -config.hit_penalty * step["hit"],
+            name="hit",
+            doc="Minus `task.hit_penalty` when the base begins to touch an obstacle.",
+            function=lambda belief, step, previous, config: -config.hit_penalty * step["hit"],
         ),
     )
     achieved = "task/delivered"
@@ -210,8 +272,8 @@ class Delivery(Task[DeliveryConfig, Records]):
         "motion": {"near_probability": 0.0},
     }
 
-    def make_state(self, batch: int) -> Records:
-        return np.zeros(batch, DELIVERY)
+    def make_state(self, batch: int) -> Records1[DeliveryState]:
+        return make_records(DeliveryState, batch)
 
     def survey(self, grounds: Grounds) -> Site:
         """Return the zones of a place and the ways between them.
@@ -220,58 +282,63 @@ class Delivery(Task[DeliveryConfig, Records]):
             ConfigError: no two zones are far enough apart.
         """
         (x0, x1), (y0, y1) = grounds.walkable_x_m, grounds.walkable_y_m
-        xs = np.arange(x0 - AROUND_M, x1 + AROUND_M, CELL_M, dtype=float)
-        ys = np.arange(y0 - AROUND_M, y1 + AROUND_M, CELL_M, dtype=float)
+        xs = np.arange(x0 - MAP_BORDER_M, x1 + MAP_BORDER_M, CELL_M, dtype=float)
+        ys = np.arange(y0 - MAP_BORDER_M, y1 + MAP_BORDER_M, CELL_M, dtype=float)
         origin, gaps = np.array([xs[0], ys[0]]), gaps_m(xs, ys, grounds.blocked)
-        roomy = (gaps > ROOMY_M) & ((xs > x0) & (xs < x1))[:, None] & ((ys > y0) & (ys < y1))
+        inside = ((xs > x0) & (xs < x1))[:, None] & ((ys > y0) & (ys < y1))
+        roomy = (gaps > ZONE_CLEARANCE_M) & inside
         points: Floats = np.asarray(np.argwhere(roomy) * CELL_M + origin, np.float64)
         works = np.array([place.xy_m for place in grounds.places]).reshape(-1, 2)
         away = np.linalg.norm(points[:, None] - works, axis=-1).min(1, initial=np.inf)
-        points = points[away > OFF_WORK_M]
-        zones = points[select_apart(points, APART_M)] if len(points) else points
-        price = np.where(gaps > ROUND_M, 1.0, np.where(gaps > HALF_WIDTH_M, TIGHT, np.inf))
+        points = points[away > ZONE_FROM_WORK_M]
+        zones = points[select_apart(points, ZONE_SPACING_M)] if len(points) else points
+        narrow = np.where(gaps > HALF_WIDTH_M, NARROW_COST, np.inf)
+        cost = np.where(gaps > TURNING_RADIUS_M, 1.0, narrow)
         cells = [nearest_point(x, y, origin, CELL_M) for x, y in zones.tolist()]
-        ways = np.array([ways_m(price, cell, CELL_M) for cell in cells]).reshape(-1, *gaps.shape)
+        ways = np.array([ways_m(cost, cell, CELL_M) for cell in cells]).reshape(-1, *gaps.shape)
         lengths = np.array([ways[:, i, j] for i, j in cells]).reshape(len(zones), len(zones)).T
-        low, high = self.config.way_m
-        if not ((lengths >= low) & (lengths <= high)).any():
-            longest = lengths.max(initial=0.0)
+        site = Site(grounds.blocked, origin, gaps, zones, ways, lengths)
+        if not _has_valid_length(site, self.config).any():
+            (low, high), longest = self.config.way_m, lengths.max(initial=0.0)
             raise ConfigError(
                 f"HRCDelivery-v0 needs a place with two zones that a way of {low:g} to {high:g} m "
                 f"joins; here are {len(zones)} zones, and the longest way is {longest:.1f} m. "
                 'Valid is scene="site", or other task.way_m.'
             )
-        return Site(grounds.blocked, origin, gaps, zones, ways, lengths)
+        return site
 
     def draw_start(
         self, rngs: Rngs, place: Site, home_q: JointAngles, spread_rad: Floats
     ) -> JointAngles:
-        """(n, 3) where bases begin: in a zone from which another is far enough, turned anyhow."""
-        fit = _fit(place, self.config).any(1)
-        places = []
+        """Draw (n, 3) starts: in a zone with a valid destination, with any heading."""
+        has_destination = _has_valid_length(place, self.config).any(1)
+        starts: list[list[float]] = []
         for rng in rngs:
-            zone = rng.choice(np.flatnonzero(fit))
+            zone = rng.choice(np.flatnonzero(has_destination))
             shift = START_M * (2.0 * rng.random(2) - 1.0)
-            places.append([*(place.zones[zone] + shift), np.pi * (2.0 * rng.random() - 1.0)])
-        return np.array(places).reshape(-1, 3)
+            starts.append([*(place.zones[zone] + shift), np.pi * (2.0 * rng.random() - 1.0)])
+        return np.array(starts).reshape(-1, 3)
 
-    def reset(self, state: Records, ids: Ints, rngs: Rngs, world: World) -> None:
-        """Choose where the material of environments `ids` goes."""
+    def reset(self, state: Records1[DeliveryState], ids: Ints, rngs: Rngs, world: World) -> None:
+        """Choose the zones to which environments `ids` bring material."""
         site: Site = world.place
         state[ids] = np.zeros((), DELIVERY)
-        for b, (x, y) in zip(ids.tolist(), world.robot.q[:, :2].tolist(), strict=True):
-            here = int(np.argmin(np.hypot(*(site.zones - [x, y]).T)))
-            zone = rngs[b].choice(np.flatnonzero(_fit(site, self.config)[here]))
+        valid = _has_valid_length(site, self.config)
+        for b, (x, y) in zip(map(int, ids), world.robot.q[:, :2].tolist(), strict=True):
+            start = int(np.argmin(np.hypot(*(site.zones - [x, y]).T)))
+            zone = rngs[b].choice(np.flatnonzero(valid[start]))
             state["zone"][b], state["goal_world"][b] = zone, site.zones[zone]
-        own = state[ids]
-        _look(own, world.robot, site)
-        state[ids] = own
+        rows = state[ids]
+        _measure(rows, world.robot, site)
+        state[ids] = rows
 
-    def advance(self, state: Records, rngs: Rngs, world: World, dt_s: float) -> Records:
-        """Judge where the bases are; (B,) of `DELIVERY_STEP`."""
-        site, robot, step = world.place, world.robot, np.zeros(len(state), DELIVERY_STEP)
+    def advance(
+        self, state: Records1[DeliveryState], rngs: Rngs, world: World, dt_s: float
+    ) -> Records1[DeliveryStep]:
+        """Judge the places of the bases, and return (B,) the results of the step."""
+        site, robot, step = world.place, world.robot, make_records(DeliveryStep, len(state))
         step["progress_m"] = state["way_m"]
-        _look(state, robot, site)
+        _measure(state, robot, site)
         step["progress_m"] -= state["way_m"]
         touching = find_overlaps(robot.capsules_world, robot.capsule_radius_m, site.footprints)
         people = np.zeros(len(state), bool) if world.touched is None else world.touched
@@ -285,16 +352,20 @@ class Delivery(Task[DeliveryConfig, Records]):
         state["delivered"] |= step["delivered"]
         return step
 
-    def is_terminal(self, step: Records) -> Bools:
+    def is_terminal(self, step: Records1[DeliveryStep]) -> Bools:
         return step["delivered"]
 
-    def view(self, state: Records, ids: Ints) -> DeliveryView:
-        """What robots `ids` know of their task."""
-        own = state[ids]
-        return DeliveryView(own["goal_world"], own["way_m"], own["way_direction"], own["ranges_m"])
+    def view(self, state: Records1[DeliveryState], ids: Ints) -> DeliveryView:
+        rows = state[ids]
+        return DeliveryView(
+            rows["goal_world"], rows["way_m"], rows["way_direction"], rows["ranges_m"]
+        )
 
-    def info(self, state: Records) -> dict[str, Floats]:
-        """What the episode has come to so far, (B,) each: delivered counts if nothing was hit."""
+    def info(self, state: Records1[DeliveryState]) -> dict[str, Floats]:
+        """Return the results of the episode until now, (B,) each.
+
+        A delivery counts as a success only if the base hit neither an obstacle nor a worker.
+        """
         delivered = (state["delivered"] & ~state["hits"].any(1)).astype(float)
         return {
             "task/delivered": delivered,
@@ -306,4 +377,4 @@ class Delivery(Task[DeliveryConfig, Records]):
         }
 
     def markers(self, view: DeliveryView) -> Points3:
-        return np.insert(view.goal_world, 2, MARKED_M, axis=1)[:, None]
+        return np.insert(view.goal_world, 2, MARKER_HEIGHT_M, axis=1)[:, None]

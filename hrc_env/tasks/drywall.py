@@ -2,72 +2,84 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 
 from hrc_env.belief import Belief
+from hrc_env.core.declared import Records1, dtype_of, make_records
 from hrc_env.core.errors import ConfigError, check_fields, needed
 from hrc_env.core.records import ObjectState
-from hrc_env.core.typing import Bools, Floats, Ints, Points3, Records, Rngs, Rotations
+from hrc_env.core.typing import Bools, Floats, Ints, Points3, Rngs, Rotations
 from hrc_env.geometry.reach import ReachTarget
 from hrc_env.geometry.rotations import matrix
 from hrc_env.observations import ObservationTerm
 from hrc_env.rewards import RewardTerm, check_kind, progress
 from hrc_env.tasks import BUILT_IN
-from hrc_env.tasks.partner import partners_arms
+from hrc_env.tasks.partner import find_partner_arms
 from hrc_env.tasks.task import Task
 from hrc_env.worker.body import assets_dir
 from hrc_env.world import FOOT_WORLD, Effects, TaskScene, Weld, WorkerSignal, Workplace, World
 
-BOARD_M, BOARD_KG = (0.6, 1.2, 0.0125), 6.12
-"""Edges of the board along its x, y and z, which is the normal of its front [m]; 680 kg/m^3."""
+BOARD_M = (0.6, 1.2, 0.0125)
+"""Edges of the board along its x, y and z axes [m]; z is the normal of its front."""
+BOARD_KG = 6.12
+"""Mass of the board [kg], at 680 kg/m^3."""
 CUPS_M = (-0.12, -0.15)
-"""Where cups sit on it, along its x and y from its middle: away from where people work [m]."""
+"""Place of the suction cups on the board, along its x and y from its middle [m]."""
 STACK_M = (0.26, -0.98, -0.36)
-"""Where its middle lies on the stack at first, front up, from the robot's foot [m]."""
+"""Place of the board's middle on the stack at the start, front up, from the robot's foot [m]."""
 WALL_Y_M = 1.0
-"""Where the studs' faces are, which look to the robot's right [m]."""
+"""Place of the studs' faces along y, from the robot's foot [m]; they face the robot."""
 PLACE_M = (0.29, WALL_Y_M - BOARD_M[2] / 2, 0.34)
-"""Where its middle belongs."""
+"""Target of the board's middle, from the robot's foot [m]."""
 R_PLACE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-"""world_from_board there: it stands on a short edge, its front to the robot."""
+"""Target world_from_board: it stands on a short edge, its front to the robot."""
 NEAR_STUD_M = 0.56
-"""The stud along which screws go [m along x]."""
+"""Place of the stud that takes the screws along x, from the robot's foot [m]."""
 SCREWS_M = tuple((NEAR_STUD_M, z) for z in (0.82, 0.67, 0.52, 0.37))
-"""Where they go, the uppermost first: along x, and above the foot [m]."""
-THERE_M, NEAR_M = 0.05, 1.0
-"""While the board is held so near to its place, shields let people's hands come who are so near to
-where screws go [m]."""
+"""Places of the screws along x and z, from the robot's foot, the uppermost first [m]."""
+AT_PLACE_M = 0.05
+"""Distance of the board from its target below which the worker's hands may come near [m]."""
+HAND_NEAR_M = 1.0
+"""Distance from the screws within which an estimated hand may then touch the robot's hand [m]."""
 BESIDE_M = (NEAR_STUD_M + 0.42, WALL_Y_M - 0.50)
-"""Where the worker stands, who looks at the board askew."""
-PUSH_N, SHEAR = (20.0, 50.0), 0.2
-"""A screwdriver pushes with so much, and aside with this share of it."""
-ALONE_S, PAUSE_S = 0.6, 0.6
-"""Where there is no worker, screws are driven by themselves: for so long, so long after another."""
-MOVED_M, TURNED_RAD = 0.02, 0.06
-"""At first the board lies off its place on the stack by up to so much."""
+"""Place where the worker stands, x and y from the robot's foot [m]."""
+PUSH_N = (20.0, 50.0)
+"""Range of the force with which a screwdriver pushes [N]."""
+SHEAR = 0.2
+"""Share of that force that acts along the board."""
+DRIVING_S = 0.6
+"""Time for which a screw is driven if there is no worker [s]."""
+PAUSE_S = 0.6
+"""Time before each screw if there is no worker [s]."""
+MOVED_M = 0.02
+"""Largest shift of the board on the stack along x and along y [m]."""
+TURNED_RAD = 0.06
+"""Largest turn of the board on the stack [rad]."""
+RADIAN_M = 0.3
+"""Length of the way that counts for a radian of the board's turn [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class DrywallConfig:
-    """What counts as held, and what that is worth."""
+    """Tolerances and rewards of holding a board."""
 
     tolerance_m: float = 0.005
-    """The board is in its place when its middle is nearer to it than this [m],"""
+    """Distance of the board's middle from its target below which the board is in place [m]."""
     tolerance_rad: float = 0.0087
-    """turned by less than this, half a degree [rad]; for as long as screws are driven."""
+    """Turn of the board against its target below which it is in place, half a degree [rad]."""
     push_n: tuple[float, float] = PUSH_N
     """Range of the force with which each screw is driven [N]."""
     reward: str = "dense"
-    """"dense": coming nearer counts, too; "sparse": only screws and the end."""
+    """"dense" rewards every metre of progress, too; "sparse" only screws and the end."""
     progress_per_m: float = 5.0
-    """Dense reward for every metre that board and tool come nearer to where they go; a radian of
+    """Dense reward for every metre that board and tool come nearer to their targets; a radian of
     the board's turn counts as 0.3 m."""
     screw_bonus: float = 3.0
-    """Reward for each screw that is driven while the board is in its place."""
+    """Reward for each screw that is driven while the board is in place."""
     done_bonus: float = 10.0
-    """Reward for a board that is fixed in its place and let go."""
+    """Reward for a board that is fixed in place and let go."""
 
     def __post_init__(self) -> None:
         check_fields(self, "be positive", "tolerance_m", "tolerance_rad")
@@ -76,106 +88,175 @@ class DrywallConfig:
         check_kind(self)
 
 
-DRYWALL = np.dtype(
-    [
-        ("pose", "f8", (7,)),  # where the board lies at first, world [m]
-        ("push_n", "f8", (len(SCREWS_M),)),  # with which each screw is driven
-        ("shear", "f8", (len(SCREWS_M), 2)),  # aside, shares of that along x and z
-        ("pressed_s", "f8"),  # for how long it has been in its place, held
-        ("driven", "i8"),  # screws
-        ("boring", "?"),  # whether one is being driven
-        ("worst_m", "f8"), ("worst_rad", "f8"),  # farthest off its place meanwhile
-        ("spoilt", "?"),  # whether that was too far
-        ("done", "?"),  # fixed in its place, let go
-        ("left_m", "f8"),  # of the ways
-    ],
-    align=True,
-)  # fmt: skip
-"""The task of one environment."""
-DRYWALL_STEP = np.dtype([("progress_m", "f8"), ("driven", "i8"), ("done", "?")], align=True)
-"""Metres that were gained in a step, screws that were driven, whether it was finished."""
+class DrywallState:
+    """State of one environment's board."""
+
+    pose: Annotated[Floats, (7,)]
+    """Pose of the board at the start: position [m, world] and quaternion (w, x, y, z)."""
+    push_n: Annotated[Floats, (len(SCREWS_M),)]
+    """Force with which each screw is driven [N]."""
+    shear: Annotated[Floats, (len(SCREWS_M), 2)]
+    """Force along the board while each screw is driven, along x and z, as shares of `push_n`."""
+    pressed_s: float
+    """Time for which the board has been held or fixed in place [s]."""
+    driven: int
+    """Number of screws that are driven."""
+    boring: bool
+    """Whether a screw is being driven."""
+    worst_m: float
+    """Largest distance of the board from its target while screws were driven [m]."""
+    worst_rad: float
+    """Largest turn of the board against its target while screws were driven [rad]."""
+    spoilt: bool
+    """Whether the board was out of place while a screw was driven."""
+    done: bool
+    """Whether the board is fixed in place and let go."""
+    left_m: float
+    """Length of the ways that board and tool have before them [m]."""
+
+
+class DrywallStep:
+    """Results of one control step of one environment."""
+
+    progress_m: float
+    """Length by which the remaining ways became shorter [m]."""
+    driven: int
+    """Number of screws that were driven in this step."""
+    done: bool
+    """Whether the task was completed in this step."""
+
+
+DRYWALL = dtype_of(DrywallState)
 
 
 @dataclass(frozen=True, slots=True)
 class DrywallView:
-    """The robots' view of their task."""
+    """Knowledge of the robots about their task."""
 
     place_world: Points3
-    """(3,) where the board's middle belongs [m]."""
+    """(3,) target of the board's middle [m]."""
     driven: Ints
-    """(B,) screws."""
+    """(B,) number of screws that are driven."""
 
 
-def off_place(board: ObjectState) -> tuple[Floats, Floats]:
-    """(B,) how far the board is from its place [m], and turned against it [rad]."""
+class BoardOffset(NamedTuple):
+    """Deviation of boards from their target."""
+
+    distance_m: Floats
+    """(B,) distance of the board's middle from its target [m]."""
+    angle_rad: Floats
+    """(B,) angle between the board and its target orientation [rad]."""
+
+
+class ScrewProgress(NamedTuple):
+    """Progress of the screws at the end of a step."""
+
+    driven: Ints
+    """(B,) number of screws that are driven."""
+    boring: Bools
+    """(B,) whether a screw is being driven."""
+
+
+def measure_offset(board: ObjectState) -> BoardOffset:
+    """Return the deviation of boards (B, 1) from their target."""
     off_m = np.linalg.norm(board.position_world[:, 0] - (FOOT_WORLD + PLACE_M), axis=-1)
-    return off_m, _turned_rad(matrix(board.quaternion_wxyz[:, 0]))
+    return BoardOffset(off_m, _measure_turn(matrix(board.quaternion_wxyz[:, 0])))
 
 
-def _turned_rad(R: Rotations) -> Floats:
+def _measure_turn(R: Rotations) -> Floats:
+    """Return (B,) the angle between world_from_board (B, 3, 3) and its target [rad]."""
     trace = np.einsum("ij,bij->b", R_PLACE, R)
     return np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0))
 
 
-def _left_m(at: Points3, R: Rotations, tool_world: Points3, taken: Bools) -> Floats:
-    """(B,) metres that the board, and the tool to it until it has it, have before them."""
-    away_m = np.linalg.norm(at - (FOOT_WORLD + PLACE_M), axis=-1) + 0.3 * _turned_rad(R)
-    return away_m + np.where(taken, 0.0, np.linalg.norm(at - tool_world, axis=-1))
+def _measure_ways(
+    board_world: Points3, R: Rotations, tool_world: Points3, is_taken: Bools
+) -> Floats:
+    """Return (B,) the length of the ways that remain [m].
+
+    Args:
+        board_world: (B, 3) middles of the boards [m].
+        R: (B, 3, 3) world_from_board.
+        tool_world: (B, 3) tool points of the robots [m].
+        is_taken: (B,) whether the tool's way to the board is behind it.
+    """
+    away_m = np.linalg.norm(board_world - (FOOT_WORLD + PLACE_M), axis=-1)
+    away_m = away_m + RADIAN_M * _measure_turn(R)
+    return away_m + np.where(is_taken, 0.0, np.linalg.norm(board_world - tool_world, axis=-1))
 
 
-def _screwed(state: Records, world: World, dt_s: float) -> tuple[Ints, Bools]:
-    """(B,) screws that are driven, and whether one is being driven: by the worker, or, where nobody
-    is, by themselves while the board is pressed."""
+def _advance_screws(state: Records1[DrywallState], world: World, dt_s: float) -> ScrewProgress:
+    """Return the screws' progress at the end of a step of dt_s [s].
+
+    The worker drives them; without a worker they are driven by themselves while the board is
+    pressed against the studs.
+    """
     n, driven = len(SCREWS_M), state["driven"]
-    deeds = needed(world.workers, "What workers do")
-    alone = ~deeds.present.any(axis=1)
-    theirs = np.maximum(driven, deeds.screws.max(axis=1, initial=0))
-    since_s = state["pressed_s"] - PAUSE_S * (driven + 1) - ALONE_S * driven
-    boring = alone & (driven < n) & (since_s > 0.0) & (state["pressed_s"] > 0.0)
-    finished = boring & (since_s >= ALONE_S - 1e-9)
-    driven, boring = np.where(alone, driven + finished, theirs), boring & ~finished
-    return driven, np.where(alone, boring, deeds.boring.any(axis=1))
+    workers = needed(world.workers, "What workers do")
+    is_alone = ~workers.present.any(axis=1)
+    by_workers = np.maximum(driven, workers.screws.max(axis=1, initial=0))
+    since_s = state["pressed_s"] - PAUSE_S * (driven + 1) - DRIVING_S * driven
+    boring = is_alone & (driven < n) & (since_s > 0.0) & (state["pressed_s"] > 0.0)
+    finished = boring & (since_s >= DRIVING_S - 1e-9)
+    return ScrewProgress(
+        driven=np.where(is_alone, driven + finished, by_workers),
+        boring=np.where(is_alone, boring & ~finished, workers.boring.any(axis=1)),
+    )
 
 
-class Drywall(Task[DrywallConfig, Records]):
+class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
     """Press a board against studs and hold it while a worker drives four screws."""
 
     id = "HRCDrywall-v0"
     config_type = DrywallConfig
     observations = (
         ObservationTerm(
-            "place_from_object", 3, "m", "world", 3.0, 0.5,
-            "From the board's middle, as measured, to where it belongs.",
-            lambda now: now.task.place_world - needed(now.objects, "A board").position_world[:, 0],
+            name="place_from_object",
+            size=3,
+            unit="m",
+            frame="world",
+            bound=3.0,
+            scale=0.5,
+            doc="From the board's middle, as measured, to its target.",
+            function=lambda belief: (
+                belief.task.place_world - needed(belief.objects, "A board").position_world[:, 0]
+            ),
         ),
         ObservationTerm(
-            "screws_driven", 1, "-", "-", 4.0, 2.0,
-            "How many screws are driven; 4: the board is fixed.",
-            lambda now: now.task.driven.astype(float),
+            name="screws_driven",
+            size=1,
+            unit="-",
+            frame="-",
+            bound=4.0,
+            scale=2.0,
+            doc="Number of screws that are driven; with 4 the board is fixed.",
+            function=lambda belief: belief.task.driven.astype(float),
         ),
-    )  # fmt: skip
+    )
     rewards = (
         progress(
-            "Metres that the board came nearer to its place, 0.3 m for a radian, and the tool to "
-            "it until it is held"
+            "Metres that the board came nearer to its target, 0.3 m for a radian, and the tool to "
+            "the board until it is held"
         ),
         RewardTerm(
-            "screws",
-            "`task.screw_bonus` for each screw that is driven.",
-            lambda now, step, previous, config: config.screw_bonus * step["driven"],
+            name="screws",
+            doc="`task.screw_bonus` for each screw that is driven.",
+            function=lambda belief, step, previous, config: config.screw_bonus * step["driven"],
         ),
         RewardTerm(
-            "done",
-            "`task.done_bonus` in the step in which the fixed board is let go.",
-            lambda now, step, previous, config: np.multiply(config.done_bonus, step["done"]),
+            name="done",
+            doc="`task.done_bonus` in the step in which the fixed board is let go.",
+            function=lambda belief, step, previous, config: np.multiply(
+                config.done_bonus, step["done"]
+            ),
         ),
     )
     achieved = "task/screws_driven"
     failed = "task/screws_left"
     starts = (
         "The arm is near home. The board lies on the stack, moved by up to 2 cm and turned by up "
-        "to 0.06 rad. The worker waits out of reach until it is pressed to the studs; without a "
-        "worker screws are driven by themselves."
+        "to 0.06 rad. The worker waits out of reach until it is pressed against the studs; without "
+        "a worker screws are driven by themselves."
     )
     ends = (
         "When four screws hold the board and the cups have let go. A success: while screws were "
@@ -189,11 +270,11 @@ class Drywall(Task[DrywallConfig, Records]):
         "motion": {"jobs": "drywall", "near_probability": 1.0, "near_radius_m": (1.7, 2.1)},
     }
 
-    def make_state(self, batch: int) -> Records:
-        return np.zeros(batch, DRYWALL)
+    def make_state(self, batch: int) -> Records1[DrywallState]:
+        return make_records(DrywallState, batch)
 
     def make_scene(self) -> TaskScene:
-        """Stack, board, studs, and where the worker stands who drives the screws."""
+        """Return stack, board and studs, and the place of the worker that drives the screws."""
         place = Workplace("board", "task", BESIDE_M, 0.75 * np.pi, SCREWS_M[0][1])
         return TaskScene(
             Path(assets_dir() / "tasks" / "drywall.xml").read_text(),
@@ -205,39 +286,41 @@ class Drywall(Task[DrywallConfig, Records]):
         )
 
     def reach_targets(self) -> list[ReachTarget]:
-        """Where the cups are when the board is in its place."""
+        """Return the place of the cups when the board is in place."""
         front = R_PLACE @ [*CUPS_M, BOARD_M[2] / 2]
         return [ReachTarget("the board's place", FOOT_WORLD + PLACE_M + front, (0.0, 1.0, 0.0))]
 
-    def reset(self, state: Records, ids: Ints, rngs: Rngs, world: World) -> None:
-        """Lay the board of environments `ids` onto the stack anew."""
+    def reset(self, state: Records1[DrywallState], ids: Ints, rngs: Rngs, world: World) -> None:
+        """Lay the board of environments `ids` onto the stack."""
         state[ids] = np.zeros((), DRYWALL)
         low, high = self.config.push_n
-        for b in ids.tolist():
+        for b in map(int, ids):
             n, draws = len(SCREWS_M), rngs[b].random(3)
             off = MOVED_M * (2.0 * draws[:2] - 1.0)
             half = 0.5 * (np.pi + TURNED_RAD * (2.0 * draws[2] - 1.0))
-            at = FOOT_WORLD + STACK_M + [*off, 0.0]
-            state["pose"][b] = (*at, np.cos(half), 0.0, 0.0, np.sin(half))
+            position = FOOT_WORLD + STACK_M + [*off, 0.0]
+            state["pose"][b] = (*position, np.cos(half), 0.0, 0.0, np.sin(half))
             state["push_n"][b] = low + (high - low) * rngs[b].random(n)
-            way = 2.0 * np.pi * rngs[b].random(n)
-            state["shear"][b] = SHEAR * np.stack([np.cos(way), np.sin(way)], axis=1)
-        poses_ = state["pose"][ids]
-        state["left_m"][ids] = _left_m(
-            poses_[:, :3], matrix(poses_[:, 3:]), world.robot.tool_world, np.zeros(len(ids), bool)
+            direction = 2.0 * np.pi * rngs[b].random(n)
+            state["shear"][b] = SHEAR * np.stack([np.cos(direction), np.sin(direction)], axis=1)
+        poses, is_taken = state["pose"][ids], np.zeros(len(ids), bool)
+        state["left_m"][ids] = _measure_ways(
+            poses[:, :3], matrix(poses[:, 3:]), world.robot.tool_world, is_taken
         )
 
-    def object_poses(self, state: Records, ids: Ints) -> Floats:
+    def object_poses(self, state: Records1[DrywallState], ids: Ints) -> Floats:
         return state["pose"][ids][:, None]
 
-    def advance(self, state: Records, rngs: Rngs, world: World, dt_s: float) -> Records:
-        """Judge where the board is and what was screwed; (B,) of `DRYWALL_STEP`."""
-        board, step = needed(world.objects, "A board"), np.zeros(len(state), DRYWALL_STEP)
-        off_m, off_rad = off_place(board)
+    def advance(
+        self, state: Records1[DrywallState], rngs: Rngs, world: World, dt_s: float
+    ) -> Records1[DrywallStep]:
+        """Judge the place of the board and the screws, and return (B,) the results of the step."""
+        board, step = needed(world.objects, "A board"), make_records(DrywallStep, len(state))
+        off_m, off_rad = measure_offset(board)
         fine = (off_m < self.config.tolerance_m) & (off_rad < self.config.tolerance_rad)
         pressed = fine & (board.held[:, 0] | (state["driven"] == len(SCREWS_M)))
         state["pressed_s"] = np.where(pressed, state["pressed_s"] + dt_s, 0.0)
-        driven, boring = _screwed(state, world, dt_s)
+        driven, boring = _advance_screws(state, world, dt_s)
         step["driven"] = driven - state["driven"]
         state["driven"], state["boring"] = driven, boring
         state["worst_m"] = np.where(boring, np.maximum(state["worst_m"], off_m), state["worst_m"])
@@ -248,49 +331,54 @@ class Drywall(Task[DrywallConfig, Records]):
         done = (driven == len(SCREWS_M)) & ~board.held[:, 0] & fine & ~state["spoilt"]
         step["done"] = done & ~state["done"]
         state["done"] |= done
-        at, R = board.position_world[:, 0], matrix(board.quaternion_wxyz[:, 0])
-        left_m = _left_m(at, R, world.robot.tool_world, board.held[:, 0] | (driven > 0))
+        left_m = _measure_ways(
+            board.position_world[:, 0],
+            matrix(board.quaternion_wxyz[:, 0]),
+            world.robot.tool_world,
+            board.held[:, 0] | (driven > 0),
+        )
         step["progress_m"], state["left_m"] = state["left_m"] - left_m, left_m
         return step
 
-    def effects(self, state: Records) -> Effects:
-        """A screw that is being driven pushes the board; four hold it."""
-        which = np.minimum(state["driven"], len(SCREWS_M) - 1)
+    def effects(self, state: Records1[DrywallState]) -> Effects:
+        """Return the push of the screw that is being driven; four screws fix the board."""
+        screw = np.minimum(state["driven"], len(SCREWS_M) - 1)
         rows = np.arange(len(state))
-        push_n = np.where(state["boring"], state["push_n"][rows, which], 0.0)
-        aside = state["shear"][rows, which]
-        force = push_n[:, None] * np.stack([aside[:, 0], np.ones(len(rows)), aside[:, 1]], axis=1)
+        push_n = np.where(state["boring"], state["push_n"][rows, screw], 0.0)
+        shear = state["shear"][rows, screw]
+        force = push_n[:, None] * np.stack([shear[:, 0], np.ones(len(rows)), shear[:, 1]], axis=1)
         x, z = (np.array(SCREWS_M) - np.array(PLACE_M)[[0, 2]]).T
-        arm = np.stack([x[which], np.zeros(len(rows)), z[which]], axis=1)
+        arm = np.stack([x[screw], np.zeros(len(rows)), z[screw]], axis=1)
         push = np.concatenate([force, np.cross(arm, force)], axis=1)
         return Effects({"board_fixed": state["driven"] == len(SCREWS_M)}, push[:, None])
 
-    def signal(self, state: Records) -> WorkerSignal:
+    def signal(self, state: Records1[DrywallState]) -> WorkerSignal:
         return WorkerSignal(
             (state["pressed_s"] > 0.0).astype(int), np.full((len(state), 3), np.nan)
         )
 
-    def is_load(self, state: Records) -> Bools:
+    def is_load(self, state: Records1[DrywallState]) -> Bools:
         return (state["pressed_s"] == 0.0)[:, None]
 
     def allowed_contact(self, belief: Belief) -> Bools:
-        """Return the arms whose hands are near the screws while the board is held there."""
+        """Return the arms with a hand near the screws while the board is held in place."""
         board = needed(belief.objects, "A board")
-        there = board.held[:, 0] & (off_place(board)[0] < THERE_M)
-        line = np.array([(x, WALL_Y_M, z) for x, z in (SCREWS_M[0], SCREWS_M[-1])])
-        lines = np.broadcast_to(FOOT_WORLD + line, (len(there), 2, 3))
-        return partners_arms(belief.estimate, BESIDE_M, lines, NEAR_M) & there[:, None, None]
+        is_held_there = board.held[:, 0] & (measure_offset(board).distance_m < AT_PLACE_M)
+        screws = np.array([(x, WALL_Y_M, z) for x, z in (SCREWS_M[0], SCREWS_M[-1])])
+        segments = np.broadcast_to(FOOT_WORLD + screws, (len(is_held_there), 2, 3))
+        arms = find_partner_arms(belief.estimate, BESIDE_M, segments, HAND_NEAR_M)
+        return arms & is_held_there[:, None, None]
 
-    def is_terminal(self, step: Records) -> Bools:
+    def is_terminal(self, step: Records1[DrywallStep]) -> Bools:
         return step["done"]
 
-    def view(self, state: Records, ids: Ints) -> DrywallView:
+    def view(self, state: Records1[DrywallState], ids: Ints) -> DrywallView:
         return DrywallView(FOOT_WORLD + PLACE_M, state["driven"][ids].copy())
 
-    def info(self, state: Records) -> dict[str, Floats]:
-        """Return counts of screws and how far off the board was while they were driven, (B,) each.
+    def info(self, state: Records1[DrywallState]) -> dict[str, Floats]:
+        """Return the screws and the board's largest deviation while they were driven, (B,) each.
 
-        It is a success if the board is fixed in its place and let go.
+        An episode is a success if the board is fixed in place and let go.
         """
         begun = (state["driven"] > 0) | state["boring"]
         return {

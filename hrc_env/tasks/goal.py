@@ -1,12 +1,12 @@
-"""Goals that stand apart from the observation, so that what was done can be judged by another one.
+"""Goals that are kept apart from the observation, so that transitions can be relabelled.
 
-Hindsight experience replay asks for this (HER; Andrychowicz et al. 2017, arXiv:1707.01495): the
-reward must follow from what is achieved and what is desired, for any number of pairs at once.
+Hindsight experience replay needs this (HER; Andrychowicz et al. 2017, arXiv:1707.01495): the
+reward must be a function of the achieved and the desired goal, for any number of pairs at once.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,16 +19,21 @@ from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.typing import Bools, Floats, Tensor
 from hrc_env.rewards import RewardTerm
 
-ACHIEVED, DESIRED = "achieved_goal", "desired_goal"
-"""The parts of an observation beside the flat one, as the field calls them."""
+ACHIEVED = "achieved_goal"
+"""Name of the achieved goal in an observation."""
+DESIRED = "desired_goal"
+"""Name of the desired goal in an observation."""
 TERM = "goal"
-"""The reward's term that follows from a goal."""
+"""Name of the reward's term that follows from a goal."""
+Infos = Mapping[str, Any] | Sequence[Mapping[str, Any]] | None
+"""Info of a step or of several: one a pair of goals, or arrays by name as a vector environment has
+them; None stands for an empty info."""
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """A goal apart from the observation, as hindsight replay (HER) needs it.
+    """A goal that is kept apart from the observation, as hindsight replay (HER) needs it.
 
         import numpy as np
         from hrc_env import Goal
@@ -44,23 +49,24 @@ class Goal:
 
     In a task with the attribute `goal` observations are dictionaries of `observation`,
     `achieved_goal` and `desired_goal`, `reward` is a term of the reward, and `compute_reward` and
-    `train --algorithm sac` judge transitions by other goals. Functions are over batches (B, ...).
-    The observation must not hold the goal: a transition that is judged by another goal would still
-    hold the old one.
+    `train --algorithm sac` reward transitions for other goals. Functions are over batches (B, ...).
+    The observation must not hold the goal: a transition that is relabelled with another goal would
+    still hold the old one.
     """
 
     size: int
-    """How many numbers it is."""
+    """Number of entries of the goal."""
     bound: float
-    """Largest magnitude of each; larger values are clipped."""
+    """Largest magnitude of an entry; larger values are clipped."""
     achieved: Callable[[Belief], Floats]
-    """(belief) -> (B, size) what is so far, as the robot knows it."""
+    """Function of the belief that returns (B, size) the achieved goal, as the robot knows it."""
     desired: Callable[[Belief], Floats]
-    """(belief) -> (B, size) what is to be."""
+    """Function of the belief that returns (B, size) the desired goal."""
     reward: Callable[[Floats, Floats, Any], Floats]
-    """(achieved (..., size), desired (..., size), the task's settings) -> (...)."""
+    """Function of achieved (..., size), desired (..., size) and the task's settings that returns
+    (...) the reward."""
     doc: str
-    """A sentence: what the reward is."""
+    """A sentence about the reward for the environment's page."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for functions that take other arguments."""
@@ -69,116 +75,143 @@ class Goal:
         check_arguments("Goal.reward", self.reward, "achieved", "desired", "settings")
 
 
-def parts(goal: Goal, now: Belief) -> dict[str, Tensor]:
-    """(B, size) float32 what the observation holds of a goal, by name."""
-    wanted = {
-        ACHIEVED: _asked("Goal.achieved", goal.achieved, now),
-        DESIRED: _asked("Goal.desired", goal.desired, now),
+class GoalPair(NamedTuple):
+    """Achieved and desired goals as finite numbers."""
+
+    achieved: Floats
+    """(size,) or (B, size) the achieved goals."""
+    desired: Floats
+    """(size,) or (B, size) the desired goals."""
+
+
+def observe_goal(goal: Goal, belief: Belief) -> dict[str, Tensor]:
+    """Return the goal's parts of an observation by name, each (B, size) float32."""
+    values = {
+        ACHIEVED: _evaluate("Goal.achieved", goal.achieved, belief),
+        DESIRED: _evaluate("Goal.desired", goal.desired, belief),
     }
-    for name, value in wanted.items():
-        check_shape(name, np.shape(value), (len(now.action), goal.size), "its `size`")
-    clipped = {k: np.clip(value, -goal.bound, goal.bound) for k, value in wanted.items()}
+    for name, value in values.items():
+        check_shape(name, np.shape(value), (len(belief.action), goal.size), "its `size`")
+    clipped = {name: np.clip(value, -goal.bound, goal.bound) for name, value in values.items()}
     return {name: value.astype(np.float32) for name, value in clipped.items()}
 
 
-def _asked(what: str, function: Callable[[Belief], Floats], now: Belief) -> Floats:
-    """The value (B, size) of a function; one of users is given a read-only belief."""
-    return called(what, function, lend_belief(now)) if is_of_user(function) else function(now)
+def _evaluate(name: str, function: Callable[[Belief], Floats], belief: Belief) -> Floats:
+    """Return (B, size) the value of a function; a user's function gets a read-only belief."""
+    if is_of_user(function):
+        return called(name, function, lend_belief(belief))
+    return function(belief)
 
 
 def reward_terms(goal: Goal | None) -> tuple[RewardTerm, ...]:
-    """The term of a goal, if there is one; it judges what the observation holds."""
+    """Return the reward's term of a goal, if there is one; it is computed from the observation."""
     if goal is None:
         return ()
 
-    def function(now: Belief, step: Any, previous: Floats, config: Any) -> Floats:
-        held = parts(goal, now)
-        pair = (held[ACHIEVED].astype(float), held[DESIRED].astype(float))
+    def function(belief: Belief, step: object, previous: Floats, config: object) -> Floats:
+        observed = observe_goal(goal, belief)
+        pair = GoalPair(observed[ACHIEVED].astype(float), observed[DESIRED].astype(float))
         return called("Goal.reward", goal.reward, *read_only(pair), config)
 
     return (RewardTerm(TERM, goal.doc, function),)
 
 
-def judged(
+def compute_reward(
     goal: Goal,
     achieved: ArrayLike,
     desired: ArrayLike,
-    info: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None,
-    config: Any,
+    info: Infos,
+    config: object,
     others: Sequence[str] = (),
     factor: float = 1.0,
 ) -> Floats | float:
-    """The reward of achieving this when that is desired.
+    """Return the reward for achieving one goal when another is desired.
 
     Args:
-        goal: of the task.
-        achieved: (size,) or (B, size).
-        desired: the same.
-        info: of the step: its entries "reward/..." of the `others` are added, so that the sum is
-            the step's reward, bit for bit; what it lacks counts nothing. Of many: one a pair, or
-            arrays by name as a vector environment has them.
+        goal: the task's goal.
+        achieved: (size,) or (B, size) achieved goals.
+        desired: (size,) or (B, size) desired goals.
+        info: of the step. Its entries "reward/..." of the `others` are added, so that the sum is
+            the step's reward, bit for bit; a missing entry counts 0.
         config: settings of the task.
         others: names of the reward's other terms, in their order.
-        factor: on the goal's term (`set_reward`).
+        factor: factor on the goal's term (`set_reward`).
 
     Returns:
         A number, or (B,).
     """
-    reached, wanted = _pair(goal, achieved, desired)
-    pair = read_only((reached, wanted))
-    given = called("Goal.reward", goal.reward, *pair, config)
-    value = np.zeros(reached.shape[:-1]) + factor * given
+    pair = _check_pair(goal, achieved, desired)
+    reward = called("Goal.reward", goal.reward, *read_only(pair), config)
+    value = np.zeros(pair.achieved.shape[:-1]) + factor * reward
     for name in others:
-        value = value + _told(info, f"reward/{name}", value.shape)
+        value = value + _read_info(info, f"reward/{name}", value.shape)
     return value if value.ndim else float(value)
 
 
-def ended(
-    goal: Goal, achieved: ArrayLike, desired: ArrayLike, info: Any, entries: Sequence[str] = ()
+def compute_terminated(
+    goal: Goal,
+    achieved: ArrayLike,
+    desired: ArrayLike,
+    info: Infos,
+    entries: Sequence[str] = (),
 ) -> Bools | bool:
     """Return whether the steps of these infos end their episodes, which reached goals never do.
 
     Args:
-        goal, achieved, desired, info: as of `judged`.
-        entries: of an info, any of which ends an episode where it is above 0.
+        goal: the task's goal.
+        achieved: (size,) or (B, size) achieved goals.
+        desired: (size,) or (B, size) desired goals.
+        info: of the step, as for `compute_reward`.
+        entries: names in the info, any of which ends an episode where its value is above 0.
 
     Returns:
         A bool, or (B,).
     """
-    reached, _ = _pair(goal, achieved, desired)
-    over = np.zeros(reached.shape[:-1], bool)
+    shape = _check_pair(goal, achieved, desired).achieved.shape[:-1]
+    over = np.zeros(shape, bool)
     for name in entries:
-        over = over | (_told(info, name, over.shape) > 0)
+        over = over | (_read_info(info, name, shape) > 0)
     return over if over.ndim else bool(over)
 
 
-def _pair(goal: Goal, achieved: ArrayLike, desired: ArrayLike) -> tuple[Floats, Floats]:
-    """Return both as numbers, (size,) or (B, size); `ConfigError` for other shapes or values."""
-    reached, wanted = _numbers(ACHIEVED, achieved), _numbers(DESIRED, desired)
-    if reached.shape != wanted.shape or reached.ndim not in (1, 2):
+def _check_pair(goal: Goal, achieved: ArrayLike, desired: ArrayLike) -> GoalPair:
+    """Return both goals as numbers, or raise `ConfigError` for other shapes or values."""
+    pair = GoalPair(_check_numbers(ACHIEVED, achieved), _check_numbers(DESIRED, desired))
+    shape = pair.achieved.shape
+    if pair.desired.shape != shape or len(shape) not in (1, 2):
         raise ConfigError(
             f"{ACHIEVED} and {DESIRED} must both have shape ({goal.size},) or (B, {goal.size}), "
-            f"got {reached.shape} and {wanted.shape}."
+            f"got {shape} and {pair.desired.shape}."
         )
-    check_shape(ACHIEVED, reached.shape[-1:], (goal.size,), "its last axis: entries of a goal")
-    return reached, wanted
+    check_shape(ACHIEVED, shape[-1:], (goal.size,), "its last axis: entries of a goal")
+    return pair
 
 
-def _numbers(name: str, given: ArrayLike) -> Floats:
-    values = np.asarray(given, float)
-    if not np.isfinite(values).all():
-        raise ConfigError(f"{name} must be finite numbers, got {values}.")
-    return values
+def _check_numbers(name: str, values: ArrayLike) -> Floats:
+    """Return values as an array, or raise `ConfigError` for any that is not finite."""
+    numbers = np.asarray(values, float)
+    if not np.isfinite(numbers).all():
+        raise ConfigError(f"{name} must be finite numbers, got {numbers}.")
+    return numbers
 
 
-def _told(info: Any, name: str, shape: tuple[int, ...]) -> Floats:
-    """What infos say under a name, 0 where they say nothing."""
+def _read_info(info: Infos, name: str, shape: tuple[int, ...]) -> Floats:
+    """Return the values of an entry of infos, 0 where it is missing.
+
+    Args:
+        info: of one step or of several.
+        name: name of the entry.
+        shape: () or (B,), the expected shape of several values.
+
+    Raises:
+        ConfigError: the entry has another shape.
+    """
     if info is None:
         return np.zeros(shape)
     if isinstance(info, Mapping):
-        told = np.asarray(info.get(name, 0.0), float)
+        values = np.asarray(info.get(name, 0.0), float)
     else:
-        told = np.array([each.get(name, 0.0) for each in info], float)
-    if told.shape not in ((), shape):
-        check_shape(f"info[{name!r}]", told.shape, shape, "a value a pair of goals")
-    return told
+        values = np.array([each.get(name, 0.0) for each in info], float)
+    if values.shape not in ((), shape):
+        check_shape(f"info[{name!r}]", values.shape, shape, "a value a pair of goals")
+    return values

@@ -1,160 +1,174 @@
-"""Hooks of a task: checked for the steps of its registration, and read-only for those of users."""
+"""Hooks of a task: checked during its registration, and read-only for those of users."""
 
-import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import wraps
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hrc_env.core.brought import check_kind, described, flags_of, numbers_of
 from hrc_env.core.errors import ConfigError, check_shape
 from hrc_env.core.lending import called, is_of_user, read_only
 from hrc_env.core.skeleton import SEGMENT_RADIUS_M
 from hrc_env.geometry.reach import ReachTarget
-from hrc_env.tasks.task import Task
+from hrc_env.tasks.task import HOOKS, AnyTask, TaskType
 from hrc_env.world import Effects, WorkerSignal
 
 
 @dataclass(slots=True)
 class Sizes:
-    """Lengths of axes of results."""
+    """Lengths of the axes of a hook's result."""
 
     batch: int
-    """Environments."""
+    """Number of environments, B."""
     workers: int
-    """Slots."""
+    """Number of worker slots, W."""
     objects: int = 0
-    """Loose ones, of a scene that is built."""
+    """Number of the task's loose objects, O; known once its scene is built."""
 
 
-Check = Callable[[str, Any, Sizes], None]
-"""(name, result of a hook, sizes); raises `ConfigError`."""
+Check = Callable[[str, object, Sizes], None]
+"""Check of a result: (name for errors, result of a hook, sizes); it raises `ConfigError`."""
 
 
-def with_checks(task: Task[Any, Any], sizes: Sizes) -> Task[Any, Any]:
-    """Return a task that does the same, and whose hooks raise `ConfigError` for results of another
-    kind or shape, or that are no numbers."""
+def add_checks(task: AnyTask, sizes: Sizes) -> AnyTask:
+    """Return a copy of a task with hooks that check their results.
+
+    They raise `ConfigError` for results of another kind or shape, or that are no numbers.
+    """
     kind = type(task)
-    hooks = {name: _checked(kind, name, check, sizes) for name, check in CHECKS.items()}
-    watched = type(kind.__name__, (kind,), {**hooks, "__doc__": kind.__doc__})
-    made: Task[Any, Any] = watched(task.config)
-    return made
-
-
-def check_places(what: str, targets: Any) -> None:
-    """Raise `ConfigError` unless these are `ReachTarget`s."""
-    if not isinstance(targets, Sequence) or isinstance(targets, str):
-        raise ConfigError(f"{what} must be a list of ReachTarget, got {described(targets)}.")
-    for k, target in enumerate(targets):
-        check_kind(f"{what}[{k}]", target, ReachTarget)
-
-
-def _checked(
-    kind: type[Task[Any, Any]], name: str, check: Check, sizes: Sizes
-) -> Callable[..., Any]:
-    hook = getattr(kind, name)
-
-    @wraps(hook)
-    def checked(self: Task[Any, Any], *args: Any, **kwargs: Any) -> Any:
-        given = hook(self, *args, **kwargs)
-        check(f"{self.id}: {name}", given, sizes)
-        return given
-
+    hooks = {name: _check_results(kind, name, check, sizes) for name, check in CHECKS.items()}
+    checked_kind = type(kind.__name__, (kind,), {**hooks, "__doc__": kind.__doc__})
+    checked: AnyTask = checked_kind(task.config)
     return checked
 
 
-def _signal(what: str, signal: Any, sizes: Sizes) -> None:
-    check_kind(what, signal, WorkerSignal, None)
-    if signal is not None:
-        numbers_of(f"{what}.stage", signal.stage, (sizes.batch,), "B")
-        where = f"{what}.offered_world"
-        numbers_of(where, signal.offered_world, (sizes.batch, 3), "B, xyz [m]", finite=False)
+def check_targets(name: str, targets: object) -> None:
+    """Raise `ConfigError` unless a value is a sequence of `ReachTarget`."""
+    if not isinstance(targets, Sequence) or isinstance(targets, str):
+        raise ConfigError(f"{name} must be a list of ReachTarget, got {described(targets)}.")
+    for k, target in enumerate(cast(Sequence[object], targets)):
+        check_kind(f"{name}[{k}]", target, ReachTarget)
 
 
-def _effects(what: str, effects: Any, sizes: Sizes) -> None:
-    check_kind(what, effects, Effects, None)
-    if effects is not None:
+def _check_results(kind: TaskType, name: str, check: Check, sizes: Sizes) -> Callable[..., Any]:
+    """Return a method that calls a task's hook and checks its result.
+
+    Args:
+        kind: class of the task.
+        name: name of the hook.
+        check: check of its result.
+        sizes: lengths of the result's axes.
+    """
+    hook = getattr(kind, name)
+
+    @wraps(hook)
+    def method(self: AnyTask, *args: Any, **kwargs: Any) -> Any:
+        result = hook(self, *args, **kwargs)
+        check(f"{self.id}: {name}", result, sizes)
+        return result
+
+    return method
+
+
+def _check_signal(name: str, signal: object, sizes: Sizes) -> None:
+    check_kind(name, signal, WorkerSignal, None)
+    if isinstance(signal, WorkerSignal):
+        shape = (sizes.batch, 3)
+        numbers_of(f"{name}.stage", signal.stage, (sizes.batch,), "B")
+        numbers_of(f"{name}.offered_world", signal.offered_world, shape, "B, xyz [m]", finite=False)
+
+
+def _check_effects(name: str, effects: object, sizes: Sizes) -> None:
+    check_kind(name, effects, Effects, None)
+    if isinstance(effects, Effects):
         shape = (sizes.batch, sizes.objects, 6)
-        check_kind(f"{what}.welded", effects.welded, Mapping)
-        numbers_of(f"{what}.push_world", effects.push_world, shape, "B, O, force and torque")
+        check_kind(f"{name}.welded", effects.welded, Mapping)
+        numbers_of(f"{name}.push_world", effects.push_world, shape, "B, O, force and torque")
 
 
-def _contacts(what: str, contacts: Any, sizes: Sizes) -> None:
+def _check_contacts(name: str, contacts: object, sizes: Sizes) -> None:
     if contacts is not None:
         shape = sizes.batch, sizes.workers, len(SEGMENT_RADIUS_M)
-        flags_of(what, contacts, shape, "B, W, segments of a body")
+        flags_of(name, contacts, shape, "B, W, segments of a body")
 
 
-def _loads(what: str, loads: Any, sizes: Sizes) -> None:
+def _check_loads(name: str, loads: object, sizes: Sizes) -> None:
     if not isinstance(loads, bool | np.bool_):
-        flags_of(what, loads, (sizes.batch, sizes.objects), "B, O, or True or False for all")
+        flags_of(name, loads, (sizes.batch, sizes.objects), "B, O, or True or False for all")
 
 
-def _over(what: str, over: Any, sizes: Sizes) -> None:
+def _check_end(name: str, over: object, sizes: Sizes) -> None:
     if not isinstance(over, bool | np.bool_):
-        flags_of(what, over, (sizes.batch,), "one an environment, or True or False for all")
+        flags_of(name, over, (sizes.batch,), "one an environment, or True or False for all")
 
 
-def _points(what: str, points: Any, sizes: Sizes) -> None:
-    shape = np.shape(points) if isinstance(points, np.ndarray) else ()
+def _check_points(name: str, points: object, sizes: Sizes) -> None:
+    shape = _shape_of(points)
     if len(shape) != 3:
         raise ConfigError(
-            f"{what} must be points (B, M, 3) [m, world], got {described(points)}; none are "
+            f"{name} must be points (B, M, 3) [m, world], got {described(points)}; none are "
             "numpy.zeros((B, 0, 3))."
         )
-    check_shape(what, shape[2:], (3,), "xyz")
+    check_shape(name, shape[2:], (3,), "xyz")
 
 
-def _angles(what: str, angles: Any, sizes: Sizes) -> None:
-    if np.ndim(angles) == 2:  # the shape is checked where they are used
-        numbers_of(what, angles, np.shape(angles), "an angle a joint")
+def _shape_of(value: object) -> tuple[int, ...]:
+    """Return the shape of an array; of anything else ()."""
+    return cast(NDArray[Any], value).shape if isinstance(value, np.ndarray) else ()
 
 
-def _numbers_by_name(what: str, info: Any, sizes: Sizes) -> None:
-    check_kind(what, info, Mapping)
+def _check_angles(name: str, angles: Any, sizes: Sizes) -> None:
+    if np.ndim(angles) == 2:  # the shape is checked when they are used
+        numbers_of(name, angles, np.shape(angles), "an angle a joint")
+
+
+def _check_info(name: str, info: object, sizes: Sizes) -> None:
+    check_kind(name, info, Mapping)
 
 
 CHECKS: dict[str, Check] = {
-    "allowed_contact": _contacts,
-    "draw_start": _angles,
-    "effects": _effects,
-    "info": _numbers_by_name,
-    "is_load": _loads,
-    "is_terminal": _over,
-    "markers": _points,
-    "signal": _signal,
+    "allowed_contact": _check_contacts,
+    "draw_start": _check_angles,
+    "effects": _check_effects,
+    "info": _check_info,
+    "is_load": _check_loads,
+    "is_terminal": _check_end,
+    "markers": _check_points,
+    "signal": _check_signal,
 }
 """Checks of results, by hook."""
-
 WRITERS = ("reset", "set_goal", "advance")
 """Methods that write their first argument, the state; all others only read it."""
-_READERS = [
-    name for name, hook in inspect.getmembers(Task, inspect.isfunction)
-    if name[0] != "_" and name not in ("make_state", "make_scene", "reach_targets", "counts")
-]  # fmt: skip
+UNPROTECTED = ("make_state", "make_scene", "reach_targets", "counts")
+"""Methods without shared arrays among their arguments."""
 
 
-def lent(task: Task[Any, Any]) -> Task[Any, Any]:
-    """Give read-only arrays to methods that a user has written; return the task.
+def protect_arrays(task: AnyTask) -> AnyTask:
+    """Give read-only arrays to the methods that a user has written, and return the task.
 
-    Such a method raises `ConfigError` if it writes into one of them, as others, a shield among
+    Such a method raises `ConfigError` if it writes into one of them, because others, a shield among
     them, are given the same arrays.
     """
-    for name in _READERS:
-        if is_of_user(getattr(type(task), name)):
-            vars(task)[name] = _reading(task, name)
+    for name in HOOKS:
+        if name not in UNPROTECTED and is_of_user(getattr(type(task), name)):
+            vars(task)[name] = _pass_read_only(task, name)
     return task
 
 
-def _reading(task: Task[Any, Any], name: str) -> Callable[..., Any]:
+def _pass_read_only(task: AnyTask, name: str) -> Callable[..., Any]:
+    """Return a function that calls a task's method with read-only arrays."""
     hook = getattr(task, name)
-    first = 1 if name in WRITERS else 0
+    n_written = 1 if name in WRITERS else 0
 
     @wraps(hook)
-    def reading(*given: Any) -> Any:
-        rest = [each if isinstance(each, list) else read_only(each) for each in given[first:]]
-        return called(f"{task.id}: {name}", hook, *given[:first], *rest)
+    def function(*args: Any) -> Any:
+        rest: list[Any] = [
+            arg if isinstance(arg, list) else read_only(arg)  # a list is of generators
+            for arg in args[n_written:]
+        ]
+        return called(f"{task.id}: {name}", hook, *args[:n_written], *rest)
 
-    return reading
+    return function

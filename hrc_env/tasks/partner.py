@@ -1,4 +1,4 @@
-"""Who takes part in what a robot does with its hand, told from estimated bodies."""
+"""The worker that takes part in a task, found among the estimated bodies."""
 
 import numpy as np
 
@@ -10,33 +10,34 @@ from hrc_env.world import FOOT_WORLD
 
 ARMS = ((6, 14), (7, 15))
 """Forearm and hand of either side, among `geometry.distances.segments`."""
-STANDS_M = 0.6
-"""Whose trunk is so near to above where a task has its worker stand takes part [m]."""
+PARTNER_RADIUS_M = 0.6
+"""Horizontal distance of a trunk from the task's workplace within which the worker takes part [m].
+"""
 
 
-def partners_arms(
-    estimate: PoseEstimate, stands_m: tuple[float, float], place_world: Capsules, within_m: float
+def find_partner_arms(
+    estimate: PoseEstimate, stand_xy_m: tuple[float, float], place_world: Capsules, within_m: float
 ) -> Bools:
-    """(B, W, S) of each environment's partner, forearms and hands whose hand is near a place.
+    """Return (B, W, S) the forearms and hands of each environment's partner that are near a place.
 
-    A partner is the tracked worker who stands where the task has them, and of several the one whose
-    hand is nearest to the place.
+    The partner is the tracked worker at the task's workplace; of several it is the one with the
+    hand nearest to the place.
 
     Args:
-        estimate: of the workers.
-        stands_m: where the task has them stand, from the robot's foot, x and y [m].
-        place_world: (B, 2, 3) the ends of where they work [m].
-        within_m: how near a hand is that takes part [m].
+        estimate: the workers.
+        stand_xy_m: workplace of the task, x and y from the robot's foot [m].
+        place_world: (B, 2, 3) end points of the segment where hands work [m].
+        within_m: distance of a hand from that segment within which its arm is returned [m].
     """
     bodies, trunk = segments(estimate.mean_world), estimate.mean_world[:, :, TORSO, :2].mean(2)
-    off_m = np.linalg.norm(trunk - (FOOT_WORLD[:2] + stands_m), axis=-1)
+    off_m = np.linalg.norm(trunk - (FOOT_WORLD[:2] + stand_xy_m), axis=-1)
     hands = bodies[:, :, -len(HAND_SEGMENTS) :, None]
     away_m = least_separation(place_world[:, None], np.zeros(1), hands, np.zeros(1)).distance_m
-    may = estimate.tracked & (off_m < STANDS_M)
-    away_m = np.where(may[..., None], away_m, np.inf)
+    is_candidate = estimate.tracked & (off_m < PARTNER_RADIUS_M)
+    away_m = np.where(is_candidate[..., None], away_m, np.inf)
     nearest = away_m.min(axis=(1, 2), initial=np.inf)[:, None]
     near = (away_m < within_m) & (away_m.min(axis=2) == nearest)[..., None]
-    welcome = np.zeros(bodies.shape[:3], bool)
-    for side, arm in enumerate(ARMS):
-        welcome[..., arm] = near[..., side, None]
-    return welcome
+    arms = np.zeros(bodies.shape[:3], bool)
+    for side, segments_of_arm in enumerate(ARMS):
+        arms[..., segments_of_arm] = near[..., side, None]
+    return arms

@@ -1,4 +1,4 @@
-"""Picking and placing with goals apart from the observation: the form that HER learns from."""
+"""Pick and place with goals kept apart from the observation, as hindsight replay needs it."""
 
 from dataclasses import dataclass
 
@@ -10,49 +10,61 @@ from hrc_env.core.typing import Floats
 from hrc_env.tasks import BUILT_IN
 from hrc_env.tasks.goal import Goal
 from hrc_env.tasks.pick_place import STUDS, PickPlace, PlacedConfig
-from hrc_env.tasks.task import Task
+from hrc_env.tasks.task import AnyTask
 
-EACH, ALL = "each", "all"
-"""How the reward counts pieces."""
+EACH = "each"
+"""Reward that counts each piece."""
+ALL = "all"
+"""Reward that counts only all pieces together."""
 
 
 @dataclass(frozen=True, slots=True)
 class PickPlaceGoalConfig(PlacedConfig):
-    """What counts as placed in the end, and what the reward asks of places."""
+    """Criteria of placed pieces, for the reward and for a success."""
 
     goal_m: float = 0.02
-    """The reward counts a piece whose middle, as measured, is nearer to its place than this [m]."""
+    """Distance of a piece's middle, as measured, from its place below which the reward counts the
+    piece as placed [m]."""
     reward: str = EACH
-    """"each": minus the share of pieces that are not there, as environments of several things to do
-    count each of them; "all": -1 until all are there, then 0."""
+    """"each" is minus the share of pieces that are not placed, "all" is -1 until all are, then
+    0."""
 
     def __post_init__(self) -> None:
         PlacedConfig.__post_init__(self)
         check_fields(self, "be positive", "goal_m")
         if self.reward not in (EACH, ALL):
-            raise ConfigError(f'{type(self).__name__}.reward must be "{EACH}" or "{ALL}", '
-                              f"got {self.reward!r}.")  # fmt: skip
+            name = type(self).__name__
+            raise ConfigError(f'{name}.reward must be "{EACH}" or "{ALL}", got {self.reward!r}.')
 
 
-def near(achieved: Floats, desired: Floats, config: PickPlaceGoalConfig) -> Floats:
-    """(...) minus the share of pieces that are not near where they are to be, or -1 if any is not;
-    0 if all are. Places of pieces are (..., 9)."""
+def reward_placing(achieved: Floats, desired: Floats, config: PickPlaceGoalConfig) -> Floats:
+    """Return (...) the reward for pieces at these places.
+
+    Args:
+        achieved: (..., 9) places of the three pieces [m].
+        desired: (..., 9) their targets [m].
+        config: radius `goal_m`, and whether pieces count one by one.
+
+    Returns:
+        Minus the share of pieces that are farther from their targets than the radius, or -1 if any
+        is and `config.reward` is "all"; 0 if none is.
+    """
     off = (achieved - desired).reshape(*achieved.shape[:-1], STUDS, 3)
     away = np.sqrt((off**2).sum(-1)) >= config.goal_m
     return -(away.any(-1) if config.reward == ALL else away.sum(-1) / STUDS).astype(float)
 
 
-def _measured(now: Belief) -> Floats:
-    return needed(now.objects, "A loose object").position_world.reshape(-1, 3 * STUDS)
+def _measured_places(belief: Belief) -> Floats:
+    return needed(belief.objects, "A loose object").position_world.reshape(-1, 3 * STUDS)
 
 
-def _places(now: Belief) -> Floats:
-    return np.broadcast_to(now.task.places_world.ravel(), (len(now.action), 3 * STUDS))
+def _target_places(belief: Belief) -> Floats:
+    return np.broadcast_to(belief.task.places_world.ravel(), (len(belief.action), 3 * STUDS))
 
 
 class PickPlaceGoal(PickPlace):
-    """Bring pieces of studs from a table to where they are asked for, while a worker takes from
-    the same table.
+    """Bring pieces of studs from a table to their goals, while a worker takes from the same
+    table.
     """
 
     id = "HRCPickPlaceGoal-v0"
@@ -64,11 +76,11 @@ class PickPlaceGoal(PickPlace):
     goal = Goal(
         size=3 * STUDS,
         bound=4.0,
-        achieved=_measured,
-        desired=_places,
-        reward=near,
+        achieved=_measured_places,
+        desired=_target_places,
+        reward=reward_placing,
         doc="Minus the share of pieces that are not within `task.goal_m` of their places, as "
-        'measured; -1 or 0 with `task.reward` "all". A success also asks whether they are let '
-        "go and at rest.",
+        'measured; -1 or 0 with `task.reward` "all". For a success they must also be let go and '
+        "at rest.",
     )
-    is_terminal = Task.is_terminal
+    is_terminal = AnyTask.is_terminal

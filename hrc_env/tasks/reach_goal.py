@@ -1,49 +1,49 @@
-"""Reaching one goal, which stands apart from the observation: the form that HER learns from."""
+"""Reach a single goal that is kept apart from the observation, as hindsight replay needs it."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
-from hrc_env.core.typing import Floats, Ints, Points3, Records, Rngs
+from hrc_env.core.declared import Records1, make_records
+from hrc_env.core.typing import Bools, Floats, Ints, Points3, Rngs
 from hrc_env.geometry.reach import ReachTarget
 from hrc_env.tasks import BUILT_IN
 from hrc_env.tasks.goal import Goal
-from hrc_env.tasks.reach import TargetConfig, drawn_goal, given_target, goal_places
+from hrc_env.tasks.reach import TargetConfig, draw_goal, list_targets, make_target
 from hrc_env.tasks.task import Task
 from hrc_env.world import World
 
 
 @dataclass(frozen=True, slots=True)
 class ReachGoalConfig(TargetConfig):
-    """Where the goal is, and what counts as reaching it."""
+    """Volume of the goal, and radius within which it is reached."""
 
 
-REACH_GOAL = np.dtype(
-    [
-        ("goal_world", "f8", (3,)),  # [m]
-        ("there", "?"),  # whether the tool point is within the radius now
-    ],
-    align=True,
-)
-"""The task of one environment."""
+class ReachGoalState:
+    """State of one environment's goal."""
+
+    goal_world: Annotated[Points3, (3,)]
+    """Place of the goal [m]."""
+    there: bool
+    """Whether the tool point is within the goal's radius now."""
 
 
 @dataclass(frozen=True, slots=True)
 class ReachGoalView:
-    """The robots' view of their task."""
+    """Knowledge of the robots about their task."""
 
     goal_world: Points3
-    """(B, 3) [m]."""
+    """(B, 3) place of the goal [m]."""
 
 
-def reached(achieved: Floats, desired: Floats, config: ReachGoalConfig) -> Floats:
-    """(...) 0 where places (..., 3) are nearer to each other than the radius, else -1."""
+def reward_reaching(achieved: Floats, desired: Floats, config: ReachGoalConfig) -> Floats:
+    """Return (...) 0 where places (..., 3) are nearer to each other than the radius, else -1."""
     off_m = np.sqrt(((achieved - desired) ** 2).sum(-1))
     return np.where(off_m < config.radius_m, 0.0, -1.0)
 
 
-class ReachGoal(Task[ReachGoalConfig, Records]):
+class ReachGoal(Task[ReachGoalConfig, Records1[ReachGoalState]]):
     """Bring the tool to a goal and keep it there, in a volume shared with a worker."""
 
     id = "HRCReachGoal-v0"
@@ -59,43 +59,51 @@ class ReachGoal(Task[ReachGoalConfig, Records]):
     goal = Goal(
         size=3,
         bound=4.0,
-        achieved=lambda now: now.robot.tool_world,
-        desired=lambda now: now.task.goal_world,
-        reward=reached,
+        achieved=lambda belief: belief.robot.tool_world,
+        desired=lambda belief: belief.task.goal_world,
+        reward=reward_reaching,
         doc="0 while the tool point is within `task.radius_m` of its goal, else -1.",
     )
 
-    def make_state(self, batch: int) -> Records:
-        return np.zeros(batch, REACH_GOAL)
+    def make_state(self, batch: int) -> Records1[ReachGoalState]:
+        return make_records(ReachGoalState, batch)
 
     def reach_targets(self) -> list[ReachTarget]:
-        return goal_places(self.config)
+        return list_targets(self.config)
 
     def goal_targets(self, goal: Floats) -> list[ReachTarget]:
-        """A place (3,) [m, world]: the goal of the episode."""
-        return given_target(goal, self.config)
+        """Return the place (3,) of the goal of the episode [m, world]."""
+        return [make_target(goal, self.config)]
 
-    def set_goal(self, state: Records, ids: Ints, goals: Floats, world: World) -> None:
+    def set_goal(
+        self, state: Records1[ReachGoalState], ids: Ints, goals: Floats, world: World
+    ) -> None:
         state["goal_world"][ids] = goals
-        state["there"][ids] = reached(world.robot.tool_world, goals, self.config) == 0.0
+        state["there"][ids] = self._is_there(world.robot.tool_world, goals)
 
-    def reset(self, state: Records, ids: Ints, rngs: Rngs, world: World) -> None:
+    def reset(self, state: Records1[ReachGoalState], ids: Ints, rngs: Rngs, world: World) -> None:
         """Give environments `ids` a goal each."""
-        for b, tool_world in zip(ids.tolist(), world.robot.tool_world, strict=True):
-            goal_world = np.array(drawn_goal(rngs[b], self.config))
-            there = reached(tool_world, goal_world, self.config) == 0.0
-            state["goal_world"][b], state["there"][b] = goal_world, there
+        for b, tool_world in zip(map(int, ids), world.robot.tool_world, strict=True):
+            goal_world = np.array(draw_goal(rngs[b], self.config))
+            state["goal_world"][b] = goal_world
+            state["there"][b] = self._is_there(tool_world, goal_world)
 
-    def advance(self, state: Records, rngs: Rngs, world: World, dt_s: float) -> Records:
-        """Judge where the tool is; a copy of the state."""
-        state["there"] = reached(world.robot.tool_world, state["goal_world"], self.config) == 0.0
+    def advance(
+        self, state: Records1[ReachGoalState], rngs: Rngs, world: World, dt_s: float
+    ) -> Records1[ReachGoalState]:
+        """Judge the place of the tool, and return a copy of the state."""
+        state["there"] = self._is_there(world.robot.tool_world, state["goal_world"])
         return state.copy()
 
-    def view(self, state: Records, ids: Ints) -> ReachGoalView:
+    def _is_there(self, tool_world: Points3, goal_world: Points3) -> Bools:
+        """Return (...) whether tool points (..., 3) are within the radius of goals (..., 3)."""
+        return reward_reaching(tool_world, goal_world, self.config) == 0.0
+
+    def view(self, state: Records1[ReachGoalState], ids: Ints) -> ReachGoalView:
         return ReachGoalView(state["goal_world"][ids])
 
-    def info(self, state: Records) -> dict[str, Any]:
-        """Whether the tool is at its goal, (B,) each; what counts is where it is at the end."""
+    def info(self, state: Records1[ReachGoalState]) -> dict[str, Floats]:
+        """Return whether the tool is at its goal now, (B,) each; its last place decides."""
         there = state["there"].astype(float)
         return {
             "task/goals_reached": there,

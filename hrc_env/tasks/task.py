@@ -1,15 +1,15 @@
-"""Tasks: the base class with its hooks, and the tasks that are known by an id."""
+"""The base class of tasks with its hooks, and the register of tasks by id."""
 
 from collections.abc import Collection, Mapping, Sequence
 from importlib import import_module
-from inspect import getdoc
-from typing import Any, ClassVar, Generic, TypeVar, cast
+from inspect import getdoc, getmembers, isfunction
+from typing import Any, ClassVar, Generic, TypeAlias, TypeGuard, TypeVar, cast
 
 import numpy as np
 
 from hrc_env import observations, rewards
 from hrc_env.belief import Belief
-from hrc_env.core.brought import described
+from hrc_env.core.brought import check_kind
 from hrc_env.core.errors import ConfigError, NoGoalError, unknown
 from hrc_env.core.registry import Registry
 from hrc_env.core.typing import Bools, Floats, Ints, JointAngles, Points3, Rngs
@@ -26,7 +26,7 @@ StateT = TypeVar("StateT")
 
 
 class Task(Generic[ConfigT, StateT]):
-    """What a robot is to achieve: derive from it, and register the class (`register_task`).
+    """A task of the robot: derive from this class, and register yours (`register_task`).
 
     The first paragraph of a subclass's docstring describes the task. A subclass must define `id`,
     `config_type`, `achieved`, `failed`, and the methods `make_state`, `reset`, `advance`, `view`
@@ -36,51 +36,52 @@ class Task(Generic[ConfigT, StateT]):
     arrays, with a row for every environment; `ids` are the rows in question, all rows where a
     method has no such argument. `rngs` holds a generator for every environment of the batch, and
     events in environment b draw from `rngs[b]` only. Methods write into `state` in `reset`,
-    `set_goal` and `advance`, and only read all else. `world` is the robot, its hand and the objects
-    as they are. B is the number of environments in question,
-    O of the task's loose objects, W of worker slots, N of robot joints.
+    `set_goal` and `advance`, and only read their other arguments. `world` is the true state of the
+    robot, its hand and the objects. B is the number of environments in question, O of the task's
+    loose objects, W of worker slots, N of robot joints.
 
     Args:
-        config: the task's settings, of `config_type`; None: its defaults.
+        config: settings of the task, of `config_type`; None for the defaults.
     """
 
     id: ClassVar[str] = ""
-    """Its name in `gymnasium.make`, such as "HRCReach-v0"."""
+    """Id of the task in `gymnasium.make`, such as "HRCReach-v0"."""
     config_type: ClassVar[type[Any]]
-    """A frozen dataclass of settings, each with a default: `config={"task": {...}}`."""
+    """Frozen dataclass of the task's settings, each with a default: `config={"task": {...}}`."""
     observations: ClassVar[tuple[ObservationTerm, ...]] = ()
     """The task's terms of the observation; their functions read `Belief.task`."""
     rewards: ClassVar[tuple[RewardTerm, ...]] = ()
     """The task's terms of the reward; their functions are given the task's settings as weights."""
     achieved: ClassVar[str] = ""
-    """The name in `info` that counts successful attempts; "success" in tables is their share."""
+    """Name in `info` of the number of successful attempts; "success" in tables is their share."""
     failed: ClassVar[str] = ""
-    """The name in `info` that counts failed attempts."""
+    """Name in `info` of the number of failed attempts."""
     starts: ClassVar[str] = ""
-    """How episodes begin, for the task's page."""
+    """Description of the start of an episode, for the task's page."""
     ends: ClassVar[str] = ""
-    """How episodes end before the time limit, for the task's page."""
+    """Description of the end of an episode before its time limit, for the task's page."""
     max_episode_steps: ClassVar[int] = EPISODE_STEPS
     """Time limit of an episode [control steps]."""
     robot: ClassVar[str | None] = None
-    """Name of the robot that does it by default; None: the package's default robot."""
+    """Name of the task's default robot; None for the package's default robot."""
     needs_gripper: ClassVar[bool] = False
-    """Whether the robot must have a hand or suction cups."""
+    """Whether the robot must have a gripper or suction cups."""
     needs_mobile_base: ClassVar[bool] = False
-    """Whether the robot must drive; where it is false the robot must not."""
+    """Whether the robot must be a mobile base; if false, it must not be one."""
     scene: ClassVar[str] = "lab"
-    """Name of the scene by default."""
+    """Name of the default scene."""
     n_workers: ClassVar[int | tuple[int, int]] = 1
-    """Number of workers by default, or the fewest and the most of an episode."""
+    """Default number of workers, or the fewest and the most of an episode."""
     viewpoint: ClassVar[str] = "beside"
-    """From where pictures show it: one of `scene.render.VIEWPOINTS`."""
+    """Viewpoint of pictures, one of `scene.render.VIEWPOINTS`."""
     defaults: ClassVar[Mapping[str, Any]] = {}
     """Values of `HRCConfig` that differ from its defaults, nested as `config=` takes them."""
     goal: ClassVar[Goal | None] = None
-    """The goal, if it stands apart from the observation as hindsight replay (HER) needs it."""
+    """Goal that is kept apart from the observation, as hindsight replay (HER) needs it; None for
+    a task without."""
 
     config: ConfigT
-    """The task's settings."""
+    """Settings of the task."""
 
     def __new__(cls, *args: Any, **kwargs: Any) -> "Task[ConfigT, StateT]":
         if cls is Task:
@@ -99,40 +100,60 @@ class Task(Generic[ConfigT, StateT]):
         raise NotImplementedError
 
     def reset(self, state: StateT, ids: Ints, rngs: Rngs, world: World) -> None:
-        """Start environments `ids` anew: write their rows of `state`; `world` is of these only."""
+        """Begin new episodes of environments `ids`.
+
+        Args:
+            state: of all environments; rows `ids` are written.
+            ids: (n,) the environments in question.
+            rngs: a generator for every environment of the batch.
+            world: of these environments only.
+        """
         raise NotImplementedError
 
     def advance(self, state: StateT, rngs: Rngs, world: World, dt_s: float) -> Any:
-        """Advance every environment by one control step of dt_s [s].
+        """Advance every environment by one control step.
+
+        Args:
+            state: (B,) written.
+            rngs: B generators.
+            world: the environments at the end of the step.
+            dt_s: duration of the step [s].
 
         Returns:
-            What the step brought, of a type of the task's own: reward terms and `is_terminal`
-            are given it.
+            The results of the step, of a type of the task's own; reward terms and `is_terminal`
+            are given them.
         """
         raise NotImplementedError
 
     def view(self, state: StateT, ids: Ints) -> Any:
-        """Return what the robots of environments `ids` know of their task: `Belief.task`."""
+        """Return the knowledge of the robots of environments `ids` about their task.
+
+        It is `Belief.task`, of a type of the task's own.
+        """
         raise NotImplementedError
 
     def info(self, state: StateT) -> Mapping[str, Floats]:
-        """Return numbers (B,) about the episode so far, by name.
+        """Return numbers (B,) about the episode until now, by name.
 
-        Names begin with "task/"; beside them stands "is_success", 0 or 1: whether the episode would
-        be a success if it ended now.
+        Names begin with "task/", except for "is_success": 1 if the episode would be a success if it
+        ended now, else 0.
         """
         raise NotImplementedError
 
     def is_terminal(self, step: Any) -> Bools | bool:
-        """Return (B,) whether the task is over, given what `advance` returned; never by default."""
+        """Return (B,) whether the task is over after a step; by default it never is.
+
+        Args:
+            step: results of the step, as `advance` returned them.
+        """
         return False
 
     def markers(self, view: Any) -> Points3:
-        """Return (B, M, 3) points that pictures show [m, world]; none by default."""
+        """Return (B, M, 3) points that pictures show, of a `view` [m, world]; by default none."""
         return np.zeros((1, 0, 3))
 
     def survey(self, grounds: Grounds) -> Any:
-        """Return what the task needs to know of the place, once: `World.place`; by default None.
+        """Return the task's own map of a place, made once: `World.place`; by default None.
 
         Raises:
             ConfigError: the place has no room for the task.
@@ -146,80 +167,81 @@ class Task(Generic[ConfigT, StateT]):
 
         Args:
             rngs: n generators, one for each robot.
-            place: what `survey` returned.
-            home_q: (N,) the robot's pose at rest; by default starts are near it.
-            spread_rad: (N,) how far from it they are at most.
+            place: the map that `survey` returned.
+            home_q: (N,) the robot's home pose; by default starts are near it.
+            spread_rad: (N,) largest distance of a start from the home pose.
         """
         return draw_near(home_q, spread_rad, rngs)
 
     def make_scene(self) -> TaskScene:
-        """Return the task's part of the scene; by default nothing."""
+        """Return the task's part of the scene; by default it is empty."""
         return NOTHING
 
     def reach_targets(self) -> Sequence[ReachTarget]:
-        """Return places that the tool has to get to, besides loose objects.
+        """Return places that the tool has to reach, besides loose objects; by default none.
 
         A robot that is too short for them is refused.
         """
         return ()
 
     def goal_targets(self, goal: Floats) -> Sequence[ReachTarget]:
-        """Return where the tool has to get to for a goal that `reset(options={"goal": ...})` gives.
+        """Return the places that the tool has to reach for `reset(options={"goal": ...})`.
 
-        A task that takes goals defines this and `set_goal`; it is asked before the episode starts,
-        and what is out of reach is refused.
+        A task that takes goals defines this method and `set_goal`. It is called before the episode
+        starts, and a goal out of reach is refused.
 
         Raises:
             ConfigError: this is no goal; by default always, as the task takes none.
         """
-        known = [
-            each for each in dict.fromkeys((*BUILT_IN, *TASKS)) if takes_goals(find_task(each))
-        ]
+        ids = dict.fromkeys((*BUILT_IN, *TASKS))
+        known = [task for task in ids if takes_goals(find_task(task))]
         raise ConfigError(
             f"{self.id} takes no goal of a reset: leave options['goal'] out. {', '.join(known)} "
             "do; a task of yours does if it defines goal_targets and set_goal (hrc_env.Task)."
         )
 
     def set_goal(self, state: StateT, ids: Ints, goals: Floats, world: World) -> None:
-        """Give environments `ids` these goals in the place of those that `reset` drew.
+        """Replace the goals that `reset` drew for environments `ids`.
 
         Args:
             state: of all environments; rows `ids` are written.
             ids: (n,) the environments in question.
-            goals: (n, ...) as `goal_targets` was given each.
+            goals: (n, ...) the new goals, in the form that `goal_targets` takes.
             world: of these environments only.
         """
         raise NotImplementedError
 
     def object_poses(self, state: StateT, ids: Ints) -> Floats | None:
-        """Return (n, O, 7) where loose objects lie after `reset`.
+        """Return (n, O, 7) the poses of loose objects after `reset`.
 
-        Position [m, world] and quaternion (w, x, y, z); None, the default: as in the MJCF.
+        A pose is a position [m, world] and a quaternion (w, x, y, z). None, the default, stands for
+        the poses of the MJCF.
         """
         return None
 
     def is_load(self, state: StateT) -> Bools | bool:
-        """Return (B, O) which objects count as part of the robot while it holds them.
+        """Return (B, O) whether each object counts as part of the robot while it holds it.
 
-        They do so in cost, separation and belief; by default all.
+        It does so in cost, separation and belief; by default all objects do.
         """
         return True
 
     def signal(self, state: StateT) -> WorkerSignal | None:
-        """Return what waiting workers are shown (`Job.waits`).
+        """Return the signal to workers that wait for the task (`Job.waits`).
 
-        None, the default: they do not wait.
+        None, the default, stands for workers that do not wait.
         """
         return None
 
     def effects(self, state: StateT) -> Effects | None:
-        """Return what is done to loose objects during the next step; by default nothing."""
+        """Return the task's forces and welds on loose objects in the next step; by default none."""
         return None
 
     def allowed_contact(self, belief: Belief) -> Bools | None:
-        """Return (B, W, S) which segments of estimated bodies may touch the robot's hand.
+        """Return (B, W, S) whether each segment of estimated bodies may touch the robot's hand.
 
-        So workers take what it brings: built-in shields let them. None, the default: none of them.
+        Built-in shields permit these contacts, so that workers can take an object from the robot.
+        None, the default, stands for no segment.
         """
         return None
 
@@ -247,33 +269,54 @@ class Task(Generic[ConfigT, StateT]):
     @property
     def can_end(self) -> bool:
         """Whether the task ends episodes before their time limit."""
-        return type(self).is_terminal is not Task.is_terminal
+        return overrides(type(self), "is_terminal")
 
     def counts(self, info: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the attempts in an info, in words: {"goals reached": 3.0, "goals missed": 1.0}."""
+        """Return the counts of attempts in an info by a readable name.
+
+        An example is {"goals reached": 3.0, "goals missed": 1.0}.
+        """
         names = (self.achieved, self.failed)
         return {name.removeprefix("task/").replace("_", " "): info[name] for name in names}
 
 
-TaskType = type[Task[Any, Any]]
+AnyTask: TypeAlias = Task[Any, Any]
+"""A task with any settings and any state."""
+TaskType: TypeAlias = type[AnyTask]
+"""A class of tasks."""
 TASKS: Registry[TaskType] = Registry("task")
-"""Task classes by id: those that were asked for, and those that were registered."""
+"""Task classes by id: the registered ones, and those of the package that have been imported."""
+HOOKS = [name for name, _ in getmembers(Task, isfunction) if name[0] != "_"]
+"""Names of the methods that a subclass may define."""
+
+
+def is_task_class(value: object) -> TypeGuard[TaskType]:
+    """Return whether a value is a subclass of `Task`."""
+    return isinstance(value, type) and issubclass(value, Task)
+
+
+def overrides(task: TaskType, name: str) -> bool:
+    """Return whether a class defines a method of `Task` of its own."""
+    return getattr(task, name) is not getattr(Task, name)
 
 
 def find_task(task: str | TaskType) -> TaskType:
-    """Return the class of a task, given that or its id.
+    """Return the class of a task.
+
+    Args:
+        task: its id, or the class itself.
 
     Raises:
-        ConfigError: there is no such task; it names those that there are.
+        ConfigError: there is no such task; the error names all tasks.
     """
-    if isinstance(task, type) and issubclass(task, Task):
+    if is_task_class(task):
         return task
     if not isinstance(task, str):
         raise ConfigError(
             f"task must be an id or a subclass of hrc_env.Task, got {type(task).__name__}."
         )
     if task not in TASKS and task in BUILT_IN:
-        module, name = BUILT_IN[task].where.split(":")
+        module, name = BUILT_IN[task].path.split(":")
         TASKS[task] = cast(TaskType, getattr(import_module(module), name))
     if task not in TASKS:
         raise unknown("task", task, sorted({*BUILT_IN, *TASKS}))
@@ -281,24 +324,24 @@ def find_task(task: str | TaskType) -> TaskType:
 
 
 def is_known(task: TaskType) -> bool:
-    """Return whether a class is a task of the package, or registered."""
+    """Return whether a class is a task of the package or a registered one."""
     if task.id in BUILT_IN and find_task(task.id) is task:
         return True
     return TASKS.name_of(task) is not None
 
 
 def with_rewards(task: str | TaskType, *terms: RewardTerm, id: str) -> TaskType:
-    """Return a task that is rewarded for more than another one, and is else the same.
+    """Return a copy of a task with additional terms of the reward.
 
     It is a subclass, as you may write one yourself: `class Mine(hrc_env.find_task(ID))` with an
-    `id` and `rewards = (*hrc_env.find_task(ID).rewards, term)`. Terms of people read the belief,
+    `id` and `rewards = (*hrc_env.find_task(ID).rewards, term)`. Terms about people read the belief,
     `Belief.estimate` and `Belief.separation`; they are given the task's settings as weights, and
-    stand in `info` as "reward/NAME". `register_task` makes the id known.
+    their values stand in `info` as "reward/NAME". `register_task` makes the id known.
 
     Args:
-        task: that is taken, its id or class.
-        terms: what is added; each returns (B,) a number for every environment.
-        id: of the new task, such as "MyReach-v0".
+        task: id or class of the task to be copied.
+        terms: additional terms; each returns (B,) a number for every environment.
+        id: id of the new task, such as "MyReach-v0".
 
     Raises:
         ConfigError: there is no such task, no term, one that is no `RewardTerm`, or one whose name
@@ -309,8 +352,7 @@ def with_rewards(task: str | TaskType, *terms: RewardTerm, id: str) -> TaskType:
         raise ConfigError(f"Give at least one RewardTerm to add to {base.id}, got none.")
     names = [term.name for term in base().reward_terms]
     for term in terms:
-        if not isinstance(term, RewardTerm):
-            raise ConfigError(f"A reward's term must be a RewardTerm, got {described(term)}.")
+        check_kind("A reward's term", term, RewardTerm)
         if term.name in names:
             raise ConfigError(
                 f"{base.id} has a term {term.name!r} already; choose another name than "
@@ -322,30 +364,34 @@ def with_rewards(task: str | TaskType, *terms: RewardTerm, id: str) -> TaskType:
 
 
 def ancestor_of(task: str, ids: Collection[str]) -> str:
-    """Return the nearest task among `ids` whose agents act in a task, or the task's own id.
+    """Return the nearest task among `ids` with agents that also act in a task, or its own id.
 
-    That is the task itself, or one that it derives from with the same observations and goals, as
+    It is the task itself, or one that it derives from with the same observations and goals, as
     `with_rewards` makes them.
+
+    Args:
+        task: id of the task in question.
+        ids: ids of the tasks that have agents.
     """
     if task not in (*BUILT_IN, *TASKS):  # a class that is not registered
         return task
     kind = find_task(task)
-    for each in kind.__mro__:
-        if not issubclass(each, Task) or "id" not in vars(each):
+    for base in kind.__mro__:
+        if not is_task_class(base) or "id" not in vars(base):
             continue
-        alike = each.observations == kind.observations and each.goal == kind.goal
-        if each.id in ids and alike and each.needs_gripper == kind.needs_gripper:
-            return each.id
+        is_alike = base.observations == kind.observations and base.goal == kind.goal
+        if base.id in ids and is_alike and base.needs_gripper == kind.needs_gripper:
+            return base.id
     return task
 
 
 def takes_goals(task: TaskType) -> bool:
     """Return whether a reset can give a task its goal."""
-    return task.set_goal is not Task.set_goal
+    return overrides(task, "set_goal")
 
 
-def goal_of(task: Task[Any, Any]) -> Goal:
-    """Return the goal of a task, or raise `NoGoalError`."""
+def require_goal(task: AnyTask) -> Goal:
+    """Return the goal of a task, or raise `NoGoalError` if it has none."""
     if task.goal is None:
         known = [each for each in dict.fromkeys((*BUILT_IN, *TASKS)) if find_task(each).goal]
         raise NoGoalError(

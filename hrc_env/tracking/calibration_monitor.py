@@ -1,146 +1,208 @@
-"""Which cameras are not where they are said to be: what cameras say of each other, over seconds.
+"""Detection of cameras that are not where their calibration says, from their disagreement.
 
 A camera that is turned, moved or zoomed against its calibration sees every body displaced in the
-same way, second after second. To first order that is four numbers of its image: a shift (2), a
+same way, second after second. To first order, that is four parameters of its image: a shift (2), a
 growth and a turn about the principal point. They are estimated for each camera from the residuals
-between what it reports and what the *other* cameras say, by least squares with exponential
-forgetting, together with a delay, so that a camera that is merely late is not taken for a displaced
-one. What they explain, in units of their covariance with an allowance for the detector's lasting
-bias, is a generalised likelihood ratio (Willsky and Jones, IEEE Transactions on Automatic Control
-21, 1976; Basseville and Nikiforov, Detection of Abrupt Changes, 1993, chapter 7). Growth alone,
-shift and growth, and the turn as well are three hypotheses; each pays for its numbers, and the best
-counts.
+between its detections and the joints as the *other* cameras see them, by least squares with
+exponential forgetting. A delay is estimated with them, so that a camera that is merely late is not
+taken for a displaced one. The evidence for a displacement is a generalised likelihood ratio: the
+parameters in units of their covariance, with an allowance for the detector's lasting bias (Willsky
+and Jones, IEEE Transactions on Automatic Control 21, 1976; Basseville and Nikiforov, Detection of
+Abrupt Changes, 1993, chapter 7). There are three hypotheses: growth alone; shift and growth; shift,
+growth and turn. Each is charged for its number of parameters, and the best one counts.
 
-Each ratio supposes that one camera alone is wrong: it is named when its ratio is clearly the
-largest. A joint must be seen by three cameras: of two that contradict each other nobody knows which
-is wrong.
+Each ratio supposes that a single camera is wrong, so a camera is suspected only when its ratio is
+clearly the largest. A joint must be seen by three cameras: when two contradict each other, either
+may be wrong.
 """
 
 import math
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
+from hrc_env.core.declared import Records1, Records2, dtype_of, make_records
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Keypoints, PoseEstimate
-from hrc_env.core.typing import Floats, Ints
+from hrc_env.core.typing import Bools, Floats, Ints, Points2, Points3, Velocities3
 from hrc_env.geometry.triangulation import pixel_of
+from hrc_env.tracking.measurements import KeypointArrays, get_keypoint_arrays
+from hrc_env.tracking.tracks import EstimateArrays, get_estimate_arrays
 
-N_NUMBERS = 5
-"""Shift along u and v, growth, turn, all in radians or shares; delay [s]."""
+N_PARAMETERS = 5
+"""Number of parameters: shift along u and along v, growth, turn (radians or shares), delay [s]."""
 KEPT = 0.96
-"""Share of the evidence that is kept from sample to sample: it is forgotten within 10 s."""
-NAMED_AT, CLEARED_AT = 7.0, 3.5
-"""A camera is named when its ratio exceeds the one, and cleared when it is below the other."""
+"""Share of the evidence that is kept from sample to sample; it is forgotten within 10 s."""
+NAMED_AT = 7.0
+"""Ratio above which a camera becomes suspected."""
+CLEARED_AT = 3.5
+"""Ratio below which a suspected camera is cleared."""
 DECIDED = 1.3
-"""And only if it is so many times every other's, where its error shows, too, but less."""
-SHIFT_COSTS, TURN_COSTS = 3.0, 7.0
-"""So much more than growth alone, shift and growth have to explain, and all with the turn: more
-numbers explain more where nothing is wrong, and a body that leans looks like a turn."""
+"""Least quotient of a suspected camera's ratio and any other's; others show its error, too."""
+SHIFT_COSTS = 3.0
+"""Charge on the ratio of shift and growth, beside growth alone."""
+TURN_COSTS = 7.0
+"""Charge on the ratio with the turn; a body that leans looks like a turn of the camera."""
 LEAST_CONFIDENCE = 0.5
+"""Least confidence of a detection that is used."""
 CAUCHY = 0.7
-"""Deviations at which a residual has half its weight (Cauchy): no view, however far off, says more
-than a bounded amount, and many have to agree."""
+"""Number of standard deviations at which a residual has half its weight (Cauchy), so that the
+evidence of a single view is bounded."""
 LEAST_VIEWS = 3
+"""Least number of cameras that must see a joint."""
 LEAST_DEPTH_M = 0.3
+"""Least depth of a joint in a camera that counts [m]."""
 U, V, WEIGHT, DU, DV = 0, 1, 2, 3, 4
+"""Columns of a view of a joint: its residual [px], its weight [1/px^2], and the velocity of the
+joint in the image [px/s]."""
 JACOBIAN = 5
+"""First of six columns: the derivatives of u and of v by the joint's position [px/m]."""
 PLACE = 11
+"""First of two columns: the expected pixel [px]."""
 N_VIEW = 13
-"""One view of a joint: residual (2), weight, velocity in the image (2), slope on the joint
-(2 x 3), pixel (2)."""
+"""Number of columns of a view."""
 EVERY = 10
-"""Updates between two samples: errors of the detector last for about twelve."""
+"""Number of updates between two samples; errors of the detector persist for about twelve."""
 PRIOR = (0.3**-2, 0.3**-2, 0.3**-2, 0.3**-2, 0.3**-2)
-"""Precision of these numbers before anything was seen."""
+"""Prior precision of the parameters."""
 ALLOWED = (0.00084**2, 0.00084**2, 0.0034**2, 0.005**2)
-"""Variance of the first four that no calibration is to blame for: the detector's lasting bias."""
-CAMERA = np.dtype(
-    [
-        # updates since the reset
-        ("updates", "i8"),
-        # of the five numbers (the upper triangle); that times the numbers
-        ("information", "f8", (N_NUMBERS, N_NUMBERS)), ("score", "f8", (N_NUMBERS,)),
-        # likelihood ratio, less its costs, at the last sample; whether the camera is named
-        ("ratio", "f8"), ("suspected", "?"),
-    ],
-    align=True,
-)  # fmt: skip
-"""What is remembered of one camera of one environment."""
+"""Variance of shift, growth and turn that the detector's lasting bias explains."""
 
 
-def make_monitor(batch: int, n_cameras: int) -> Any:
-    """(B, C) records of `CAMERA`, nobody suspected."""
-    return np.zeros((batch, n_cameras), CAMERA)
+class MonitoredCamera:
+    """The evidence for an error in the calibration of one camera of one environment."""
+
+    updates: int
+    """Number of updates since the reset."""
+    information: Annotated[Floats, (N_PARAMETERS, N_PARAMETERS)]
+    """Information matrix of the parameters; its upper triangle."""
+    score: Annotated[Floats, (N_PARAMETERS,)]
+    """Information matrix times the parameters."""
+    ratio: float
+    """Likelihood ratio at the last sample, less the charges."""
+    suspected: bool
+    """Whether the camera is suspected to be miscalibrated."""
 
 
-def forget_monitor(state: Any, ids: Ints) -> None:
-    """Begin environments `ids` anew."""
+CAMERA = dtype_of(MonitoredCamera)
+
+
+def make_monitor(batch: int, n_cameras: int) -> Records2[MonitoredCamera]:
+    """Return the evidence (B, C) before any update; no camera is suspected."""
+    return make_records(MonitoredCamera, (batch, n_cameras))
+
+
+def forget_monitor(state: Records2[MonitoredCamera], ids: Ints) -> None:
+    """Discard the evidence of environments `ids`."""
     state[ids] = np.zeros((), CAMERA)
 
 
 def monitor(
-    state: Any, ids: Ints, keypoints: Keypoints, age_s: Floats, estimate: PoseEstimate,
-    P: Floats, axes: Floats,
-) -> None:  # fmt: skip
-    """Count an update of environments `ids`, whose rows the other arguments are.
+    state: Records2[MonitoredCamera],
+    ids: Ints,
+    keypoints: Keypoints,
+    age_s: Floats,
+    estimate: PoseEstimate,
+    P: Floats,
+    axes: Floats,
+) -> None:
+    """Count an update of some environments, and take a sample of every tenth, in place.
 
     Args:
-        state: (B, C) of the whole batch.
-        ids: (B,) environments.
-        keypoints: pinhole pixels, by worker.
-        age_s: (B, C) how old each camera's frame is [s].
-        estimate: what is believed now.
-        P: (C, 3, 4) projections, as the cameras are said to be.
+        state: (B, C) evidence of the whole batch.
+        ids: (b,) indices of the environments, the rows of the arguments that follow.
+        keypoints: (b, C, W, J) pinhole pixels, assigned to workers.
+        age_s: (b, C) age of each camera's frame [s].
+        estimate: (b, W, J) estimate of the tracker.
+        P: (C, 3, 4) projections of the calibrated cameras.
         axes: (C, 3) principal point and focal length [px].
     """
     state["updates"][ids] += 1
     due = np.flatnonzero(state["updates"][ids, 0] % EVERY == 0)
     if len(due) == 0:
         return
-    seen = (keypoints.px, keypoints.confidence, keypoints.sigma_px, age_s)
-    believed = (estimate.mean_world, estimate.velocity_world, estimate.tracked)
-    gather(state, due, ids, seen, believed, P, axes)
+    sample_views(
+        state,
+        due,
+        ids,
+        get_keypoint_arrays(keypoints),
+        age_s,
+        get_estimate_arrays(estimate),
+        P,
+        axes,
+    )
 
 
 @kernel(makes_arrays=True)
-def gather(cameras, due, ids, seen, believed, P, axes):
-    """Take a sample of rows `due`, environments `ids[due]`; arguments as of `monitor`."""
-    (px, confidence, sigma_px, age_s), (mean, velocity, tracked) = seen, believed
+def sample_views(
+    state: Records2[MonitoredCamera],
+    due: Ints,
+    ids: Ints,
+    detections: KeypointArrays,
+    age_s: Floats,
+    estimate: EstimateArrays,
+    P: Floats,
+    axes: Floats,
+) -> None:
+    """Add the evidence of one sample for rows `due`; the other arguments are those of `monitor`."""
+    mean, velocity, tracked = estimate.mean_world, estimate.velocity_world, estimate.tracked
     n_cameras = len(P)
-    view, small = np.empty((n_cameras, N_VIEW)), np.empty((N_NUMBERS, N_NUMBERS))
+    view, scratch = np.empty((n_cameras, N_VIEW)), np.empty((N_PARAMETERS, N_PARAMETERS))
     sees = np.empty(n_cameras, np.bool_)
     for row in due:
-        own = cameras[ids[row]]
+        cameras: Records1[MonitoredCamera] = state[int(ids[row])]
         for c in range(n_cameras):
-            for i in range(N_NUMBERS):
-                own[c].score[i] *= KEPT
-                for j in range(i, N_NUMBERS):
-                    own[c].information[i, j] *= KEPT
+            for i in range(N_PARAMETERS):
+                cameras[c].score[i] *= KEPT
+                for j in range(i, N_PARAMETERS):
+                    cameras[c].information[i, j] *= KEPT
         for w in range(tracked.shape[1]):
             if not tracked[row, w]:
                 continue
             for j in range(mean.shape[2]):
                 n = 0
                 for c in range(n_cameras):
-                    sees[c] = _view(
-                        px[row, c, w, j], confidence[row, c, w, j], sigma_px[row, c, w, j],
-                        age_s[row, c], mean[row, w, j], velocity[row, w, j], P[c], view[c],
-                    )  # fmt: skip
+                    sees[c] = detections.confidence[
+                        row, c, w, j
+                    ] >= LEAST_CONFIDENCE and _fill_view(
+                        detections.px[row, c, w, j],
+                        detections.sigma_px[row, c, w, j],
+                        age_s[row, c],
+                        mean[row, w, j],
+                        velocity[row, w, j],
+                        P[c],
+                        view[c],
+                    )
                     n += sees[c]
                 if n >= LEAST_VIEWS:
-                    _triangulate(view, sees, axes, own, small)
+                    _add_joint(view, sees, axes, cameras, scratch)
         for c in range(n_cameras):
-            own[c].ratio = _ratio(own[c].information, own[c].score, small)
-        _judge(own)
+            cameras[c].ratio = _compute_ratio(cameras[c].information, cameras[c].score, scratch)
+        _suspect_worst(cameras)
 
 
 @kernel
-def _view(px, confidence, sigma_px, age_s, mean, velocity, p, out):
-    """Write one camera's view of a joint; whether there is one."""
-    if not confidence >= LEAST_CONFIDENCE:
-        return False
-    dx, dy, dz = velocity
+def _fill_view(
+    px: Points2,
+    sigma_px: float,
+    age_s: float,
+    mean: Points3,
+    velocity: Velocities3,
+    p: Floats,
+    out: Floats,
+) -> bool:
+    """Write one camera's view of a joint, and return whether it can be used.
+
+    Args:
+        px: (2,) detected pixel.
+        sigma_px: its standard deviation [px].
+        age_s: age of the frame [s].
+        mean: (3,) position of the joint now [m].
+        velocity: (3,) its velocity [m/s].
+        p: (3, 4) projection of the camera.
+        out: (N_VIEW,) view, filled in.
+    """
+    dx, dy, dz = velocity[0], velocity[1], velocity[2]
     u, v, depth = pixel_of(p, mean[0] - age_s * dx, mean[1] - age_s * dy, mean[2] - age_s * dz)
     out[U], out[V] = px[0] - u, px[1] - v
     squares = (out[U] ** 2 + out[V] ** 2) / sigma_px**2
@@ -157,40 +219,57 @@ def _view(px, confidence, sigma_px, age_s, mean, velocity, p, out):
 
 
 @kernel
-def _triangulate(view, seen, axes, cameras, small):
-    """Add what the views of one joint say of the cameras that it is seen by.
+def _add_joint(
+    view: Floats, sees: Bools, axes: Floats, cameras: Records1[MonitoredCamera], scratch: Floats
+) -> None:
+    """Add the evidence of the views of one joint, in place.
 
-    All triangulate the joint; the residual of each counts with the information that is left when
-    the others are asked, which is the same as to leave it out (Woodbury).
+    All views triangulate the joint. The residual of each then counts with the information that the
+    other views leave, which is equivalent to leaving it out of the triangulation (Woodbury).
+
+    Args:
+        view: (C, N_VIEW) views of the joint.
+        sees: (C,) which of them are used.
+        axes: (C, 3) principal point and focal length [px].
+        cameras: (C,) evidence, added to.
+        scratch: (N_PARAMETERS, N_PARAMETERS) room for the information and the score of the joint.
     """
     for i in range(3):
         for j in range(4):
-            small[i, j] = 0.0
-    for c in range(len(seen)):
-        if seen[c]:
+            scratch[i, j] = 0.0
+    for c in range(len(sees)):
+        if sees[c]:
             v, weight = view[c], view[c, WEIGHT]
             for i in range(3):
                 first, second = weight * v[JACOBIAN + i], weight * v[JACOBIAN + 3 + i]
                 for j in range(3):
-                    small[i, j] += first * v[JACOBIAN + j] + second * v[JACOBIAN + 3 + j]
-                small[i, 3] += first * v[U] + second * v[V]
-    _invert(small, 3)
-    for c in range(len(seen)):
-        if seen[c]:
-            _add(view[c], axes[c], small, cameras[c].information, cameras[c].score)
+                    scratch[i, j] += first * v[JACOBIAN + j] + second * v[JACOBIAN + 3 + j]
+                scratch[i, 3] += first * v[U] + second * v[V]
+    _invert(scratch, 3)
+    for c in range(len(sees)):
+        if sees[c]:
+            _add_view(view[c], axes[c], scratch, cameras[c].information, cameras[c].score)
 
 
 @kernel
-def _add(v, axes, small, information, score):
-    """Add one view; `small` holds the inverse information of the joint, and its score beside."""
+def _add_view(v: Floats, axes: Floats, joint: Floats, information: Floats, score: Floats) -> None:
+    """Add the evidence of one view, in place.
+
+    Args:
+        v: (N_VIEW,) view of a joint.
+        axes: (3,) principal point and focal length of the camera [px].
+        joint: (3, 4) inverse information of the joint and, in the last column, its score.
+        information: (N_PARAMETERS, N_PARAMETERS) of the camera's parameters, added to.
+        score: (N_PARAMETERS,) of the camera's parameters, added to.
+    """
     b00 = b01 = b11 = 0.0
     e0, e1, weight = v[U], v[V], v[WEIGHT]
     for i in range(3):
         first = second = shift = 0.0
         for j in range(3):
-            first += small[i, j] * v[JACOBIAN + j]
-            second += small[i, j] * v[JACOBIAN + 3 + j]
-            shift += small[i, j] * small[j, 3]
+            first += joint[i, j] * v[JACOBIAN + j]
+            second += joint[i, j] * v[JACOBIAN + 3 + j]
+            shift += joint[i, j] * joint[j, 3]
         b00 += v[JACOBIAN + i] * first
         b01 += v[JACOBIAN + i] * second
         b11 += v[JACOBIAN + 3 + i] * second
@@ -201,17 +280,23 @@ def _add(v, axes, small, information, score):
     f, x, y = axes[2], v[PLACE] - axes[0], v[PLACE + 1] - axes[1]
     a0 = (f, 0.0, x, -y, -v[DU])
     a1 = (0.0, f, y, x, -v[DV])
-    for i in range(N_NUMBERS):
+    for i in range(N_PARAMETERS):
         score[i] += a0[i] * r0 + a1[i] * r1
         left, right = a0[i] * m00 + a1[i] * m01, a0[i] * m01 + a1[i] * m11
-        for j in range(i, N_NUMBERS):
+        for j in range(i, N_PARAMETERS):
             information[i, j] += left * a0[j] + right * a1[j]
 
 
 @kernel
-def _ratio(information, score, small):
-    """What growth alone explains, or shift and growth, or all four numbers, at their costs."""
-    n, growth, turn = N_NUMBERS, N_NUMBERS - 3, N_NUMBERS - 2
+def _compute_ratio(information: Floats, score: Floats, small: Floats) -> float:
+    """Return the largest likelihood ratio of the three hypotheses, less their charges.
+
+    Args:
+        information: (N_PARAMETERS, N_PARAMETERS) of the parameters.
+        score: (N_PARAMETERS,) of the parameters.
+        small: (N_PARAMETERS, N_PARAMETERS) scratch.
+    """
+    n, growth, turn = N_PARAMETERS, N_PARAMETERS - 3, N_PARAMETERS - 2
     for i in range(n):
         for j in range(i, n):
             small[i, j] = small[j, i] = information[i, j]
@@ -243,8 +328,8 @@ def _ratio(information, score, small):
 
 
 @kernel
-def _judge(cameras):
-    """Name the worst camera, keep whom one has named until others are worse or it agrees again."""
+def _suspect_worst(cameras: Records1[MonitoredCamera]) -> None:
+    """Suspect the camera (C,) with the largest ratio if it is decisive, and clear all others."""
     worst, second = 0, 0.0
     for c in range(1, len(cameras)):
         if cameras[c].ratio > cameras[worst].ratio:
@@ -259,8 +344,8 @@ def _judge(cameras):
 
 
 @kernel
-def _invert(a, n):
-    """Invert the leading n rows and columns of a symmetric positive matrix in place."""
+def _invert(a: Floats, n: int) -> None:
+    """Invert the leading n rows and columns of a symmetric positive matrix, in place."""
     for k in range(n):
         pivot = 1.0 / a[k, k]
         for j in range(n):

@@ -1,9 +1,11 @@
-"""Estimators that users bring, behind a check of everything that they give."""
+"""Checks of estimators from outside the package, and of all that they return."""
 
+from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
-from typing import Any
+from typing import Any, Generic, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hrc_env.core.batching import copied
 from hrc_env.core.brought import check_arguments, described, flags_of, numbers_of
@@ -12,6 +14,7 @@ from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import JOINTS, N_JOINTS
 from hrc_env.core.typing import Floats, Ints, Rngs
 from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.interface import Estimator, State
 
 METHODS = {
     "init": ("batch", "n_workers"),
@@ -21,21 +24,29 @@ METHODS = {
     "estimate": ("state",),
     "forecast": ("state", "horizon_s"),
 }
-"""Methods of `estimators.Estimator`, with their arguments."""
+"""Methods of an `Estimator`, with their arguments."""
 OFF_M2 = 1e-9
-"""A covariance is symmetric up to this [m^2]."""
+"""Greatest asymmetry of a covariance [m^2]."""
 
 
-class CheckedEstimator:
-    """An estimator whose estimates are checked; `ConfigError` says what is wrong with them."""
+class CheckedEstimator(Generic[State]):
+    """An estimator with a check of all its estimates.
 
-    def __init__(self, name: str, inner: Any) -> None:
-        """Raise `ConfigError` for an estimator that lacks methods or settings."""
+    Args:
+        name: name of the estimator, which errors begin with.
+        inner: the estimator.
+
+    Raises:
+        ConfigError: methods or settings of the estimator are missing or of another form. Its
+            methods raise it for estimates that are invalid.
+    """
+
+    def __init__(self, name: str, inner: Estimator[State]) -> None:
         missing = [each for each in METHODS if not callable(getattr(inner, each, None))]
         if missing:
             raise ConfigError(
                 f"{name}: the estimator lacks {', '.join(missing)}; "
-                "hrc_env.tracking.estimators.Estimator says what each does."
+                "hrc_env.tracking.estimators.Estimator describes each of them."
             )
         for method, arguments in METHODS.items():
             check_arguments(f"{name}: {method}", getattr(inner, method), *arguments)
@@ -48,44 +59,56 @@ class CheckedEstimator:
 
     @property
     def config(self) -> TrackerConfig:
-        """The settings."""
+        """Settings of the estimator."""
         return self.inner.config
 
-    def init(self, batch: int, n_workers: int) -> Any:
-        """Return a state in which no worker has been seen."""
+    def init(self, batch: int, n_workers: int) -> State:
+        """Return the state of workers that have never been detected."""
         self.n_workers = n_workers
         state = self.inner.init(batch, n_workers)
-        if _batch_of(state) not in (None, batch):
+        if _find_batch(state) not in (None, batch):
             raise ConfigError(
                 f"{self.name}: arrays of a state must begin with (B, W) = ({batch}, {n_workers}), "
                 f"got {described(state)}."
             )
         return state
 
-    def reset(self, state: Any, ids: Ints, rngs: Rngs) -> None:
-        """Start environments `ids` anew."""
+    def reset(self, state: State, ids: Ints, rngs: Rngs) -> None:
+        """Reset environments `ids`."""
         self.inner.reset(state, ids.copy(), rngs)
 
-    def predict(self, state: Any, dt_s: float, rngs: Rngs) -> None:
+    def predict(self, state: State, dt_s: float, rngs: Rngs) -> None:
         """Let `dt_s` seconds pass."""
         self.inner.predict(state, dt_s, rngs)
 
-    def update(self, state: Any, keypoints: Keypoints, rngs: Rngs) -> None:
-        """Take one set of frames in, of which the estimator gets arrays of its own."""
+    def update(self, state: State, keypoints: Keypoints, rngs: Rngs) -> None:
+        """Update with one set of frames, of which the estimator receives a copy."""
         self.inner.update(state, copied(keypoints), rngs)
 
-    def estimate(self, state: Any) -> PoseEstimate:
-        """Return what is believed now, checked."""
-        return self._checked("estimate", self.inner.estimate(state), _batch_of(state))
+    def estimate(self, state: State) -> PoseEstimate:
+        """Return the present estimate, checked."""
+        return self._check_estimate("estimate", self.inner.estimate(state), _find_batch(state))
 
-    def forecast(self, state: Any, horizon_s: float) -> PoseEstimate:
-        """Return what is expected in `horizon_s` [s], checked."""
-        return self._checked("forecast", self.inner.forecast(state, horizon_s), _batch_of(state))
+    def forecast(self, state: State, horizon_s: float) -> PoseEstimate:
+        """Return the estimate expected in `horizon_s` [s], checked."""
+        return self._check_estimate(
+            "forecast", self.inner.forecast(state, horizon_s), _find_batch(state)
+        )
 
-    def _checked(self, what: str, given: object, batch: int | None) -> PoseEstimate:
+    def _check_estimate(self, method: str, given: object, batch: int | None) -> PoseEstimate:
+        """Return an estimate as contiguous arrays.
+
+        Args:
+            method: the method that returned it, for errors.
+            given: the estimate.
+            batch: the expected number of environments; None if it is unknown.
+
+        Raises:
+            ConfigError: it is no `PoseEstimate`, or one of its arrays is invalid.
+        """
         if not isinstance(given, PoseEstimate):
             raise ConfigError(
-                f"{self.name}: {what} must give a PoseEstimate, got {described(given)}."
+                f"{self.name}: {method} must give a PoseEstimate, got {described(given)}."
             )
         n = len(given.mean_world) if batch is None else batch
         slots = (n, self.n_workers)
@@ -93,11 +116,11 @@ class CheckedEstimator:
         axes = f"B, W, {N_JOINTS} joints from {JOINTS[0]} to {JOINTS[-1]}"
 
         def read(field: str, unit: str, *more: int, finite: bool = True) -> Floats:
-            name = f"{self.name}: {what}.{field}"
+            name = f"{self.name}: {method}.{field}"
             meaning = ", ".join((axes, *map(str, more))) + f" [{unit}]"
             return numbers_of(name, getattr(given, field), (*joints, *more), meaning, finite)
 
-        lead = f"{self.name}: {what}."
+        lead = f"{self.name}: {method}."
         checked = PoseEstimate(
             mean_world=read("mean_world", "m", 3),
             cov_world=read("cov_world", "m^2", 3, 3),
@@ -113,27 +136,29 @@ class CheckedEstimator:
             raise ConfigError(f"{lead}age_s must not be negative [s], got {checked.age_s.min()}.")
         return checked
 
-    def _check_covariance(self, what: str, cov: Any) -> None:
+    def _check_covariance(self, name: str, cov: Floats) -> None:
+        """Raise `ConfigError` unless covariances (..., 3, 3) are symmetric positive definite."""
         if np.abs(cov - cov.swapaxes(-1, -2)).max(initial=0.0) > OFF_M2:
-            raise ConfigError(f"{what} must be symmetric.")
+            raise ConfigError(f"{name} must be symmetric.")
         try:
             np.linalg.cholesky(cov)
         except np.linalg.LinAlgError as error:
             least = np.linalg.eigvalsh(cov).min()
             raise ConfigError(
-                f"{what} must be positive definite, got an eigenvalue of {least:.3g} m^2."
+                f"{name} must be positive definite, got an eigenvalue of {least:.3g} m^2."
             ) from error
 
 
-def _batch_of(state: Any) -> int | None:
-    """Return the first axis of a state's arrays; None if it holds none."""
+def _find_batch(state: object) -> int | None:
+    """Return the length of the first axis of a state's arrays; None if it holds none."""
     if isinstance(state, np.ndarray):
-        return len(state) if state.ndim else None
+        shape = cast(NDArray[Any], state).shape
+        return shape[0] if shape else None
     if is_dataclass(state) and not isinstance(state, type):
-        parts: Any = [getattr(state, each.name) for each in fields(state)]
+        parts: Sequence[object] = [getattr(state, each.name) for each in fields(state)]
     elif isinstance(state, tuple | list):
-        parts = state
+        parts = cast(Sequence[object], state)
     else:
         return None
-    sizes = (_batch_of(part) for part in parts)
+    sizes = (_find_batch(part) for part in parts)
     return next((size for size in sizes if size is not None), None)

@@ -1,4 +1,4 @@
-"""Settings of the estimators: what all of them share, and a record for each."""
+"""Settings of the estimators: those that all of them share, and a class for each estimator."""
 
 from dataclasses import dataclass, fields
 from typing import TypeVar
@@ -12,49 +12,54 @@ from hrc_env.core.mapping import answer_unknown_fields
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class TrackerConfig:
-    """How workers are acquired, lost and reported, whatever the estimator.
+    """How every estimator starts, loses and reports tracks of workers.
 
-    Positions are in the world, +Z up. `dataclasses.replace` makes a copy with other values.
+    Positions are in the world frame, +Z up. Use `dataclasses.replace` for a copy with other values.
 
     Raises:
         ConfigError: a value is out of its range; the error names the field and the range.
     """
 
     prior_mean_world: tuple[float, float, float] = (1.3, 0.0, 1.0)
-    """Where a worker is thought to be when nothing was seen [m]: the working area's centre."""
+    """Position at which a worker is assumed before any measurement, x, y, z in the world frame [m].
+    The default is the centre of the working area."""
     prior_std_m: float = 1.5
-    """Standard deviation of that prior on each axis [m]; no estimate is reported as wider."""
+    """Standard deviation of the prior position on each axis [m]. No estimate is reported with a
+    larger one."""
     max_age_s: float = 5.0
-    """Ages are counted up to this bound [s]."""
+    """Upper bound of the reported ages [s]."""
     lost_after_s: float = 1.0
-    """A track is lost when no joint was supported by a measurement for this long [s]."""
+    """Time without a measurement of any joint after which a track is lost [s]."""
     forget_s: float = 2.0
-    """Time constant with which a lost worker's estimate relaxes to the prior [s]."""
+    """Time constant with which the estimate of a lost worker relaxes to the prior [s]."""
     longest_delay_s: float = 0.0
-    """Frames that arrive up to this late are used at their own time (`Keypoints.time_s`), at most
-    1 s [s]; 0: every frame is taken as of the update that brings it."""
+    """Largest delay with which a frame is still used at its own time, `Keypoints.time_s`; in [0, 1]
+    [s]. With 0, every frame counts as taken at the update that brings it."""
     acquire_min_joints: int = 6
-    """A worker is acquired when two cameras agree on at least this many joints."""
+    """Number of joints on which two cameras must agree to start a track."""
     body_radius_m: float = 1.3
-    """Joints further than this from the middle of the body are not believed [m]."""
+    """Largest distance of a joint from the middle of the body [m]. Joints beyond it are
+    rejected."""
     conflict_frames: int = 3
-    """A joint is acquired anew when two views agreed elsewhere for so many updates."""
+    """Number of successive updates in which two views agree on another place of a joint before the
+    joint is acquired anew."""
     gate_sigma: float = 5.0
-    """Views agree within so many standard deviations of the detector."""
+    """Gate for the agreement of views, in standard deviations of the detector."""
     sigma_scale: float = 1.0
-    """Factor on the detector's sigma; where it is not learnt, 1.2 suits errors that persist for
-    half a second."""
+    """Factor on the standard deviations that the detector reports. For an estimator that does not
+    learn the noise, 1.2 suits errors that persist for half a second."""
     min_std_m: float = 0.005
-    """No standard deviation, in any direction, is reported as less than this [m]."""
+    """Smallest standard deviation that is reported in any direction [m]."""
     root_acceleration: float = 3.0
-    """Spectral density of the whole body's acceleration [m^2/s^3]."""
+    """Spectral density of the acceleration of the whole body [m^2/s^3]."""
 
     def __post_init__(self) -> None:
-        check_fields(
-            self, "be positive", "prior_std_m", "max_age_s", "lost_after_s", "forget_s",
-            "acquire_min_joints", "body_radius_m", "conflict_frames", "gate_sigma", "sigma_scale",
-            "min_std_m", "root_acceleration",
-        )  # fmt: skip
+        positive = (
+            *("prior_std_m", "max_age_s", "lost_after_s", "forget_s", "acquire_min_joints"),
+            *("body_radius_m", "conflict_frames", "gate_sigma", "sigma_scale", "min_std_m"),
+            "root_acceleration",
+        )
+        check_fields(self, "be positive", *positive)
         check_fields(self, "be in [0, 1]", "longest_delay_s")
         if self.lost_after_s > self.max_age_s:
             raise ConfigError(
@@ -65,97 +70,104 @@ class TrackerConfig:
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class ParticleConfig(TrackerConfig):
-    """The default estimator: hypotheses about what is discrete, each with a Gaussian.
+    """Settings of the default estimator: discrete hypotheses, each with a Gaussian body.
 
-    A Rao-Blackwellised particle filter (Doucet, de Freitas, Murphy and Russell, UAI 2000); the
-    mathematics, with the symbols that these settings stand for, is in docs/tracking.md.
+    The estimator is a Rao-Blackwellised particle filter (Doucet, de Freitas, Murphy and Russell,
+    UAI 2000). Its mathematics, with the symbols of these settings, is in docs/tracking.md.
 
     Raises:
         ConfigError: a value is out of its range; the error names the field and the range.
     """
 
     noise_bounds: tuple[float, float] = (1.0, 6.0)
-    """Least and most of the factor on the detector's variance that is learnt for every camera
-    and joint. Errors that all views share do not show where views disagree:
-    never less than told is careful. Equal bounds are that factor, and nothing is learnt."""
+    """Lower and upper bound of the factor on the detector's variance that is learnt for every
+    camera and joint. Errors that all views share do not show as disagreement between views, so a
+    lower bound of 1 is the careful choice. With equal bounds nothing is learnt and the factor is
+    that number."""
     noise_tau_s: float = 4.0
-    """Time constant with which it is learnt and forgotten [s]."""
+    """Time constant with which the factors on the noise are learnt and forgotten [s]."""
     noise_persists_s: float = 0.5
-    """How long errors of the detector persist where they do [s]; BlazePose's: half a second."""
+    """Correlation time of the persistent part of the detector's errors [s]. For BlazePose it is
+    half a second."""
     noise_share: float = 0.9
-    """Share of the variance that is thought to persist before anything was learnt, as BlazePose's
-    does; 0 for a detector that is known to be wrong anew in every image. [0, 1)"""
+    """Prior share of the variance that belongs to persistent errors, in [0, 1). The default suits
+    BlazePose; use 0 for a detector whose errors are independent from image to image."""
     floor_std_m: float = 0.05
-    """Nobody stands below the floor, z = 0: a joint that the views put there is measured to be on
-    it, with this standard deviation [m]; infinity: no floor is known."""
+    """Standard deviation of the pseudo-measurement that puts a joint found below the floor, z < 0,
+    back onto it [m]. With infinity no floor is assumed."""
     bone_give: float = 1.5
-    """Factor on how much bones give: what a detector takes for a joint wanders
-    on the body, so that even a rigid bone seems to change its length; 1 for points that do not."""
+    """Factor on the variation of bone lengths. A detector's joints wander on the body, so that even
+    a rigid bone seems to change its length; use 1 for points that do not."""
     gauss_newton_steps: int = 2
-    """Steps of the search for the posterior mode; more make no measurable difference."""
+    """Number of Gauss-Newton steps in the search for the posterior mode. More than two make no
+    measurable difference."""
     outlier_weight: float = 0.15
-    """Probability that a measurement is anywhere in the image instead of near its joint."""
+    """Prior probability that a measurement is an outlier, uniform over the image."""
     image_area_px: float = 1920.0 * 1080.0
-    """Area of an image [px^2]: an outlier's density is its inverse."""
+    """Area of an image [px^2]; the density of outliers is its inverse."""
     damping: float = 0.5
-    """Damping ratio of a joint about its place on the body; in (0, 1)."""
+    """Damping ratio of the motion of a joint about its place on the body, in (0, 1)."""
     mean_correction: float = 0.8
-    """Share of Laplace's step from the mode to the mean; without it the depth that one
-    camera leaves open runs to the lens, the whole of it overshoots a little."""
+    """Share of Laplace's correction from the mode to the mean of the posterior that is applied.
+    With 0 the depth that one camera leaves open drifts towards the lens; 1 overshoots a little."""
     one_view_inflation: float = 1.21
-    """Factor on the reported covariance of a worker whom one camera alone has seen for a while."""
+    """Factor on the reported covariance of a worker seen by only one camera for a while."""
     lying_inflation: float = 4.5
-    """Further factor if the body lies: its depth is told by how people stand."""
+    """Additional factor on the reported covariance of a lying body that only one camera sees,
+    because one camera infers depth from how people stand."""
     n_hypotheses: int = 8
-    """Most hypotheses about one worker; one is a Gaussian (estimator="kalman")."""
+    """Maximum number of hypotheses about one worker. With 1 the estimator is a single Gaussian
+    (estimator="kalman")."""
     wait_updates: int = 5
-    """Where one view alone shows somebody new, so many updates are waited for a second one before
-    the track is begun from it; a rig of one camera does not wait."""
+    """Number of updates to wait for a second view of a new person before a track is started from
+    one view alone. A rig of one camera does not wait."""
     size_std: float = 0.06
-    """Standard deviation of people's size as a share of it, as of adults' statures: how little the
-    depth is known of a body that one view has begun."""
+    """Relative standard deviation of people's size, as of adult statures. It sets the depth
+    uncertainty of a body that was started from one view."""
     stands_std_m: float = 0.0
-    """Such a body's lowest joint is thought to be on the floor, z = 0, within this, which measures
-    its size [m], as .1; 0: people may be anywhere above it."""
+    """Standard deviation of the height of the lowest joint above the floor, z = 0, assumed when one
+    view starts a body [m]. It measures the size of the body; 0.1 suits people on the floor. With 0,
+    people may be at any height."""
     mirrored_parts: tuple[str, ...] = ("body", "limbs")
-    """What may be turned or reflected in depth when one view carries it."""
+    """Parts that may be mirrored in depth while only one view shows them: "body", "limbs" or
+    both."""
     look_every_s: float = 0.12
-    """Time between two searches for other hypotheses [s]."""
+    """Time between two searches for alternative hypotheses [s]."""
     open_depth_m: float = 0.04
-    """They are looked for where one view carries a part whose depth has at least this standard
-    deviation [m]: what other views said a moment ago is still known."""
+    """Smallest standard deviation of the depth of a part seen in one view at which alternative
+    hypotheses are searched for [m]. Below it, recent measurements of other views still fix the
+    depth."""
     turn_std_rad: float = 0.7
-    """A body that is turned by this much against a known hypothesis begins e^-0.5 as likely."""
+    """Standard deviation of the turn between a new hypothesis and a known one [rad]. A body turned
+    by this angle starts with e^-0.5 of the weight."""
     evidence_trust: float = 0.1
-    """Share of the log-evidence of a set of frames that counts between hypotheses: what
-    the model gets wrong in one frame it gets wrong in the next."""
+    """Exponent on the evidence of a set of frames when hypotheses are weighted, because model
+    errors are correlated from frame to frame."""
     anatomy_trust: float = 1.0
-    """Share of what the places of nose, toes, knees and elbows say between hypotheses."""
+    """Exponent on the anatomical prior when hypotheses are weighted: the places of nose, toes,
+    knees and elbows relative to the body."""
     walking_odds: float = 2.0
-    """Log-odds per second by which a hypothesis that walks forwards gains on one that does not."""
+    """Log-odds per second that a hypothesis which walks forwards gains on one which does not
+    [1/s]."""
     least_weight: float = 1e-3
     """Probability below which a hypothesis is dropped."""
     swap_begins: float = 0.01
-    """Probability per update that a camera begins to exchange left and right."""
+    """Probability per update that a camera starts to exchange left and right."""
     swap_ends: float = 0.15
-    """Probability per update that it stops."""
+    """Probability per update that a camera stops exchanging left and right."""
 
     def __post_init__(self) -> None:
         TrackerConfig.__post_init__(self)
-        check_fields(
-            self, "be positive", "floor_std_m", "bone_give", "noise_tau_s", "noise_persists_s",
-            "gauss_newton_steps", "image_area_px", "one_view_inflation", "lying_inflation",
-            "n_hypotheses", "look_every_s", "open_depth_m", "turn_std_rad", "evidence_trust",
-            "size_std",
-        )  # fmt: skip
-        check_fields(
-            self, "not be negative", "mean_correction", "anatomy_trust", "walking_odds",
-            "wait_updates", "stands_std_m",
-        )  # fmt: skip
-        check_fields(
-            self, "be in (0, 1)", "least_weight", "outlier_weight", "damping", "swap_begins",
-            "swap_ends",
-        )  # fmt: skip
+        positive = (
+            *("floor_std_m", "bone_give", "noise_tau_s", "noise_persists_s", "gauss_newton_steps"),
+            *("image_area_px", "one_view_inflation", "lying_inflation", "n_hypotheses"),
+            *("look_every_s", "open_depth_m", "turn_std_rad", "evidence_trust", "size_std"),
+        )
+        check_fields(self, "be positive", *positive)
+        not_negative = ("mean_correction", "anatomy_trust", "walking_odds", "wait_updates")
+        check_fields(self, "not be negative", *not_negative, "stands_std_m")
+        probabilities = ("least_weight", "outlier_weight", "swap_begins", "swap_ends")
+        check_fields(self, "be in (0, 1)", *probabilities, "damping")
         check_fields(self, "be in [0, 1)", "noise_share")
         least, most = self.noise_bounds
         if not 0 < least <= most < float("inf"):
@@ -169,23 +181,24 @@ class ParticleConfig(TrackerConfig):
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class PaperConfig(TrackerConfig):
-    """The paper's Algorithm 1.
+    """Settings of the paper's Algorithm 1.
 
     Raises:
         ConfigError: a value is out of its range; the error names the field and the range.
     """
 
     velocity_tau_s: float = 0.2
-    """Time constant of the difference filter for velocities [s]."""
+    """Time constant of the low-pass filter on differenced velocities [s]."""
     n_particles: int = 1000
-    """The paper's M: particles per joint."""
+    """Number of particles per joint, the paper's M."""
     sigma_m: float = 0.05
-    """The paper's Sigma: random walk per frame and axis [m]; the paper gives no number."""
+    """Standard deviation of the random walk per frame and axis, the paper's Sigma [m]. The paper
+    gives no number."""
     n_iterations: int = 1
-    """The paper's N: passes of Algorithm 1 over one set of frames."""
+    """Number of passes of Algorithm 1 over one set of frames, the paper's N."""
     place_m: tuple[tuple[float, float], ...] = ()
-    """Over which line 1 draws particles: least and most x, y and z [m]. Empty: what the cameras
-    stand round, from the floor to 2.2 m."""
+    """Lower and upper bounds of x, y and z within which line 1 draws particles [m]. If empty, the
+    area that the cameras surround, from the floor to 2.2 m."""
 
     def __post_init__(self) -> None:
         TrackerConfig.__post_init__(self)
@@ -196,10 +209,10 @@ class PaperConfig(TrackerConfig):
                 f"n_particles must be at least 10, got {self.n_particles}: after a resampling "
                 "fewer have no covariance."
             )
+        place = np.array(self.place_m)
         if self.place_m and not (
-            np.shape(self.place_m) == (3, 2) and np.isfinite(self.place_m).all()
-            and (np.diff(self.place_m) > 0).all()
-        ):  # fmt: skip
+            place.shape == (3, 2) and np.isfinite(place).all() and (np.diff(place) > 0).all()
+        ):
             raise ConfigError(
                 "place_m must be empty or hold the least and the most x, y and z, as "
                 f"((-3, 3), (-3, 3), (0, 2.2)), got {self.place_m}."
@@ -209,16 +222,16 @@ class PaperConfig(TrackerConfig):
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class TriangulationConfig(TrackerConfig):
-    """Triangulation, frame by frame.
+    """Settings of triangulation, frame by frame.
 
     Raises:
         ConfigError: a value is out of its range; the error names the field and the range.
     """
 
     velocity_tau_s: float = 0.2
-    """Time constant of the difference filter for velocities [s]."""
+    """Time constant of the low-pass filter on differenced velocities [s]."""
     hold_speed_m_s: float = 1.0
-    """How fast a held point loses its worth in gaps [m/s]."""
+    """Speed at which the uncertainty of a held point grows during gaps [m/s]."""
 
     def __post_init__(self) -> None:
         TrackerConfig.__post_init__(self)
@@ -228,8 +241,13 @@ class TriangulationConfig(TrackerConfig):
 ConfigT = TypeVar("ConfigT", bound=TrackerConfig)
 
 
-def of_kind(config: TrackerConfig | None, kind: type[ConfigT]) -> ConfigT:
-    """The settings of one estimator: these, or what they share with it and its defaults."""
+def cast_config(config: TrackerConfig | None, kind: type[ConfigT]) -> ConfigT:
+    """Return settings of one kind: the given ones, or its defaults with the shared fields of those.
+
+    Args:
+        config: settings of any estimator; None for the defaults.
+        kind: the class of settings that the estimator takes.
+    """
     if isinstance(config, kind):
         return config
     shared = {each.name for each in fields(TrackerConfig)}

@@ -1,22 +1,20 @@
-"""Estimators by name, and what each of them can do.
+"""The estimators by name, their registration and their checks.
 
-| name | what it is |
+| name | estimator |
 |---|---|
-| `particle` | the default: hypotheses about what is discrete, each with one Gaussian on the body |
+| `particle` | the default: discrete hypotheses, each with one Gaussian on the body |
 | `kalman` | the same with one hypothesis: a Gaussian on the kinematic tree |
-| `paper` | the paper's Algorithm 1 as printed: particles begin all over the place |
-| `paper_restarts` | the same, begun, repaired and given up as the others are |
-| `triangulation` | every frame by itself, all views by weighted least squares; gaps are held |
+| `paper` | the paper's Algorithm 1 as printed, with particles that start all over the area |
+| `paper_restarts` | the same, with tracks that start, are repaired and end as the others' do |
+| `triangulation` | weighted least squares from all views, frame by frame; gaps are held |
 | `ransac` | the same from the views that agree |
 
 `smoother` is offline: `smoother.smooth` takes a whole clip (`OFFLINE`).
-
-A control step is `predict` and then `update`; `estimate` may be asked at any time.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any, Protocol, TypeVar
+from typing import Any, cast
 
 import numpy as np
 
@@ -27,135 +25,67 @@ from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.registry import Registry
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Floats, Ints, Rngs
+from hrc_env.core.typing import Floats
 from hrc_env.tracking.checked import CheckedEstimator
 from hrc_env.tracking.config import (
     PaperConfig,
     ParticleConfig,
     TrackerConfig,
     TriangulationConfig,
-    of_kind,
+    cast_config,
 )
+from hrc_env.tracking.interface import Estimator as Estimator
 from hrc_env.tracking.out_of_sequence import OutOfSequence
 from hrc_env.tracking.paper import PaperEstimator
 from hrc_env.tracking.paper_restarts import PaperRestarts
 from hrc_env.tracking.particle import ParticleEstimator
 from hrc_env.tracking.triangulating import TriangulationEstimator
 
-State = TypeVar("State")
-
-
-class Estimator(Protocol[State]):
-    """From keypoints to a belief, for B environments with W workers each.
-
-    A control step is `predict` and then `update`; in between, level "pixels" puts the cameras'
-    windows where `estimate` expects the workers. The state is an array, or a record of arrays, with
-    leading axes (B, W), changed in place: copying the arrays copies it. Random numbers for
-    environment b come from `rngs[b]` only, and nothing that happens in one environment depends on
-    the others or on how many there are.
-    Positions are in the world, +Z up, in metres and seconds; pixels are those of the cameras'
-    projections, u to the right and v down.
-
-    A frame that arrives late is no concern of an estimator. The package keeps what was believed at
-    the end of every control step (copies of the state), goes back to the last one before the frame
-    was taken, and calls `predict` and `update` again from there. So `predict` may be asked for
-    parts of a control step, and `update` comes once for each moment at which frames were taken; an
-    estimator that would rather do this itself says so (`EstimatorSpec.handles_late_frames`).
-    """
-
-    @property
-    def config(self) -> TrackerConfig:
-        """The settings."""
-        ...
-
-    def init(self, batch: int, n_workers: int) -> State:
-        """Return a state in which no worker has been seen."""
-        ...
-
-    def reset(self, state: State, ids: Ints, rngs: Rngs) -> None:
-        """Start environments `ids` anew.
-
-        Args:
-            state: as `init` made it; changed in place.
-            ids: rows of the environments.
-            rngs: one generator for each environment of the batch.
-        """
-        ...
-
-    def predict(self, state: State, dt_s: float, rngs: Rngs) -> None:
-        """Let time pass (Algorithm 1, line 7): move means on, widen covariances, count ages up.
-
-        Args:
-            state: changed in place.
-            dt_s: time since the last call, above 0 [s]: a control step, or where cameras are late
-                or out of step the part of one up to the next frame.
-            rngs: one generator for each environment of the batch.
-        """
-        ...
-
-    def update(self, state: State, keypoints: Keypoints, rngs: Rngs) -> None:
-        """Take one set of frames in (lines 8 to 17); whatever they show, it does not raise.
-
-        Args:
-            state: changed in place.
-            keypoints: (B, C, W, J) in pinhole pixels, already sorted by worker. A joint that was
-                not found, and every joint of a camera that gave no frame, has NaN pixels,
-                confidence 0 and infinite sigma: that is no measurement, never one at 0. All of
-                them belong to the time up to which `predict` was called; `Keypoints.time_s` is of
-                interest to who handles late frames alone.
-            rngs: one generator for each environment of the batch.
-        """
-        ...
-
-    def estimate(self, state: State) -> PoseEstimate:
-        """Return what is believed now, in arrays of its own."""
-        ...
-
-    def forecast(self, state: State, horizon_s: float) -> PoseEstimate:
-        """Return what is expected in `horizon_s`, in (0, 1] [s]; the state stays as it is."""
-        ...
-
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class EstimatorSpec:
-    """An estimator by name: how it is made, and what may be set.
+    """An estimator with its name, its factory and its settings.
 
-    `register_estimator` takes one; `estimator=` of an environment takes its name, it, or `make`.
+    `register_estimator` takes a spec. The argument `estimator` of an environment takes a spec, the
+    name of a registered one, or a function like `make`.
     """
 
     name: str
-    """As which it is registered and named in errors."""
+    """Name under which the estimator is registered and which errors mention."""
     make: Callable[[Floats, float, Any], Estimator[Any]]
-    """(P, ctrl_dt, config) -> estimator: projections from the world to pixels (C, 3, 4), time
-    between updates [s], and settings, of the kind `config`."""
+    """Function (P, ctrl_dt, config) that returns the estimator. Its arguments are the projections
+    (C, 3, 4) from the world [m] to pixels, the time between updates [s], and settings of the class
+    `config`."""
     config: type[TrackerConfig] = TrackerConfig
-    """The kind of its settings."""
+    """Class of the settings that `make` takes."""
     needs_pairs: bool = False
-    """Whether it makes nothing of a camera alone: beside a frame that comes alone, because it is
-    late or of another rate, it is then shown the other cameras' last ones."""
+    """Whether the estimator cannot use a single camera. It then also receives the last frames of
+    the other cameras with a frame that comes alone because it is late or of another rate."""
     handles_late_frames: bool = False
-    """Whether it uses late frames at their own time by itself. False, the default: the package
-    does, round any estimator, by going back and replaying what came since. True: `update` gets
-    frames as they arrive, once a control step, with their times in `Keypoints.time_s`."""
+    """Whether the estimator itself uses late frames at their own time. If so, `update` receives
+    frames as they arrive, once a control step, with their times in `Keypoints.time_s`. If not, the
+    package returns to an earlier state and repeats the later steps."""
 
     @property
     def wants_pairs(self) -> str:
-        """Its name, if it needs two cameras; else ""."""
+        """The name if the estimator needs two cameras, else the empty string."""
         return self.name if self.needs_pairs else ""
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A spec that is known by its name is pickled as that."""
+        """Pickle a registered spec by its name, any other one by its fields."""
         if ESTIMATORS.get(self.name) is self:
-            return estimator_called, (self.name,)
+            return find_estimator, (self.name,)
         return EstimatorSpec, tuple(getattr(self, each.name) for each in fields(self))
 
 
-def _kalman(P: Floats, ctrl_dt: float, config: ParticleConfig) -> ParticleEstimator:
+def _make_kalman(P: Floats, ctrl_dt: float, config: ParticleConfig) -> ParticleEstimator:
+    """Return the default estimator with a single hypothesis."""
     return ParticleEstimator(P, ctrl_dt, replace(config, n_hypotheses=1))
 
 
-def _ransac(P: Floats, ctrl_dt: float, config: TriangulationConfig) -> TriangulationEstimator:
+def _make_ransac(P: Floats, ctrl_dt: float, config: TriangulationConfig) -> TriangulationEstimator:
+    """Return triangulation from the views that agree."""
     return TriangulationEstimator(P, ctrl_dt, config, config.gate_sigma)
 
 
@@ -165,29 +95,27 @@ ESTIMATORS = Registry(
         spec.name: spec
         for spec in (
             EstimatorSpec("particle", ParticleEstimator, ParticleConfig),
-            EstimatorSpec("kalman", _kalman, ParticleConfig),
+            EstimatorSpec("kalman", _make_kalman, ParticleConfig),
             EstimatorSpec("paper", PaperEstimator, PaperConfig),
             EstimatorSpec("paper_restarts", PaperRestarts, PaperConfig),
             EstimatorSpec(
                 "triangulation", TriangulationEstimator, TriangulationConfig, needs_pairs=True
             ),
-            EstimatorSpec("ransac", _ransac, TriangulationConfig, needs_pairs=True),
+            EstimatorSpec("ransac", _make_ransac, TriangulationConfig, needs_pairs=True),
         )
     },
 )
-"""By name: those of this package, and those that were registered."""
+"""Specs by name: those of this package, and those that were registered."""
 BUILT_IN = frozenset(ESTIMATORS.data.values())
-"""Those of this package; what others give is checked (`checked.CheckedEstimator`)."""
+"""Specs of this package; the results of all others are checked (`checked.CheckedEstimator`)."""
 OFFLINE = {"smoother": "hrc_env.tracking.smoother.smooth(P, clip, dt_s)"}
-"""What needs the future, and the function that gives it a whole clip."""
-
-
+"""Offline estimators by name, with the functions that take a whole clip."""
 EstimatorChoice = str | EstimatorSpec | Callable[..., Any]
-"""A name in `ESTIMATORS`, a spec, or a function as `EstimatorSpec.make`."""
+"""A name in `ESTIMATORS`, a spec, or a function like `EstimatorSpec.make`."""
 
 
-def estimator_called(estimator: EstimatorChoice) -> EstimatorSpec:
-    """Return the spec of an estimator that is given by name, as a spec or as `EstimatorSpec.make`.
+def find_estimator(estimator: EstimatorChoice) -> EstimatorSpec:
+    """Return the spec of an estimator given by name, as a spec or as a function.
 
     Raises:
         ConfigError: the name is unknown or `OFFLINE`, or the function takes other arguments.
@@ -197,7 +125,8 @@ def estimator_called(estimator: EstimatorChoice) -> EstimatorSpec:
     if callable(estimator):
         check_arguments("An estimator", estimator, "P", "ctrl_dt", "config")
         return EstimatorSpec(getattr(estimator, "__name__", type(estimator).__name__), estimator)
-    if not isinstance(estimator, str):
+    given = cast(object, estimator)
+    if not isinstance(given, str):
         raise ConfigError(
             "estimator must be a name, an EstimatorSpec or a function of (P, ctrl_dt, config), got "
             f"{described(estimator)}."
@@ -220,57 +149,61 @@ def make_estimator(
     """Return an estimator for a rig of cameras.
 
     Args:
-        estimator: a name in `ESTIMATORS`, an `EstimatorSpec`, or a function as its `make`.
+        estimator: a name in `ESTIMATORS`, an `EstimatorSpec`, or a function like its `make`.
         P: (C, 3, 4) projections from the world [m] to pixels.
         ctrl_dt: usual time between two updates [s].
-        config: its settings; of another estimator's those that all share count. None: the defaults.
+        config: settings; of those of another estimator, the shared fields are used. None for the
+            defaults.
 
     Returns:
-        The estimator. Of one that is not built in, arguments and estimates are checked
-        (`checked.CheckedEstimator`); with `config.longest_delay_s` late frames are used at their
-        own time (`out_of_sequence.OutOfSequence`), unless it handles them itself.
+        The estimator. The arguments and the estimates of one that is not built in are checked
+        (`checked.CheckedEstimator`). With `config.longest_delay_s`, late frames are used at their
+        own time (`out_of_sequence.OutOfSequence`), unless the estimator handles them itself.
 
     Raises:
-        ConfigError: the estimator is unknown or needs the future (`OFFLINE`), P is of another shape
-            or not finite, `ctrl_dt` is not positive.
+        ConfigError: the estimator is unknown or needs the future (`OFFLINE`), P has another shape
+            or is not finite, or `ctrl_dt` is not positive.
     """
-    spec = estimator_called(estimator)
-    P = np.ascontiguousarray(P, dtype=float)
-    if P.ndim != 3 or P.shape[1:] != (3, 4) or not np.isfinite(P).all():
-        raise ConfigError(f"P must be finite with shape (C, 3, 4), got {P.shape}.")
+    spec = find_estimator(estimator)
+    cameras = np.ascontiguousarray(P, dtype=float)
+    if cameras.ndim != 3 or cameras.shape[1:] != (3, 4) or not np.isfinite(cameras).all():
+        raise ConfigError(f"P must be finite with shape (C, 3, 4), got {cameras.shape}.")
     if not ctrl_dt > 0:
         raise ConfigError(f"ctrl_dt must be positive, got {ctrl_dt}.")
-    settings = of_kind(config, spec.config)
-    made = spec.make(P, ctrl_dt, settings)
+    settings = cast_config(config, spec.config)
+    made: Estimator[Any] = spec.make(cameras, ctrl_dt, settings)
     if spec not in BUILT_IN:
         made = CheckedEstimator(spec.name, made)
     if settings.longest_delay_s > 0 and not spec.handles_late_frames:
-        return OutOfSequence(made, len(P), ctrl_dt, settings.longest_delay_s, spec.needs_pairs)
+        memory_s = settings.longest_delay_s
+        return OutOfSequence(made, len(cameras), ctrl_dt, memory_s, spec.needs_pairs)
     return made
 
 
 _DT_S = 0.04
 _P = np.array([[[900.0, 640, 0, 0], [0, 360, -900, 0], [0, 1, 0, 3]],
                [[640.0, -900, 0, 0], [360, 0, -900, 0], [1, 0, 0, 3]]])  # fmt: skip
-"""Two cameras that look at the origin."""
+"""(2, 3, 4) projections of two cameras that look at the origin, for checks."""
 
 
 def check_estimator(spec: EstimatorSpec) -> None:
-    """Raise `ConfigError` for what an estimator lacks, or for estimates that are none.
+    """Raise `ConfigError` for an estimator that is incomplete or returns invalid estimates.
 
-    It is asked about workers of whom nobody sees anything: those must have an estimate, too.
+    The check includes workers that no camera sees: they must have an estimate, too.
     """
-    if not isinstance(spec, EstimatorSpec):
-        raise ConfigError(f"An estimator must be an EstimatorSpec, got {type(spec).__name__}.")
-    if not (isinstance(spec.config, type) and issubclass(spec.config, TrackerConfig)):
+    given = cast(object, spec)
+    if not isinstance(given, EstimatorSpec):
+        raise ConfigError(f"An estimator must be an EstimatorSpec, got {type(given).__name__}.")
+    kind = cast(object, spec.config)
+    if not (isinstance(kind, type) and issubclass(kind, TrackerConfig)):
         raise ConfigError(f"{spec.name}: config must be a kind of TrackerConfig.")
     for name in ("needs_pairs", "handles_late_frames"):
         check_kind(f"{spec.name}: {name}", getattr(spec, name), bool)
     made = make_estimator(spec, _P, _DT_S)
     state, rngs = made.init(3, 2), [np.random.default_rng(b) for b in range(3)]
     made.reset(state, np.arange(3), rngs)
-    seen = (3, len(_P), 2, N_JOINTS)
-    nothing = Keypoints(np.full((*seen, 2), np.nan), np.zeros(seen), np.full(seen, np.inf))
+    shape = (3, len(_P), 2, N_JOINTS)
+    nothing = Keypoints(np.full((*shape, 2), np.nan), np.zeros(shape), np.full(shape, np.inf))
     made.predict(state, _DT_S, rngs)
     made.update(state, nothing, rngs)
     if spec.handles_late_frames:
@@ -279,24 +212,38 @@ def check_estimator(spec: EstimatorSpec) -> None:
         made.update(state, replace(nothing, time_s=times_s), rngs)
     made.estimate(state)
     made.forecast(state, 0.2)
-    _check_alone(spec)
+    _check_independence(spec)
 
 
-def _check_alone(spec: EstimatorSpec) -> None:
-    """Raise `ConfigError` for an estimator in which environments depend on each other, or on
-    anything outside its state."""
+_DEPENDS_ON_OTHERS = (
+    "an environment must have the same estimates beside others than alone: draw from rngs[b] of "
+    "environment b only, and compute nothing over the first axis"
+)
+_DEPENDS_ON_SELF = (
+    "a copy of the state must lead to the same estimates: keep all that changes in the state, "
+    "nothing in self, and draw from rngs only"
+)
+
+
+def _check_independence(spec: EstimatorSpec) -> None:
+    """Raise `ConfigError` if environments depend on each other or on anything but their state."""
     seeds = (0, 1)
-    together = _followed(spec, seeds)
+    together = _track_people(spec, seeds)
     for row, seed in enumerate(seeds):
-        for one, several in zip(_followed(spec, (seed,)), together, strict=True):
-            _check_same(spec, one, rows(several, np.array([row])), (
-                "one environment is estimated otherwise beside others than alone: draw from "
-                "rngs[b] of environment b only, and take nothing over the first axis"
-            ))  # fmt: skip
+        for one, several in zip(_track_people(spec, (seed,)), together, strict=True):
+            _check_same(spec, one, rows(several, np.array([row])), _DEPENDS_ON_OTHERS)
 
 
-def _followed(spec: EstimatorSpec, seeds: Sequence[int]) -> list[PoseEstimate]:
-    """Return the estimates of standing people, one in each environment."""
+def _track_people(spec: EstimatorSpec, seeds: Sequence[int]) -> list[PoseEstimate]:
+    """Return six successive estimates of one standing person in each environment.
+
+    Args:
+        spec: the estimator.
+        seeds: one seed for each environment.
+
+    Raises:
+        ConfigError: the estimates depend on anything but the state.
+    """
     made, rngs = make_estimator(spec, _P, _DT_S), [np.random.default_rng(seed) for seed in seeds]
     state, everyone = made.init(len(seeds), 1), np.arange(len(seeds))
     made.reset(state, everyone, rngs)
@@ -306,33 +253,39 @@ def _followed(spec: EstimatorSpec, seeds: Sequence[int]) -> list[PoseEstimate]:
     image = homogeneous @ _P.swapaxes(-1, -2)
     px = (image[..., :2] / image[..., 2:])[None, :, None]
 
-    def look() -> Keypoints:
+    def detect() -> Keypoints:
         shape = (len(seeds), len(_P), 1, N_JOINTS)
         moved = np.stack([each.normal(0.0, 1.0, (*shape[1:], 2)) for each in noise])
         return Keypoints(px + moved, np.full(shape, 0.9), np.full(shape, 2.0))
 
-    found: list[PoseEstimate] = []
+    estimates: list[PoseEstimate] = []
     for k in range(6):
-        seen, before = look(), (copied(state), copied(rngs))
+        detected, before = detect(), (copied(state), copied(rngs))
         made.predict(state, _DT_S, rngs)
-        made.update(state, seen, rngs)
-        found.append(made.estimate(state))
-        if k == 3:  # it forgets one of them, as when its episode ends
+        made.update(state, detected, rngs)
+        estimates.append(made.estimate(state))
+        if k == 3:  # one of the environments is reset, as when its episode ends
             made.reset(state, np.flatnonzero(np.array(seeds) == 1), rngs)
-        if k == 5:  # late frames: it goes on from a copy of the state
+        if k == 5:  # as with late frames, the estimator continues from a copy of the state
             state, rngs = before
             made.predict(state, _DT_S, rngs)
-            made.update(state, seen, rngs)
-            _check_same(spec, made.estimate(state), found[-1], (
-                "it comes to something else from a copy of its state: keep all that changes in the "
-                "state, nothing in self, and draw from rngs only"
-            ))  # fmt: skip
-            _check_same(spec, made.estimate(state), found[-1], "estimate must change nothing")
-    return found
+            made.update(state, detected, rngs)
+            _check_same(spec, made.estimate(state), estimates[-1], _DEPENDS_ON_SELF)
+            last = "estimate must change nothing"
+            _check_same(spec, made.estimate(state), estimates[-1], last)
+    return estimates
 
 
-def _check_same(spec: EstimatorSpec, one: PoseEstimate, other: PoseEstimate, said: str) -> None:
+def _check_same(spec: EstimatorSpec, one: PoseEstimate, other: PoseEstimate, message: str) -> None:
+    """Raise `ConfigError` with a message unless two estimates are equal up to rounding.
+
+    Args:
+        spec: the estimator, which the error names.
+        one: an estimate.
+        other: an estimate that should be the same.
+        message: what is wrong otherwise.
+    """
     for name in ("mean_world", "cov_world", "velocity_world", "age_s", "tracked"):
         x, y = (np.asarray(getattr(each, name), float) for each in (one, other))
         if not np.allclose(x, y, 1e-5, 1e-7):
-            raise ConfigError(f"{spec.name}: {said} ({name} differs).")
+            raise ConfigError(f"{spec.name}: {message} ({name} differs).")

@@ -1,10 +1,10 @@
-"""Where a worker will be, up to a second from now, if nobody looks.
+"""Forecasts of the workers up to a second ahead, without further measurements.
 
-A small network, made by `assets/ahead/train.py` from the environment's own motions, looks at one
-body in the frame of its heading. For a few horizons it says each joint's displacement and the
-standard deviation of what it cannot know, which is added to what is not known now. A body whose
-heading is unknown moves on with constant velocity and random acceleration; one that is not tracked
-relaxes to the prior (docs/tracking.md, "Forecast").
+A small network, trained by `assets/ahead/train.py` on the environment's own motions, takes one body
+in the frame of its heading. For a few horizons it predicts the displacement of each joint and the
+standard deviation of its error, which is added to the present uncertainty. A body of unknown
+heading moves with constant velocity and random acceleration; one that is not tracked relaxes to the
+prior (docs/tracking.md, "Forecast").
 """
 
 import functools
@@ -13,50 +13,94 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hrc_env.core.batching import mapped
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Floats, Ints
+from hrc_env.core.typing import Covariances3, Floats, Ints, Points3, Tensor, Velocities3
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.tracks import bounded, relax
-from hrc_env.tracking.tree.evidence import heading
+from hrc_env.tracking.tracks import EstimateArrays, bound_estimate, relax
+from hrc_env.tracking.tree.evidence import Heading, find_heading
 from hrc_env.worker.body import assets_dir
 
 LONGEST_S = 1.0
-"""No estimator looks further ahead [s]."""
+"""Greatest horizon of a forecast [s]."""
 N_INPUTS = 7 * N_JOINTS + 4
+"""Number of the network's inputs; see `describe`."""
 _N_OUTPUTS = 4 * N_JOINTS
+"""Number of the network's outputs for one horizon: displacements and log-deviations."""
 _TORSO = (1, 2, 7, 8)
+"""Indices of shoulders and hips."""
 _REORDER = {"reassoc", "contract", "nsz"}
-Weights = NDArray[np.float32]
 
 
 class ForecastNetwork(NamedTuple):
-    """The network: two hidden layers of rectified units, (in, out) matrices in float32."""
+    """The network: two hidden layers of n and m rectified units, matrices (in, out) in float32."""
 
     horizons_s: Floats
-    """(H,) times ahead that it was trained for, ascending [s]."""
-    weight_1: Weights
-    """(N_INPUTS, n), inputs in metres, seconds and logarithms: their scales are in here."""
-    bias_1: Weights
-    weight_2: Weights
-    """(n, m)."""
-    bias_2: Weights
-    weight_3: Weights
-    """(H, m, 60): displacements (J, 3) [m] in the body's frame, then ln of (J,) deviations [m]."""
-    bias_3: Weights
-    """(H, 60)."""
+    """(H,) horizons that it was trained for, ascending [s]."""
+    weight_1: Tensor
+    """(N_INPUTS, n) first matrix; it contains the scales of the inputs (m, s, logarithms)."""
+    bias_1: Tensor
+    """(n,) first bias."""
+    weight_2: Tensor
+    """(n, m) second matrix."""
+    bias_2: Tensor
+    """(m,) second bias."""
+    weight_3: Tensor
+    """(H, m, 60) last matrix for each horizon: displacements (J, 3) in the body's frame [m], then
+    logarithms of standard deviations (J,) [m]."""
+    bias_3: Tensor
+    """(H, 60) last bias for each horizon."""
     log_std: Floats
-    """(2,) least and largest ln of a joint's standard deviation [m] that it has seen."""
+    """(2,) least and greatest logarithm of a joint's standard deviation in the training data
+    [m]."""
+
+
+class Scratch(NamedTuple):
+    """Room for the layers of one body."""
+
+    inputs: Tensor
+    """(N_INPUTS,) inputs."""
+    first: Tensor
+    """(n,) first hidden layer."""
+    second: Tensor
+    """(m,) second hidden layer."""
+    before: Tensor
+    """(60,) outputs for the trained horizon before the wanted one."""
+    after: Tensor
+    """(60,) outputs for the trained horizon after it."""
+
+
+class Motion(NamedTuple):
+    """The predicted motion of one body, in the frame of its heading."""
+
+    moved: Points3
+    """(J, 3) displacements [m]."""
+    rate: Velocities3
+    """(J, 3) velocities [m/s]."""
+    std: Floats
+    """(J,) standard deviations of the displacements [m]."""
+
+
+class Drift(NamedTuple):
+    """The motion of bodies to which the network does not apply."""
+
+    heading_m2: float
+    """Variance added on each axis to a tracked body of unknown heading [m^2]."""
+    keep: float
+    """Share of its deviation from the prior that a body without a track keeps."""
+    prior_mean: tuple[float, float, float]
+    """Position of the prior [m]."""
+    prior_std: float
+    """Standard deviation of the prior on each axis [m]."""
 
 
 @functools.cache
 def load_network() -> ForecastNetwork:
-    """The network that is shipped."""
+    """Return the network that comes with the package."""
     with np.load(assets_dir() / "ahead" / "ahead.npz") as stored:
         return ForecastNetwork(
             *(np.ascontiguousarray(stored[name]) for name in ForecastNetwork._fields)
@@ -64,13 +108,24 @@ def load_network() -> ForecastNetwork:
 
 
 @kernel(makes_arrays=True)
-def describe(points, velocity, cov, log_std, out):
-    """What the network looks at: out (N_INPUTS,) float32; cosine, sine of the heading, known.
+def describe(
+    points: Points3, velocity: Velocities3, cov: Covariances3, log_std: Floats, out: Tensor
+) -> Heading:
+    """Write the network's inputs for one body, and return its heading.
 
-    Joints about the torso (J, 3), velocities about the torso's (J, 3), both forward, left, up; the
-    torso's velocity (3,) and height; ln of the joints' deviations (J,) within the bounds `log_std`.
+    The inputs are, in the frame of the heading (forward, left, up): the joints (J, 3) relative to
+    the middle of the torso and their velocities (J, 3) relative to the torso's; the torso's
+    velocity (3,) and height; and the logarithms of the joints' standard deviations (J,).
+
+    Args:
+        points: (J, 3) joints in the world frame [m].
+        velocity: (J, 3) their velocities [m/s].
+        cov: (J, 3, 3) their covariances [m^2].
+        log_std: (2,) bounds of the logarithms of standard deviations.
+        out: (N_INPUTS,) inputs, filled in.
     """
-    cos, sin, known = heading(points)
+    heading = find_heading(points)
+    cos, sin = heading.cos, heading.sin
     root, speed = np.zeros(3), np.zeros(3)
     for j in _TORSO:
         for i in range(3):
@@ -91,12 +146,12 @@ def describe(points, velocity, cov, log_std, out):
     for j in range(len(points)):
         variance = (cov[j, 0, 0] + cov[j, 1, 1] + cov[j, 2, 2]) / 3.0
         out[at + 4 + j] = min(max(0.5 * math.log(variance), log_std[0]), log_std[1])
-    return cos, sin, known
+    return heading
 
 
 @kernel(makes_arrays=True, fastmath=_REORDER)
-def _layer(inputs, weight, bias, out):
-    """out = bias + inputs weight."""
+def _apply_layer(inputs: Tensor, weight: Tensor, bias: Tensor, out: Tensor) -> None:
+    """Write out = bias + inputs weight, for a matrix (in, out)."""
     for k in range(len(out)):
         out[k] = bias[k]
     for i in range(len(inputs)):
@@ -106,31 +161,36 @@ def _layer(inputs, weight, bias, out):
 
 
 @kernel(makes_arrays=True)
-def _hidden(inputs, weight, bias, out):
-    _layer(inputs, weight, bias, out)
+def _apply_hidden_layer(inputs: Tensor, weight: Tensor, bias: Tensor, out: Tensor) -> None:
+    """Write out = max(bias + inputs weight, 0)."""
+    _apply_layer(inputs, weight, bias, out)
     for k in range(len(out)):
         out[k] = max(out[k], np.float32(0.0))
 
 
 @kernel(makes_arrays=True)
-def run_network(network, inputs, horizon, scratch, moved, rate, std):
-    """The network's answer at `horizon` [s], interpolated between those that it knows.
+def run_network(network: ForecastNetwork, horizon: float, scratch: Scratch, motion: Motion) -> None:
+    """Write the predicted motion at `horizon` [s], interpolated between the trained horizons.
 
-    `inputs` are from `describe`, `scratch` from `make_scratch`. Fills displacements in the body's
-    frame moved (J, 3) [m], how fast they grow rate (J, 3) [m/s], and deviations std (J,) [m].
+    Args:
+        network: the network.
+        horizon: time ahead [s].
+        scratch: the inputs, of `describe`, and room for the layers.
+        motion: the motion, filled in.
     """
-    first, second, before, after = scratch
-    _hidden(inputs, network.weight_1, network.bias_1, first)
-    _hidden(first, network.weight_2, network.bias_2, second)
+    second, before, after = scratch.second, scratch.before, scratch.after
+    moved, rate, std = motion.moved, motion.rate, motion.std
+    _apply_hidden_layer(scratch.inputs, network.weight_1, network.bias_1, scratch.first)
+    _apply_hidden_layer(scratch.first, network.weight_2, network.bias_2, second)
     k = 0
     while k < len(network.horizons_s) - 1 and network.horizons_s[k] < horizon:
         k += 1
     begin = network.horizons_s[k - 1] if k > 0 else 0.0
     length = network.horizons_s[k] - begin
     share = (horizon - begin) / length
-    _layer(second, network.weight_3[k], network.bias_3[k], after)
+    _apply_layer(second, network.weight_3[k], network.bias_3[k], after)
     if k > 0:
-        _layer(second, network.weight_3[k - 1], network.bias_3[k - 1], before)
+        _apply_layer(second, network.weight_3[k - 1], network.bias_3[k - 1], before)
     for j in range(N_JOINTS):
         for i in range(3):
             last = before[3 * j + i] if k > 0 else 0.0
@@ -141,25 +201,29 @@ def run_network(network, inputs, horizon, scratch, moved, rate, std):
 
 
 @kernel(makes_arrays=True)
-def make_scratch(network):
-    """Room for one body's layers."""
-    first = np.empty(network.weight_1.shape[1], np.float32)
-    second = np.empty(network.weight_2.shape[1], np.float32)
-    return first, second, np.empty(_N_OUTPUTS, np.float32), np.empty(_N_OUTPUTS, np.float32)
+def make_scratch(network: ForecastNetwork) -> Scratch:
+    """Return room for the layers of one body."""
+    return Scratch(
+        inputs=np.empty(N_INPUTS, np.float32),
+        first=np.empty(network.weight_1.shape[1], np.float32),
+        second=np.empty(network.weight_2.shape[1], np.float32),
+        before=np.empty(_N_OUTPUTS, np.float32),
+        after=np.empty(_N_OUTPUTS, np.float32),
+    )
 
 
 def forecast(now: PoseEstimate, horizon_s: float, config: TrackerConfig) -> PoseEstimate:
-    """Return what is expected of the workers in a while, if no camera sees them until then.
+    """Return the expected estimate after a while in which no camera sees the workers.
 
     Args:
-        now: what is believed of them, in the world; it stays as it is.
-        horizon_s: how long from now, in (0, 1] [s].
-        config: settings of the estimator that said so: the prior, to which a worker without a track
-            relaxes, and the bounds of what is reported.
+        now: present estimate in the world frame; it is not changed.
+        horizon_s: time ahead, in (0, 1] [s].
+        config: settings of the estimator: the prior, to which a worker without a track relaxes, and
+            the bounds of what is reported.
 
     Returns:
-        Arrays of its own of the shapes of `now`: means [m], velocities [m/s] and covariances [m^2]
-        at that time, and ages that have grown by the horizon. Who is tracked stays tracked.
+        New arrays of the shapes of `now`: means [m], velocities [m/s] and covariances [m^2] at that
+        time, and ages increased by the horizon. Tracked workers stay tracked.
 
     Raises:
         ConfigError: `horizon_s` is not in (0, 1].
@@ -168,26 +232,29 @@ def forecast(now: PoseEstimate, horizon_s: float, config: TrackerConfig) -> Pose
         raise ConfigError(f"A horizon must be in (0, {LONGEST_S:g}] s, got {horizon_s}.")
     age_s = np.minimum(now.age_s + horizon_s, config.max_age_s)
     later = replace(mapped(now, lambda array: array.copy()), age_s=age_s)
-    workers = (later.mean_world, later.cov_world, later.velocity_world, later.tracked)
-    unknown_heading = config.root_acceleration * horizon_s**3 / 3
-    keep = float(np.exp(-horizon_s / config.forget_s))
-    prior = (keep, config.prior_mean_world, config.prior_std_m)
-    _forecast(load_network(), workers, horizon_s, unknown_heading, prior)
-    return bounded(later, config)
+    workers = EstimateArrays(*(getattr(later, name) for name in EstimateArrays._fields))
+    drift = Drift(
+        heading_m2=config.root_acceleration * horizon_s**3 / 3,
+        keep=float(np.exp(-horizon_s / config.forget_s)),
+        prior_mean=config.prior_mean_world,
+        prior_std=config.prior_std_m,
+    )
+    _move_workers(load_network(), workers, horizon_s, drift)
+    return bound_estimate(later, config)
 
 
-def mixed(later: PoseEstimate, log_weight: Floats, n_alive: Ints) -> PoseEstimate:
-    """What several hypotheses about each worker expect together: moments of their mixture.
+def mix_hypotheses(later: PoseEstimate, log_weight: Floats, n_alive: Ints) -> PoseEstimate:
+    """Return the moments of the mixture of several forecasts for each worker.
 
     Args:
-        later: what each of them expects, (B, W H, J, ...); a worker's H columns side by side.
-        log_weight: (B, W, H) their log-probabilities.
-        n_alive: (B, W) how many of a worker's columns count, the heaviest first.
+        later: (B, W H, J, ...) forecasts of the H hypotheses about each worker, side by side.
+        log_weight: (B, W, H) log-probabilities of the hypotheses.
+        n_alive: (B, W) number of a worker's hypotheses that are in use, the heaviest first.
 
     Returns:
-        (B, W, J, ...); ages and tracks are the heaviest hypothesis's.
+        The estimate (B, W, J, ...), with ages and tracks of the heaviest hypothesis.
     """
-    alive = np.arange(log_weight.shape[2]) < n_alive[..., None]
+    alive = np.arange(log_weight.shape[2], dtype=np.int64) < n_alive[..., None]
     share = np.where(alive, np.exp(log_weight), 0.0)
     share = (share / share.sum(-1, keepdims=True))[..., None, None]
 
@@ -209,40 +276,51 @@ def mixed(later: PoseEstimate, log_weight: Floats, n_alive: Ints) -> PoseEstimat
 
 
 @kernel(makes_arrays=True)
-def _forecast(network, workers, horizon, unknown_heading, prior):
-    """Move every worker (mean, cov, velocity, tracked) by `horizon` [s], in place.
+def _move_workers(
+    network: ForecastNetwork, workers: EstimateArrays, horizon: float, drift: Drift
+) -> None:
+    """Move every worker by `horizon` [s], in place.
 
-    `unknown_heading` [m^2] is as in `_go_on`, `prior` the last arguments of `relax`.
+    Args:
+        network: the network.
+        workers: (B, W, ...) present estimate, changed in place except for its ages.
+        horizon: time ahead [s].
+        drift: the motion of bodies to which the network does not apply.
     """
-    mean, cov, velocity, tracked = workers
-    scratch, inputs = make_scratch(network), np.empty(N_INPUTS, np.float32)
-    moved, rate, std = np.empty((N_JOINTS, 3)), np.empty((N_JOINTS, 3)), np.empty(N_JOINTS)
-    for b in range(mean.shape[0]):
-        for w in range(mean.shape[1]):
-            body = (mean[b, w], cov[b, w], velocity[b, w])
+    tracked, scratch = workers.tracked, make_scratch(network)
+    motion = Motion(np.empty((N_JOINTS, 3)), np.empty((N_JOINTS, 3)), np.empty(N_JOINTS))
+    for b in range(tracked.shape[0]):
+        for w in range(tracked.shape[1]):
+            mean, cov = workers.mean_world[b, w], workers.cov_world[b, w]
+            velocity = workers.velocity_world[b, w]
             if not tracked[b, w]:
-                relax(*body, *prior)
+                relax(mean, cov, velocity, drift.keep, drift.prior_mean, drift.prior_std)
                 continue
-            cos, sin, known = describe(body[0], body[2], body[1], network.log_std, inputs)
-            if not known:
-                _go_on(*body, horizon, unknown_heading)
+            heading = describe(mean, velocity, cov, network.log_std, scratch.inputs)
+            if not heading.is_known:
+                for j in range(len(mean)):  # constant velocity
+                    for i in range(3):
+                        mean[j, i] += horizon * velocity[j, i]
+                        cov[j, i, i] += drift.heading_m2
                 continue
-            run_network(network, inputs, horizon, scratch, moved, rate, std)
-            _add(*body, cos, sin, moved, rate, std)
+            run_network(network, horizon, scratch, motion)
+            _apply_motion(mean, cov, velocity, heading, motion)
 
 
 @kernel(makes_arrays=True)
-def _go_on(mean, cov, velocity, horizon, variance):
-    """Constant velocity, and `variance` [m^2] more."""
-    for j in range(len(mean)):
-        for i in range(3):
-            mean[j, i] += horizon * velocity[j, i]
-            cov[j, i, i] += variance
+def _apply_motion(
+    mean: Points3, cov: Covariances3, velocity: Velocities3, heading: Heading, motion: Motion
+) -> None:
+    """Apply a motion in the frame of the heading to a body in the world frame, in place.
 
-
-@kernel(makes_arrays=True)
-def _add(mean, cov, velocity, cos, sin, moved, rate, std):
-    """Displacements of the body's frame onto the body in the world."""
+    Args:
+        mean: (J, 3) joints [m].
+        cov: (J, 3, 3) their covariances [m^2].
+        velocity: (J, 3) their velocities [m/s].
+        heading: direction in which the body faces.
+        motion: the predicted motion.
+    """
+    cos, sin, moved, rate, std = heading.cos, heading.sin, motion.moved, motion.rate, motion.std
     for j in range(len(mean)):
         mean[j, 0] += cos * moved[j, 0] - sin * moved[j, 1]
         mean[j, 1] += sin * moved[j, 0] + cos * moved[j, 1]

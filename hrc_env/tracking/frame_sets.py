@@ -1,4 +1,4 @@
-"""The last frames of every camera with their times, and which of them belong together."""
+"""The last frames of every camera with their times, grouped into sets that were taken together."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -11,47 +11,85 @@ from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Floats, Ints
 
 SAME_S = 5e-5
-"""Times that differ by no more are the same."""
+"""Greatest difference of two times that count as the same [s]."""
 _TICK_S = 1e-4
-"""Times within a control step are taken to this, so that equal latencies share a computation."""
+"""Resolution of times within a control step, so that equal latencies share a computation [s]."""
 _TOGETHER_TICKS = 20
-"""Frames within 2 ms are of one set: at walking speed, less than 3 mm."""
-_END, _NEVER = 2**40, 2**41
-"""Ticks of a frame at the end of its step, and of one that is not within it."""
+"""Greatest difference of the times of frames in one set: 2 ms, in which a walker moves 3 mm."""
+_END = 2**40
+"""Ticks of a frame that was taken at the end of its step."""
+_NEVER = 2**41
+"""Ticks of a frame that was not taken within the step."""
 _HELD_S = 0.1
-"""A frame may be shown beside one that is so much newer, where two views are needed."""
+"""Greatest age of a frame that may be held beside a newer one, where two views are needed [s]."""
 _DRIFT_PX_S = 300.0
-"""How fast a walker's pixels move: what a held frame's detections lose in worth."""
+"""Speed of a walker's pixels, which makes detections of a held frame less certain [px/s]."""
 
 
 class Frames(NamedTuple):
-    """N frames of each camera of each environment, a ring; arrays changed in place."""
+    """The last N frames of each camera of each environment, in rings that change in place."""
 
     keypoints: Keypoints
-    """(B, C, N, W, J, ...)."""
+    """(B, C, N, W, J, ...) keypoints of the frames."""
     time_s: Floats
-    """(B, C, N) when they were taken [s]; NaN: no frame."""
+    """(B, C, N) times at which they were taken [s]; NaN where there is no frame."""
     n_taken: Ints
-    """(B, C) frames that were taken in."""
+    """(B, C) number of frames that were stored."""
     newest_s: Floats
-    """(B, C) time of the newest [s]."""
+    """(B, C) time of the newest frame [s]."""
     forgotten_s: Floats
     """(B,) time of the newest frame that was overwritten [s]."""
 
 
 class FrameSet(NamedTuple):
-    """Frames of one time in G environments."""
+    """The frames of one time in G environments."""
 
     keypoints: Keypoints
-    """(G, C, W, J, ...), missing where a camera has no frame."""
+    """(G, C, W, J, ...) keypoints; missing where a camera has no frame."""
     has: Bools
-    """(G, C) whether it has."""
+    """(G, C) whether the camera has a frame."""
     at_s: Floats
-    """(G,) the time."""
+    """(G,) time of the frames [s]."""
+
+
+class TimedFrameSet(NamedTuple):
+    """A set of frames with its place in the control step."""
+
+    since_s: float
+    """Time from the beginning of the step to the frames [s]."""
+    frames: FrameSet
+    """The frames."""
+
+
+class StepFrames(NamedTuple):
+    """The frames of one control step in environments with equal times."""
+
+    members: Ints
+    """(M,) positions of these environments in the `ids` of `group_frames`."""
+    step_s: float
+    """Length of the step [s]."""
+    frame_sets: list[TimedFrameSet]
+    """The sets of frames in the order of time."""
+
+
+class Span(NamedTuple):
+    """The ticks of one set of frames."""
+
+    first: int
+    """Ticks of its first frame."""
+    last: int
+    """Ticks of its last frame."""
 
 
 def make_frames(batch: int, n_cameras: int, n_frames: int, n_workers: int) -> Frames:
-    """Room for frames, and none yet."""
+    """Return empty rings for the frames of every camera.
+
+    Args:
+        batch: number of environments B.
+        n_cameras: number of cameras C.
+        n_frames: number of frames N that are kept of each camera.
+        n_workers: number of workers W.
+    """
     shape = (batch, n_cameras, n_frames, n_workers, N_JOINTS)
     return Frames(
         keypoints=Keypoints(np.full((*shape, 2), np.nan), np.zeros(shape), np.full(shape, np.inf)),
@@ -63,13 +101,20 @@ def make_frames(batch: int, n_cameras: int, n_frames: int, n_workers: int) -> Fr
 
 
 def forget_frames(frames: Frames, ids: Ints) -> None:
-    """Environments `ids` have seen nothing."""
+    """Discard the frames of environments `ids`."""
     frames.time_s[ids], frames.n_taken[ids] = np.nan, 0
     frames.newest_s[ids], frames.forgotten_s[ids] = -np.inf, -np.inf
 
 
 def remember(frames: Frames, keypoints: Keypoints, time_s: Floats, use: Bools) -> None:
-    """Keep the frames `use` (B, C) of times (B, C); the oldest ones make room."""
+    """Store some frames in place of the oldest ones.
+
+    Args:
+        frames: the rings, changed in place.
+        keypoints: (B, C, W, J, ...) keypoints of one frame of each camera.
+        time_s: (B, C) times at which these were taken [s].
+        use: (B, C) the frames that are stored.
+    """
     b, c = np.nonzero(use)
     n = frames.n_taken[b, c] % frames.time_s.shape[2]
     old_s = frames.time_s[b, c, n]
@@ -79,35 +124,45 @@ def remember(frames: Frames, keypoints: Keypoints, time_s: Floats, use: Bools) -
     frames.n_taken[b, c] += 1
 
 
-def frame_sets_of(
-    frames: Frames, ids: Ints, end_s: Floats, step_s: Floats
-) -> Iterator[tuple[Ints, float, list[tuple[float, FrameSet]]]]:
-    """What was seen in a step of environments `ids` (G,) that ended at `end_s` and was `step_s`
-    (G,) long, by groups with equal times: members (M,) of `ids`; the step [s]; and its frame sets
-    in order of time, each with the time since the step began [s]."""
-    ticks = _ticks(frames.time_s[ids], end_s, step_s)
+def group_frames(frames: Frames, ids: Ints, end_s: Floats, step_s: Floats) -> Iterator[StepFrames]:
+    """Yield the frames of one control step, by groups of environments with equal times.
+
+    Args:
+        frames: the stored frames.
+        ids: (G,) indices of the environments.
+        end_s: (G,) times at which their steps ended [s].
+        step_s: (G,) lengths of their steps [s].
+    """
+    ticks = _count_ticks(frames.time_s[ids], end_s, step_s)
     times = np.sort(ticks.reshape(len(ids), -1), axis=1)
     times = times[:, : int((times < _NEVER).sum(1).max(initial=0))]
-    for members in _alike(np.column_stack([step_s.view(np.int64), times])):
+    for members in _group_equal_rows(np.column_stack([step_s.view(np.int64), times])):
         step = float(step_s[members[0]])
         begin_s = end_s[members] - step
-        frame_sets = []
-        for first, last in _spans(times[members[0]]):
+        frame_sets: list[TimedFrameSet] = []
+        for first, last in _find_spans(times[members[0]]):
             at_s = step if last == _END else float(last) * _TICK_S
             inside = (ticks[members] >= first) & (ticks[members] <= last)
-            frame_sets.append((at_s, _frame_set(frames, ids[members], inside, begin_s + at_s)))
-        yield members, step, frame_sets
+            newest = _select_newest(frames, ids[members], inside, begin_s + at_s)
+            frame_sets.append(TimedFrameSet(at_s, newest))
+        yield StepFrames(members, step, frame_sets)
 
 
-def beside(frames: Frames, ids: Ints, frame_set: FrameSet, wanted: Bools) -> Keypoints:
-    """The frames of a set, and the other cameras' last ones for the workers `wanted` (G, W).
+def add_held_frames(frames: Frames, ids: Ints, frame_set: FrameSet, wanted: Bools) -> Keypoints:
+    """Return the keypoints of a set, with the last frames of the other cameras for some workers.
 
-    Two views that are a little out of step say where somebody is better than one alone does.
-    Detections of a held frame are told as less certain, by how far a walker may have come.
+    Two views that are a little out of step locate a worker better than one view alone. The
+    detections of a held frame become less certain by the distance that a walker may have moved.
+
+    Args:
+        frames: the stored frames.
+        ids: (G,) indices of the environments.
+        frame_set: the set of frames.
+        wanted: (G, W) the workers that need held frames.
     """
     age_s = frame_set.at_s[:, None, None] - frames.time_s[ids]
     recent = (age_s > -SAME_S) & (age_s < _HELD_S) & ~frame_set.has[:, :, None]
-    held = _frame_set(frames, ids, recent, frame_set.at_s)
+    held = _select_newest(frames, ids, recent, frame_set.at_s)
     youngest_s = np.where(recent, age_s, np.inf).min(2)
     drift_px = _DRIFT_PX_S * np.where(held.has, youngest_s, 0.0)
     sigma_px = np.hypot(held.keypoints.sigma_px, drift_px[:, :, None, None])
@@ -119,8 +174,8 @@ def beside(frames: Frames, ids: Ints, frame_set: FrameSet, wanted: Bools) -> Key
     )
 
 
-def without(keypoints: Keypoints, missing: Bools) -> Keypoints:
-    """Keypoints without the frames of cameras `missing` (B, C)."""
+def drop_cameras(keypoints: Keypoints, missing: Bools) -> Keypoints:
+    """Return keypoints without the frames of cameras `missing` (B, C)."""
     gone = missing[:, :, None, None]
     return Keypoints(
         np.where(gone[..., None], np.nan, keypoints.px),
@@ -129,13 +184,21 @@ def without(keypoints: Keypoints, missing: Bools) -> Keypoints:
     )
 
 
-def shows_anything(keypoints: Keypoints) -> Bools:
-    """(B, C) whether a camera's frame has any detection."""
+def has_detections(keypoints: Keypoints) -> Bools:
+    """Return (B, C) whether a camera's frame has any detection."""
     return np.any(np.isfinite(keypoints.px[..., 0]) & (keypoints.confidence > 0), axis=(2, 3))
 
 
-def _ticks(time_s: Floats, end_s: Floats, step_s: Floats) -> Ints:
-    """(G, C, N) ticks since the step began; `_END` at its end, `_NEVER` outside of it."""
+def _count_ticks(time_s: Floats, end_s: Floats, step_s: Floats) -> Ints:
+    """Return (G, C, N) ticks from the beginning of the step to each frame.
+
+    They are `_END` at the end of the step and `_NEVER` outside of it.
+
+    Args:
+        time_s: (G, C, N) times of the frames [s].
+        end_s: (G,) times at which the steps ended [s].
+        step_s: (G,) lengths of the steps [s].
+    """
     since_s = time_s - (end_s - step_s)[:, None, None]
     step_s = step_s[:, None, None]
     inside = (since_s > SAME_S) & (since_s <= step_s + SAME_S)
@@ -144,8 +207,8 @@ def _ticks(time_s: Floats, end_s: Floats, step_s: Floats) -> Ints:
     return np.where(inside, ticks, _NEVER)
 
 
-def _alike(keys: Ints) -> Iterator[Ints]:
-    """Indices of equal rows of `keys` (G, n), group by group."""
+def _group_equal_rows(keys: Ints) -> Iterator[Ints]:
+    """Yield the indices of equal rows of `keys` (G, n), group by group."""
     if (keys == keys[0]).all():
         yield np.arange(len(keys))
         return
@@ -155,21 +218,28 @@ def _alike(keys: Ints) -> Iterator[Ints]:
         yield np.flatnonzero(group == k)
 
 
-def _spans(times: Ints) -> list[tuple[int, int]]:
-    """First and last tick of each set in sorted ticks."""
-    spans: list[tuple[int, int]] = []
+def _find_spans(times: Ints) -> list[Span]:
+    """Return the first and the last tick of each set in sorted ticks (n,)."""
+    spans: list[Span] = []
     for tick in map(int, times[times < _NEVER]):
-        if spans and tick - spans[-1][0] <= _TOGETHER_TICKS:
-            spans[-1] = (spans[-1][0], tick)
+        if spans and tick - spans[-1].first <= _TOGETHER_TICKS:
+            spans[-1] = Span(spans[-1].first, tick)
         else:
-            spans.append((tick, tick))
+            spans.append(Span(tick, tick))
     return spans
 
 
-def _frame_set(frames: Frames, ids: Ints, among: Bools, at_s: Floats) -> FrameSet:
-    """The newest frame of each camera `among` (G, C, N)."""
+def _select_newest(frames: Frames, ids: Ints, among: Bools, at_s: Floats) -> FrameSet:
+    """Return the newest of some frames of each camera as a set.
+
+    Args:
+        frames: the stored frames.
+        ids: (G,) indices of the environments.
+        among: (G, C, N) the frames to select from.
+        at_s: (G,) time of the set [s].
+    """
     n = np.where(among, frames.time_s[ids], -np.inf).argmax(2)
-    b, c = ids[:, None], np.arange(n.shape[1])
+    b, c = ids[:, None], np.arange(n.shape[1], dtype=np.int64)
     keypoints = mapped(frames.keypoints, lambda array: array[b, c, n])
     has = np.asarray(among.any(2))
-    return FrameSet(keypoints if has.all() else without(keypoints, ~has), has, at_s)
+    return FrameSet(keypoints if has.all() else drop_cameras(keypoints, ~has), has, at_s)

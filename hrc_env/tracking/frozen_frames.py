@@ -1,62 +1,76 @@
-"""Cameras whose image does not change: they are stuck, whatever they show.
+"""Detection of cameras with a frozen image.
 
-No live camera gives the very same keypoints twice: people sway, and sensors have noise. One that
-repeats itself bit for bit is left out until several images in a row are new; a crop that moves over
-a frozen image makes single new ones.
+No live camera reports exactly the same keypoints twice, because people sway and sensors have noise.
+If the keypoints of a camera repeat bit for bit, it is ignored until several successive images are
+new. One new image is not enough: a crop that moves over a frozen image makes single new ones.
 """
 
 import math
-from typing import Any
 
 import numpy as np
 
+from hrc_env.core.declared import Records2, dtype_of, make_records
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Keypoints
-from hrc_env.core.typing import Bools, Ints
+from hrc_env.core.typing import Bools, Floats, Ints, Points2
 
 LEAST_NEW = 3
-"""So many images in a row must be new before a camera that was stuck is believed again."""
-LAST_IMAGE = np.dtype(
-    [
-        # a sum over its keypoints, by which it is known again (0: nobody seen); images in a row
-        # that were new, up to `LEAST_NEW`
-        ("total", "f8"), ("n_new", "i8"),
-    ],
-    align=True,
-)  # fmt: skip
-"""What is remembered of one camera of one environment."""
+"""Number of successive new images after which a frozen camera is used again."""
 
 
-def make_frozen(batch: int, n_cameras: int) -> Any:
-    """(B, C) records of `LAST_IMAGE`; every camera is believed."""
-    state = np.empty((batch, n_cameras), LAST_IMAGE)
+class LastImage:
+    """The memory of the images of one camera of one environment."""
+
+    total: float
+    """Checksum of the keypoints of the last image with any; 0 before the first."""
+    n_new: int
+    """Number of successive images that were new, up to `LEAST_NEW`."""
+
+
+LAST_IMAGE = dtype_of(LastImage)
+
+
+def make_frozen(batch: int, n_cameras: int) -> Records2[LastImage]:
+    """Return the memory (B, C) of cameras, none of which is frozen."""
+    state = make_records(LastImage, (batch, n_cameras))
     forget_frozen(state, np.arange(batch))
     return state
 
 
-def forget_frozen(state: Any, ids: Ints) -> None:
-    """Begin environments `ids` anew."""
+def forget_frozen(state: Records2[LastImage], ids: Ints) -> None:
+    """Reset the memory of environments `ids`: none of their cameras is frozen."""
     state[ids] = (0.0, LEAST_NEW)
 
 
-def leave_out_frozen(state: Any, ids: Ints, keypoints: Keypoints) -> None:
-    """Make what stuck cameras report missing, in place, in keypoints of environments `ids`.
+def leave_out_frozen(state: Records2[LastImage], ids: Ints, keypoints: Keypoints) -> None:
+    """Mark the keypoints of frozen cameras as missing, in place, and update the memory.
 
-    `state` is of the whole batch; cameras without an image report nothing.
+    Args:
+        state: (B, C) memory of the whole batch.
+        ids: (b,) indices of the environments that the keypoints belong to.
+        keypoints: (b, C, W, J) keypoints. Cameras without a new image must report none.
     """
     _leave_out(state, ids, keypoints.px, keypoints.confidence, keypoints.sigma_px)
 
 
-def believed(state: Any, ids: Ints) -> Bools:
-    """(B, C) which cameras of environments `ids` are not stuck, as far as is known."""
+def find_live_cameras(state: Records2[LastImage], ids: Ints) -> Bools:
+    """Return (b, C) which cameras of environments `ids` are not known to be frozen."""
     return state["n_new"][ids] >= LEAST_NEW
 
 
 @kernel
-def _leave_out(state, ids, px, confidence, sigma_px):
+def _leave_out(
+    state: Records2[LastImage], ids: Ints, px: Points2, confidence: Floats, sigma_px: Floats
+) -> None:
+    """Update the memory and blank the keypoints of frozen cameras; see `leave_out_frozen`."""
     for row in range(len(ids)):
         for c in range(px.shape[1]):
-            last, total = state[ids[row], c], _sum(px[row, c])
+            last, total = state[ids[row], c], 0.0
+            for w in range(px.shape[2]):
+                for j in range(px.shape[3]):
+                    u, v = px[row, c, w, j, 0], px[row, c, w, j, 1]
+                    if math.isfinite(u) and math.isfinite(v):
+                        total += u + math.pi * v
             if total == 0.0:
                 continue
             last.n_new = 0 if total == last.total else min(last.n_new + 1, LEAST_NEW)
@@ -66,15 +80,3 @@ def _leave_out(state, ids, px, confidence, sigma_px):
                     for j in range(px.shape[3]):
                         px[row, c, w, j, 0] = px[row, c, w, j, 1] = math.nan
                         confidence[row, c, w, j], sigma_px[row, c, w, j] = 0.0, math.inf
-
-
-@kernel
-def _sum(px):
-    """Of all pixels of one camera; 0 where there are none."""
-    total = 0.0
-    for w in range(px.shape[0]):
-        for j in range(px.shape[1]):
-            u, v = px[w, j, 0], px[w, j, 1]
-            if math.isfinite(u) and math.isfinite(v):
-                total += u + math.pi * v
-    return total

@@ -1,132 +1,197 @@
-"""Measurements: one worker's usable pixels of one frame, and which side each camera calls left.
+"""Measurements of one worker in one set of frames, with left and right as each camera reports them.
 
-Pixels that are not finite or absurdly far, confidences outside (0, 1] and standard deviations that
-are not finite and positive mean that there is no measurement; wrong pixels that look like pixels
-are left to the robust likelihoods.
+A detection is a measurement unless its pixel is not finite or absurdly far, its confidence is
+outside (0, 1], or its standard deviation is not finite and positive. Wrong but plausible pixels are
+left to the robust likelihoods.
 
-Cameras that exchange left and right are noticed over the whole body by a two-state hidden Markov
-model per camera: detections as they are, or mirrored. A camera that comes back after having seen
-nothing is believed at first, for the body may have been tracked mirrored in depth meanwhile; so
-are several cameras that all seem to be wrong.
+Cameras that exchange left and right are detected over the whole body by a hidden Markov model with
+two states per camera: detections as they are, or mirrored. A camera that sees the worker again
+after a while is trusted at first, because the body may have been tracked mirrored in depth in the
+meantime. So are several cameras that all seem to be wrong.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from hrc_env.core.declared import Records1, Records2
 from hrc_env.core.errors import check_shape
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Keypoints
 from hrc_env.core.skeleton import MIRROR, N_JOINTS
-from hrc_env.core.typing import Bools, Floats
+from hrc_env.core.typing import Bools, Floats, Points2
+from hrc_env.geometry.lines_of_sight import Camera
 from hrc_env.geometry.triangulation import FURTHEST_PX, NEAREST_DEPTH_M
-from hrc_env.tracking.tree.state import LANES, N_IMAGE, N_VIEW
+from hrc_env.tracking.settings import Settings
+from hrc_env.tracking.tree.state import LANES, N_IMAGE, N_VIEW, Noise, Tree, View
 
 MIN_SIGMA_PX = 0.25
-"""No detector is believed to be better than this [px]."""
+"""Smallest standard deviation of a detection that is used [px]."""
 _REORDER = {"reassoc", "contract", "nsz"}
 _MIRROR = tuple(int(j) for j in MIRROR)
-_BLIND_UPDATES, _BELIEVED_UPDATES = 8, 5
-_ENOUGH, _AGAINST = 3, 5.0
-"""So many cameras hardly exchange sides at once, while the others say no more than this against it
-(a log-likelihood ratio)."""
-_LEAST_CHANCE, _MOST_EVIDENCE = 1e-3, 50.0
+"""Index of the same joint on the other side of the body."""
+_UNSEEN_UPDATES = 8
+"""Number of updates without the worker after which a camera that sees them again is trusted."""
+_TRUSTED_UPDATES = 5
+"""Number of updates for which such a camera is trusted."""
+_ENOUGH = 3
+"""Number of cameras that seem swapped from which the body may have its sides exchanged instead."""
+_AGAINST = 5.0
+"""Log-likelihood ratio of the other cameras against an exchange that still allows it."""
+_LEAST_CHANCE = 1e-3
+"""Least probability of either state of a camera."""
+_MOST_EVIDENCE = 50.0
+"""Greatest log-likelihood ratio of one frame, in either direction."""
 
 
-def arrays_of(
-    keypoints: Keypoints, shape: tuple[int, int, int, int]
-) -> tuple[Floats, Floats, Floats]:
-    """Pixels, confidence and sigma as contiguous float64; `shape` is (B, C, W, J)."""
-    check_shape("Keypoints.px", keypoints.px.shape, (*shape, 2), "B, C, W, J, 2")
-    check_shape("Keypoints.confidence", keypoints.confidence.shape, shape, "B, C, W, J")
-    check_shape("Keypoints.sigma_px", keypoints.sigma_px.shape, shape, "B, C, W, J")
-    return (
+class KeypointArrays(NamedTuple):
+    """The arrays of a `Keypoints` that estimators read, as compiled functions take them."""
+
+    px: Points2
+    """(B, C, W, J, 2) pixels."""
+    confidence: Floats
+    """(B, C, W, J) confidence, 0 to 1."""
+    sigma_px: Floats
+    """(B, C, W, J) standard deviation of each coordinate [px]."""
+
+
+def get_keypoint_arrays(
+    keypoints: Keypoints, shape: tuple[int, int, int, int] | None = None
+) -> KeypointArrays:
+    """Return the arrays of keypoints, made contiguous where they are not.
+
+    Args:
+        keypoints: the keypoints.
+        shape: the expected shape (B, C, W, J); None if it is not checked.
+
+    Raises:
+        ConfigError: the arrays have another shape.
+    """
+    if shape is not None:
+        check_shape("Keypoints.px", keypoints.px.shape, (*shape, 2), "B, C, W, J, 2")
+        check_shape("Keypoints.confidence", keypoints.confidence.shape, shape, "B, C, W, J")
+        check_shape("Keypoints.sigma_px", keypoints.sigma_px.shape, shape, "B, C, W, J")
+    return KeypointArrays(
         np.ascontiguousarray(keypoints.px, np.float64),
         np.ascontiguousarray(keypoints.confidence, np.float64),
         np.ascontiguousarray(keypoints.sigma_px, np.float64),
     )
 
 
+class Frame(NamedTuple):
+    """The measurements of one worker by C cameras, with what an update computes from them.
+
+    All arrays but `cameras` are filled in place.
+    """
+
+    cameras: Records1[Camera]
+    """(C,) cameras as the rig is calibrated."""
+    P: Floats
+    """(C, 3, 4) projections as the cameras are assumed to be placed; the third row is the axis."""
+    z: Points2
+    """(J, C, 2) pixels; 0 where there is no measurement."""
+    sigma: Floats
+    """(J, C) standard deviations of the pixels [px]; 1 where there is no measurement."""
+    ok: Bools
+    """(J, C) whether there is a measurement."""
+    belief: Floats
+    """(J, C) probability that the measurement is no outlier."""
+    views: Floats
+    """(C, N_VIEW, LANES) the measurements as `tree.search` reads them."""
+    images: Floats
+    """(C, N_IMAGE, LANES) the joints in each camera where `tree.search` linearised last."""
+    joint_views: Floats
+    """(C, 8) scratch of `tree.learning` for one joint."""
+
+
+class JointPixel(NamedTuple):
+    """The predicted pixel of a joint in one camera."""
+
+    u: float
+    """Column [px]."""
+    v: float
+    """Row [px]."""
+    depth: float
+    """Distance along the axis [m]; without meaning as a pixel at NEAREST_DEPTH_M or less."""
+    spread: float
+    """Mean variance of a coordinate of the pixel [px^2]."""
+
+
 @kernel
-def is_measurement(u, v, belief, sigma):
-    """Whether a pixel, its confidence and its standard deviation are a measurement."""
+def is_measurement(u: float, v: float, confidence: float, sigma: float) -> bool:
+    """Return whether a detection is a measurement.
+
+    Args:
+        u: column of its pixel [px].
+        v: row of its pixel [px].
+        confidence: its confidence.
+        sigma: standard deviation of each coordinate [px].
+    """
     return (
         abs(u) < FURTHEST_PX
         and abs(v) < FURTHEST_PX
-        and 0.0 < belief <= 1.0 + 1e-6
+        and 0.0 < confidence <= 1.0 + 1e-6
         and 0.0 < sigma < FURTHEST_PX
     )
 
 
-class Frame(NamedTuple):
-    """What C cameras measured of one worker, and what an update makes of it; filled in place."""
-
-    cameras: Any
-    """(C,) records of `lines_of_sight.CAMERA`, as the rig has them."""
-    P: Floats
-    """(C, 3, 4) projections, as the cameras are believed to hang; the third row is the axis."""
-    z: Floats
-    """(J, C, 2) pixels; 0 where there is no measurement."""
-    sigma: Floats
-    """(J, C) [px]; 1 where there is none."""
-    ok: Bools
-    """(J, C) whether there is one."""
-    belief: Floats
-    """(J, C) how far it is believed to be no outlier."""
-    views: Floats
-    """(C, N_VIEW, LANES) the measurements as `tree.search` takes them."""
-    images: Floats
-    """(C, N_IMAGE, LANES) the joints in each camera where `tree.search` linearised last."""
-    looks: Floats
-    """(C, 8) what each camera says of one joint, for `learning`."""
-
-
 @kernel(makes_arrays=True)
-def make_frame(cameras):
-    """Return room for the measurements of one worker by `cameras`, (C,) records of `CAMERA`."""
+def make_frame(cameras: Records1[Camera]) -> Frame:
+    """Return room for the measurements of one worker by cameras (C,)."""
     n = len(cameras)
     return Frame(
         cameras=cameras,
-        P=cameras.P.copy(),
+        P=cameras["P"].copy(),
         z=np.empty((N_JOINTS, n, 2)),
         sigma=np.empty((N_JOINTS, n)),
         ok=np.empty((N_JOINTS, n), np.bool_),
         belief=np.empty((N_JOINTS, n)),
         views=np.zeros((n, N_VIEW, LANES)),
         images=np.zeros((n, N_IMAGE, LANES)),
-        looks=np.empty((n, 8)),
+        joint_views=np.empty((n, 8)),
     )
 
 
 @kernel
-def read_worker(measured, b, w, scale, frame):
-    """Put what was measured of worker w of environment b into `frame`; whether there is anything.
+def read_worker(measured: KeypointArrays, b: int, w: int, sigma_scale: float, frame: Frame) -> bool:
+    """Fill in the measurements of one worker, and return whether there are any.
 
-    `measured` is as `arrays_of` gives it, `scale` a factor on sigma. Missing measurements get
-    pixel 0 and sigma 1, so that no NaN enters the arithmetic.
+    Missing measurements get pixel 0 and sigma 1, so that no NaN enters the arithmetic.
+
+    Args:
+        measured: detections of all workers.
+        b: index of the environment.
+        w: index of the worker.
+        sigma_scale: factor on the standard deviations.
+        frame: room for the measurements.
     """
-    px, confidence, sigma_px = measured
+    px, confidence, sigma_px = measured.px, measured.confidence, measured.sigma_px
     z, sigma, ok = frame.z, frame.sigma, frame.ok
     any_ok = False
     for c in range(px.shape[1]):
         for j in range(px.shape[3]):
             u, v = px[b, c, w, j, 0], px[b, c, w, j, 1]
-            s, belief = sigma_px[b, c, w, j], confidence[b, c, w, j]
-            good = is_measurement(u, v, belief, s)
+            std = sigma_px[b, c, w, j]
+            good = is_measurement(u, v, confidence[b, c, w, j], std)
             ok[j, c] = good
             any_ok |= good
             z[j, c, 0] = u if good else 0.0
             z[j, c, 1] = v if good else 0.0
-            sigma[j, c] = max(s * scale, MIN_SIGMA_PX) if good else 1.0
+            sigma[j, c] = max(std * sigma_scale, MIN_SIGMA_PX) if good else 1.0
     return any_ok
 
 
 @kernel(fastmath=_REORDER)
-def pixel_spread(p, u, v, depth, cov):
-    """Mean variance of a coordinate of the pixel [px^2] of a point with covariance `cov` (3+, 3+).
+def pixel_spread(p: Floats, u: float, v: float, depth: float, cov: Floats) -> float:
+    """Return the mean variance of a coordinate of the pixel of an uncertain point [px^2].
 
-    `p` is the (3, 4) camera, (u, v, depth) where it sees the point.
+    Args:
+        p: (3, 4) projection of the camera.
+        u: column of the point's pixel [px].
+        v: row of the point's pixel [px].
+        depth: depth of the point in the camera [m].
+        cov: (3+, 3+) covariance of the point [m^2].
     """
     near = 1.0 / depth
     a0, b0 = (p[0, 0] - u * p[2, 0]) * near, (p[1, 0] - v * p[2, 0]) * near
@@ -142,22 +207,36 @@ def pixel_spread(p, u, v, depth, cov):
 
 
 @kernel
-def project_joint(p, mean, cov):
-    """Return (u, v, depth, spread): the pixel of a joint (3+,) and its mean variance [px^2].
+def project_joint(p: Floats, mean: Floats, cov: Floats) -> JointPixel:
+    """Return the predicted pixel of a joint.
 
-    `p` is the (3, 4) camera. A depth of NEAREST_DEPTH_M or less means that there is no pixel.
+    Args:
+        p: (3, 4) projection of the camera.
+        mean: (3+,) position of the joint [m].
+        cov: (3+, 3+) its covariance [m^2].
     """
     x, y, z = mean[0], mean[1], mean[2]
     depth = p[2, 0] * x + p[2, 1] * y + p[2, 2] * z + p[2, 3]
     u = (p[0, 0] * x + p[0, 1] * y + p[0, 2] * z + p[0, 3]) / depth
     v = (p[1, 0] * x + p[1, 1] * y + p[1, 2] * z + p[1, 3]) / depth
-    return u, v, depth, pixel_spread(p, u, v, depth, cov)
+    return JointPixel(u, v, depth, pixel_spread(p, u, v, depth, cov))
 
 
 @kernel
-def supports(camera, z, sigma, gate_sigma, point, cov):
-    """Whether a pixel lies where a joint with this mean and covariance may be seen."""
-    u, v, depth, spread = project_joint(camera, point, cov)
+def is_consistent(
+    camera: Floats, z: Points2, sigma: float, gate_sigma: float, mean: Floats, cov: Floats
+) -> bool:
+    """Return whether a measurement is within the gate around the predicted pixel of a joint.
+
+    Args:
+        camera: (3, 4) projection.
+        z: (2,) measured pixel.
+        sigma: standard deviation of each coordinate [px].
+        gate_sigma: the gate, in standard deviations.
+        mean: (3+,) position of the joint [m].
+        cov: (3+, 3+) its covariance [m^2].
+    """
+    u, v, depth, spread = project_joint(camera, mean, cov)
     if not depth > NEAREST_DEPTH_M:
         return False
     variance = sigma * sigma + spread
@@ -165,30 +244,60 @@ def supports(camera, z, sigma, gate_sigma, point, cov):
 
 
 @kernel
-def read_for_hypothesis(tree, views, learnt, measured, at, s, frame):
-    """Read a worker's measurements as one hypothesis takes them; whether it is the mirrored one.
+def read_for_hypothesis(
+    tree: Tree,
+    views: Records1[View],
+    noise: Records2[Noise],
+    measured: KeypointArrays,
+    b: int,
+    w: int,
+    settings: Settings,
+    frame: Frame,
+) -> bool:
+    """Fill in the measurements of one worker as one hypothesis reads them.
 
-    `learnt` (J, C) and `views` (C,) are its records of `NOISE` and `VIEW`: standard deviations are
-    scaled by what it has learnt, and cameras that exchange left and right are corrected.
+    The standard deviations are scaled by the noise that the hypothesis has learnt, and cameras that
+    exchange left and right are corrected.
+
+    Args:
+        tree: the body of the hypothesis.
+        views: (C,) its memory of each camera, updated in place.
+        noise: (J, C) its measurement noise.
+        measured: detections of all workers.
+        b: index of the environment.
+        w: index of the worker.
+        settings: settings of the estimator.
+        frame: room for the measurements.
+
+    Returns:
+        Whether the body is the mirrored one: it has its sides exchanged, not the cameras.
     """
-    read_worker(measured, at[0], at[1], s.sigma_scale, frame)
-    scale_sigma(learnt, frame.sigma)
-    return undo_swaps(tree, frame, views, s)
+    read_worker(measured, b, w, settings.sigma_scale, frame)
+    scale_sigma(noise, frame.sigma)
+    return undo_swaps(tree, frame, views, settings)
 
 
 @kernel
-def scale_sigma(learnt, sigma):
-    """Multiply sigma (J, C) by the roots of the learnt factors (J, C), in place."""
+def scale_sigma(noise: Records2[Noise], sigma: Floats) -> None:
+    """Multiply standard deviations (J, C) by the roots of the learnt factors (J, C), in place."""
     for j in range(len(sigma)):
         for c in range(sigma.shape[1]):
-            sigma[j, c] *= math.sqrt(learnt[j, c].factor)
+            sigma[j, c] *= math.sqrt(noise[j, c].factor)
 
 
 @kernel
-def undo_swaps(tree, frame, views, s):
-    """Mirror measurements of cameras that are probably swapped, in place.
+def undo_swaps(tree: Tree, frame: Frame, views: Records1[View], settings: Settings) -> bool:
+    """Mirror the measurements of cameras that probably exchange left and right, in place.
 
-    Returns whether the body has its sides exchanged instead, as all of several cameras show it.
+    Args:
+        tree: the body of the hypothesis.
+        frame: measurements of the worker.
+        views: (C,) memory of each camera, updated in place.
+        settings: settings of the estimator.
+
+    Returns:
+        Whether the body has its sides exchanged instead, because all of several cameras agree on
+        that.
     """
     n_seeing, n_swapped, against = 0, 0, 0.0
     for c in range(len(views)):
@@ -196,17 +305,18 @@ def undo_swaps(tree, frame, views, s):
         for j in range(len(_MIRROR)):
             sees |= frame.ok[j, c]
         if not sees:
-            view.blind += 1
+            view.unseen_updates += 1
             continue
-        back = view.blind > _BLIND_UPDATES
-        view.believed = _BELIEVED_UPDATES if back else max(view.believed - 1, 0)
-        view.blind = 0
+        returns = view.unseen_updates > _UNSEEN_UPDATES
+        view.trusted_updates = _TRUSTED_UPDATES if returns else max(view.trusted_updates - 1, 0)
+        view.unseen_updates = 0
         n_seeing += 1
-        if view.believed > 0:
+        if view.trusted_updates > 0:
             view.swap_chance = _LEAST_CHANCE
             continue
-        prior = view.swap_chance * (1.0 - s.swap_ends) + (1.0 - view.swap_chance) * s.swap_begins
-        evidence = _swap_evidence(tree, frame, c, s.inlier_odds)
+        stays = view.swap_chance * (1.0 - settings.swap_ends)
+        prior = stays + (1.0 - view.swap_chance) * settings.swap_begins
+        evidence = _weigh_swap(tree, frame, c, settings.inlier_odds)
         odds = math.log(prior / (1.0 - prior)) + evidence
         chance = min(max(1.0 / (1.0 + math.exp(-odds)), _LEAST_CHANCE), 1.0 - _LEAST_CHANCE)
         view.swap_chance = chance
@@ -217,14 +327,21 @@ def undo_swaps(tree, frame, views, s):
         for c in range(len(views)):
             views[c].swap_chance = _LEAST_CHANCE
     for c in range(len(views)):
-        if views[c].swap_chance > 0.5 and views[c].blind == 0:
+        if views[c].swap_chance > 0.5 and views[c].unseen_updates == 0:
             mirror(c, frame.z, frame.sigma, frame.ok)
     return mirrored
 
 
 @kernel
-def _swap_evidence(tree, frame, c, inlier_odds):
-    """Log-likelihood ratio of camera c being swapped, bounded."""
+def _weigh_swap(tree: Tree, frame: Frame, c: int, inlier_odds: float) -> float:
+    """Return the bounded log-likelihood ratio of an exchange of left and right by one camera.
+
+    Args:
+        tree: the body of the hypothesis.
+        frame: measurements of the worker.
+        c: index of the camera.
+        inlier_odds: odds of a perfect inlier, times the variance of its pixel [px^2].
+    """
     camera, body, cov = frame.P[c], tree.body, tree.cov
     z, sigma, ok = frame.z, frame.sigma, frame.ok
     swapped, right = 1.0, 1.0  # products: no term is more than 1e10
@@ -236,22 +353,43 @@ def _swap_evidence(tree, frame, c, inlier_odds):
         if not depth > NEAREST_DEPTH_M:
             continue
         if ok[m, c]:
-            swapped *= _mixture(z[m, c, 0] - u, z[m, c, 1] - v, sigma[m, c], spread, inlier_odds)
+            swapped *= _mixture_density(
+                z[m, c, 0] - u, z[m, c, 1] - v, sigma[m, c], spread, inlier_odds
+            )
         if ok[j, c]:
-            right *= _mixture(z[j, c, 0] - u, z[j, c, 1] - v, sigma[j, c], spread, inlier_odds)
+            right *= _mixture_density(
+                z[j, c, 0] - u, z[j, c, 1] - v, sigma[j, c], spread, inlier_odds
+            )
     return min(max(math.log(swapped / right), -_MOST_EVIDENCE), _MOST_EVIDENCE)
 
 
 @kernel(fastmath=_REORDER)
-def _mixture(du, dv, sigma, spread, inlier_odds):
-    """Density of a detection over that of an outlier, but for a factor that pairs share."""
+def _mixture_density(
+    du: float, dv: float, sigma: float, spread: float, inlier_odds: float
+) -> float:
+    """Return the density of a detection relative to an outlier's, up to a common factor.
+
+    Args:
+        du: residual of the column [px].
+        dv: residual of the row [px].
+        sigma: standard deviation of each coordinate [px].
+        spread: variance of the predicted pixel [px^2].
+        inlier_odds: odds of a perfect inlier, times the variance of its pixel [px^2].
+    """
     near = 1.0 / (sigma * sigma + spread)
     return 1.0 + inlier_odds * near * math.exp(-0.5 * (du * du + dv * dv) * near)
 
 
 @kernel
-def mirror(c, z, sigma, ok):
-    """Exchange left and right of camera c, in place."""
+def mirror(c: int, z: Points2, sigma: Floats, ok: Bools) -> None:
+    """Exchange left and right in the measurements of one camera, in place.
+
+    Args:
+        c: index of the camera.
+        z: (J, C, 2) pixels.
+        sigma: (J, C) standard deviations [px].
+        ok: (J, C) whether there is a measurement.
+    """
     for j in range(len(_MIRROR)):
         m = _MIRROR[j]
         if m > j:

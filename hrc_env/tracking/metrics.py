@@ -1,82 +1,122 @@
-"""How far tracks are from the bodies that they follow, and whether they take one for another."""
+"""Errors of tracks against the true bodies, and how often tracks change from one worker to another.
+
+All functions compare belief with truth, so only metrics and infos may use them.
+"""
 
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from hrc_env.core.declared import Records1, Records2, dtype_of, make_records
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Bools, Ints, Points3, Records
+from hrc_env.core.typing import Bools, Floats, Ints, Points3
 from hrc_env.geometry.assignment import assign_rows
 
 SAME_M = 0.5
-"""A track follows a worker while their joints are this near to each other on average [m]: the gate
-that CLEAR MOT takes for people (Bernardin and Stiefelhagen 2008, doi:10.1155/2008/246309)."""
-IDENTITY = np.dtype(
-    [
-        ("track", "i8"),  # the slot with which the worker was matched last; -1: with none yet
-        ("matched", "?"),  # whether in the last step
-        ("switches", "i8"),  # how often it was another slot than the time before
-        ("counted", "i8"),  # steps in which the worker was there, and those of the slot's track
-    ],
-    align=True,
-)
-"""What an episode has known of one worker and of the slot of the same number."""
-TRACKING = np.dtype(
-    [
-        ("mpjpe_m", "f8"),  # mean error of tracks from the workers whom they fit best [m]
-        ("mpjpe_by_identity_m", "f8"),  # of workers from the tracks they were matched with last
-        ("lost", "f8"),  # 1: a worker is there who has no track
-        ("id_switches", "f8"),  # in this episode so far, all workers together
-        ("idf1", "f8"),  # of this episode so far
-    ],
-    align=True,
-)
-"""Errors of one environment's step; NaN where there is nothing to compare."""
+"""Mean distance of joints within which a track follows a worker [m]: the gate that CLEAR MOT uses
+for people (Bernardin and Stiefelhagen 2008, doi:10.1155/2008/246309)."""
+
+
+class Identity:
+    """The tracking history of one worker in an episode, and of the slot of the same number."""
+
+    track: int
+    """Slot with which the worker was matched last; -1 before the first match."""
+    matched: bool
+    """Whether the worker was matched in the last step."""
+    switches: int
+    """Number of matches with another slot than the time before."""
+    counted: int
+    """Number of steps in which the worker was present, plus those in which the slot had a track."""
+
+
+IDENTITY = dtype_of(Identity)
+
+
+class TrackingError:
+    """The errors of one environment's step; NaN where there is nothing to compare."""
+
+    mpjpe_m: float
+    """Mean error of tracks from the workers that they fit best [m]."""
+    mpjpe_by_identity_m: float
+    """Mean error of workers from the tracks with which they were matched last [m]."""
+    lost: float
+    """1 if fewer workers are tracked than present, else 0."""
+    id_switches: float
+    """Number of identity switches of all workers since the episode began."""
+    idf1: float
+    """IDF1 since the episode began."""
+
+
+TRACKING = dtype_of(TrackingError)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Identities:
-    """Who was whose track in the episodes so far."""
+    """The matches of workers and tracks since the episodes began."""
 
-    workers: Records
-    """(B, W) of `IDENTITY`."""
+    workers: Records2[Identity]
+    """(B, W) history of each worker."""
     near: Ints
-    """(B, W, W) steps in which worker and track were within `SAME_M`."""
+    """(B, W, W) number of steps in which worker and track were within `SAME_M`."""
 
 
-def no_identities(batch: int, n_workers: int) -> Identities:
-    """Of episodes that begin."""
-    workers = np.zeros((batch, n_workers), IDENTITY)
-    workers["track"] = -1
+def make_identities(batch: int, n_workers: int) -> Identities:
+    """Return the identities at the start of episodes: no worker is matched."""
+    workers = make_records(Identity, (batch, n_workers))
+    workers["track"][:] = -1
     return Identities(workers, np.zeros((batch, n_workers, n_workers), np.int64))
 
 
-def tracking_error(
+def measure_errors(
     estimate: PoseEstimate, joints_world: Points3, present: Bools, identities: Identities
-) -> Records:
-    """Return (B,) of `TRACKING` for bodies (B, W, J, 3) that are `present` (B, W), and advance the
-    `identities` by a step.
+) -> Records1[TrackingError]:
+    """Compare tracks with the true bodies, and advance the identities by a step.
 
-    A match of worker and track lasts while they are within `SAME_M`; then as many others as
-    possible are matched within it, at the least sum of distances (CLEAR MOT). A worker who is
-    matched with another slot than the last time has switched: two who are exchanged are two
-    switches. IDF1 is 2 m / n: m steps in which workers and tracks were within `SAME_M`, each worker
-    with one slot for the whole episode, in the best way; n steps of workers and of tracks together
-    (Ristani et al. 2016, doi:10.1007/978-3-319-48881-3_2).
+    A match of worker and track lasts while they are within `SAME_M`. Then as many of the others as
+    possible are matched within that distance, at the least sum of distances (CLEAR MOT). A worker
+    matched with another slot than the last time has switched, so an exchange of two workers counts
+    as two switches. IDF1 is 2 m / n. Here m is the number of steps in which workers and
+    tracks were within `SAME_M`, each worker with one slot for the whole episode, in the best
+    assignment; n is the number of steps of workers and of tracks together (Ristani et al. 2016,
+    doi:10.1007/978-3-319-48881-3_2).
+
+    Args:
+        estimate: (B, W, ...) tracks.
+        joints_world: (B, W, J, 3) true joints [m].
+        present: (B, W) whether the worker is present.
+        identities: matches since the episodes began, changed in place.
+
+    Returns:
+        (B,) errors of each environment.
     """
-    found = np.empty(len(present), TRACKING)
-    _tracking_error(
-        estimate.mean_world, joints_world, estimate.tracked, present,
-        identities.workers, identities.near, found,
-    )  # fmt: skip
-    return found
+    errors = make_records(TrackingError, len(present))
+    _measure_errors(
+        estimate.mean_world,
+        joints_world,
+        estimate.tracked,
+        present,
+        identities.workers,
+        identities.near,
+        errors,
+    )
+    return errors
 
 
 @kernel(makes_arrays=True)
-def _tracking_error(mean_world, joints_world, tracked, there, workers, near, found):
+def _measure_errors(
+    mean_world: Points3,
+    joints_world: Points3,
+    tracked: Bools,
+    present: Bools,
+    workers: Records2[Identity],
+    near: Ints,
+    errors: Records1[TrackingError],
+) -> None:
+    """Fill in the errors (B,); the other arguments are those of `measure_errors`."""
     n = tracked.shape[1]
     off_m, cost, chosen = np.empty((n, n)), np.empty((n, n)), np.empty(n, np.int64)
     for b in range(len(tracked)):
@@ -84,60 +124,84 @@ def _tracking_error(mean_world, joints_world, tracked, there, workers, near, fou
             for k in range(n):
                 off_m[w, k] = np.inf
                 if tracked[b, k]:
-                    off_m[w, k] = _joint_error(mean_world[b, k], joints_world[b, w]) / N_JOINTS
-        found[b].lost = tracked[b].sum() < there[b].sum()
-        found[b].mpjpe_m = _best_fit(off_m, tracked[b], cost, chosen)
+                    off_m[w, k] = _sum_distances(mean_world[b, k], joints_world[b, w]) / N_JOINTS
+        errors[b].lost = tracked[b].sum() < present[b].sum()
+        errors[b].mpjpe_m = _match_tracks(off_m, tracked[b], cost, chosen)
         for w in range(n):
-            workers[b, w].counted += there[b, w] + tracked[b, w]
+            workers[b, w].counted += present[b, w] + tracked[b, w]
             for k in range(n):
-                off_m[w, k] = off_m[w, k] if there[b, w] else np.inf
+                off_m[w, k] = off_m[w, k] if present[b, w] else np.inf
                 near[b, w, k] += off_m[w, k] <= SAME_M
-        found[b].mpjpe_by_identity_m = _own_error(off_m, workers[b], cost, chosen)
-        found[b].id_switches = workers[b].switches.sum()
-        found[b].idf1 = _idf1(near[b], workers[b], cost, chosen)
+        errors[b].mpjpe_by_identity_m = _match_workers(off_m, workers[b], cost, chosen)
+        errors[b].id_switches = workers[b]["switches"].sum()
+        errors[b].idf1 = _compute_idf1(near[b], workers[b], cost, chosen)
 
 
 @kernel
-def _best_fit(off_m, tracked, cost, whom):
-    """Mean distance of tracks from workers, each from another one, in the best way."""
+def _match_tracks(off_m: Floats, tracked: Bools, cost: Floats, chosen: Ints) -> float:
+    """Return the mean distance of tracks from workers in the best assignment; NaN without tracks.
+
+    Args:
+        off_m: (W, W) distance of each worker from each track [m].
+        tracked: (W,) the slots that have a track.
+        cost: (W, W) scratch.
+        chosen: (W,) scratch.
+    """
     count, total = 0, 0.0
     for k in range(len(tracked)):
         if tracked[k]:
             for w in range(len(tracked)):
                 cost[count, w] = off_m[w, k]
             count += 1
-    assign_rows(cost[:count], whom)
+    assign_rows(cost[:count], chosen)
     for row in range(count):
-        total += cost[row, whom[row]]
+        total += cost[row, chosen[row]]
     return total / count if count else np.nan
 
 
 @kernel
-def _own_error(off_m, workers, cost, chosen):
-    """Keep matches within the gate, and match who is left; mean distance of workers from the tracks
-    that they were matched with last."""
+def _match_workers(off_m: Floats, workers: Records1[Identity], cost: Floats, chosen: Ints) -> float:
+    """Keep matches within the gate and match the other workers with the other tracks.
+
+    Args:
+        off_m: (W, W) distance of each worker from each track [m]; infinite without either.
+        workers: (W,) history of each worker, changed in place.
+        cost: (W, W) scratch.
+        chosen: (W,) scratch.
+
+    Returns:
+        The mean distance of workers from the tracks that they were matched with last [m]; NaN
+        without any.
+    """
     count, total = 0, 0.0
     for w in range(len(workers)):
-        me = workers[w]
+        worker = workers[w]
         for k in range(len(workers)):
             cost[w, k] = off_m[w, k] if off_m[w, k] <= SAME_M else 1e3  # more than all within it
-        if me.matched and off_m[w, me.track] <= SAME_M:
-            cost[w, me.track] = -1e6
+        if worker.matched and off_m[w, worker.track] <= SAME_M:
+            cost[w, worker.track] = -1e6
     assign_rows(cost, chosen)
     for w in range(len(workers)):
-        me, k = workers[w], chosen[w]
-        me.matched = off_m[w, k] <= SAME_M
-        if me.matched:
-            me.switches += 0 <= me.track != k
-            me.track = k
-        if me.track >= 0 and off_m[w, me.track] != np.inf:
-            count, total = count + 1, total + off_m[w, me.track]
+        worker, k = workers[w], chosen[w]
+        worker.matched = off_m[w, k] <= SAME_M
+        if worker.matched:
+            worker.switches += 0 <= worker.track != k
+            worker.track = k
+        if worker.track >= 0 and off_m[w, worker.track] != np.inf:
+            count, total = count + 1, total + off_m[w, worker.track]
     return total / count if count else np.nan
 
 
 @kernel
-def _idf1(near, workers, cost, chosen):
-    """Of so many steps in which each worker was near each slot's track."""
+def _compute_idf1(near: Ints, workers: Records1[Identity], cost: Floats, chosen: Ints) -> float:
+    """Return the IDF1 of an episode; NaN without workers and tracks.
+
+    Args:
+        near: (W, W) number of steps in which worker and track were within `SAME_M`.
+        workers: (W,) history of each worker.
+        cost: (W, W) scratch.
+        chosen: (W,) scratch.
+    """
     for w in range(len(workers)):
         for k in range(len(workers)):
             cost[w, k] = -near[w, k]
@@ -150,8 +214,8 @@ def _idf1(near, workers, cost, chosen):
 
 
 @kernel
-def _joint_error(mean_world, joints_world):
-    """Sum over joints of the distances between two bodies [m]."""
+def _sum_distances(mean_world: Points3, joints_world: Points3) -> float:
+    """Return the sum of the distances between the joints (J, 3) of two bodies [m]."""
     total = 0.0
     for j in range(mean_world.shape[0]):
         squared = 0.0

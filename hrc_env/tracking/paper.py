@@ -1,57 +1,64 @@
 """The paper's Algorithm 1, EstimatePose(N, M, C), as printed, and nothing else.
 
-"Line" in a comment is a line of that listing. What the listing leaves open is read so:
+"Line" in a comment is a line of that listing. Where the listing leaves a choice, it is read as
+follows:
 
-- every joint has its own cloud (line 1 speaks of "the i-th joint"; one cloud for all 45
-  coordinates does not work with any number of particles that one can afford);
-- clouds begin uniform over the place (line 1, `place_of`) and are never begun again: who comes
-  back elsewhere is reached by line 7 alone;
-- a step of the simulation is one pass of the loop of line 2: line 7 happens in `predict`,
-  lines 8 to 17 in `update`; more passes over the same frames (`n_iterations`) repeat both;
-- the likelihoods of cameras are multiplied (line 13), that of one camera is a Gaussian of the
-  pixel distance with the detector's sigma; a joint that a camera does not see multiplies by 1;
-- the estimate (line 19) is the mean and the covariance of the resampled cloud.
+- Every joint has its own cloud of particles. Line 1 speaks of "the i-th joint", and one cloud for
+  all 45 coordinates does not work with any affordable number of particles.
+- Clouds start uniform over a volume (line 1, `find_place`) and never restart: a worker who comes
+  back elsewhere is reached by line 7 alone.
+- A step of the simulation is one pass of the loop of line 2. Line 7 happens in `predict`, lines 8
+  to 17 in `update`; more passes over the same frames (`n_iterations`) repeat both.
+- The likelihoods of the cameras are multiplied (line 13). That of one camera is a Gaussian of the
+  pixel distance with the detector's sigma, or 1 for a joint that the camera does not see.
+- The estimate (line 19) is the mean and the covariance of the resampled cloud.
 
-What a report needs besides moves no particle: a joint's age is the time since a detection lay where
-its cloud may be seen; a worker is `tracked` once `acquire_min_joints` joints have age 0, while one
-age is below `lost_after_s`; velocities, 0 until then, are filtered differences of the means.
-`paper_restarts` has what the listing lacks.
+The other fields of a report move no particle. A joint's age is the time since a detection was
+consistent with its cloud. A worker becomes `tracked` once `acquire_min_joints` joints have age 0,
+and stays so while one age is below `lost_after_s`. Velocities are filtered differences of the
+means, 0 before. `paper_restarts` adds the steps that the listing lacks.
 """
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from hrc_env.core.declared import Records2
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Bools, Floats, Ints, Rngs
+from hrc_env.core.typing import Bools, Covariances3, Floats, Ints, Points3, Rngs, Tensor
 from hrc_env.geometry.lines_of_sight import cameras_of
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
 from hrc_env.tracking.config import PaperConfig
 from hrc_env.tracking.forecast import forecast
-from hrc_env.tracking.measurements import Frame, arrays_of, make_frame, read_worker, supports
-from hrc_env.tracking.tracks import forget, make_tracks, report
+from hrc_env.tracking.measurements import (
+    Frame,
+    get_keypoint_arrays,
+    is_consistent,
+    make_frame,
+    read_worker,
+)
+from hrc_env.tracking.tracks import Track, make_tracks, report_tracks, reset_tracks
 from hrc_env.tracking.tree.update import count_conflict
 
 BEHIND = -1e12
-"""Log-likelihood of a particle behind the camera that saw the joint: the last to be chosen."""
+"""Log-likelihood of a particle behind the camera that saw the joint, so that it is chosen last."""
 HEIGHTS_M = (0.0, 2.2)
-"""Between these joints are expected where `PaperConfig.place_m` does not say."""
+"""Bounds of z of the first particles, unless `PaperConfig.place_m` is given [m]."""
 _NARROWEST_M = 1.0
-"""Cameras that hang nearer together along an axis do not say how long the place is."""
+"""Least extent of the cameras along an axis that bounds the first particles [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class PaperState:
-    """The clouds, and what is said of them."""
+    """The clouds of particles, and the tracks that are reported."""
 
-    tracks: Any
-    """(B, W) records of `tracks.TRACK`."""
+    tracks: Records2[Track]
+    """(B, W) tracks."""
     particles: Floats
-    """(B, W, J, 3, M) [m]."""
+    """(B, W, J, 3, M) positions of the particles in the world frame [m]."""
     elapsed_s: Floats
     """(B,) time since the last update [s]."""
 
@@ -61,11 +68,14 @@ class PaperEstimator:
     """Algorithm 1 for every worker; see `tracking.estimators.Estimator`."""
 
     P: Floats
+    """(C, 3, 4) projections from the world [m] to pixels."""
     ctrl_dt: float
+    """Usual time between two updates [s]."""
     config: PaperConfig
+    """Settings of the algorithm."""
 
     def init(self, batch: int, n_workers: int) -> PaperState:
-        """Workers whom nobody has seen; `reset` draws their clouds anew."""
+        """Return the state before any detection; `reset` draws new clouds."""
         shape = (batch, n_workers, N_JOINTS, 3, self.config.n_particles)
         tracks = make_tracks(batch, n_workers, self.config)
         state = PaperState(tracks, np.zeros(shape), np.zeros(batch))
@@ -73,87 +83,119 @@ class PaperEstimator:
         return state
 
     def reset(self, state: PaperState, ids: Ints, rngs: Rngs) -> None:
-        """Line 1, initialize_particle(M): clouds all over the place, in environments `ids`."""
-        forget(state.tracks, ids, self.config)
+        """Draw uniform clouds for environments `ids` (line 1, initialize_particle(M))."""
+        reset_tracks(state.tracks, ids, self.config)
         state.elapsed_s[ids] = 0.0
-        place = place_of(self.P, self.config)
-        for b in ids:
+        place = find_place(self.P, self.config)
+        for b in map(int, ids):
             drawn = rngs[b].random(state.particles.shape[1:])
             state.particles[b] = place[:, :1] + np.diff(place) * drawn
-            for track, particles in zip(state.tracks[b], state.particles[b], strict=True):
-                moments(particles, track["mean_world"], track["cov_world"])
+            mean, cov = state.tracks["mean_world"], state.tracks["cov_world"]
+            for w in range(state.tracks.shape[1]):
+                compute_moments(state.particles[b, w], mean[b, w], cov[b, w])
 
     def predict(self, state: PaperState, dt_s: float, rngs: Rngs) -> None:
-        """Line 7."""
+        """Move the particles and count ages up (line 7)."""
         self.walk(state, np.ones_like(state.tracks["tracked"]), dt_s, rngs)
         age_s = state.tracks["age_s"]
         age_s[...] = np.minimum(age_s + dt_s, self.config.max_age_s)
         state.tracks["tracked"] &= (age_s < self.config.lost_after_s - 1e-9).any(-1)
 
     def update(self, state: PaperState, keypoints: Keypoints, rngs: Rngs) -> None:
-        """Lines 8 to 17."""
+        """Weight and resample the clouds by one set of frames (lines 8 to 17)."""
         batch, n_workers = state.tracks.shape
-        measured = arrays_of(keypoints, (batch, len(self.P), n_workers, N_JOINTS))
+        detections = get_keypoint_arrays(keypoints, (batch, len(self.P), n_workers, N_JOINTS))
         frame = make_frame(cameras_of(self.P))
-        for b, w in np.ndindex(state.tracks.shape):
-            read_worker(measured, b, w, self.config.sigma_scale, frame)
-            self.take(state, (b, w), frame, rngs[b])
+        for b in range(batch):
+            for w in range(n_workers):
+                read_worker(detections, b, w, self.config.sigma_scale, frame)
+                self.apply_frame(state, b, w, frame, rngs[b])
         state.elapsed_s[:] = 0.0
 
     def estimate(self, state: PaperState) -> PoseEstimate:
-        """Line 19: what is believed now."""
-        return report(state.tracks, self.config)
+        """Return the present estimate (line 19)."""
+        return report_tracks(state.tracks, self.config)
 
     def forecast(self, state: PaperState, horizon_s: float) -> PoseEstimate:
-        """What is expected in `horizon_s`; see `tracking.forecast`."""
+        """Return the estimate expected in `horizon_s` [s]; see `tracking.forecast`."""
         return forecast(self.estimate(state), horizon_s, self.config)
 
-    def walk(self, state: PaperState, who: Bools, dt_s: float, rngs: Rngs) -> None:
-        """Line 7 for workers `who` (B, W); the walk's variance, by which the estimate's covariance
-        grows, is proportional to time."""
+    def walk(self, state: PaperState, moving: Bools, dt_s: float, rngs: Rngs) -> None:
+        """Move the particles of some workers by a random walk (line 7).
+
+        The variance of the walk, by which the estimate's covariance grows, is proportional to time.
+
+        Args:
+            state: changed in place.
+            moving: (B, W) the workers to move.
+            dt_s: time that passes [s].
+            rngs: (B,) one generator for each environment.
+        """
         sigma_m = self.config.sigma_m * np.sqrt(dt_s / self.ctrl_dt)
         state.elapsed_s[:] += dt_s
-        for b, w in np.argwhere(who):
-            roll(state.particles[b, w], sigma_m, rngs[b])  # line 7
-            state.tracks["cov_world"][b, w] += sigma_m**2 * np.eye(3)
+        for b in range(len(moving)):
+            for w in np.flatnonzero(moving[b]):
+                roll(state.particles[b, w], sigma_m, rngs[b])  # line 7
+                state.tracks["cov_world"][b, w] += sigma_m**2 * np.eye(3)
 
-    def take(
-        self, state: PaperState, who: tuple[int, int], frame: Frame, rng: np.random.Generator
+    def apply_frame(
+        self, state: PaperState, b: int, w: int, frame: Frame, rng: np.random.Generator
     ) -> None:
-        """What one set of frames does to a worker: the loop of lines 2 to 18, then line 19."""
-        track, particles, config = state.tracks[who], state.particles[who], self.config
+        """Update one worker by one set of frames (the loop of lines 2 to 18, then line 19).
+
+        Args:
+            state: changed in place.
+            b: index of the environment.
+            w: index of the worker.
+            frame: detections of that worker.
+            rng: generator of that environment.
+        """
+        tracks, particles, config = state.tracks, state.particles[b, w], self.config
         for n in range(config.n_iterations):  # line 2: for n = 1 to N
             if n > 0:
                 roll(particles, config.sigma_m, rng)  # line 7, of further passes
             waits = rng.standard_exponential((N_JOINTS, particles.shape[-1] + 1))
             weigh_and_resample(frame, particles, waits)
         mean, cov = np.empty((N_JOINTS, 3)), np.empty((N_JOINTS, 3, 3))
-        moments(particles, mean, cov)  # line 19
-        elapsed_s = max(state.elapsed_s.item(who[0]), 1e-6)
-        if track["tracked"]:
-            change = (mean - track["mean_world"]) / elapsed_s - track["velocity_world"]
-            track["velocity_world"] += elapsed_s / (config.velocity_tau_s + elapsed_s) * change
-        track["mean_world"], track["cov_world"] = mean, cov
-        n_supported = note_support(track, frame, config.gate_sigma)
-        track["tracked"] |= n_supported >= config.acquire_min_joints
+        compute_moments(particles, mean, cov)  # line 19
+        elapsed_s = max(state.elapsed_s.item(b), 1e-6)
+        if tracks["tracked"][b, w]:
+            velocity = tracks["velocity_world"][b, w]
+            change = (mean - tracks["mean_world"][b, w]) / elapsed_s - velocity
+            velocity += elapsed_s / (config.velocity_tau_s + elapsed_s) * change
+        tracks["mean_world"][b, w], tracks["cov_world"][b, w] = mean, cov
+        n_supported = count_support(tracks, b, w, frame, config.gate_sigma)
+        tracks["tracked"][b, w] |= n_supported >= config.acquire_min_joints
 
 
-def place_of(P: Floats, config: PaperConfig) -> Floats:
-    """(3, 2) least and most x, y, z of the first particles [m]: as configured, else what the
-    cameras P (C, 3, 4) stand round or, along an axis on which they do not, two standard deviations
-    about the prior."""
+def find_place(P: Floats, config: PaperConfig) -> Floats:
+    """Return the bounds of x, y and z within which the first particles are drawn, (3, 2) [m].
+
+    They are those of the configuration, else those of the area that the cameras surround. Along an
+    axis on which the cameras do not, they are two standard deviations about the prior.
+
+    Args:
+        P: (C, 3, 4) projections.
+        config: settings of the algorithm.
+    """
     if config.place_m:
         return np.array(config.place_m)
-    eyes = -np.linalg.solve(P[:, :, :3], P[:, :, 3:])[:, :2, 0]
-    place = np.array([*zip(eyes.min(0), eyes.max(0), strict=True), HEIGHTS_M])
+    centres = -np.linalg.solve(P[:, :, :3], P[:, :, 3:])[:, :2, 0]
+    place = np.array([*zip(centres.min(0), centres.max(0), strict=True), HEIGHTS_M])
     for i in np.flatnonzero(np.diff(place)[:, 0] < _NARROWEST_M):
         place[i] = config.prior_mean_world[i] + 2 * config.prior_std_m * np.array([-1, 1])
     return place
 
 
 @kernel(makes_arrays=True)
-def weigh_and_resample(frame, particles, waits):
-    """Lines 8 to 17 for clouds (J, 3, M) of one worker, in place; `waits` are `multinomial`'s."""
+def weigh_and_resample(frame: Frame, particles: Points3, waits: Floats) -> None:
+    """Weight and resample the clouds of one worker (lines 8 to 17).
+
+    Args:
+        frame: detections of the worker.
+        particles: (J, 3, M) positions of the particles [m], changed in place.
+        waits: (J, M + 1) standard exponential variates, for `draw_multinomial`.
+    """
     P, z, sigma, ok = frame.P, frame.z, frame.sigma, frame.ok
     n_joints, n_cameras = ok.shape
     n_particles = particles.shape[2]
@@ -167,7 +209,7 @@ def weigh_and_resample(frame, particles, waits):
                 u, v = z[j, c, 0], z[j, c, 1]
                 add_log_likelihood(P[c], u, v, sigma[j, c], particles[j], log_weights)
         normalise(log_weights, weights)  # line 16
-        multinomial(weights, waits[j], ancestors)  # line 17
+        draw_multinomial(weights, waits[j], ancestors)  # line 17
         before[:] = particles[j]
         for i in range(3):
             for m in range(n_particles):
@@ -175,8 +217,17 @@ def weigh_and_resample(frame, particles, waits):
 
 
 @kernel(makes_arrays=True)
-def note_support(track, frame, gate_sigma):
-    """Count ages and conflicts of one worker's joints; how many of these a view supports."""
+def count_support(tracks: Records2[Track], b: int, w: int, frame: Frame, gate_sigma: float) -> int:
+    """Count the joints of one worker that a view supports, and update ages and conflicts.
+
+    Args:
+        tracks: (B, W) tracks, of which ages and conflicts of one are changed in place.
+        b: index of the environment.
+        w: index of the worker.
+        frame: detections of the worker.
+        gate_sigma: gate around the expected pixel, in standard deviations.
+    """
+    track = tracks[b, w]
     mean, cov, n_supported = track.mean_world, track.cov_world, 0
     for j in range(len(mean)):
         n_ok, n_supporting = 0, 0
@@ -184,7 +235,7 @@ def note_support(track, frame, gate_sigma):
             if frame.ok[j, c]:
                 z, sigma = frame.z[j, c], frame.sigma[j, c]
                 n_ok += 1
-                n_supporting += supports(frame.P[c], z, sigma, gate_sigma, mean[j], cov[j])
+                n_supporting += is_consistent(frame.P[c], z, sigma, gate_sigma, mean[j], cov[j])
         track.conflict[j] = count_conflict(n_ok, n_supporting, track.conflict[j])
         if n_supporting > 0:
             track.age_s[j] = 0.0
@@ -193,12 +244,19 @@ def note_support(track, frame, gate_sigma):
 
 
 def roll(particles: Floats, sigma_m: float, rng: np.random.Generator) -> None:
-    """Move every particle a Gaussian step of `sigma_m` on each axis, in place."""
+    """Move particles by Gaussian steps, in place.
+
+    Args:
+        particles: (J, 3, M) positions [m].
+        sigma_m: standard deviation of a step on each axis [m].
+        rng: generator of the steps.
+    """
     _add_scaled(particles, rng.standard_normal(particles.shape, dtype=np.float32), sigma_m)
 
 
 @kernel(makes_arrays=True)
-def _add_scaled(particles, noise, scale):
+def _add_scaled(particles: Points3, noise: Tensor, scale: float) -> None:
+    """Add `scale` [m] times `noise` (J, 3, M) to particles (J, 3, M), in place."""
     for j in range(particles.shape[0]):
         for i in range(3):
             for m in range(particles.shape[2]):
@@ -206,8 +264,14 @@ def _add_scaled(particles, noise, scale):
 
 
 @kernel(makes_arrays=True)
-def moments(particles, mean, cov):
-    """Mean (J, 3) and covariance (J, 3, 3) of unweighted clouds (J, 3, M)."""
+def compute_moments(particles: Points3, mean: Points3, cov: Covariances3) -> None:
+    """Compute the means and the covariances of unweighted clouds.
+
+    Args:
+        particles: (J, 3, M) positions [m].
+        mean: (J, 3) means [m], filled in.
+        cov: (J, 3, 3) covariances [m^2], filled in.
+    """
     n = particles.shape[2]
     for j in range(particles.shape[0]):
         for i in range(3):
@@ -221,8 +285,19 @@ def moments(particles, mean, cov):
 
 
 @kernel(makes_arrays=True)
-def add_log_likelihood(camera, u, v, sigma, particles, log_weights):
-    """Add one camera's log-likelihood of pixel (u, v) to the log-weights of particles (3, M)."""
+def add_log_likelihood(
+    camera: Floats, u: float, v: float, sigma: float, particles: Points3, log_weights: Floats
+) -> None:
+    """Add the log-likelihood of a detection in one camera to the log-weights of particles.
+
+    Args:
+        camera: (3, 4) projection.
+        u: column of the detected pixel [px].
+        v: row of the detected pixel [px].
+        sigma: standard deviation of each coordinate [px].
+        particles: (3, M) positions [m].
+        log_weights: (M,) log-weights, added to.
+    """
     for m in range(particles.shape[1]):
         expected_u, expected_v, depth = pixel_of(
             camera, particles[0, m], particles[1, m], particles[2, m]
@@ -235,8 +310,8 @@ def add_log_likelihood(camera, u, v, sigma, particles, log_weights):
 
 
 @kernel(makes_arrays=True)
-def normalise(log_weights, weights):
-    """Weights that sum to one."""
+def normalise(log_weights: Floats, weights: Floats) -> None:
+    """Fill in the weights (M,) of log-weights (M,), scaled so that they sum to one."""
     largest = log_weights.max()
     total = 0.0
     for m in range(len(log_weights)):
@@ -247,11 +322,16 @@ def normalise(log_weights, weights):
 
 
 @kernel(makes_arrays=True)
-def multinomial(weights, waits, ancestors):
-    """M independent choices `ancestors` (M,), sorted, by weights (M,) that sum to one.
+def draw_multinomial(weights: Floats, waits: Floats, ancestors: Ints) -> None:
+    """Draw M independent indices with given probabilities, sorted.
 
-    The normalised cumulative sums of `waits` (M + 1,), standard exponential variates, are M sorted
-    uniform ones (Devroye, Non-Uniform Random Variate Generation, V.3).
+    The normalised cumulative sums of M + 1 standard exponential variates are M sorted uniform
+    variates (Devroye, Non-Uniform Random Variate Generation, V.3).
+
+    Args:
+        weights: (M,) probabilities; their sum is one.
+        waits: (M + 1,) standard exponential variates.
+        ancestors: (M,) indices, filled in.
     """
     total = waits.sum()
     particle, cumulative, position = 0, weights[0], 0.0

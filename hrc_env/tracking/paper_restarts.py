@@ -1,7 +1,7 @@
-"""Algorithm 1 with what its listing lacks: it begins, is repaired and is given up as other tracks.
+"""Algorithm 1 with steps that its listing lacks: tracks start, are repaired and end as others do.
 
-A cloud begins round a triangulated point, as `tree.acquisition` finds it; a joint that two views
-have long agreed on elsewhere begins anew there; a worker whom nothing supports is lost, and the
+A cloud starts around a triangulated point, which `tree.acquisition` finds. A joint restarts where
+two views have long agreed on another place. A worker that no detection supports is lost, and the
 estimate relaxes to the prior. Between these events the clouds are those of `paper`.
 """
 
@@ -13,8 +13,8 @@ from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Ints, Rngs
 from hrc_env.tracking.measurements import Frame
 from hrc_env.tracking.paper import PaperEstimator, PaperState
-from hrc_env.tracking.settings import settings_of
-from hrc_env.tracking.tracks import forget, grow_older
+from hrc_env.tracking.settings import make_settings
+from hrc_env.tracking.tracks import age_tracks, reset_tracks
 from hrc_env.tracking.tree.acquisition import find_again, find_body
 
 
@@ -23,33 +23,43 @@ class PaperRestarts(PaperEstimator):
     """Algorithm 1 with restarts for every worker; see `tracking.estimators.Estimator`."""
 
     def reset(self, state: PaperState, ids: Ints, rngs: Rngs) -> None:
-        """Forget environments `ids`; draws nothing."""
-        forget(state.tracks, ids, self.config)
+        """Reset environments `ids` to the prior, without random numbers."""
+        reset_tracks(state.tracks, ids, self.config)
         state.elapsed_s[ids] = 0.0
 
     def predict(self, state: PaperState, dt_s: float, rngs: Rngs) -> None:
-        """Line 7 for workers with a track; count ages up, give tracks up."""
+        """Move the particles of tracked workers (line 7), count ages up and end tracks."""
         self.walk(state, state.tracks["tracked"], dt_s, rngs)
-        grow_older(state.tracks, dt_s, self.config)
+        age_tracks(state.tracks, dt_s, self.config)
 
-    def take(
-        self, state: PaperState, who: tuple[int, int], frame: Frame, rng: np.random.Generator
+    def apply_frame(
+        self, state: PaperState, b: int, w: int, frame: Frame, rng: np.random.Generator
     ) -> None:
-        """Lines 2 to 19 for a worker with a track, and what it needs; line 1 for one without."""
-        track, s, anew = state.tracks[who], settings_of(self.config), np.zeros(N_JOINTS, bool)
-        points, cov = np.empty((N_JOINTS, 3)), np.empty((N_JOINTS, 3, 3))
-        if track["tracked"]:
-            PaperEstimator.take(self, state, who, frame, rng)
-            middle = np.median(track["mean_world"], axis=0)
-            for j in np.flatnonzero(track["conflict"] >= s.conflict_frames):
-                anew[j] = find_again(frame, j, s, middle, points[j], cov[j])
-            track["age_s"][anew], track["conflict"][anew] = 0.0, 0
-        elif frame.ok.any() and find_body(frame, s, points, cov, anew):
-            track["age_s"][anew] = 0.0
-            track["tracked"], anew[:] = True, True
+        """Update one worker by one set of frames: lines 2 to 19 with restarts, or a new track.
+
+        Args:
+            state: changed in place.
+            b: index of the environment.
+            w: index of the worker.
+            frame: detections of that worker.
+            rng: generator of that environment.
+        """
+        mean, cov = state.tracks["mean_world"][b, w], state.tracks["cov_world"][b, w]
+        age_s, conflict = state.tracks["age_s"][b, w], state.tracks["conflict"][b, w]
+        settings, anew = make_settings(self.config), np.zeros(N_JOINTS, np.bool_)
+        new_mean, new_cov = np.empty((N_JOINTS, 3)), np.empty((N_JOINTS, 3, 3))
+        if state.tracks["tracked"][b, w]:
+            PaperEstimator.apply_frame(self, state, b, w, frame, rng)
+            middle = np.median(mean, axis=0)
+            for j in map(int, np.flatnonzero(conflict >= settings.conflict_frames)):
+                anew[j] = find_again(frame, j, settings, middle, new_mean[j], new_cov[j])
+            age_s[anew], conflict[anew] = 0.0, 0
+        elif frame.ok.any() and find_body(frame, settings, new_mean, new_cov, anew):
+            age_s[anew] = 0.0
+            state.tracks["tracked"][b, w], anew[:] = True, True
         if anew.any():
-            track["mean_world"][anew], track["cov_world"][anew] = points[anew], cov[anew]
-            track["velocity_world"][anew] = 0.0
-            root, n_particles = np.linalg.cholesky(cov[anew]), self.config.n_particles
+            mean[anew], cov[anew] = new_mean[anew], new_cov[anew]
+            state.tracks["velocity_world"][b, w, anew] = 0.0
+            root, n_particles = np.linalg.cholesky(new_cov[anew]), self.config.n_particles
             steps = rng.standard_normal((len(root), 3, n_particles))
-            state.particles[who][anew] = points[anew, :, None] + root @ steps
+            state.particles[b, w][anew] = new_mean[anew, :, None] + root @ steps

@@ -1,30 +1,33 @@
-"""Presence of people without a track: unknown is not absent.
+"""Presence of people without a track: a slot without a track is not yet an empty one.
 
-Absence is a statement about pieces of floor on which cameras would detect a person (`Coverage`).
-For a worker's slot without a track each piece is
+Absence is a statement about pieces of floor on which cameras would detect a person (`Coverage`). It
+rests on searches of whole images, one by a camera at a time. For a worker's slot without a track,
+each piece is
 
-- `EMPTY`: at least `LEAST_CAMERAS` cameras that see it have searched their whole images enough
-  times in a row without an untracked person, and at least that many still do;
-- `PROBABLY_EMPTY`: at least one camera that sees it has, in `SEVERAL` looks. One camera alone
-  proves no more: some 2 % of workers begin hidden from it;
-- `POSSIBLE`: the looks are too few, the cameras that see it give no images or stuck ones, no camera
-  sees it, or a camera shows an untracked person.
+- `EMPTY`: at least `LEAST_CAMERAS` cameras that see it have searched their images often enough in
+  succession without finding an untracked person, and at least that many still do;
+- `PROBABLY_EMPTY`: at least one camera that sees it has, in `SEVERAL` searches. A single camera
+  proves no more: some 2 % of workers start out hidden from it;
+- `POSSIBLE`: there were too few searches, the cameras that see the piece give no images or frozen
+  ones, no camera sees it, or a camera shows an untracked person.
 
-The slot is *absent* if every piece is empty, else *unknown*. A lost worker may hide at the last
-estimated place: no piece becomes empty until the track is back, or until that estimate is forgotten
-(`FORGOTTEN` time constants `forget_s` without a measurement) and looks find no person. Looks are
-forgotten as a track is, `lost_after_s` later.
+The slot is *absent* if every piece is empty, else *unknown*. A lost worker may be hidden at the
+last estimated place. Therefore no piece becomes empty until the worker is tracked again, or until
+that estimate is forgotten (after `FORGOTTEN` time constants `forget_s` without a measurement) and
+searches find no person. A search is forgotten like a track, after `lost_after_s`.
 """
 
 from dataclasses import dataclass, replace
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from hrc_env.core.batching import Stateful, rows, write_rows
+from hrc_env.core.declared import Records1, Records2, Records3, dtype_of, make_records
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Bools, Floats, Ints
+from hrc_env.core.typing import Bools, Floats, Ints, Points3
 from hrc_env.core.vacancy import (
     EMPTY,
     POSSIBLE,
@@ -35,40 +38,126 @@ from hrc_env.core.vacancy import (
     no_others,
 )
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.contradiction import Shown
+from hrc_env.tracking.contradiction import DetectedPoses
 
 LEAST_CAMERAS = 2
-IMAGES, SEARCHES = 8, 24
-"""Looks of all cameras together that prove absence, with full detection and by searches; a part of
-the rig needs its share. Each of 2,000 workers was in the first images of four cameras, the first
-two searches missed one of 180, and six found 400 of 400 (tests/properties holds 90 %)."""
+"""Least number of cameras that prove absence by their searches."""
+IMAGES = 8
+"""Number of searches by all cameras together that prove absence where every image is processed
+whole; a part of the rig needs its share. Each of 2,000 workers was found in the first images of
+four cameras."""
+SEARCHES = 24
+"""The same where whole images are searched now and then. The first two searches missed one worker
+of 180, and six found 400 of 400 (tests/properties guarantees 90 %)."""
 SEVERAL = 3
-"""Looks of one camera after which floor is probably empty."""
+"""Number of searches by one camera after which floor is probably empty."""
 FORGOTTEN = 3.0
-SLOT = np.dtype(
-    [
-        # whether it is known that nobody is there; whether a track was lost; time since cameras
-        # last said something about it [s]
-        ("absent", "?"), ("lost", "?"), ("blind_s", "f8"),
-        # where the worker was believed to be when a camera showed them last [m]
-        ("seen_world", "f8", (N_JOINTS, 3)),
-    ],
-    align=True,
-)  # fmt: skip
-"""What is known of one worker's slot."""
-LOOK = np.dtype([("empty", "i8"), ("since_s", "f8")], align=True)
-"""How often in a row a camera showed nobody for a slot; age of its image in which it last did."""
+"""Time without a measurement after which the place of a lost worker is forgotten, as a multiple of
+`forget_s`."""
 REPEATED = 2
-"""Looks in a row at an unexplained person before it counts: the detector takes the robot for a
-person now and then."""
+"""Number of successive images with an unexplained person before it counts; the detector
+occasionally takes the robot for a person."""
 CONTRADICTED = 6
-"""Looks in a row of several cameras at an unexplained person that contradict the calibration."""
+"""Number of successive images with an unexplained person, in several cameras, that contradict the
+calibration."""
 AGREED = 25
-"""Updates without contradiction after which tracks are believed again."""
+"""Number of updates without contradiction after which tracks are trusted again."""
+
+
+class Slot:
+    """The presence of one worker."""
+
+    absent: bool
+    """Whether it is known that no person is there."""
+    lost: bool
+    """Whether the slot had a track, which was lost."""
+    blind_s: float
+    """Time since cameras last saw the worker or found the floor empty [s]."""
+    seen_world: Annotated[Points3, (N_JOINTS, 3)]
+    """Estimated joints when a camera last saw the worker [m]; NaN if none has."""
+
+
+SLOT = dtype_of(Slot)
+
+
+class SearchCount:
+    """The searches of one camera for one slot."""
+
+    empty: int
+    """Number of successive searches that found no person for the slot."""
+    since_s: float
+    """Age of the image in which the last of these searched [s]."""
+
+
+SEARCH_COUNT = dtype_of(SearchCount)
+
+
+class PresenceArrays(NamedTuple):
+    """The arrays of `Presence` that an update changes in place."""
+
+    slots: Records2[Slot]
+    """(B, W) presence of each worker."""
+    searches: Records3[SearchCount]
+    """(B, W, C) searches of each camera for each slot."""
+    levels: Ints
+    """(B, W, G) `POSSIBLE`, `PROBABLY_EMPTY` or `EMPTY` for each group of floor."""
+    age_s: Floats
+    """(B, W) age of the oldest search behind the levels [s]."""
+    cameras: Bools
+    """(G, C) the cameras that see each group of floor; not changed."""
+
+
+class Evidence(NamedTuple):
+    """The tracks and the searches of one update of `b` environments."""
+
+    tracked: Bools
+    """(b, W) whether the worker is tracked."""
+    age_s: Floats
+    """(b, W) age of the worker's youngest joint [s]."""
+    mean_world: Points3
+    """(b, W, J, 3) estimated joints [m]."""
+    found: Floats
+    """(b, C, W, J) confidence of the detections before association with workers."""
+    assigned: Floats
+    """(b, C, W, J) confidence of the detections after association."""
+    has_strangers: Bools
+    """(b,) whether there is a person beyond the slots."""
+    searched: Bools
+    """(b, C) whether the camera searched its whole image."""
+    image_age_s: Floats
+    """(b, C) age of the camera's image [s]."""
+    enough: int
+    """Number of searches that prove absence."""
+    dt_s: float
+    """Time since the last update [s]."""
+    lost_after_s: float
+    """Time after which a search is forgotten [s]."""
+    forgotten_s: float
+    """Time after which the place of a lost worker is forgotten [s]."""
+
+
+class PresenceReport(NamedTuple):
+    """The fields of a `PoseEstimate` that an update of presence fills in."""
+
+    unknown: Bools
+    """(b, W) whether a person without a track may be there."""
+    blind_s: Floats
+    """(b, W) time since cameras last saw the worker or found the floor empty [s]."""
+    seen_world: Points3
+    """(b, W, J, 3) estimated joints when a camera last saw the worker [m]."""
+
+
+class FloorState(NamedTuple):
+    """The state of a group of floor for one slot."""
+
+    level: int
+    """`POSSIBLE`, `PROBABLY_EMPTY` or `EMPTY`."""
+    age_s: float
+    """Age of the search behind it [s]; 0 if possible."""
 
 
 @dataclass(frozen=True, slots=True)
-class Looks:
+class ImageSearches:
     """The searches of whole images in one update."""
 
     whole: Bools
@@ -76,47 +165,60 @@ class Looks:
     age_s: Floats
     """(B, C) age of the camera's image [s]."""
     enough: int
-    """The number of looks that prove absence: `IMAGES` or `SEARCHES`."""
-    shown: Shown
-    """The poses in these images, explained and not."""
+    """Number of searches that prove absence: `IMAGES` or `SEARCHES`."""
+    shown: DetectedPoses
+    """Cameras that detect poses, and those that detect unexplained ones."""
     others: Others
-    """The people beyond the slots."""
+    """Detected people beyond the slots."""
 
 
 class Presence(Stateful):
-    """The presence of people in the slots of a batch of environments."""
+    """The presence of people in the slots of a batch of environments.
 
-    CHANGES = ("slots", "looks", "levels", "age_s", "strangers", "doubt", "others")
+    Args:
+        batch: number of environments B.
+        n_workers: number of slots W in each.
+        coverage: the cameras that see each piece of floor.
+    """
+
+    CHANGES = ("slots", "searches", "levels", "age_s", "strangers", "doubt", "others")
 
     def __init__(self, batch: int, n_workers: int, coverage: Coverage) -> None:
-        """`coverage`: the cameras that see each piece of floor."""
         self.coverage, cameras = coverage, coverage.cameras
-        self.slots = np.zeros((batch, n_workers), SLOT)
-        self.looks = np.zeros((batch, n_workers, cameras.shape[1]), LOOK)
+        self.slots = make_records(Slot, (batch, n_workers))
+        """(B, W) presence of each worker."""
+        self.searches = make_records(SearchCount, (batch, n_workers, cameras.shape[1]))
+        """(B, W, C) searches of each camera for each slot."""
         self.levels = np.zeros((batch, n_workers, len(cameras)), np.int64)
+        """(B, W, G) state of each group of floor for each slot."""
         self.age_s = np.zeros((batch, n_workers))
+        """(B, W) age of the oldest search behind `levels` [s]."""
         self.strangers = np.zeros((batch, cameras.shape[1]), np.int64)
-        """(B, C) looks in a row in which a camera showed an unexplained person."""
+        """(B, C) number of successive images in which a camera showed an unexplained person."""
         self.doubt = np.zeros(batch, np.int64)
-        """(B,) updates for which no track will be believed."""
+        """(B,) number of updates for which no track will be trusted."""
         self.others = no_others(batch)
+        """The detected people beyond the slots."""
         self.forget(np.arange(batch))
 
     def forget(self, ids: Ints) -> None:
-        """Start environments `ids` again, before any look."""
-        self.slots[ids], self.looks[ids] = (False, False, 0.0, np.nan), (0, np.inf)
+        """Reset environments `ids` to their state before any search."""
+        self.slots[ids], self.searches[ids] = (False, False, 0.0, np.nan), (0, np.inf)
         self.levels[ids], self.age_s[ids], self.strangers[ids] = POSSIBLE, 0.0, 0
         self.doubt[ids] = 0
         write_rows(self.others, ids, no_others(len(ids)))
 
     def vacancy(self, ids: Ints) -> Vacancy:
-        """Return the state of the floor."""
+        """Return the state of the floor of environments `ids`."""
         others = rows(self.others, ids)
         return Vacancy(self.coverage, self.levels[ids], self.age_s[ids], others)
 
     def contradicted(self, ids: Ints) -> Bools:
-        """Return (B, C) the cameras of environments `ids` that contradict the calibration: several
-        of them have shown an unexplained person in `CONTRADICTED` looks in a row."""
+        """Return (b, C) the cameras of environments `ids` that contradict the calibration.
+
+        Several cameras contradict it once they have shown an unexplained person in `CONTRADICTED`
+        successive images.
+        """
         often = self.strangers[ids] >= CONTRADICTED
         return often & (often.sum(1, keepdims=True) >= LEAST_CAMERAS)
 
@@ -125,18 +227,19 @@ class Presence(Stateful):
         ids: Ints,
         estimate: PoseEstimate,
         found: Keypoints,
-        sorted_: Keypoints,
-        looks: Looks,
+        assigned: Keypoints,
+        searches: ImageSearches,
         dt_s: float,
         config: TrackerConfig,
     ) -> PoseEstimate:
         """Advance environments `ids` by one update.
 
         Args:
-            ids: (B,) environments, the rows of the other arguments.
-            estimate: (B, W, ...) of the tracker.
-            found, sorted_: (B, C, W, ...) detections before and after association with workers.
-            looks: the searches of whole images.
+            ids: (b,) indices of the environments, the rows of the other arguments.
+            estimate: (b, W, ...) estimate of the tracker.
+            found: (b, C, W, ...) detections before association with workers.
+            assigned: (b, C, W, ...) detections after association with workers.
+            searches: the searches of whole images.
             dt_s: time since the last update [s].
             config: times after which tracks are lost and forgotten.
 
@@ -144,89 +247,126 @@ class Presence(Stateful):
             The estimate with `unknown`, `blind_s` and `seen_world`; contradicted tracks are not
             `tracked`.
         """
-        strange = np.where(looks.shown.unexplained, self.strangers[ids] + 1, 0)
-        strange = np.where(looks.whole | looks.shown.poses, strange, self.strangers[ids])
-        self.strangers[ids], whole = strange, looks.whole & (strange < REPEATED)
+        strange = np.where(searches.shown.unexplained, self.strangers[ids] + 1, 0)
+        strange = np.where(searches.whole | searches.shown.poses, strange, self.strangers[ids])
+        self.strangers[ids] = strange
         contradicted = self.contradicted(ids).any(1)
         self.doubt[ids] = np.where(contradicted, AGREED, np.maximum(self.doubt[ids] - 1, 0))
         doubtful = self.doubt[ids] > 0
         estimate = replace(estimate, tracked=estimate.tracked & ~doubtful[:, None])
-        write_rows(self.others, ids, looks.others)
-        someone = looks.others.any | doubtful | ((strange >= REPEATED).sum(1) >= LEAST_CAMERAS)
+        write_rows(self.others, ids, searches.others)
+        several_show = (strange >= REPEATED).sum(1) >= LEAST_CAMERAS
+        evidence = Evidence(
+            tracked=estimate.tracked,
+            age_s=estimate.age_s.min(-1),
+            mean_world=estimate.mean_world,
+            found=found.confidence,
+            assigned=assigned.confidence,
+            has_strangers=searches.others.any | doubtful | several_show,
+            searched=searches.whole & (strange < REPEATED),
+            image_age_s=searches.age_s,
+            enough=searches.enough,
+            dt_s=dt_s,
+            lost_after_s=config.lost_after_s - 1e-9,
+            forgotten_s=FORGOTTEN * config.forget_s,
+        )
         shape = estimate.tracked.shape
-        unknown, blind_s = np.empty(shape, bool), np.empty(shape)
-        seen_world = np.empty_like(estimate.mean_world)
-        _update(
-            (self.slots, self.looks, self.levels, self.age_s, self.coverage.cameras), ids,
-            (estimate.tracked, estimate.age_s.min(-1), estimate.mean_world),
-            (found.confidence, sorted_.confidence, someone),
-            (whole, looks.age_s, looks.enough),
-            (dt_s, config.lost_after_s - 1e-9, FORGOTTEN * config.forget_s),
-            (unknown, blind_s, seen_world),
-        )  # fmt: skip
-        unknown |= looks.others.any[:, None]
-        return replace(estimate, unknown=unknown, blind_s=blind_s, seen_world=seen_world)
+        report = PresenceReport(
+            np.empty(shape, np.bool_), np.empty(shape), np.empty_like(estimate.mean_world)
+        )
+        arrays = (self.slots, self.searches, self.levels, self.age_s, self.coverage.cameras)
+        _update_slots(PresenceArrays(*arrays), ids, evidence, report)
+        unknown = report.unknown | searches.others.any[:, None]
+        return replace(
+            estimate, unknown=unknown, blind_s=report.blind_s, seen_world=report.seen_world
+        )
 
 
 @kernel
-def _update(known, ids, belief, seen, looked, times, out):
-    slots, looks, levels, ages, cameras = known
-    (tracked, age_s, mean), (unknown, blind, seen_world) = belief, out
+def _update_slots(
+    state: PresenceArrays, ids: Ints, evidence: Evidence, report: PresenceReport
+) -> None:
+    """Advance the slots of environments `ids`, the rows of `evidence` and `report`."""
+    tracked, age_s = evidence.tracked, evidence.age_s
     for row in range(len(ids)):
         for w in range(tracked.shape[1]):
-            slot, look, level = slots[ids[row], w], looks[ids[row], w], levels[ids[row], w]
-            people = tracked[row].sum()
-            shown = _look(look, row, w, people, seen, looked, times)
+            slot, search = state.slots[ids[row], w], state.searches[ids[row], w]
+            level = state.levels[ids[row], w]
+            shown = _count_searches(search, row, w, evidence)
             if tracked[row, w]:
-                if not slot.lost or age_s[row, w] < slot.blind_s + 0.5 * times[0]:
-                    _copy(mean[row, w], slot.seen_world)
+                if not slot.lost or age_s[row, w] < slot.blind_s + 0.5 * evidence.dt_s:
+                    _copy_points(evidence.mean_world[row, w], slot.seen_world)
                 slot.lost, slot.absent, slot.blind_s = True, False, age_s[row, w]
                 level[:] = POSSIBLE
             else:
-                if seen[2][row]:  # the last estimated place need not be theirs
+                if evidence.has_strangers[row]:  # the last estimated place need not be theirs
                     _forget_place(slot)
-                ages[ids[row], w] = _search(slot, look, level, cameras, shown, looked[2], times)
+                state.age_s[ids[row], w] = _judge_floor(
+                    slot, search, level, state.cameras, shown, evidence
+                )
             if tracked[row, w] or shown:
-                for c in range(len(look)):
-                    look[c].empty = 0
-            unknown[row, w] = not (tracked[row, w] or slot.absent)
-            blind[row, w] = slot.blind_s
-            _copy(slot.seen_world, seen_world[row, w])
+                for c in range(len(search)):
+                    search[c].empty = 0
+            report.unknown[row, w] = not (tracked[row, w] or slot.absent)
+            report.blind_s[row, w] = slot.blind_s
+            _copy_points(slot.seen_world, report.seen_world[row, w])
 
 
 @kernel
-def _copy(points, to):
-    for j in range(N_JOINTS):
-        for i in range(3):
-            to[j, i] = points[j, i]
+def _count_searches(search: Records1[SearchCount], row: int, w: int, evidence: Evidence) -> bool:
+    """Count the searches for one slot, and return whether a camera shows a person for it.
 
+    Such a person is the slot's worker, or one more than there are tracks.
 
-@kernel
-def _look(look, row, w, people, seen, looked, times):
-    """Count looks (C,) for a slot; whether one shows its worker or an untracked person."""
-    (dt, lost_after, _), (whole, image_age, _), (found, own, strangers) = times, looked, seen
-    shown = strangers[row]
-    for c in range(len(look)):
-        look[c].since_s += dt
-        if _is_shown(own[row, c, w]) or _poses(found[row, c]) > people:
+    Args:
+        search: (C,) searches for the slot, changed in place.
+        row: row of the environment in `evidence`.
+        w: index of the slot.
+        evidence: the tracks and the searches of the update.
+    """
+    shown, people = evidence.has_strangers[row], evidence.tracked[row].sum()
+    for c in range(len(search)):
+        search[c].since_s += evidence.dt_s
+        n_found, found = 0, evidence.found[row, c]
+        for k in range(len(found)):
+            n_found += _is_shown(found[k])
+        if _is_shown(evidence.assigned[row, c, w]) or n_found > people:
             shown = True
-        elif whole[row, c]:
-            look[c].empty += 1
-            look[c].since_s = image_age[row, c]
-        if look[c].since_s >= lost_after:
-            look[c].empty = 0
+        elif evidence.searched[row, c]:
+            search[c].empty += 1
+            search[c].since_s = evidence.image_age_s[row, c]
+        if search[c].since_s >= evidence.lost_after_s:
+            search[c].empty = 0
     return shown
 
 
 @kernel
-def _search(slot, look, level, cameras, shown, enough, times):
-    """Update a slot without a track; return the age of the looks that emptied the floor [s]."""
-    dt, _, forgotten = times
-    slot.blind_s += dt
-    hides = slot.lost and slot.blind_s < forgotten
+def _judge_floor(
+    slot: Slot,
+    search: Records1[SearchCount],
+    level: Ints,
+    cameras: Bools,
+    shown: bool,
+    evidence: Evidence,
+) -> float:
+    """Update a slot without a track, in place.
+
+    Args:
+        slot: the slot.
+        search: (C,) searches for it.
+        level: (G,) state of each group of floor, changed in place.
+        cameras: (G, C) the cameras that see each group.
+        shown: whether a camera shows a person for the slot.
+        evidence: times and the number of searches that prove absence.
+
+    Returns:
+        The age of the oldest search that found floor empty [s]; 0 if none did.
+    """
+    slot.blind_s += evidence.dt_s
+    hides = slot.lost and slot.blind_s < evidence.forgotten_s
     slot.absent, emptied, oldest = True, False, 0.0
     for g in range(len(cameras)):
-        level[g], age_s = _vacant(look, cameras[g], level[g], enough, shown, hides)
+        level[g], age_s = _judge_group(search, cameras[g], level[g], evidence.enough, shown, hides)
         slot.absent &= level[g] == EMPTY
         if level[g] != POSSIBLE:
             emptied, oldest = True, max(oldest, age_s)
@@ -238,7 +378,46 @@ def _search(slot, look, level, cameras, shown, enough, times):
 
 
 @kernel
-def _forget_place(slot):
+def _judge_group(
+    search: Records1[SearchCount], sees: Bools, level: int, enough: int, shown: bool, hides: bool
+) -> FloorState:
+    """Return the state of one group of floor for a slot without a track.
+
+    Args:
+        search: (C,) searches for the slot.
+        sees: (C,) the cameras that see the group.
+        level: present state of the group.
+        enough: number of searches by all cameras that prove absence.
+        shown: whether a camera shows a person for the slot.
+        hides: whether a lost worker may still be hidden.
+    """
+    total, cameras, least, second = 0, 0, np.inf, np.inf
+    needed = enough * sees.sum() / len(sees)
+    for c in range(len(search)):
+        if sees[c] and search[c].empty > 0:
+            total, cameras = total + search[c].empty, cameras + 1
+            second = min(second, max(least, search[c].since_s))
+            least = min(least, search[c].since_s)
+    if shown or cameras == 0:
+        return FloorState(POSSIBLE, 0.0)
+    if cameras >= LEAST_CAMERAS and (level == EMPTY or (total >= needed and not hides)):
+        return FloorState(EMPTY, second)
+    if level != POSSIBLE or (total >= SEVERAL and not hides):
+        return FloorState(PROBABLY_EMPTY, least)
+    return FloorState(POSSIBLE, 0.0)
+
+
+@kernel
+def _copy_points(points: Points3, out: Points3) -> None:
+    """Copy joints (J, 3)."""
+    for j in range(N_JOINTS):
+        for i in range(3):
+            out[j, i] = points[j, i]
+
+
+@kernel
+def _forget_place(slot: Slot) -> None:
+    """Forget that the slot had a track, and where."""
     slot.lost = False
     for j in range(N_JOINTS):
         for i in range(3):
@@ -246,36 +425,8 @@ def _forget_place(slot):
 
 
 @kernel
-def _vacant(look, sees, level, enough, shown, hides):
-    """Return the state of floor that cameras (C,) `sees` cover, and the age of its look."""
-    total, cameras, least, second = 0, 0, np.inf, np.inf
-    needed = enough * sees.sum() / len(sees)
-    for c in range(len(look)):
-        if sees[c] and look[c].empty > 0:
-            total, cameras = total + look[c].empty, cameras + 1
-            second = min(second, max(least, look[c].since_s))
-            least = min(least, look[c].since_s)
-    if shown or cameras == 0:
-        return POSSIBLE, 0.0
-    if cameras >= LEAST_CAMERAS and (level == EMPTY or (total >= needed and not hides)):
-        return EMPTY, second
-    if level != POSSIBLE or (total >= SEVERAL and not hides):
-        return PROBABLY_EMPTY, least
-    return POSSIBLE, 0.0
-
-
-@kernel
-def _poses(confidence):
-    """How many workers (W, J) a camera shows."""
-    n = 0
-    for w in range(len(confidence)):
-        n += _is_shown(confidence[w])
-    return n
-
-
-@kernel
-def _is_shown(confidence):
-    """Whether any joint (J,) is seen."""
+def _is_shown(confidence: Floats) -> bool:
+    """Return whether any joint (J,) is detected."""
     most = 0.0
     for value in confidence:
         most = max(most, value)

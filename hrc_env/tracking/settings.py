@@ -1,59 +1,93 @@
-"""The settings that the kernels take."""
+"""The settings of the estimators in the form that compiled functions take."""
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from hrc_env.tracking.config import ParticleConfig, TrackerConfig, of_kind
+from hrc_env.tracking.config import ParticleConfig, TrackerConfig, cast_config
 
 _TICK_S = 1e-6
-"""Sums of time steps that are short by no more are whole."""
+"""Tolerance for sums of time steps: a period counts as over when it is short by no more [s]."""
 
 
 class Settings(NamedTuple):
-    """What the kernels need of `ParticleConfig`, under the same names if not described."""
+    """The fields of `ParticleConfig` that compiled functions read, and what follows from them."""
 
     sigma_scale: float
+    """Factor on the standard deviations that the detector reports."""
     gate_sigma: float
+    """Gate for the agreement of views, in standard deviations of the detector."""
     body_radius_m: float
+    """Largest distance of a joint from the middle of the body [m]."""
     acquire_min_joints: int
+    """Number of joints on which two cameras must agree to start a track."""
     conflict_frames: int
+    """Number of successive updates in which two views disagree with a joint before it is acquired
+    anew."""
     wait_updates: int
+    """Number of updates to wait for a second view before one view starts a track."""
     size_std: float
+    """Relative standard deviation of people's size."""
     stands_std_m: float
+    """Standard deviation of the height of the lowest joint of a body started from one view [m]; 0
+    if people may be at any height."""
     inlier_odds: float
-    """Of a perfect inlier against an outlier, times the variance of its pixel [px^2]."""
+    """Odds of a perfect inlier against an outlier, times the variance of its pixel [px^2]."""
     swap_begins: float
+    """Probability per update that a camera starts to exchange left and right."""
     swap_ends: float
+    """Probability per update that a camera stops exchanging left and right."""
     gauss_newton_steps: int
+    """Number of Gauss-Newton steps in the search for the posterior mode."""
     prior_mean_world: tuple[float, float, float]
+    """Position of the prior, x, y, z in the world frame [m]."""
     prior_std_m: float
+    """Standard deviation of the prior position on each axis [m]."""
     max_age_s: float
+    """Upper bound of the ages [s]."""
     lost_after_s: float
+    """Time without a measurement of any joint after which a track is lost [s]."""
     forget_s: float
+    """Time constant with which the estimate of a lost worker relaxes to the prior [s]."""
     mean_correction: float
+    """Share of Laplace's correction from the mode to the mean that is applied."""
     one_view_inflation: float
+    """Factor on the reported covariance of a worker seen by only one camera."""
     lying_inflation: float
+    """Additional factor on the reported covariance of a lying body seen by only one camera."""
     min_std_m: float
+    """Smallest standard deviation that is reported in any direction [m]."""
     floor_std_m: float
+    """Standard deviation of the pseudo-measurement that puts a joint back onto the floor [m]."""
     bone_give: float
+    """Factor on the variation of bone lengths."""
     mirrors_body: bool
-    """Whether a whole body may be turned the other way."""
+    """Whether hypotheses may turn a whole body the other way."""
     mirrors_limbs: bool
-    """Whether a limb may be reflected in depth."""
+    """Whether hypotheses may reflect a limb in depth."""
     look_every_s: float
+    """Time between two searches for alternative hypotheses, short by a tolerance [s]."""
     open_depth_m: float
+    """Smallest standard deviation of a part's depth at which hypotheses are searched for [m]."""
     turn_std_rad: float
+    """Standard deviation of the turn between a new hypothesis and a known one [rad]."""
     evidence_trust: float
+    """Exponent on the evidence of a set of frames when hypotheses are weighted."""
     anatomy_trust: float
+    """Exponent on the anatomical prior when hypotheses are weighted."""
     walking_odds: float
+    """Log-odds per second that a hypothesis gains by walking forwards [1/s]."""
     log_least_weight: float
+    """Log-probability below which a hypothesis is dropped."""
 
 
-def settings_of(config: TrackerConfig) -> Settings:
-    """The kernels' part of the configuration; of another estimator's, what all share."""
-    config = of_kind(config, ParticleConfig)
+def make_settings(config: TrackerConfig) -> Settings:
+    """Return the settings for compiled functions.
+
+    Other estimators than the default one contribute the fields that all of them share.
+    """
+    config = cast_config(config, ParticleConfig)
     weight, area_px = config.outlier_weight, config.image_area_px
-    derived = {
+    derived: dict[str, Any] = {
         "inlier_odds": (1.0 - weight) * area_px / (2.0 * math.pi * weight),
         "mirrors_body": "body" in config.mirrored_parts,
         "mirrors_limbs": "limbs" in config.mirrored_parts,

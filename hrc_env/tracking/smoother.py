@@ -1,117 +1,146 @@
-"""What could have been known: a whole clip, smoothed after the fact.
+"""Smoothing of a whole clip after the fact, as an upper bound for estimators.
 
-The filter on the kinematic tree goes through the clip with one hypothesis; then a
-Rauch-Tung-Striebel pass (AIAA Journal 3, 1965) goes back over its linear motion, on all 90 numbers
-of a body at once. With P the covariance of the belief at t, F and Q the motion to t + 1, x- and
-P- = F P F' + Q the prediction:
+The filter on the kinematic tree runs through the clip with one hypothesis. Then a
+Rauch-Tung-Striebel pass (AIAA Journal 3, 1965) runs backwards over its linear motion, on all 90
+coordinates of a body at once. With x and P the mean and the covariance of the filter at t, F and Q
+the motion to t + 1, and x- and P- = F P F' + Q the prediction:
 
     G = P F' (P-)^-1,   x_s = x + G (x_s' - x-),   P_s = P + G (P_s' - P-) G'.
 
-Nothing is carried back across the beginning of a track. As no such pass turns a body round that one
-camera has mirrored in depth, the clip is also read backwards: the answer is the mixture of both,
-each with the certainty its filter had there.
+Nothing is carried back across the start of a track. No such pass corrects a body that one camera
+has mirrored in depth. Therefore the clip is also processed in reverse, and the result is the
+mixture of both directions, weighted by the certainty of their filters.
 
-Needing the future, this is no estimator of an environment; it is offline, and in plain numpy.
+The smoother needs the future, so it is no estimator of an environment. It is offline, in plain
+NumPy.
 """
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hrc_env.core.batching import mapped
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS, TORSO
 from hrc_env.core.typing import Bools, Floats
-from hrc_env.tracking.config import ParticleConfig, TrackerConfig, of_kind
+from hrc_env.tracking.config import ParticleConfig, TrackerConfig, cast_config
 from hrc_env.tracking.particle import ParticleEstimator
-from hrc_env.tracking.tracks import bounded
+from hrc_env.tracking.tracks import bound_estimate
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT
-from hrc_env.tracking.tree.predict import motion
+from hrc_env.tracking.tree.predict import make_motion_model
 
 _N = 6 * N_JOINTS
-Moments: TypeAlias = tuple[Floats, Floats]
-"""Means and covariances."""
+"""Number of coordinates of a body: positions and velocities of all joints."""
 
 
-class _Passed(NamedTuple):
-    """What the filter believed in a frame of n = B W workers."""
+class Moments(NamedTuple):
+    """The means and covariances of n Gaussians of d coordinates."""
+
+    mean: Floats
+    """(n, d) means."""
+    cov: Floats
+    """(n, d, d) covariances."""
+
+
+class LinearMotion(NamedTuple):
+    """The motion of a body over one step: x' = F x + constant + noise of covariance Q."""
+
+    F: Floats
+    """(90, 90) transition."""
+    Q: Floats
+    """(90, 90) covariance of the noise."""
+
+
+class _FilteredFrame(NamedTuple):
+    """The state of the filter in a frame of n = B W workers."""
 
     predicted: Floats
     """(n, 90) means before the frame."""
-    trees: Any
-    """(n,) records of `tree.state.TREE` after it."""
+    mean: Floats
+    """(n, 90) means after the frame."""
+    cov: Floats
+    """(n, J, 6, 6) marginal covariances of the joints after the frame."""
+    slope: Floats
+    """(n, J, 6, 6) slopes of the joints on their parents after the frame."""
+    displaced_m2: Floats
+    """(n, 3, 3) covariance of a displacement of the whole body [m^2]."""
+    age_s: Floats
+    """(n, J) ages of the joints [s]."""
+    tracked: Bools
+    """(n,) whether the worker is tracked."""
     follows: Bools
-    """(n,) whether the track is the last frame's."""
+    """(n,) whether the track continues that of the frame before."""
 
 
 class _Smoothed(NamedTuple):
-    """One direction's answer: T frames, n workers, in the clip's order."""
+    """The result of one direction for T frames of n workers, in the order of the clip."""
 
     mean: Floats
-    """(T, n, J, 6)."""
+    """(T, n, J, 6) positions [m] and velocities [m/s]."""
     cov: Floats
-    """(T, n, J, 3, 3) of the positions."""
+    """(T, n, J, 3, 3) covariances of the positions [m^2]."""
     doubt: Floats
-    """(T, n) mean variance that its filter had [m^2]."""
+    """(T, n) mean variance of the filter's positions [m^2]."""
     age_s: Floats
-    """(T, n, J)."""
+    """(T, n, J) ages of the joints [s]."""
     tracked: Bools
-    """(T, n)."""
+    """(T, n) whether the worker was tracked."""
 
 
 def smooth(
     P: Floats, clip: Sequence[Keypoints], dt_s: float, config: TrackerConfig | None = None
 ) -> PoseEstimate:
-    """Return the best belief of every frame, in view of the whole clip.
+    """Return the estimate of every frame, given the whole clip.
 
     Args:
-        P: (C, 3, 4) projections.
-        clip: keypoints of T frames, each (B, C, W, J, ...), in order of time; their `time_s` is
-            not looked at.
+        P: (C, 3, 4) projections from the world [m] to pixels.
+        clip: keypoints of T frames, each (B, C, W, J, ...), in the order of time; their `time_s` is
+            ignored.
         dt_s: time between two frames [s].
-        config: settings of the estimator "kalman"; None: the defaults.
+        config: settings of the estimator "kalman"; None for the defaults.
 
     Returns:
-        Arrays (T, B, W, ...). A worker whom the filter followed in neither direction is where
-        the forward one reported; `age_s` is the time to the nearest measurement of the joint.
+        Arrays (T, B, W, ...). A worker tracked in neither direction is where the forward filter
+        reported; `age_s` is the time to the nearest measurement of the joint [s].
 
     Raises:
-        ConfigError: no frames, or a time between them that is not positive.
+        ConfigError: there are no frames, or the time between them is not positive.
     """
     if len(clip) == 0 or not dt_s > 0:
         raise ConfigError(f"a clip needs frames and a positive dt_s, got {len(clip)}, {dt_s}.")
-    config = replace(of_kind(config, ParticleConfig), n_hypotheses=1)
+    config = replace(cast_config(config, ParticleConfig), n_hypotheses=1)
     estimator = ParticleEstimator(np.ascontiguousarray(P, float), dt_s, config)
-    forth = _one_way(estimator, clip, dt_s)
-    back = _turned(_one_way(estimator, clip[::-1], dt_s))
+    forth = _smooth_one_way(estimator, clip, dt_s)
+    back = _reverse(_smooth_one_way(estimator, clip[::-1], dt_s))
     batch, _, n_workers = clip[0].px.shape[:3]
-    return _reported(_mixture(forth, back), (len(clip), batch, n_workers), config)
+    return _make_estimate(_mix(forth, back), batch, n_workers, config)
 
 
-def rts_step(belief: Moments, predicted: Floats, later: Moments, F: Floats, Q: Floats) -> Moments:
-    """One step back, for n Gaussians of d numbers: mean and covariance, smoothed.
+def rts_step(filtered: Moments, predicted: Floats, later: Moments, F: Floats, Q: Floats) -> Moments:
+    """Return the smoothed moments of a frame, given those of the next frame.
 
     Args:
-        belief: mean (n, d) and covariance (n, d, d) as filtered.
-        predicted: (n, d) mean of the next frame as predicted from it.
-        later: the next frame, smoothed.
-        F, Q: (d, d) motion from one to the other, and its noise.
+        filtered: moments of the filter in the frame.
+        predicted: (n, d) means of the next frame as predicted from it.
+        later: smoothed moments of the next frame.
+        F: (d, d) transition from one frame to the next.
+        Q: (d, d) covariance of its noise.
     """
-    (mean, cov), (mean_later, cov_later) = belief, later
-    moved = F @ cov
+    moved = F @ filtered.cov
     cov_predicted = moved @ F.T + Q
     gain = np.linalg.solve(cov_predicted, moved).swapaxes(-1, -2)
-    mean = mean + np.einsum("nij,nj->ni", gain, mean_later - predicted)
-    cov = cov + gain @ (cov_later - cov_predicted) @ gain.swapaxes(-1, -2)
-    return mean, 0.5 * (cov + cov.swapaxes(-1, -2))
+    mean = filtered.mean + np.einsum("nij,nj->ni", gain, later.mean - predicted)
+    cov = filtered.cov + gain @ (later.cov - cov_predicted) @ gain.swapaxes(-1, -2)
+    return Moments(mean, 0.5 * (cov + cov.swapaxes(-1, -2)))
 
 
-def linear_motion(dt_s: float, config: ParticleConfig) -> tuple[Floats, Floats]:
-    """F, Q (90, 90): x' = F x + constant + noise, as `tree.predict` moves the body."""
-    own, travel, noise, shared = motion(dt_s, config.damping, config.root_acceleration)
+def linear_motion(dt_s: float, config: ParticleConfig) -> LinearMotion:
+    """Return the motion of a body over `dt_s` [s], as `tree.predict` moves it."""
+    own, travel, noise, shared = make_motion_model(dt_s, config.damping, config.root_acceleration)
     F = np.zeros((N_JOINTS, 2, N_JOINTS, 2))
     Q = np.tile(shared[None, :, None, :], (N_JOINTS, 1, N_JOINTS, 1))
     for j in range(N_JOINTS):
@@ -119,11 +148,16 @@ def linear_motion(dt_s: float, config: ParticleConfig) -> tuple[Floats, Floats]:
         Q[j, :, j] = noise[j]
         for k in TORSO:
             F[j, :, int(k)] += travel[j] / len(TORSO)
-    return _on_axes(F), _on_axes(Q)
+    return LinearMotion(_expand_axes(F), _expand_axes(Q))
 
 
 def dense(cov: Floats, slope: Floats) -> Floats:
-    """(n, 90, 90) covariance of all joints from marginals and slopes (n, J, 6, 6)."""
+    """Return the covariance of all joints, (n, 90, 90).
+
+    Args:
+        cov: (n, J, 6, 6) marginal covariances of the joints.
+        slope: (n, J, 6, 6) slopes on the parents.
+    """
     out = np.zeros((len(cov), N_JOINTS, 6, N_JOINTS, 6))
     for m, j in enumerate(ORDER):
         for k in ORDER[:m]:
@@ -133,75 +167,91 @@ def dense(cov: Floats, slope: Floats) -> Floats:
     return out.reshape(-1, _N, _N)
 
 
-def _on_axes(blocks: Floats) -> Floats:
-    """(90, 90) of (J, 2, J, 2) on position and velocity, alike on each axis."""
+def _expand_axes(blocks: Floats) -> Floats:
+    """Return (90, 90) from blocks (J, 2, J, 2) of position and velocity, equal on each axis."""
     full = np.einsum("jakb,cd->jackbd", blocks, np.eye(3))
     return full.reshape(_N, _N)
 
 
-def _one_way(estimator: ParticleEstimator, clip: Sequence[Keypoints], dt_s: float) -> _Smoothed:
-    """Filter through a clip, smooth back."""
-    passed = _filtered(estimator, clip, dt_s)
+def _smooth_one_way(
+    estimator: ParticleEstimator, clip: Sequence[Keypoints], dt_s: float
+) -> _Smoothed:
+    """Filter through a clip with frames every `dt_s` [s], then smooth backwards."""
+    frames = _filter_clip(estimator, clip, dt_s)
     F, Q = linear_motion(dt_s, estimator.config)
-    mean, cov = _moments(passed[-1].trees)
-    means, covs = [mean], [_own(cov)]
-    for here, later in zip(passed[-2::-1], passed[:0:-1], strict=True):
+    mean, cov = _get_moments(frames[-1])
+    means, covs = [mean], [_get_position_blocks(cov)]
+    for frame, later in zip(frames[-2::-1], frames[:0:-1], strict=True):
         on = later.follows
-        x, spread = _moments(here.trees)
-        now, then = (x[on], spread[on]), (mean[on], cov[on])
-        x[on], spread[on] = rts_step(now, later.predicted[on], then, F, Q)
+        x, spread = _get_moments(frame)
+        filtered, smoothed = Moments(x[on], spread[on]), Moments(mean[on], cov[on])
+        x[on], spread[on] = rts_step(filtered, later.predicted[on], smoothed, F, Q)
         mean, cov = x, spread
         means.append(mean)
-        covs.append(_own(cov))
-    trees = np.stack([each.trees for each in passed])
+        covs.append(_get_position_blocks(cov))
+    marginals = np.stack([frame.cov for frame in frames])
     return _Smoothed(
-        mean=np.stack(means[::-1]).reshape(len(passed), -1, N_JOINTS, 6),
-        cov=np.stack(covs[::-1]) + trees["displaced_m2"][:, :, None],
-        doubt=np.trace(trees["cov"][..., :3, :3], axis1=-2, axis2=-1).mean(-1),
-        age_s=trees["age_s"],
-        tracked=trees["tracked"],
+        mean=np.stack(means[::-1]).reshape(len(frames), -1, N_JOINTS, 6),
+        cov=np.stack(covs[::-1]) + np.stack([frame.displaced_m2 for frame in frames])[:, :, None],
+        doubt=np.trace(marginals[..., :3, :3], axis1=-2, axis2=-1).mean(-1),
+        age_s=np.stack([frame.age_s for frame in frames]),
+        tracked=np.stack([frame.tracked for frame in frames]),
     )
 
 
-def _filtered(
+def _filter_clip(
     estimator: ParticleEstimator, clip: Sequence[Keypoints], dt_s: float
-) -> list[_Passed]:
-    """What the filter believed in every frame."""
+) -> list[_FilteredFrame]:
+    """Return the state of the filter in every frame of a clip with frames every `dt_s` [s]."""
     batch, _, n_workers = clip[0].px.shape[:3]
-    state, passed = estimator.init(batch, n_workers), []
+    state, frames = estimator.init(batch, n_workers), list[_FilteredFrame]()
+
+    def copy_field(name: str) -> NDArray[Any]:
+        array = state.trees[name]
+        return array.copy().reshape(batch * n_workers, *array.shape[3:])
+
     for keypoints in clip:
         estimator.predict(state, dt_s, [])
-        before = state.trees.flatten()
+        predicted, was_tracked = copy_field("body"), copy_field("tracked")
         estimator.update(state, keypoints, [])
-        trees = state.trees.flatten()
-        began = ~trees["body"][..., 3:].any((-2, -1))  # at rest: in the first frame, and only then
-        follows = before["tracked"] & trees["tracked"] & ~began
-        passed.append(_Passed(before["body"].reshape(-1, _N), trees, follows))
-    return passed
+        body, tracked = copy_field("body"), copy_field("tracked")
+        begins = ~body[..., 3:].any((-2, -1))  # at rest: in the first frame of a track only
+        frame = _FilteredFrame(
+            predicted=predicted.reshape(-1, _N),
+            mean=body.reshape(-1, _N),
+            cov=copy_field("cov"),
+            slope=copy_field("slope"),
+            displaced_m2=copy_field("displaced_m2"),
+            age_s=copy_field("age_s"),
+            tracked=tracked,
+            follows=was_tracked & tracked & ~begins,
+        )
+        frames.append(frame)
+    return frames
 
 
-def _moments(trees: Any) -> Moments:
-    """Mean (n, 90) and covariance (n, 90, 90) of trees (n,)."""
-    return trees["body"].reshape(-1, _N).copy(), dense(trees["cov"], trees["slope"])
+def _get_moments(frame: _FilteredFrame) -> Moments:
+    """Return the moments of all 90 coordinates of the bodies after a frame."""
+    return Moments(frame.mean.copy(), dense(frame.cov, frame.slope))
 
 
-def _own(cov: Floats) -> Floats:
-    """(n, J, 3, 3) of the positions from (n, 90, 90)."""
+def _get_position_blocks(cov: Floats) -> Floats:
+    """Return the covariances (n, J, 3, 3) of the positions from those (n, 90, 90) of bodies."""
     joint = np.arange(N_JOINTS)
     blocks = cov.reshape(-1, N_JOINTS, 6, N_JOINTS, 6)
     return np.moveaxis(blocks[:, joint, :3, joint, :3], 0, 1)
 
 
-def _turned(there: _Smoothed) -> _Smoothed:
-    """The answer for a clip that was read backwards, in the clip's order."""
-    mean = there.mean[::-1].copy()
+def _reverse(backward: _Smoothed) -> _Smoothed:
+    """Return the result of a reversed clip in the order of the clip."""
+    mean = backward.mean[::-1].copy()
     mean[..., 3:] *= -1.0
-    rest = (there.cov[::-1], there.doubt[::-1], there.age_s[::-1])
-    return _Smoothed(mean, *rest, there.tracked[::-1])
+    rest = (backward.cov[::-1], backward.doubt[::-1], backward.age_s[::-1])
+    return _Smoothed(mean, *rest, backward.tracked[::-1])
 
 
-def _mixture(a: _Smoothed, b: _Smoothed) -> _Smoothed:
-    """Mean and covariance of the two answers, each weighted by how sure its filter was."""
+def _mix(a: _Smoothed, b: _Smoothed) -> _Smoothed:
+    """Return the moments of the mixture of two results, weighted by their filters' certainty."""
     share = b.doubt / (a.doubt + b.doubt)
     share = np.where(a.tracked == b.tracked, share, a.tracked)
     share = np.where(a.tracked | b.tracked, share, 1.0)[..., None, None]
@@ -216,12 +266,19 @@ def _mixture(a: _Smoothed, b: _Smoothed) -> _Smoothed:
     )
 
 
-def _reported(
-    smoothed: _Smoothed, shape: tuple[int, int, int], config: ParticleConfig
+def _make_estimate(
+    smoothed: _Smoothed, batch: int, n_workers: int, config: ParticleConfig
 ) -> PoseEstimate:
-    """Arrays (T, B, W, ...) as estimators report theirs."""
-    n_frames, batch, n_workers = shape
-    tracked = smoothed.tracked.reshape(-1, n_workers)
+    """Return the estimate (T, B, W, ...) of a clip.
+
+    Args:
+        smoothed: the result for n = B W workers.
+        batch: number of environments B.
+        n_workers: number of workers W.
+        config: bounds of the covariances.
+    """
+    n_frames = len(smoothed.tracked)
+    tracked = smoothed.tracked.reshape(n_frames * batch, n_workers)
     joints = (*tracked.shape, N_JOINTS)
     estimate = PoseEstimate(
         mean_world=smoothed.mean[..., :3].reshape(*joints, 3),
@@ -230,4 +287,6 @@ def _reported(
         age_s=smoothed.age_s.reshape(joints),
         tracked=tracked,
     )
-    return mapped(bounded(estimate, config), lambda a: a.reshape(n_frames, batch, *a.shape[1:]))
+    return mapped(
+        bound_estimate(estimate, config), lambda a: a.reshape(n_frames, batch, *a.shape[1:])
+    )

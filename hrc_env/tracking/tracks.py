@@ -1,44 +1,89 @@
-"""What the estimators without hypotheses keep of a worker, and how all of them age and report."""
+"""Tracks of the estimators without hypotheses, and how all estimators age and report tracks."""
 
 import math
-from typing import Any
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
+from hrc_env.core.declared import Records2, dtype_of, make_records
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Ints
+from hrc_env.core.typing import Bools, Covariances3, Floats, Ints, Points3, Velocities3
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.settings import settings_of
+from hrc_env.tracking.settings import Settings, make_settings
 
-_J = N_JOINTS
-TRACK = np.dtype(
-    [
-        # position [m], its covariance [m^2] and velocity [m/s]
-        ("mean_world", "f8", (_J, 3)), ("cov_world", "f8", (_J, 3, 3)),
-        ("velocity_world", "f8", (_J, 3)),
-        # since a measurement supported the joint [s]; updates in a row in which views did not
-        ("age_s", "f8", (_J,)), ("conflict", "i8", (_J,)), ("tracked", "?"),
-    ],
-    align=True,
-)  # fmt: skip
-"""What is believed of one worker."""
-REPORTED = ("mean_world", "cov_world", "velocity_world", "age_s", "tracked")
-"""Fields of a `PoseEstimate` that tracks hold."""
 _ROUNDING = 1e-6
-"""Least eigenvalues may be wrong by no more than this share of the largest."""
+"""Relative error allowed in the smallest eigenvalue, as a share of the largest."""
 
 
-def make_tracks(batch: int, n_workers: int, config: TrackerConfig) -> Any:
-    """(B, W) records of `TRACK`, of workers whom nobody has seen."""
-    tracks = np.zeros((batch, n_workers), TRACK)
-    forget(tracks, np.arange(batch), config)
+class Track:
+    """The estimate of one worker, with what it takes to age and to repair it."""
+
+    mean_world: Annotated[Points3, (N_JOINTS, 3)]
+    """Position of each joint in the world frame [m]."""
+    cov_world: Annotated[Covariances3, (N_JOINTS, 3, 3)]
+    """Covariance of each joint's position [m^2]."""
+    velocity_world: Annotated[Velocities3, (N_JOINTS, 3)]
+    """Velocity of each joint in the world frame [m/s]."""
+    age_s: Annotated[Floats, (N_JOINTS,)]
+    """Time since a measurement last supported the joint [s]."""
+    conflict: Annotated[Ints, (N_JOINTS,)]
+    """Number of successive updates in which views contradicted the joint."""
+    tracked: bool
+    """Whether the worker is tracked; otherwise the estimate relaxes to the prior."""
+
+
+TRACK = dtype_of(Track)
+
+
+class EstimateArrays(NamedTuple):
+    """The arrays of a `PoseEstimate` that estimators fill, as compiled functions take them."""
+
+    mean_world: Points3
+    """(B, W, J, 3) positions in the world frame [m]."""
+    cov_world: Covariances3
+    """(B, W, J, 3, 3) covariances of the positions [m^2]."""
+    velocity_world: Velocities3
+    """(B, W, J, 3) velocities in the world frame [m/s]."""
+    age_s: Floats
+    """(B, W, J) time since a measurement last supported the joint [s]."""
+    tracked: Bools
+    """(B, W) whether the worker is tracked."""
+
+
+def get_estimate_arrays(estimate: PoseEstimate) -> EstimateArrays:
+    """Return the arrays of an estimate, made contiguous where they are not."""
+    return EstimateArrays(
+        mean_world=np.ascontiguousarray(estimate.mean_world, np.float64),
+        cov_world=np.ascontiguousarray(estimate.cov_world, np.float64),
+        velocity_world=np.ascontiguousarray(estimate.velocity_world, np.float64),
+        age_s=np.ascontiguousarray(estimate.age_s, np.float64),
+        tracked=np.ascontiguousarray(estimate.tracked),
+    )
+
+
+def make_tracks(batch: int, n_workers: int, config: TrackerConfig) -> Records2[Track]:
+    """Return tracks (B, W) of workers that have never been detected.
+
+    Args:
+        batch: number of environments B.
+        n_workers: number of workers W in each.
+        config: the prior and the largest age.
+    """
+    tracks = make_records(Track, (batch, n_workers))
+    reset_tracks(tracks, np.arange(batch), config)
     return tracks
 
 
-def forget(tracks: Any, ids: Ints, config: TrackerConfig) -> None:
-    """Put environments `ids` back to the prior."""
+def reset_tracks(tracks: Records2[Track], ids: Ints, config: TrackerConfig) -> None:
+    """Set the tracks of some environments back to the prior, in place.
+
+    Args:
+        tracks: (B, W) tracks of the whole batch.
+        ids: indices of the environments to reset.
+        config: the prior and the largest age.
+    """
     fresh = np.zeros((), TRACK)
     fresh["mean_world"] = config.prior_mean_world
     fresh["cov_world"] = config.prior_std_m**2 * np.eye(3)
@@ -46,91 +91,149 @@ def forget(tracks: Any, ids: Ints, config: TrackerConfig) -> None:
     tracks[ids] = fresh
 
 
-def grow_older(tracks: Any, dt_s: float, config: TrackerConfig) -> None:
-    """Count ages up, give up tracks that nothing supports, let lost ones relax to the prior.
+def age_tracks(tracks: Records2[Track], dt_s: float, config: TrackerConfig) -> None:
+    """Count ages up, end tracks that no measurement supports, and relax lost ones to the prior.
 
-    A lost worker's mean and covariance follow an Ornstein-Uhlenbeck process whose stationary
-    distribution is the prior.
+    The mean and the covariance of a lost worker follow an Ornstein-Uhlenbeck process with the
+    prior as its stationary distribution.
+
+    Args:
+        tracks: (B, W) tracks, changed in place.
+        dt_s: time that passes [s].
+        config: the prior and the times after which tracks are lost and forgotten.
     """
-    _grow_older(tracks, dt_s, settings_of(config))
+    _age_tracks(tracks, dt_s, make_settings(config))
 
 
 @kernel
-def _grow_older(tracks, dt, s):
+def _age_tracks(tracks: Records2[Track], dt: float, settings: Settings) -> None:
+    """Apply `age_worker` to every track (B, W)."""
     for b in range(tracks.shape[0]):
         for w in range(tracks.shape[1]):
             t = tracks[b, w]
-            gaussian = (t.mean_world, t.cov_world, t.velocity_world)
-            t.tracked = age_worker(*gaussian, t.age_s, t.conflict, t.tracked, dt, s)
+            t.tracked = age_worker(
+                t.mean_world,
+                t.cov_world,
+                t.velocity_world,
+                t.age_s,
+                t.conflict,
+                t.tracked,
+                dt,
+                settings,
+            )
 
 
 @kernel
-def age_worker(mean, cov, velocity, age, conflict, tracked, dt, s):
-    """A worker (J, ...) gets older by dt [s], in place; whether they are still tracked.
+def age_worker(
+    mean: Points3,
+    cov: Covariances3,
+    velocity: Velocities3,
+    age: Floats,
+    conflict: Ints,
+    tracked: bool,
+    dt: float,
+    settings: Settings,
+) -> bool:
+    """Let time pass for one worker and return whether the worker is still tracked.
 
-    `s` are `settings.Settings`.
+    Args:
+        mean: (J, 3) positions [m], relaxed in place where the worker is not tracked.
+        cov: (J, 3, 3) covariances [m^2], likewise.
+        velocity: (J, 3) velocities [m/s], likewise.
+        age: (J,) ages [s], increased in place.
+        conflict: (J,) counts of contradictions, set to zero where the worker is not tracked.
+        tracked: whether the worker was tracked before.
+        dt: time that passes [s].
+        settings: the prior and the times after which tracks are lost and forgotten.
     """
-    youngest = count_up(age, dt, s.max_age_s)
-    if tracked and youngest < s.lost_after_s - 1e-9:
+    youngest = count_up(age, dt, settings.max_age_s)
+    if tracked and youngest < settings.lost_after_s - 1e-9:
         return True
     for j in range(len(conflict)):
         conflict[j] = 0
-    relax(mean, cov, velocity, np.exp(-dt / s.forget_s), s.prior_mean_world, s.prior_std_m)
+    keep = np.exp(-dt / settings.forget_s)
+    relax(mean, cov, velocity, keep, settings.prior_mean_world, settings.prior_std_m)
     return False
 
 
 @kernel
-def count_up(age, dt, most):
-    """Ages (J,) dt [s] later, in place; the youngest."""
+def count_up(age: Floats, dt: float, max_age: float) -> float:
+    """Increase ages and return the smallest [s].
+
+    Args:
+        age: (J,) ages [s], changed in place.
+        dt: time that passes [s].
+        max_age: upper bound of the ages [s].
+    """
     youngest = np.inf
     for j in range(len(age)):
-        age[j] = min(age[j] + dt, most)
+        age[j] = min(age[j] + dt, max_age)
         youngest = min(youngest, age[j])
     return youngest
 
 
 @kernel
-def relax(mean, cov, velocity, keep, home, std):
-    """A body (J, ...) that nobody follows keeps a share of what was known; the rest is prior."""
+def relax(
+    mean: Points3,
+    cov: Covariances3,
+    velocity: Velocities3,
+    keep: float,
+    prior_mean: tuple[float, float, float],
+    prior_std: float,
+) -> None:
+    """Move the estimate of a body towards the prior, in place.
+
+    Args:
+        mean: (J, 3) positions [m].
+        cov: (J, 3, 3) covariances [m^2].
+        velocity: (J, 3) velocities [m/s].
+        keep: share of the deviation from the prior that is kept.
+        prior_mean: position of the prior [m].
+        prior_std: standard deviation of the prior on each axis [m].
+    """
     for j in range(len(mean)):
         for i in range(3):
-            mean[j, i] = home[i] + keep * (mean[j, i] - home[i])
+            mean[j, i] = prior_mean[i] + keep * (mean[j, i] - prior_mean[i])
             velocity[j, i] *= keep
             for k in range(3):
                 cov[j, i, k] *= keep * keep
-            cov[j, i, i] += (1.0 - keep * keep) * std * std
+            cov[j, i, i] += (1.0 - keep * keep) * prior_std * prior_std
 
 
-def as_estimate(tracks: Any) -> PoseEstimate:
-    """The tracks in arrays of their own."""
-    return PoseEstimate(*(tracks[name].copy() for name in REPORTED))
+def copy_estimate(tracks: Records2[Track]) -> PoseEstimate:
+    """Return the estimate of tracks (B, W), as copies of their fields."""
+    return PoseEstimate(*(tracks[name].copy() for name in EstimateArrays._fields))
 
 
-def report(tracks: Any, config: TrackerConfig) -> PoseEstimate:
-    """The tracks as others may see them."""
-    return bounded(as_estimate(tracks), config)
+def report_tracks(tracks: Records2[Track], config: TrackerConfig) -> PoseEstimate:
+    """Return the estimate of tracks (B, W), with covariances within the configured bounds."""
+    return bound_estimate(copy_estimate(tracks), config)
 
 
-def bounded(estimate: PoseEstimate, config: TrackerConfig) -> PoseEstimate:
-    """An estimate whose covariances were put, in place, between the floor and the prior."""
+def bound_estimate(estimate: PoseEstimate, config: TrackerConfig) -> PoseEstimate:
+    """Bound the covariances of an estimate by `min_std_m` and the prior, in place; return it."""
     _bound_all(estimate.cov_world, config.min_std_m, config.prior_std_m)
     return estimate
 
 
 @kernel
-def _bound_all(cov, least_std, most_std):
+def _bound_all(cov: Covariances3, min_std: float, max_std: float) -> None:
+    """Apply `bound` to every worker's covariances (B, W, J, 3, 3)."""
     for b in range(cov.shape[0]):
         for w in range(cov.shape[1]):
-            bound(cov[b, w], least_std, most_std)
+            bound(cov[b, w], min_std, max_std)
 
 
 @kernel
-def bound(cov, least_std, most_std):
-    """Make covariances (J, 3, 3) no narrower and no wider than these [m], in place.
+def bound(cov: Covariances3, min_std: float, max_std: float) -> None:
+    """Bound covariances from below and from above, in place.
 
-    Only their upper halves are looked at.
+    Args:
+        cov: (J, 3, 3) covariances [m^2]. Only their upper triangles are read.
+        min_std: smallest standard deviation in any direction [m].
+        max_std: largest standard deviation on any axis [m].
     """
-    floor, ceiling = least_std * least_std, most_std * most_std
+    floor, ceiling = min_std * min_std, max_std * max_std
     for j in range(len(cov)):
         widest = max(cov[j, 0, 0], cov[j, 1, 1], cov[j, 2, 2])
         scale = min(1.0, ceiling / widest)
@@ -144,8 +247,8 @@ def bound(cov, least_std, most_std):
 
 
 @kernel
-def _is_wider(a, floor):
-    """Whether every eigenvalue of a symmetric 3x3 matrix is above `floor`, without any root."""
+def _is_wider(a: Floats, floor: float) -> bool:
+    """Return whether all eigenvalues of a symmetric 3x3 matrix exceed `floor`, without roots."""
     x, y, z = a[0, 0] - floor, a[1, 1] - floor, a[2, 2] - floor
     f, g, h = a[0, 1], a[0, 2], a[1, 2]
     determinant = x * (y * z - h * h) - f * (f * z - g * h) + g * (f * h - g * y)
@@ -153,8 +256,8 @@ def _is_wider(a, floor):
 
 
 @kernel
-def least_eigenvalue(a):
-    """Smallest eigenvalue of a symmetric 3x3 matrix (Smith, Comm. ACM 4, 1961)."""
+def least_eigenvalue(a: Floats) -> float:
+    """Return the smallest eigenvalue of a symmetric 3x3 matrix (Smith, Comm. ACM 4, 1961)."""
     mean = (a[0, 0] + a[1, 1] + a[2, 2]) / 3.0
     x, y, z = a[0, 0] - mean, a[1, 1] - mean, a[2, 2] - mean
     f, g, h = a[0, 1], a[0, 2], a[1, 2]

@@ -1,82 +1,96 @@
-"""The estimators without memory: triangulate each frame, hold the last point through gaps.
+"""The estimators without memory: triangulate each frame, and hold the last point through gaps.
 
-`triangulation` is weighted least squares from all views; `ransac` takes the views that agree, found
-by trying every pair of cameras (after Fischler and Bolles, Comm. ACM 24, 1981). A joint moves only
-when two views make a point.
+`triangulation` is weighted least squares from all views. `ransac` uses the views that agree, which
+it finds by trying every pair of cameras (after Fischler and Bolles, Comm. ACM 24, 1981). A joint
+moves only when two views make a point.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from hrc_env.core.declared import Records2
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Floats, Ints, Points2, Rngs
+from hrc_env.core.typing import Bools, Covariances3, Floats, Ints, Points3, Rngs
 from hrc_env.geometry.triangulation import FURTHEST_PX, triangulate
 from hrc_env.tracking.config import TriangulationConfig
 from hrc_env.tracking.forecast import forecast
-from hrc_env.tracking.measurements import MIN_SIGMA_PX, arrays_of
-from hrc_env.tracking.settings import settings_of
-from hrc_env.tracking.tracks import forget, grow_older, make_tracks, report
+from hrc_env.tracking.measurements import MIN_SIGMA_PX, KeypointArrays, get_keypoint_arrays
+from hrc_env.tracking.settings import Settings, make_settings
+from hrc_env.tracking.tracks import Track, age_tracks, make_tracks, report_tracks, reset_tracks
 from hrc_env.tracking.tree.acquisition import complete_body, keep_one_body
 
 
 @dataclass(frozen=True, slots=True)
 class TriangulationEstimator:
-    """Every frame by itself; see `tracking.estimators.Estimator`."""
+    """Triangulation of every frame by itself; see `tracking.estimators.Estimator`."""
 
     P: Floats
+    """(C, 3, 4) projections from the world [m] to pixels."""
     ctrl_dt: float
+    """Usual time between two updates [s]."""
     config: TriangulationConfig
+    """Settings of the estimator."""
     gate_sigma: float = 0.0
-    """Within how many standard deviations views must agree; 0: all are used."""
+    """Gate for the agreement of views, in standard deviations; with 0 all views are used."""
 
-    def init(self, batch: int, n_workers: int) -> Any:
-        """(B, W) records of `tracks.TRACK`, of workers whom nobody has seen."""
+    def init(self, batch: int, n_workers: int) -> Records2[Track]:
+        """Return the tracks (B, W) of workers that have never been detected."""
         return make_tracks(batch, n_workers, self.config)
 
-    def reset(self, state: Any, ids: Ints, rngs: Rngs) -> None:
-        """Forget environments `ids`; draws nothing."""
-        forget(state, ids, self.config)
+    def reset(self, state: Records2[Track], ids: Ints, rngs: Rngs) -> None:
+        """Reset environments `ids` to the prior, without random numbers."""
+        reset_tracks(state, ids, self.config)
 
-    def predict(self, state: Any, dt_s: float, rngs: Rngs) -> None:
+    def predict(self, state: Records2[Track], dt_s: float, rngs: Rngs) -> None:
         """Hold every joint where it was; its covariance grows with the square of the age."""
-        _hold(state, dt_s, self.config.hold_speed_m_s)
-        grow_older(state, dt_s, self.config)
+        _grow_covariances(state, dt_s, self.config.hold_speed_m_s)
+        age_tracks(state, dt_s, self.config)
 
-    def update(self, state: Any, keypoints: Keypoints, rngs: Rngs) -> None:
-        """Put every joint where its views see it."""
+    def update(self, state: Records2[Track], keypoints: Keypoints, rngs: Rngs) -> None:
+        """Move every joint to the point that its views make."""
         config, (batch, n_workers) = self.config, state.shape
-        measured = arrays_of(keypoints, (batch, len(self.P), n_workers, N_JOINTS))
-        believed = _believed(*measured, config.sigma_scale)
-        made = triangulate(self.P, *believed, self.gate_sigma)
+        detections = get_keypoint_arrays(keypoints, (batch, len(self.P), n_workers, N_JOINTS))
+        valid = _mask_invalid(detections, config.sigma_scale)
+        made = triangulate(self.P, valid.px, valid.sigma_px, self.gate_sigma)
         points = np.ascontiguousarray(made.points_world), np.ascontiguousarray(made.cov_world)
-        _update(state, *points, settings_of(config), config.velocity_tau_s)
+        _update(state, *points, make_settings(config), config.velocity_tau_s)
 
-    def estimate(self, state: Any) -> PoseEstimate:
-        """What is believed now."""
-        return report(state, self.config)
+    def estimate(self, state: Records2[Track]) -> PoseEstimate:
+        """Return the present estimate."""
+        return report_tracks(state, self.config)
 
-    def forecast(self, state: Any, horizon_s: float) -> PoseEstimate:
-        """What is expected in `horizon_s`; see `tracking.forecast`."""
+    def forecast(self, state: Records2[Track], horizon_s: float) -> PoseEstimate:
+        """Return the estimate expected in `horizon_s` [s]; see `tracking.forecast`."""
         return forecast(self.estimate(state), horizon_s, self.config)
 
 
-def _believed(
-    px: Points2, confidence: Floats, sigma_px: Floats, scale: float
-) -> tuple[Points2, Floats]:
-    """Pixels and sigma, NaN and infinite where a detector's word is no measurement."""
+def _mask_invalid(detections: KeypointArrays, sigma_scale: float) -> KeypointArrays:
+    """Return detections with NaN pixels and infinite sigma for those that are no measurements.
+
+    Args:
+        detections: (B, C, W, J) detections.
+        sigma_scale: factor on the standard deviations of the others.
+    """
+    px, confidence, sigma_px = detections.px, detections.confidence, detections.sigma_px
     inside = np.all(np.abs(px) < FURTHEST_PX, axis=-1)
     ok = inside & (confidence > 0) & (confidence <= 1 + 1e-6)
     ok &= (sigma_px > 0) & (sigma_px < FURTHEST_PX)
-    sigma = np.maximum(np.where(ok, sigma_px * scale, np.inf), MIN_SIGMA_PX)
-    return np.where(ok[..., None], px, np.nan), sigma
+    sigma = np.maximum(np.where(ok, sigma_px * sigma_scale, np.inf), MIN_SIGMA_PX)
+    return KeypointArrays(np.where(ok[..., None], px, np.nan), confidence, sigma)
 
 
 @kernel(makes_arrays=True)
-def _hold(tracks, dt, speed):
+def _grow_covariances(tracks: Records2[Track], dt: float, speed: float) -> None:
+    """Grow the covariances of tracked workers (B, W) with the square of their ages, in place.
+
+    Args:
+        tracks: (B, W) tracks.
+        dt: time that passes [s].
+        speed: growth of the standard deviation [m/s].
+    """
     for b in range(tracks.shape[0]):
         for w in range(tracks.shape[1]):
             t = tracks[b, w]
@@ -89,31 +103,57 @@ def _hold(tracks, dt, speed):
 
 
 @kernel(makes_arrays=True)
-def _update(tracks, made, spread, s, tau):
-    """Take in points made (B, W, J, 3) with spread (B, W, J, 3, 3), NaN where there is none."""
+def _update(
+    tracks: Records2[Track],
+    made: Points3,
+    cov: Covariances3,
+    settings: Settings,
+    velocity_tau: float,
+) -> None:
+    """Update tracks (B, W) by triangulated points, in place.
+
+    Args:
+        tracks: (B, W) tracks.
+        made: (B, W, J, 3) points [m]; NaN where there is none.
+        cov: (B, W, J, 3, 3) their covariances [m^2].
+        settings: when tracks start and which points belong to a body.
+        velocity_tau: time constant of the filter on velocities [s].
+    """
     found = np.empty(made.shape[2], np.bool_)
     for b in range(made.shape[0]):
         for w in range(made.shape[1]):
-            t, points, around = tracks[b, w], made[b, w], spread[b, w]
+            track, points, spread = tracks[b, w], made[b, w], cov[b, w]
             for j in range(len(found)):
                 found[j] = np.isfinite(points[j, 0])
-            n_found = keep_one_body(points, around, found, s.body_radius_m)
-            if t.tracked:
-                _follow(t, points, around, found, tau)
-            elif n_found >= s.acquire_min_joints:
-                complete_body(points, around, found)
-                t.mean_world[:], t.cov_world[:], t.velocity_world[:] = points, around, 0.0
+            n_found = keep_one_body(points, spread, found, settings.body_radius_m)
+            if track.tracked:
+                _update_track(track, points, spread, found, velocity_tau)
+            elif n_found >= settings.acquire_min_joints:
+                complete_body(points, spread, found)
+                track.mean_world[:], track.cov_world[:] = points, spread
+                track.velocity_world[:] = 0.0
                 for j in range(len(found)):
-                    t.age_s[j] = 0.0 if found[j] else t.age_s[j]
-                t.tracked = True
+                    track.age_s[j] = 0.0 if found[j] else track.age_s[j]
+                track.tracked = True
 
 
 @kernel(makes_arrays=True)
-def _follow(track, points, spread, found, tau):
+def _update_track(
+    track: Track, points: Points3, spread: Covariances3, found: Bools, velocity_tau: float
+) -> None:
+    """Move the joints of a track to new points and filter their velocities, in place.
+
+    Args:
+        track: the track.
+        points: (J, 3) points [m].
+        spread: (J, 3, 3) their covariances [m^2].
+        found: (J,) joints that have a point.
+        velocity_tau: time constant of the filter on velocities [s].
+    """
     mean, velocity, age = track.mean_world, track.velocity_world, track.age_s
     for j in range(len(points)):
         elapsed = age[j]
-        trust = elapsed / (tau + elapsed)
+        trust = elapsed / (velocity_tau + elapsed)
         for i in range(3):
             speed = (points[j, i] - mean[j, i]) / max(elapsed, 1e-6) if found[j] else 0.0
             velocity[j, i] += trust * (speed - velocity[j, i])

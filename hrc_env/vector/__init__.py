@@ -1,1 +1,1 @@
-"""Many environments in one."""
+"""The vector environment and its parts."""

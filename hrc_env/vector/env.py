@@ -3,14 +3,13 @@
 import gymnasium, hrc_env
 envs = gymnasium.make_vec("HRCReach-v0", num_envs=64, perception="keypoints")
 
-Environment k is `gymnasium.make("HRCReach-v0", ...)`, bit for bit, whatever the number of
-environments and of threads. What it says, and in which form, is what gymnasium's
-`SyncVectorEnv` of the same environments says.
+Environment k is `gymnasium.make("HRCReach-v0", ...)`, bit for bit, for any number of environments
+and threads. Results have the form of gymnasium's `SyncVectorEnv` of the same environments.
 """
 
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from gymnasium.utils import seeding
@@ -22,7 +21,7 @@ from hrc_env.control import check_action
 from hrc_env.core.batching import State, copied, mapped, one, write_rows
 from hrc_env.core.errors import ConfigError, check_shape, whole
 from hrc_env.core.typing import Bools, Floats, Ints
-from hrc_env.env import RENDER_MODES, EnvBase, spaces
+from hrc_env.env import RENDER_MODES, EnvBase, make_spaces
 from hrc_env.env_config import check_keywords
 from hrc_env.rehearsal import rehearse
 from hrc_env.render.views import CameraChoice
@@ -31,48 +30,49 @@ from hrc_env.rewards import RewardConfig
 from hrc_env.settings import settle
 from hrc_env.simulation import Simulation
 from hrc_env.step_result import Observation, StepResult
-from hrc_env.tasks.task import Task
-from hrc_env.vector.infos import InfoTable, table, words_of_infos
+from hrc_env.tasks.task import AnyTask
+from hrc_env.vector.infos import InfoTable, make_table, words_of_infos
 from hrc_env.vector.member import TOGETHER, Member
 from hrc_env.vector.options import (
     ALONE,
     MAX_ENVS,
     OF_VECTORS,
-    autoreset_of,
-    options_of_each,
+    count_elapsed_steps,
+    parse_autoreset,
+    parse_seeds,
+    parse_threads,
+    parse_time_limit,
     read_options,
-    seeds_of,
-    steps_behind,
-    threads_of,
-    time_limit,
+    split_options,
 )
 from hrc_env.vector.pictures import LISTS, Pictures
 from hrc_env.vector.shards import Shards
 
-Step = tuple[Observation, NDArray[np.float64], Bools, Bools, dict[str, Any]]
+Step: TypeAlias = tuple[Observation, NDArray[np.float64], Bools, Bools, dict[str, Any]]
+"""Result of a step, in the form of gymnasium."""
 
 
 class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
     EnvBase, VectorEnv[Observation, NDArray[np.float32], NDArray[Any]]
 ):
-    """A vector environment: robots, each beside workers of its own, stepped at once.
+    """A vector environment: robots, each beside workers of its own, that step together.
 
-    Environment k of `reset(seed=s)` is the single environment after `reset(seed=s + k)`, to the
+    Environment k after `reset(seed=s)` is the single environment after `reset(seed=s + k)`, bit for
     bit. Actions are (num_envs, A), observations (num_envs, n).
 
     Args:
-        num_envs: how many environments step together.
-        max_episode_steps: the time limit; None is the task's, -1 none.
-        autoreset_mode: when an environment whose episode is over starts anew: at the next
-            step (default), in the same step, or not by itself ("Disabled").
-        num_threads: threads that share the environments; all cores if None.
-        arguments: of `EnvConfig`. perception is "keypoints" (default), "truth" or "none", as
-            pictures have no batched form; with "_list" behind a render mode `render` gives every
-            environment's pictures of all steps since the last `render` or the beginning of the
+        num_envs: number of environments.
+        max_episode_steps: time limit; None for the task's, -1 for none.
+        autoreset_mode: time of the reset after the end of an episode: in the next step (default),
+            in the same step, or never ("Disabled").
+        num_threads: number of threads that share the environments; None for all cores.
+        arguments: fields of `EnvConfig`. perception is "keypoints" (default), "truth" or "none", as
+            images have no batched form. With the suffix "_list" of a render mode, `render` returns
+            every environment's pictures of all steps since the last `render` or the start of the
             episode.
 
     Raises:
-        ConfigError: a name, index or value that is not valid, with those that are.
+        ConfigError: a name, index or value is not valid; the error names the valid ones.
     """
 
     CHANGES = ("shards", "_streams", "_steps", "_ended", "_observation")
@@ -100,31 +100,31 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         if self.render_mode in LISTS:
             self.metadata["render_modes"].append(self.render_mode)
         self.arguments = arguments if self.render_mode else _without_pictures(arguments)
-        """Given arguments of `HRCEnv`."""
+        """Arguments of `HRCEnv`, as they were given."""
         self.num_envs = whole("num_envs", num_envs, 1, MAX_ENVS)
-        self.autoreset_mode = autoreset_of(autoreset_mode)
+        self.autoreset_mode = parse_autoreset(autoreset_mode)
         self.metadata["autoreset_mode"] = self.autoreset_mode
         rehearse(settings)
-        n_shards = min(threads_of(num_threads), self.num_envs)
+        n_shards = min(parse_threads(num_threads), self.num_envs)
         self.shards = Shards(self.num_envs, n_shards, partial(Simulation, settings=settings))
         self.pictures = Pictures(self.shards, self.render_mode, self._size, self._shown)
-        self.single_observation_space, self.single_action_space = spaces(self.shards.first)
+        self.single_observation_space, self.single_action_space = make_spaces(self.shards.first)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._streams = [seeding.np_random() for _ in range(self.num_envs)]
-        """Each environment's generator, and what it was made from."""
+        """Generator of each environment, and its seed."""
         self._action_shape = (self.num_envs, self.shards.first.n_actions)
         limit = settings.task.max_episode_steps if max_episode_steps is None else max_episode_steps
-        self.max_episode_steps = time_limit(limit)
+        self.max_episode_steps = parse_time_limit(limit)
         self._steps = np.zeros(self.num_envs, int)
         self._ended = np.zeros(self.num_envs, bool)
         self._observation: Observation | None = None
         self._options: list[dict[str, Any]] = [{}] * self.num_envs
-        """The parts of each environment's episodes that are fixed until further notice."""
+        """Fixed parts of all episodes to come, by environment."""
         self._fixed: list[Fixed | None] = [None] * self.num_envs
-        """The same, checked."""
+        """Checked form of `_options`."""
         self.notes: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        """Attributes of every environment that a user has set."""
+        """Attributes of each environment that a user has set."""
 
     def reset(
         self,
@@ -135,19 +135,23 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         """Start episodes of all environments, or of some.
 
         Args:
-            seed: environment k gets `seed + k`, or the k-th of a list; with None its random
-                stream goes on.
-            options: "reset_mask", (num_envs,) bool: only these environments start anew.
-                "steps_left", one or (num_envs,) int: after so many steps these first episodes are
-                truncated, if not before. Or "elapsed_steps", (num_envs,) int: how much of the
-                time limit they have behind them. What of the episodes is fixed: the other fields
-                of `ResetOptions`, and "each", a list of a mapping of them for each environment.
+            seed: environment k gets `seed + k`, or the k-th of a list; with None its random stream
+                continues.
+            options: options by name. "reset_mask", (num_envs,) bool, selects the environments that
+                start an episode. "steps_left", one or (num_envs,) int, is the number of steps after
+                which these episodes are truncated, if not before; or "elapsed_steps", (num_envs,)
+                int, is the number of steps of the time limit that have passed. The other fields of
+                `ResetOptions` fix parts of the episodes; "each" is a list of a mapping of fields
+                for each environment.
 
         Returns:
             Observations of all environments, and infos of those that started.
+
+        Raises:
+            ConfigError: an option is invalid; no episode has started then.
         """
         self.refuse_closed()
-        seeds = seeds_of(seed, self.num_envs)
+        seeds = parse_seeds(seed, self.num_envs)
         asked = read_options(options, self.num_envs, self.max_episode_steps)
         mask, elapsed_steps = asked.mask, asked.elapsed_steps
         if self._observation is None and not mask.all():
@@ -164,20 +168,27 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         write_rows(self._observation, ids, fresh.observation)
         self._ended = self._ended & ~mask
         self.pictures.take(mask, mask)
-        return copied(self._observation), table(fresh, ids, self.num_envs).arrays(mask)
+        return copied(self._observation), make_table(fresh, ids, self.num_envs).arrays(mask)
 
     def step(self, actions: NDArray[np.float32]) -> Step:
-        """One control step of every environment; actions (num_envs, n) in [-1, 1].
+        """Advance every environment by one control step.
 
-        In the mode NEXT_STEP those of environments whose episode has just ended are ignored:
-        these start anew instead. Infos are arrays (num_envs,), each with a mask "_name".
+        In the mode NEXT_STEP, environments whose episode has just ended are reset instead, and
+        their actions are ignored.
+
+        Args:
+            actions: (num_envs, A) actions in [-1, 1].
+
+        Returns:
+            Observations, rewards (num_envs,), whether episodes are terminated, whether they are
+            truncated, and infos: arrays (num_envs,), each with a mask "_name".
         """
-        result = self.shards.step(self._checked(actions))
+        result = self.shards.step(self._check_actions(actions))
         observation = copied(result.observation)
-        info = table(result, slice(None), self.num_envs)
+        info = make_table(result, slice(None), self.num_envs)
         reward, terminated, over = result.reward.copy(), result.terminated.copy(), self._ended
         self._steps += 1
-        if over.any():  # only where the mode is NEXT_STEP
+        if over.any():  # in the mode NEXT_STEP only
             self._restart(over, observation, info)
             reward[over], terminated[over] = 0.0, False
         truncated = self._steps >= self.max_episode_steps
@@ -192,10 +203,10 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         return copied(observation), reward, terminated, truncated, infos
 
     def words(self, infos: Mapping[str, Any]) -> dict[str, NDArray[np.object_]]:
-        """Return in words what infos say of workers, contacts and cameras.
+        """Return the indices of infos in words: activities, bodies, contacts and cameras.
 
         Args:
-            infos: as `reset` and `step` return them.
+            infos: infos of `reset` or `step`.
 
         Returns:
             (num_envs,) tuples of words by the names of docs/reference/infos.md.
@@ -203,43 +214,43 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         return words_of_infos(infos, self.num_envs, self.shards.first.bodies.names)
 
     def set_options(self, options: Mapping[str, Any] | ResetOptions | None = None) -> None:
-        """Fix something of all episodes to come, as `HRCEnv.set_options`, in every environment.
+        """Fix parts of all episodes to come in every environment, until the next call.
 
         Args:
-            options: as of `reset`, "each" included; None: nothing is fixed any more.
+            options: options of `reset`, "each" included; None fixes nothing.
 
         Raises:
-            ConfigError: an option that cannot be, or is of one reset.
+            ConfigError: an option is invalid, or for a single reset only.
         """
-        each = options_of_each(lasting_options(options, *OF_VECTORS), self.num_envs)
+        each = split_options(lasting_options(options, *OF_VECTORS), self.num_envs)
         for of_one in each:
             lasting_options(of_one)
         nothing: list[dict[str, Any]] = [{}] * self.num_envs
         everyone = np.arange(self.num_envs)
-        fixed = _fixed_each(self.shards.first, everyone, nothing, each)
+        fixed = _fix_episodes(self.shards.first, everyone, nothing, each)
         self._options, self._fixed = each, fixed
 
     def get_state(self) -> State:
-        """Return a copy of everything that changes, options of `set_options` included."""
+        """Return a copy of the whole state, options of `set_options` included."""
         return {**super().get_state(), "options": copied(self._options)}
 
     def set_state(self, state: State) -> None:
-        """Continue from a state that was taken with the same arguments, bit for bit."""
+        """Restore a state that was taken with the same arguments, bit for bit."""
         super().set_state(state)
         self.set_options({"each": copied(state["options"])})
 
     def check_options(self, k: int, options: Mapping[str, Any] | ResetOptions | None) -> None:
-        """Raise the `ConfigError` that a reset of environment `k` with these options raises."""
+        """Raise the `ConfigError` that a reset of environment `k` would raise for these options."""
         given = named_options(options, *ALONE)
-        steps_behind({n: given.pop(n) for n in ALONE if n in given}, self.max_episode_steps)
+        count_elapsed_steps({n: given.pop(n) for n in ALONE if n in given}, self.max_episode_steps)
         self.shards.first.fix({**self._options[k], **given})
 
     def options_of(self, k: int) -> dict[str, Any]:
-        """Return the fixed parts of environment `k`'s episodes to come, by name."""
+        """Return the options of all episodes to come of environment `k`, by name."""
         return dict(self._options[k])
 
     def set_options_of(self, k: int, options: Mapping[str, Any] | ResetOptions | None) -> None:
-        """Fix something of the episodes to come of environment `k` alone."""
+        """Fix parts of all episodes to come of environment `k` alone."""
         given = lasting_options(options)
         fixed = self.shards.first.fix(given) if given else None
         self._options = [given if b == k else each for b, each in enumerate(self._options)]
@@ -248,7 +259,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
     def set_reward(
         self, weights: RewardConfig | None = None, factors: Mapping[str, float] | None = None
     ) -> None:
-        """Weigh the reward's terms so from the next step on, in all environments (`HRCEnv`)."""
+        """Set the weights of the reward's terms in all environments, as `HRCEnv.set_reward`."""
         for part in self.shards.parts:
             part.set_reward(weights, factors)
 
@@ -258,7 +269,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         They are drawn one after the other, which is slow.
 
         Args:
-            camera: through which, as of `HRCEnv.render`; not of lists.
+            camera: camera of the pictures, as for `HRCEnv.render`; not for lists.
 
         Raises:
             ConfigError: there is no such camera.
@@ -269,32 +280,32 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         return tuple(self.pictures.of(k, camera) for k in range(self.num_envs))
 
     def member(self, k: int) -> Member:
-        """Return environment `k` by itself."""
+        """Return environment `k` alone."""
         return Member(self, k)
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
         """Return the result of a method, or the value of an attribute, of every environment.
 
         Args:
-            name: of the method or attribute; the methods `TOGETHER` are called once.
-            args: of the method.
-            kwargs: of the method.
+            name: name of the method or attribute; the methods `TOGETHER` are called once.
+            args: arguments of the method.
+            kwargs: keyword arguments of the method.
         """
         if name in TOGETHER:
             return (getattr(self, name)(*args, **kwargs),) * self.num_envs
-        said = [getattr(self.member(k), name) for k in range(self.num_envs)]
-        return tuple(each(*args, **kwargs) if callable(each) else each for each in said)
+        values = [getattr(self.member(k), name) for k in range(self.num_envs)]
+        return tuple(each(*args, **kwargs) if callable(each) else each for each in values)
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
-        """Return an attribute of every environment; see `Member`."""
+        """Return an attribute of every environment, as of `Member`."""
         return self.call(name)
 
     def set_attr(self, name: str, values: Any) -> None:
-        """Set an attribute of your own of every environment; see `Member`.
+        """Set a user's own attribute of every environment, as of `Member`.
 
         Args:
-            name: of the attribute.
-            values: one for all environments, or a list or tuple of one for each.
+            name: name of the attribute.
+            values: a value for all environments, or a list or tuple with one for each.
         """
         each = values if isinstance(values, (list, tuple)) else [values] * self.num_envs
         check_shape(f"values of {name!r}", (len(each),), (self.num_envs,), "one an environment")
@@ -303,33 +314,33 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
 
     @property
     def simulation(self) -> Simulation:
-        """The environments' simulation; of several, the first."""
+        """Simulation of the environments; of several, the first."""
         return self.shards.first
 
     @property
-    def task(self) -> Task[Any, Any]:
-        """The task of every robot."""
+    def task(self) -> AnyTask:
+        """Task of the robots."""
         return self._task
 
     @property
     def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
-        """The environments' random generators."""
+        """Random generator of each environment."""
         return tuple(generator for generator, _ in self._streams)
 
     @property
     def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
-        """What the environments' random generators were made from."""
+        """Seed of each environment's random generator; -1 if it is unknown."""
         return tuple(seed for _, seed in self._streams)
 
     def set_stream(self, k: int, stream: np.random.Generator) -> None:
-        """Let environment `k` draw from this generator, of unknown seed (-1)."""
+        """Set the random generator of environment `k`, whose seed is unknown (-1)."""
         if not isinstance(stream, np.random.Generator):
             raise ConfigError(f"np_random must be a numpy.random.Generator, got {stream!r}.")
         self._streams[k] = stream, -1
 
     def close_extras(self, **kwargs: Any) -> None:
         """Stop the threads and release graphics contexts."""
-        if "pictures" not in vars(self):  # gymnasium before 1.4 closes what could not be made, too
+        if "pictures" not in vars(self):  # gymnasium before 1.4 also closes after an error
             return
         self.pictures.close()
         self.shards.close()
@@ -338,26 +349,36 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         return self.shards.first.reward_factors.get(term, 1.0)
 
     def _begin(self, ids: Ints, fixed: Sequence[Fixed | None] = ()) -> StepResult:
-        """Start environments `ids` anew; their random streams go on."""
+        """Begin new episodes of environments `ids`, whose random streams continue."""
         self._steps[ids] = 0
         return self.shards.reset(ids, [self._streams[k][0] for k in ids.tolist()], fixed)
 
     def _fix_each(self, ids: Ints, each: Sequence[dict[str, Any]]) -> list[Fixed | None]:
-        """What is fixed of the episodes of environments `ids`, by the options of a reset (B,) and
-        those of all."""
+        """Return the fixed parts of the episodes of environments `ids`.
+
+        Args:
+            ids: (n,) the environments in question.
+            each: options of a reset, B of them.
+        """
         if not any(each):
             return [self._fixed[k] for k in ids.tolist()]
-        return _fixed_each(self.shards.first, ids, self._options, each)
+        return _fix_episodes(self.shards.first, ids, self._options, each)
 
-    def _restart(self, who: Bools, observation: Observation, info: InfoTable) -> None:
-        """Start environments `who` (B,) anew and write what they see over what they saw."""
-        ids = np.flatnonzero(who)
+    def _restart(self, mask: Bools, observation: Observation, info: InfoTable) -> None:
+        """Reset environments, and replace their observations and infos.
+
+        Args:
+            mask: (B,) the environments in question.
+            observation: observations, whose rows are replaced.
+            info: infos, whose rows are replaced.
+        """
+        ids = np.flatnonzero(mask)
         fresh = self._begin(ids, [self._fixed[k] for k in ids.tolist()])
         write_rows(observation, ids, fresh.observation)
         info.write(ids, fresh)
 
-    def _checked(self, actions: Any) -> Floats:
-        """Actions (num_envs, n) clipped to [-1, 1]; zero for environments that start anew."""
+    def _check_actions(self, actions: Any) -> Floats:
+        """Return actions (num_envs, A) clipped to [-1, 1]; 0 for environments that are reset."""
         self.refuse_closed()
         if self._observation is None:
             raise ConfigError("Call reset() before step().")
@@ -374,16 +395,25 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
 
 
 def _without_pictures(arguments: dict[str, Any]) -> dict[str, Any]:
-    """Return arguments without those of pictures, which nobody draws."""
-    of_pictures = ("render_mode", "width", "height", "render_markers", "overlay")
-    return {name: value for name, value in arguments.items() if name not in of_pictures}
+    """Return arguments without those of pictures."""
+    names = ("render_mode", "width", "height", "render_markers", "overlay")
+    return {name: value for name, value in arguments.items() if name not in names}
 
 
-def _fixed_each(
-    simulation: Simulation, ids: Ints, lasting: Sequence[dict[str, Any]],
+def _fix_episodes(
+    simulation: Simulation,
+    ids: Ints,
+    lasting: Sequence[dict[str, Any]],
     each: Sequence[dict[str, Any]],
-) -> list[Fixed | None]:  # fmt: skip
-    """What options (B,), those of all resets and those of one, fix of environments `ids`."""
+) -> list[Fixed | None]:
+    """Return the fixed parts of the episodes of environments `ids`.
+
+    Args:
+        simulation: a simulation with their settings.
+        ids: (n,) the environments in question.
+        lasting: options of all resets, B of them.
+        each: options of one reset, B of them.
+    """
     known: dict[tuple[int, int], Fixed | None] = {}
     for k in ids.tolist():
         key = id(lasting[k]), id(each[k])
@@ -393,10 +423,10 @@ def _fixed_each(
     return [known[id(lasting[k]), id(each[k])] for k in ids.tolist()]
 
 
-def _finals(observation: Observation, info: InfoTable, who: Bools) -> dict[str, Any]:
-    """The last observations and infos of the episodes of environments `who` (B,)."""
-    last = np.full(len(who), None, object)
-    for b in np.flatnonzero(who):
+def _finals(observation: Observation, info: InfoTable, ended: Bools) -> dict[str, Any]:
+    """Return the last observations and infos of the episodes that `ended` (B,)."""
+    last = np.full(len(ended), None, object)
+    for b in np.flatnonzero(ended):
         last[b] = copied(one(observation, int(b)))
-    final_info = {"final_info": info.arrays(who), "_final_info": who.copy()}
-    return {"final_obs": last, "_final_obs": who.copy(), **final_info}
+    final_info = {"final_info": info.arrays(ended), "_final_info": ended.copy()}
+    return {"final_obs": last, "_final_obs": ended.copy(), **final_info}

@@ -1,7 +1,7 @@
-"""Infos of many environments: one array a name, each with a mask of who has the value.
+"""Infos of many environments: an array for each name, with a mask of the environments that have it.
 
 The layout is that of gymnasium's `VectorEnv._add_info`. Names are the same in every step; where the
-mask is false an environment has no info now, and the value is zero.
+mask is false, an environment has no info in this step, and the value is 0.
 """
 
 import warnings
@@ -26,49 +26,55 @@ class InfoTable:
     """Named values of B environments."""
 
     values: dict[str, Floats]
-    """(B,) numbers by name; NaN where an environment has no such value."""
+    """(B,) numbers by name; NaN for an environment without a value."""
 
     def write(self, ids: Ints | slice, result: StepResult) -> None:
-        """Give environments `ids` the values of a result of them."""
+        """Write the infos of a result of environments `ids`."""
         for name, values in result.info.items():
             self.values[name][ids] = values
 
-    def arrays(self, who: Bools) -> dict[str, Any]:
-        """Values and masks for the environments `who` (B,); the others have none."""
+    def arrays(self, mask: Bools) -> dict[str, Any]:
+        """Return values and masks by name; environments outside of the mask (B,) have none."""
         infos: dict[str, Any] = {}
         for name, values in published(self.values).items():
-            infos[name] = np.where(who, values, np.zeros_like(values))
-            infos[f"_{name}"] = who.copy()
+            infos[name] = np.where(mask, values, np.zeros_like(values))
+            infos[f"_{name}"] = mask.copy()
         return infos
 
 
-def table(result: StepResult, ids: Ints | slice, batch: int) -> InfoTable:
-    """The info of a result of environments `ids` as a table; the others have no values."""
-    made = InfoTable({name: _unknown(batch, values) for name, values in result.info.items()})
-    made.write(ids, result)
-    return made
+def make_table(result: StepResult, ids: Ints | slice, batch: int) -> InfoTable:
+    """Return the infos of some environments as a table of all.
+
+    Args:
+        result: result of environments `ids`.
+        ids: these environments.
+        batch: number of all environments, B.
+    """
+    table = InfoTable({name: _fill(batch, values) for name, values in result.info.items()})
+    table.write(ids, result)
+    return table
 
 
-def _unknown(batch: int, values: Any) -> Any:
-    """Return (B,) entries of the type of `values`, NaN if that has one."""
+def _fill(batch: int, values: NDArray[Any]) -> NDArray[Any]:
+    """Return (B,) missing values of the type of an array: NaN, or -1 for integers."""
     return np.full(batch, np.nan if values.dtype.kind == "f" else -1, values.dtype)
 
 
-def chosen_infos(patterns: str | Sequence[str], arguments: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the names of infos that patterns choose, before an environment is played.
+def choose_infos(patterns: str | Sequence[str], arguments: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the names of infos that match patterns, of a small environment.
 
     Args:
-        patterns: names, or patterns of names: "safety/*".
-        arguments: of `HRCVectorEnv`, whose infos they are; a small environment of them is asked.
+        patterns: names, or patterns of names such as "safety/*".
+        arguments: arguments of `HRCVectorEnv`.
 
     Raises:
-        ConfigError: a pattern that no name matches, or that is no text.
+        ConfigError: no name matches a pattern, or it is no text.
     """
     if not isinstance(patterns, str) and not patterns:
         return ()
-    own = {each.name for each in fields(EnvConfig)} - {"render_mode", "width", "height"}
-    given = {name: value for name, value in arguments.items() if name in own}
-    with warnings.catch_warnings():  # the environment itself says what there is to say
+    known = {each.name for each in fields(EnvConfig)} - {"render_mode", "width", "height"}
+    given = {name: value for name, value in arguments.items() if name in known}
+    with warnings.catch_warnings():  # the environment itself repeats them
         warnings.simplefilter("ignore")
         small = Simulation(1, settle(**{"perception": "keypoints", **given}))
     try:
@@ -81,7 +87,7 @@ def chosen_infos(patterns: str | Sequence[str], arguments: Mapping[str, Any]) ->
 def words_of_infos(
     infos: Mapping[str, Any], num_envs: int, bodies: tuple[str, ...]
 ) -> dict[str, NDArray[np.object_]]:
-    """Return in words what infos of a batch say.
+    """Return the indices of a batch's infos in words.
 
     Args:
         infos: arrays (num_envs,) by name.
@@ -93,8 +99,10 @@ def words_of_infos(
     """
     words = words_of(bodies)
     numbers = {name: infos[name] for name in infos if not name.startswith(("_", "final_"))}
-    said = [
+    worded_infos = [
         worded({name: values[b] for name, values in numbers.items()}, words)
         for b in range(num_envs)
     ]
-    return {name: np.fromiter((each[name] for each in said), object) for name in said[0]}
+    return {
+        name: np.fromiter((each[name] for each in worded_infos), object) for name in worded_infos[0]
+    }

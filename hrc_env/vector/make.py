@@ -1,4 +1,4 @@
-"""Making of vector environments: one batch, or at level "pixels" a process for each environment."""
+"""Make vector environments: one batch, or at level "pixels" a process for each environment."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
@@ -18,62 +18,62 @@ from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import TASKS, find_task
 from hrc_env.vector.env import HRCVectorEnv
 from hrc_env.vector.infos import words_of_infos
-from hrc_env.vector.options import options_of_each
+from hrc_env.vector.options import split_options
 
 PROCESSES_PER_CORE = 2
-"""More processes that render and run networks only wait for each other."""
+"""Largest number of processes a core; more renderers and networks are no faster."""
 REFUSING = ("check_options", "set_options", "set_reward")
-"""Methods of `HRCEnv` that refuse arguments."""
+"""Methods of `HRCEnv` that raise errors for arguments."""
 
 
-def without_refusal(results: Iterable[Any]) -> tuple[Any, ...]:
-    """Return results of `HRCEnv.attempt`; raise the first error among them."""
-    told = tuple(results)
-    for each in told:
-        if isinstance(each, ConfigError):
-            raise each
-    return told
+def raise_first_error(results: Iterable[Any]) -> tuple[Any, ...]:
+    """Return results of `HRCEnv.attempt`, or raise the first error among them."""
+    values = tuple(results)
+    for value in values:
+        if isinstance(value, ConfigError):
+            raise value
+    return values
 
 
 class PixelVectorEnv(HasSpec, AsyncVectorEnv):  # type: ignore[misc]  # `spec` is a property
     """Environments at level "pixels", a process for each.
 
-    Errors of options and rewards are raised here, and processes go on.
+    Errors of options and rewards are raised in this process, and the others continue.
     """
 
     def reset_async(self, seed: int | list[int | None] | None = None, options: Any = None) -> None:
-        """Ask for resets, each environment's with options of its own, as of `HRCVectorEnv`."""
+        """Start resets; the arguments are those of `HRCVectorEnv.reset`."""
         given = named_options(options, "reset_mask", "each")
         mask = {name: given.pop(name) for name in ("reset_mask",) if name in given}
         if given:
-            each = options_of_each(given, self.num_envs)
+            each = split_options(given, self.num_envs)
             chosen = mask.get("reset_mask", [True] * self.num_envs)
-            asked = zip(each, chosen, strict=True)
-            self._offer([of_one if goes else {} for of_one, goes in asked])
+            pairs = zip(each, chosen, strict=True)
+            self._set_next_options([of_env if is_reset else {} for of_env, is_reset in pairs])
         super().reset_async(seed, mask or None)
 
     def set_options(self, options: Mapping[str, Any] | ResetOptions | None = None) -> None:
-        """Fix something of all episodes to come, as `HRCVectorEnv.set_options` does."""
-        self.set_attr("options", options_of_each(lasting_options(options, "each"), self.num_envs))
+        """Fix parts of all episodes to come, as `HRCVectorEnv.set_options` does."""
+        self.set_attr("options", split_options(lasting_options(options, "each"), self.num_envs))
 
     def set_attr(self, name: str, values: Any) -> None:
         """Set an attribute of every environment, "options" among them.
 
         Args:
-            name: of the attribute.
-            values: one for all environments, or a list or tuple of one for each.
+            name: name of the attribute.
+            values: a value for all environments, or a list or tuple with one for each.
 
         Raises:
-            ConfigError: options that cannot be; they are then as they were in every environment.
+            ConfigError: an option is invalid; no environment's options have changed then.
         """
         if name == "options":
             each = values if isinstance(values, (list, tuple)) else [values] * self.num_envs
-            self._offer([lasting_options(of_one) for of_one in each], lasting=True)
+            self._set_next_options([lasting_options(of_env) for of_env in each], lasting=True)
             super().set_attr("next_options", None)
         super().set_attr(name, values)
 
     def call_async(self, name: str, /, *args: Any, **kwargs: Any) -> None:
-        """Start a call of every environment; `call_wait` raises their errors."""
+        """Start a call of every environment; `call_wait` raises its errors."""
         attempt = ("attempt",) if name in REFUSING else ()
         super().call_async(*attempt, name, *args, **kwargs)
 
@@ -81,20 +81,24 @@ class PixelVectorEnv(HasSpec, AsyncVectorEnv):  # type: ignore[misc]  # `spec` i
         """Return the results of calls.
 
         Args:
-            timeout: after which it is a `TimeoutError` [s]; None: none.
+            timeout: time after which `TimeoutError` is raised [s]; None for no limit.
 
         Raises:
             ConfigError: an environment refuses the arguments.
         """
-        return without_refusal(super().call_wait(timeout))
+        return raise_first_error(super().call_wait(timeout))
 
     def words(self, infos: Mapping[str, Any]) -> dict[str, NDArray[np.object_]]:
-        """Return in words what infos say, as `HRCVectorEnv.words` does."""
+        """Return the indices of infos in words, as `HRCVectorEnv.words` does."""
         return words_of_infos(infos, self.num_envs, self.get_attr("body_names")[0])
 
-    def _offer(self, each: Sequence[Mapping[str, Any]], lasting: bool = False) -> None:
-        """Give every environment options of its next reset, and take them back if one cannot have
-        them."""
+    def _set_next_options(self, each: Sequence[Mapping[str, Any]], lasting: bool = False) -> None:
+        """Set the options of each environment's next reset, or of none if one raises an error.
+
+        Args:
+            each: options for each environment.
+            lasting: whether they are for all resets to come.
+        """
         super().set_attr("next_options", list(each))
         try:
             self.call("check_options", lasting=lasting)
@@ -109,16 +113,16 @@ def make_vector(
     """Make a vector environment at any perception level, as `gymnasium.make_vec` does.
 
     Args:
-        num_envs: how many environments step together.
-        perception: as of `HRCEnv`.
-        force: with "pixels" allow more processes than two for each core.
-        kwargs: of `HRCVectorEnv`; no `num_threads` with "pixels".
+        num_envs: number of environments.
+        perception: perception level, as for `HRCEnv`.
+        force: whether more than two processes a core are allowed with "pixels".
+        kwargs: arguments of `HRCVectorEnv`; without `num_threads` with "pixels".
 
     Returns:
         An `HRCVectorEnv`; for "pixels" gymnasium's `AsyncVectorEnv`, a process an environment.
 
     Raises:
-        ConfigError: a value that is not valid, or more processes than make sense.
+        ConfigError: a value is not valid, or there are too many processes.
     """
     if perception != "pixels":
         if kwargs.get("render_mode") != "human":

@@ -1,4 +1,4 @@
-"""One environment of a vector environment by itself, with the interface of `HRCEnv`."""
+"""One environment of a vector environment alone, with the interface of `HRCEnv`."""
 
 import inspect
 from collections.abc import Mapping
@@ -26,20 +26,29 @@ if TYPE_CHECKING:
     from hrc_env.vector.env import HRCVectorEnv
 
 ALIKE = (
-    "closed", "compute_reward", "compute_terminated", "compute_truncated", "config",
-    "max_episode_steps", "render_mode",
-)  # fmt: skip
-"""Attributes of the vector environment that hold for every environment."""
+    "closed",
+    "compute_reward",
+    "compute_terminated",
+    "compute_truncated",
+    "config",
+    "max_episode_steps",
+    "render_mode",
+)
+"""Attributes of the vector environment that are those of every environment."""
 TOGETHER = ("close", "set_reward")
 """Methods for all environments together only."""
 TAKEN = {*inspect.signature(HRCEnv).parameters, *dir(HRCEnv), *ALIKE, "simulation", "views"}
-"""Names of an environment's attributes and arguments."""
+"""Names of an environment's attributes and arguments, which a user's own must not have."""
 
 
 class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
-    """Environment `k` of a vector environment: its attributes, its pictures and resets of it alone.
+    """Environment `k` of a vector environment: its attributes, pictures and resets.
 
-    It steps with the others only. The vector environment keeps attributes that a user sets.
+    It steps only together with the others. The vector environment stores attributes of a user.
+
+    Args:
+        vector: the vector environment.
+        k: index of the environment.
     """
 
     def __init__(self, vector: "HRCVectorEnv", k: int) -> None:
@@ -48,7 +57,12 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Start an episode of this environment; as of `HRCEnv`, and "elapsed_steps"."""
+        """Start an episode of this environment.
+
+        Args:
+            seed: seed of its random stream; with None the stream continues.
+            options: options of `HRCEnv.reset`, or "elapsed_steps".
+        """
         alone = np.arange(self._vector.num_envs) == self._k
         observation, infos = self._vector.reset(
             seed=[seed if each else None for each in alone],
@@ -57,7 +71,7 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
         return copied(one(observation, self._k)), info_of(infos, self._k)
 
     def step(self, action: Any) -> NoReturn:
-        """Raise a `ConfigError`: environments step together."""
+        """Raise `ConfigError`, as environments step together."""
         raise ConfigError(
             f"Environment {self._k} of {self._vector} steps with the others: call step() of the "
             "vector, with an action for each."
@@ -65,19 +79,19 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     @property
     def rig(self) -> tuple[CameraConfig, ...]:
-        """The cameras of this environment's episode."""
-        simulation, b = self._vector.shards.where(self._k)
+        """Calibration of this episode's cameras, as the estimator has it."""
+        simulation, b = self._vector.shards.locate(self._k)
         return simulation.rig_of(b)
 
     @property
     def faults(self) -> tuple[FaultConfig, ...]:
-        """The faults of this environment's cameras in its episode, as `HRCEnv.faults`."""
-        simulation, b = self._vector.shards.where(self._k)
+        """Faults of this episode's cameras, each with its drawn amount."""
+        simulation, b = self._vector.shards.locate(self._k)
         return simulation.cameras.faults_of(b)
 
     @property
     def options(self) -> dict[str, Any]:
-        """Fixed parts of its episodes to come, by name; to be set, as of `HRCEnv`."""
+        """Options of all episodes to come by name; they can be set."""
         return self._vector.options_of(self._k)
 
     @options.setter
@@ -85,48 +99,51 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.set_options(options)
 
     def set_options(self, options: Mapping[str, Any] | ResetOptions | None = None) -> None:
-        """Fix something of the episodes to come of this environment, as `HRCEnv` does."""
+        """Fix parts of all episodes to come of this environment, as `HRCEnv.set_options`."""
         self._vector.set_options_of(self._k, options)
 
     def render(self, camera: CameraChoice = None) -> Any:
-        """Return a picture of this environment, or with a mode "..._list" those since the last;
-        `camera` as of `HRCEnv.render`."""
+        """Return a picture of this environment; with a mode "..._list", those since the last call.
+
+        Args:
+            camera: camera of the picture, as for `HRCEnv.render`.
+        """
         self._vector.refuse_closed()
         return self._vector.pictures.of(self._k, camera)
 
     def mosaic(self) -> NDArray[np.uint8]:
-        """Return the cameras' pictures, as `HRCEnv` does."""
+        """Return the cameras' images with crops, keypoints and estimated skeletons, tiled."""
         self._vector.refuse_closed()
         return self._vector.pictures.mosaic(self._k)
 
     def split_observation(self, observation: Observation) -> dict[str, Floats]:
-        """Return an observation's terms by name, as `HRCEnv` does."""
+        """Return the terms of an observation by name, as `HRCEnv.split_observation`."""
         return observations.split(observation, self._vector.shards.first.layout)
 
     @property
     def observation_space(self) -> Any:  # type: ignore[override]
-        """Of one environment."""
+        """Space of one environment's observations."""
         return self._vector.single_observation_space
 
     @property
     def action_space(self) -> Any:  # type: ignore[override]
-        """Of one environment."""
+        """Space of one environment's actions."""
         return self._vector.single_action_space
 
     @property
     def metadata(self) -> dict[str, Any]:  # type: ignore[override]
-        """Of one environment, without the `autoreset_mode`."""
-        said = self._vector.metadata
-        return {name: value for name, value in said.items() if name != "autoreset_mode"}
+        """Metadata of one environment, without the `autoreset_mode`."""
+        metadata = self._vector.metadata
+        return {name: value for name, value in metadata.items() if name != "autoreset_mode"}
 
     @property
     def render_mode(self) -> str | None:  # type: ignore[override]
-        """Of every environment."""
+        """Render mode of every environment."""
         return self._vector.render_mode
 
     @property
     def spec(self) -> EnvSpec | None:  # type: ignore[override]
-        """Specification for `gymnasium.make`; None of an unregistered task."""
+        """Specification for `gymnasium.make`; None for an unregistered task."""
         vector = self._vector
         known = gymnasium.registry.get(vector.task.id)
         if known is None:
@@ -137,7 +154,7 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     @property
     def np_random(self) -> np.random.Generator:
-        """The environment's random generator."""
+        """Random generator of the environment."""
         return self._vector.np_random[self._k]
 
     @np_random.setter
@@ -146,7 +163,7 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     @property
     def np_random_seed(self) -> int:
-        """Seed of the random generator; -1 of one that a user has set."""
+        """Seed of the random generator; -1 for one that a user has set."""
         return self._vector.np_random_seed[self._k]
 
     def __getattr__(self, name: str) -> Any:
@@ -178,5 +195,5 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
 
 
 def info_of(infos: Mapping[str, Any], b: int) -> dict[str, Any]:
-    """Return the info of environment `b`, of a vector environment's infos."""
+    """Return the info of environment `b` among the infos of a vector environment."""
     return {name: infos[name][b] for name in infos if not name.startswith(("_", "final_"))}

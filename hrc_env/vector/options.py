@@ -1,4 +1,4 @@
-"""What the vector environment's arguments, and those of its `reset`, mean."""
+"""Parse the arguments of the vector environment and the options of its `reset`."""
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
@@ -15,44 +15,46 @@ from hrc_env.env import ENDLESS
 from hrc_env.reset_options import ResetOptions, named_options
 
 MAX_ENVS = 16_384
-"""More would be gigabytes of filters' states, and no faster."""
+"""Largest number of environments; more would take gigabytes and be no faster."""
 ALONE = ("steps_left", "elapsed_steps")
-"""Options of a reset that one environment may have of its own."""
+"""Options of a reset that may differ between environments beside `ResetOptions`."""
 ROWS = {"goal": 1, "start_q": 1, "n_workers": 0, "steps_left": 0, "elapsed_steps": 0}
-"""Options of which an array may hold one an environment, and axes of one alone."""
+"""Options that may be an array with a row an environment, with the number of axes of a row."""
 OF_VECTORS = ("reset_mask", "elapsed_steps", "each")
-"""Options of a reset that vector environments take besides."""
+"""Options of a reset that only vector environments take."""
 
 
-def time_limit(max_episode_steps: int) -> int:
-    """Steps of an episode; -1 is as good as infinitely many."""
+def parse_time_limit(max_episode_steps: int) -> int:
+    """Return the time limit of an episode [control steps]; -1 stands for none."""
     if max_episode_steps == -1:
         return ENDLESS
     return whole("max_episode_steps", max_episode_steps, 1, ENDLESS)
 
 
-def autoreset_of(mode: str | AutoresetMode) -> AutoresetMode:
-    """When environments start anew."""
+def parse_autoreset(mode: str | AutoresetMode) -> AutoresetMode:
+    """Return the mode of resets after the end of an episode."""
     try:
         return AutoresetMode(mode)
     except ValueError as error:
         raise unknown("autoreset_mode", mode, [each.value for each in AutoresetMode]) from error
 
 
-def threads_of(num_threads: int | None) -> int:
-    """How many threads to use: as many as cores, unless a number was given."""
+def parse_threads(num_threads: int | None) -> int:
+    """Return the number of threads; None stands for the number of cores."""
     cores = n_cores()
     if num_threads is None:
         return cores
     n_threads = whole("num_threads", num_threads, 1, MAX_ENVS)
     if n_threads > cores:
-        said = f"num_threads={n_threads} on {cores} cores: results are the same, and later."
-        warnings.warn(said, stacklevel=3)
+        warnings.warn(
+            f"num_threads={n_threads} on {cores} cores: results are the same, and later.",
+            stacklevel=3,
+        )
     return n_threads
 
 
-def seeds_of(seed: int | Sequence[int | None] | None, num_envs: int) -> list[int | None]:
-    """A seed, or None, for each environment."""
+def parse_seeds(seed: int | Sequence[int | None] | None, num_envs: int) -> list[int | None]:
+    """Return a seed, or None, for each environment."""
     if seed is None:
         return [None] * num_envs
     if isinstance(seed, (int, np.integer)):
@@ -68,44 +70,58 @@ def seeds_of(seed: int | Sequence[int | None] | None, num_envs: int) -> list[int
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Asked:
-    """The options of a vector environment's reset, read."""
+class ParsedOptions:
+    """Parsed options of a vector environment's reset."""
 
     mask: Bools
-    """(B,) which environments it is for."""
+    """(B,) whether each environment is reset."""
     elapsed_steps: Ints
-    """(B,) steps that their episodes have behind them."""
+    """(B,) steps of the time limit that have passed."""
     each: list[dict[str, Any]]
-    """The fixed parts of each episode, by name."""
+    """Fixed parts of each episode, by name."""
 
 
 def read_options(
     options: Mapping[str, Any] | ResetOptions | None, num_envs: int, max_episode_steps: int
-) -> Asked:
-    """Return a reset's options, read; `ConfigError` for an option that there is not, or a value
-    that cannot work."""
+) -> ParsedOptions:
+    """Return the parsed options of a reset.
+
+    Args:
+        options: options as a record or a mapping.
+        num_envs: number of environments.
+        max_episode_steps: time limit of episodes.
+
+    Raises:
+        ConfigError: an option is unknown or invalid.
+    """
     given = named_options(options, *OF_VECTORS)
     mask = _mask(given.pop("reset_mask", np.ones(num_envs, bool)), num_envs)
     steps = {name: given.pop(name) for name in ALONE if name in given}
     elapsed_steps = _elapsed(steps, num_envs, max_episode_steps)
-    each = options_of_each(given, num_envs, *ALONE)
-    for k, of_one in enumerate(each):
-        own = {name: of_one[name] for name in ALONE if name in of_one}
-        if own:
-            of_one = each[k] = {name: of_one[name] for name in of_one if name not in own}
-            elapsed_steps[k] = steps_behind(own, max_episode_steps)
-    return Asked(mask, elapsed_steps, each)
+    each = split_options(given, num_envs, *ALONE)
+    for k, of_env in enumerate(each):
+        own_steps = {name: of_env[name] for name in ALONE if name in of_env}
+        if own_steps:
+            each[k] = {name: of_env[name] for name in of_env if name not in own_steps}
+            elapsed_steps[k] = count_elapsed_steps(own_steps, max_episode_steps)
+    return ParsedOptions(mask, elapsed_steps, each)
 
 
-def options_of_each(
+def split_options(
     options: Mapping[str, Any] | ResetOptions | None, num_envs: int, *more: str
 ) -> list[dict[str, Any]]:
-    """Return each environment's options, by name, from one value for all, arrays with a row for
-    each, and the list "each"; what all share is one dictionary.
+    """Return the options of each environment by name.
+
+    They come from values for all environments, arrays with a row for each, and the list "each". If
+    all environments have the same options, they share one dictionary.
+
+    Args:
+        options: options as a record or a mapping.
+        num_envs: number of environments.
+        more: further names that are valid within "each".
 
     Raises:
-        ConfigError: an unknown name, a list of another length, or an option that is given twice.
-            `more` are names that are valid within "each" besides.
+        ConfigError: a name is unknown, a list has another length, or an option is given twice.
     """
     given = named_options(options, "each", *more)
     lists = given.pop("each", None)
@@ -118,21 +134,26 @@ def options_of_each(
     shared = {name: value for name, value in given.items() if name not in by_row}
     if lists is None and not by_row:
         return [shared] * num_envs
-    every = []
-    for k, own in enumerate(lists or [None] * num_envs):
-        own = named_options(own, *more)
-        for name in own:
+    every: list[dict[str, Any]] = []
+    for k, of_env in enumerate(lists or [None] * num_envs):
+        own_options = named_options(of_env, *more)
+        for name in own_options:
             if name in given:
                 raise ConfigError(
                     f'The option {name!r} is given for all environments and in options["each"]'
                     f"[{k}], too: give it once."
                 )
-        every.append({**shared, **{name: value[k] for name, value in by_row.items()}, **own})
+        rows = {name: value[k] for name, value in by_row.items()}
+        every.append({**shared, **rows, **own_options})
     return every
 
 
 def _has_rows(name: str, value: Any, num_envs: int) -> bool:
-    """Whether a value holds one an environment; `ConfigError` for another number of them."""
+    """Return whether a value has a row for each environment.
+
+    Raises:
+        ConfigError: it has another number of rows.
+    """
     try:
         lead = np.shape(value)[:1]
         has_rows = np.ndim(value) == ROWS.get(name, np.inf) + 1
@@ -143,9 +164,16 @@ def _has_rows(name: str, value: Any, num_envs: int) -> bool:
     return has_rows
 
 
-def steps_behind(options: Mapping[str, Any] | None, max_episode_steps: int) -> int:
-    """Return the steps that one environment's episode has behind it, from its "steps_left" or
-    "elapsed_steps"; `ConfigError` as of `read_options`."""
+def count_elapsed_steps(options: Mapping[str, Any] | None, max_episode_steps: int) -> int:
+    """Return the steps of one environment's time limit that have passed.
+
+    Args:
+        options: "steps_left" or "elapsed_steps" of the environment.
+        max_episode_steps: its time limit.
+
+    Raises:
+        ConfigError: an option is unknown or invalid.
+    """
     given = dict(options or {})
     check_names("reset option of one environment", given, ALONE)
     each = {name: np.array([value]) for name, value in given.items()}
@@ -153,6 +181,7 @@ def steps_behind(options: Mapping[str, Any] | None, max_episode_steps: int) -> i
 
 
 def _elapsed(steps: Mapping[str, Any], num_envs: int, max_episode_steps: int) -> Ints:
+    """Return (B,) the elapsed steps, from "steps_left" or "elapsed_steps"."""
     if "elapsed_steps" in steps and "steps_left" in steps:
         raise ConfigError("elapsed_steps and steps_left say the same: give one of them.")
     if "steps_left" in steps:
@@ -165,6 +194,7 @@ def _elapsed(steps: Mapping[str, Any], num_envs: int, max_episode_steps: int) ->
 
 
 def _mask(mask: Any, num_envs: int) -> Bools:
+    """Return a valid mask (B,) of environments to reset, or raise `ConfigError`."""
     if not isinstance(mask, np.ndarray) or mask.dtype != bool:
         raise ConfigError(
             'options["reset_mask"] must be a NumPy array of bool, one for each environment, '
@@ -176,12 +206,13 @@ def _mask(mask: Any, num_envs: int) -> Bools:
     return mask
 
 
-def _steps(name: str, given: Any, num_envs: int, low: int, high: int) -> Ints:
-    steps = np.asarray(given)
+def _steps(name: str, value: Any, num_envs: int, low: int, high: int) -> Ints:
+    """Return (B,) numbers of steps from `low` to `high`, or raise `ConfigError`."""
+    steps = np.asarray(value)
     check_shape(name, steps.shape, (num_envs,), "one for each environment")
     is_whole = np.issubdtype(steps.dtype, np.integer)
     if not is_whole or not ((steps >= low) & (steps <= high)).all():
         raise ConfigError(
-            f'options["{name}"] must be whole numbers from {low} to {high}, got {given!r}.'
+            f'options["{name}"] must be whole numbers from {low} to {high}, got {value!r}.'
         )
     return steps

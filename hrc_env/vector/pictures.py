@@ -1,7 +1,7 @@
-"""Pictures of many environments: of the present, or of every step since the last `render`."""
+"""Pictures of many environments: of the present step, or of all since the last `render`."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +13,27 @@ from hrc_env.render.views import CameraChoice, Views
 from hrc_env.vector.shards import Shards
 
 LISTS = tuple(f"{mode}_list" for mode in RENDER_MODES)
-"""Render modes of every step's picture, which `gymnasium.make` adds to one environment."""
+"""Render modes with a picture of every step, as `gymnasium.make` has for single environments."""
+
+
+class LocatedView(NamedTuple):
+    """The views of an environment's shard."""
+
+    view: Views
+    """Views of the shard."""
+    b: int
+    """Index of the environment in the shard."""
 
 
 class Pictures:
-    """Draws the environments of shards in a render mode, `size` (width, height) [px]; `shown`:
-    what of `Views.picture` is shown beside the scene."""
+    """Renderer of the environments of shards.
+
+    Args:
+        shards: the environments.
+        render_mode: form of the pictures; None for none.
+        size: width and height of the pictures [px].
+        shown: arguments `markers` and `capsules` of `Views.picture`.
+    """
 
     def __init__(
         self,
@@ -31,14 +46,20 @@ class Pictures:
         self.shown = dict(shown)
         self.views = [Views(part) for part in shards.parts]
         self._film: list[list[NDArray[Any]]] = [[] for _ in range(shards.bounds[-1])]
-        """Pictures of every environment since its last `of`, in the modes `LISTS`."""
+        """Pictures of each environment since its last `of`, in the modes `LISTS`."""
 
     def of(self, k: int, camera: CameraChoice = None) -> Any:
-        """Return environment `k`'s picture, or its list of them, which begins anew; None without a
-        mode. `camera` as of `Views.picture`.
+        """Return the picture of environment `k`, or its list of pictures, which is then emptied.
+
+        Args:
+            k: the environment.
+            camera: camera of the picture, as for `Views.picture`; not for lists.
+
+        Returns:
+            None without a render mode.
 
         Raises:
-            ConfigError: there is no such camera, or lists are of the usual one.
+            ConfigError: there is no such camera, or a camera was given for a list.
         """
         if self.render_mode is None:
             return None
@@ -50,33 +71,38 @@ class Pictures:
                 )
             shown, self._film[k] = self._film[k], []
             return shown
-        return self._drawn(k, camera)
+        return self._draw(k, camera)
 
     def mosaic(self, k: int) -> NDArray[np.uint8]:
-        """Return the cameras' pictures of environment `k`, as of `Views`."""
-        view, b = self._where(k)
+        """Return the cameras' images of environment `k` with crops and skeletons, tiled."""
+        view, b = self._locate(k)
         return view.mosaic(b)
 
-    def take(self, chosen: Bools, anew: Bools) -> None:
-        """Keep pictures of the `chosen` environments (B,), and only these of those that start
-        `anew`."""
+    def take(self, mask: Bools, is_first: Bools) -> None:
+        """Add a picture of the present step to the lists, in the modes `LISTS`.
+
+        Args:
+            mask: (B,) the environments in question.
+            is_first: (B,) whether the step is the first of an episode, which empties the list.
+        """
         if self.render_mode not in LISTS:
             return
-        for k in np.flatnonzero(chosen).tolist():
-            kept = [] if anew[k] else self._film[k]
-            self._film[k] = [*kept, self._drawn(k)]
+        for k in np.flatnonzero(mask).tolist():
+            kept = [] if is_first[k] else self._film[k]
+            self._film[k] = [*kept, self._draw(k)]
 
     def close(self) -> None:
-        """Release graphics contexts."""
+        """Free the graphics contexts."""
         for view in self.views:
             view.close()
 
-    def _drawn(self, k: int, camera: CameraChoice = None) -> NDArray[Any]:
-        view, b = self._where(k)
+    def _draw(self, k: int, camera: CameraChoice = None) -> NDArray[Any]:
+        """Return a picture of environment `k`."""
+        view, b = self._locate(k)
         is_depth = str(self.render_mode).startswith("depth")
         return view.picture(is_depth, b, self.size, camera=camera, **self.shown)
 
-    def _where(self, k: int) -> tuple[Views, int]:
-        """Return the views of environment `k`'s shard, and its number there."""
+    def _locate(self, k: int) -> LocatedView:
+        """Return the views of environment `k`'s shard, and its index there."""
         shard = int(np.searchsorted(self.bounds, k, "right")) - 1
-        return self.views[shard], k - self.bounds[shard]
+        return LocatedView(self.views[shard], k - self.bounds[shard])

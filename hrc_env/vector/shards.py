@@ -1,13 +1,13 @@
-"""A batch of environments in contiguous ranges, each a `Simulation` stepped by its own thread.
+"""A batch of environments in contiguous ranges, each a `Simulation` with a thread of its own.
 
-As no result depends on the size of a batch, none depends on the number of ranges either.
+Results depend neither on the size of a batch nor on the number of ranges.
 """
 
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,26 +16,49 @@ from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.core.typing import Floats, Ints
 from hrc_env.reset_options import Fixed
 from hrc_env.simulation import Simulation
-from hrc_env.step_result import StepResult, joined
+from hrc_env.step_result import StepResult, concatenate_results
+
+
+class Located(NamedTuple):
+    """The simulation of an environment."""
+
+    simulation: Simulation
+    """The simulation."""
+    b: int
+    """Index of the environment in the simulation."""
 
 
 class Shards:
-    """`batch` environments in `n_shards` simulations; the calling thread works on the first."""
+    """Environments in several simulations; the calling thread steps the first one.
+
+    Args:
+        batch: number of environments.
+        n_shards: number of simulations.
+        make: function of a number of environments that returns their simulation.
+    """
 
     def __init__(self, batch: int, n_shards: int, make: Callable[[int], Simulation]) -> None:
-        """`make` gives a simulation of so many environments, always of the same kind."""
         self.bounds = [batch * k // n_shards for k in range(n_shards + 1)]
         self.parts = [make(high - low) for low, high in pairwise(self.bounds)]
         self.first = self.parts[0]
-        """That of the calling thread."""
+        """Simulation of the calling thread."""
         self._pool: ThreadPoolExecutor | None = None
 
     def reset(
         self, ids: Ints, rngs: Sequence[np.random.Generator], fixed: Sequence[Fixed | None] = ()
     ) -> StepResult:
-        """Start environments `ids` (sorted) anew, one generator each; their rows. In one thread:
-        this is Python for the most part, in which others would only wait. `fixed`: as of
-        `Simulation.reset`."""
+        """Begin new episodes of environments `ids`, in the calling thread.
+
+        Most of a reset is Python code, which further threads would not speed up.
+
+        Args:
+            ids: (n,) the environments in question, sorted.
+            rngs: n generators, one for each.
+            fixed: fixed parts of each episode; empty for none.
+
+        Returns:
+            The result of these environments, n rows.
+        """
         cuts = pairwise(np.searchsorted(ids, self.bounds).tolist())
         parts = zip(self.parts, self.bounds[:-1], cuts, strict=True)
         jobs = [
@@ -43,30 +66,34 @@ class Shards:
             for part, first, (low, high) in parts
             if low < high
         ]
-        return joined(_all_done(jobs))
+        return concatenate_results(_collect(jobs))
 
-    def where(self, k: int) -> tuple[Simulation, int]:
-        """Return the simulation of environment k, and its number there."""
+    def locate(self, k: int) -> Located:
+        """Return the simulation of environment k, and its index there."""
         shard = int(np.searchsorted(self.bounds, k, "right")) - 1
-        return self.parts[shard], k - self.bounds[shard]
+        return Located(self.parts[shard], k - self.bounds[shard])
 
     def step(self, action: Floats) -> StepResult:
-        """One control step of every environment; action (B, A) in [-1, 1]."""
-        own, *theirs = [
+        """Advance every environment by one control step.
+
+        Args:
+            action: (B, A) actions in [-1, 1].
+        """
+        first, *others = [
             (low, partial(part.step, action[low:high]))
             for part, (low, high) in zip(self.parts, pairwise(self.bounds), strict=True)
         ]
-        if theirs and self._pool is None:
-            self._pool = ThreadPoolExecutor(len(theirs), thread_name_prefix="hrc_env-shard")
-        started = [(low, self._pool.submit(job).result) for low, job in theirs if self._pool]
-        return joined(_all_done([own, *started]))
+        if others and self._pool is None:
+            self._pool = ThreadPoolExecutor(len(others), thread_name_prefix="hrc_env-shard")
+        started = [(low, self._pool.submit(job).result) for low, job in others if self._pool]
+        return concatenate_results(_collect([first, *started]))
 
     def get_state(self) -> list[State]:
-        """A copy of everything that changes, part by part."""
+        """Return a copy of the state of every simulation."""
         return [part.get_state() for part in self.parts]
 
     def set_state(self, state: list[State]) -> None:
-        """Continue from a state of as many parts with the same settings."""
+        """Restore a state of the same number of simulations with the same settings."""
         if len(state) != len(self.parts):
             raise ConfigError(
                 f"The state was taken with {len(state)} threads; here there are "
@@ -76,7 +103,7 @@ class Shards:
             part.set_state(saved)
 
     def close(self) -> None:
-        """Stop the threads, release what the simulations hold."""
+        """Stop the threads, and close the simulations."""
         if self._pool is not None:
             self._pool.shutdown()
             self._pool = None
@@ -87,10 +114,13 @@ class Shards:
         return {**self.__dict__, "_pool": None}
 
 
-def _all_done(jobs: Iterable[tuple[int, Callable[[], StepResult]]]) -> list[StepResult]:
-    """What jobs give, each with the number of its first environment; or, once all are done and
-    nobody works on any more, the first error."""
-    results, errors = [], []
+def _collect(jobs: Iterable[tuple[int, Callable[[], StepResult]]]) -> list[StepResult]:
+    """Return the results of jobs; after all have ended, raise the first error among them.
+
+    Args:
+        jobs: index of the first environment of each job, and the job.
+    """
+    results, errors = list[StepResult](), list[BaseException]()
     for first, job in jobs:
         try:
             results.append(job())

@@ -1,9 +1,9 @@
-"""For safe-RL libraries whose `step` gives the cost beside the reward, as Safety-Gymnasium's does.
+"""Wrappers for safe-RL libraries in which `step` returns the cost, as in Safety-Gymnasium.
 
     env = CostEnv(gymnasium.make("HRCReach-v0", perception="keypoints"))
     observation, reward, cost, terminated, truncated, info = env.step(action)
 
-Libraries that read `info["cost"]` need neither.
+Libraries that read `info["cost"]` need no wrapper.
 """
 
 from typing import Any
@@ -17,31 +17,48 @@ from hrc_env.core.errors import ConfigError
 
 
 class CostEnv(gymnasium.Wrapper[Any, Any, Any, Any]):
-    """One environment, whose `step` gives six values; `ConfigError` where there is no cost."""
+    """A single environment in which `step` returns six values, the cost as the third.
+
+    `step` raises `ConfigError` if the info has no cost.
+    """
 
     def step(self, action: Any) -> Any:
-        """Observation, reward, cost, whether the episode ends or is cut off, and info."""
+        """Advance the environment by one control step.
+
+        Returns:
+            Observation, reward, cost, whether the episode is terminated, whether it is truncated,
+            and info.
+        """
         observation, reward, terminated, truncated, info = self.env.step(action)
-        return observation, reward, float(_known(info)), terminated, truncated, info
+        return observation, reward, float(_read_cost(info)), terminated, truncated, info
 
 
 class CostVectorEnv(VectorWrapper):
-    """The same of several, with arrays (B,); of an episode that ends the cost of its last step,
-    also where the next one begins in the same step."""
+    """A vector environment in which `step` returns six values, the cost (B,) as the third.
+
+    At the end of an episode it is the cost of its last step, also if the next episode begins in the
+    same step.
+    """
 
     def __init__(self, env: VectorEnv) -> None:
         super().__init__(env)
 
     def step(self, actions: Any) -> Any:
-        """Observations, rewards, costs, whether episodes end or are cut off, and infos."""
+        """Advance every environment by one control step.
+
+        Returns:
+            Observations, rewards, costs, whether episodes are terminated, whether they are
+            truncated, and infos.
+        """
         observation, reward, terminated, truncated, infos = self.env.step(actions)
-        cost: NDArray[np.float64] = np.array(_known(infos), float)
+        cost: NDArray[np.float64] = np.array(_read_cost(infos), float)
         if "final_info" in infos:
             cost = np.where(infos["_final_info"], infos["final_info"]["cost"], cost)
         return observation, reward, cost, terminated, truncated, infos
 
 
-def _known(info: dict[str, Any]) -> Any:
+def _read_cost(info: dict[str, Any]) -> Any:
+    """Return the cost in infos, or raise `ConfigError` if there is none."""
     if "cost" not in info:
         raise ConfigError('The environment gives no info["cost"]; those of hrc_env do.')
     return info["cost"]

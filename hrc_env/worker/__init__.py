@@ -1,1 +1,1 @@
-"""A worker's body: measures, surface, what the hands hold."""
+"""A worker's body: measures, surface and the props in the hands."""

@@ -1,13 +1,14 @@
-"""The worker's body: 22 segments, 15 joints, the capsules round them.
+"""The worker's body: 22 segments, 15 joints and the capsules around them.
 
-Numbers that `assets/workers/bake.py` wrote into `assets/workers/<name>.npz`. Rest frame: x forward,
-y left, z up, origin on the floor below the pelvis; all segments are world-aligned at rest.
+The numbers are from `assets/workers/<name>.npz`, which `assets/workers/bake.py` writes. In the rest
+frame x is forward, y left, z up, with the origin on the floor below the pelvis; at rest all
+segments are aligned with it.
 """
 
 import functools
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from hrc_env.core.batching import flat
 from hrc_env.core.errors import ConfigError, check_shape, unknown
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import WorkerMotion, WorkerPath, WorkerTruth
-from hrc_env.core.typing import Capsules, Floats, Ints, Points3, QuaternionsWxyz
+from hrc_env.core.typing import Capsules, Floats, Ints, Points3, QuaternionsWxyz, Velocities3
 from hrc_env.geometry.rotations import rotate
 
 TRUNK = ("pelvis", "abdomen", "torso", "chest", "neck", "head")
@@ -23,37 +24,40 @@ LIMBS = ("clavicle", "upper_arm", "forearm", "hand", "thigh", "shank", "foot", "
 SEGMENTS = (*TRUNK, *(f"{side}_{part}" for side in ("left", "right") for part in LIMBS))
 N_SEGMENTS = len(SEGMENTS)
 SEGMENT: dict[str, int] = {name: index for index, name in enumerate(SEGMENTS)}
+"""Row of each segment, by name."""
 
 PARENT: Ints = np.array(
     [-1, 0, 1, 2, 3, 4, 3, 6, 7, 8, 0, 10, 11, 12, 3, 14, 15, 16, 0, 18, 19, 20]
 )
-"""(22,) segment that each segment hangs on; -1 for the pelvis."""
+"""Parent (22,) of each segment; -1 for the pelvis."""
 
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """One worker's measures, all in metres; or those of N workers, with a first axis of N."""
+    """Measures of one worker, or of N workers with a first axis of N; lengths are in metres."""
 
     names: tuple[str, ...]
-    stature_m: Any
-    """(...,) barefoot, without the hat."""
+    """Names of the workers."""
+    stature_m: Floats
+    """Stature (...,) barefoot, without the hat [m]."""
     rest_position: Points3
-    """(..., S, 3) origins of the segments at rest."""
+    """Origins (..., S, 3) of the segments at rest [m]."""
     joint_segment: Ints
-    """(J,) segment that carries each of the 15 joints."""
+    """Segment (J,) that carries each of the 15 joints."""
     joint_offset: Points3
-    """(..., J, 3) the joint in that segment's frame, where BlazePose would place it."""
+    """Position (..., J, 3) of each BlazePose joint in that segment's frame [m]."""
     capsule_names: tuple[str, ...]
+    """Names of the capsules."""
     capsule_segment: Ints
-    """(K,) segment that carries each capsule."""
+    """Segment (K,) that carries each capsule."""
     capsule_ends: Points3
-    """(..., K, 2, 3) end points in that segment's frame."""
+    """End points (..., K, 2, 3) in that segment's frame [m]."""
     capsule_radius_m: Floats
-    """(..., K)."""
+    """Radius (..., K) of each capsule [m]."""
 
 
-OWN = ("stature_m", "rest_position", "joint_offset", "capsule_ends", "capsule_radius_m")
-"""What differs from body to body."""
+MEASURED = ("stature_m", "rest_position", "joint_offset", "capsule_ends", "capsule_radius_m")
+"""Fields that differ from body to body."""
 
 
 def assets_dir() -> Path:
@@ -62,30 +66,30 @@ def assets_dir() -> Path:
 
 
 def worker_names() -> tuple[str, ...]:
-    """Names of the baked workers."""
+    """Return the names of the baked workers."""
     return tuple(sorted(path.stem for path in (assets_dir() / "workers").glob("*.npz")))
 
 
 @functools.cache
 def load_body(name: str = "worker_1") -> Body:
-    """Read a baked worker's measures; `ConfigError` where no worker of that name was baked."""
-    with np.load(baked_path(name)) as baked:
+    """Read the measures of a baked worker; `ConfigError` if no worker of that name was baked."""
+    with np.load(find_baked(name)) as baked:
         return Body(
             names=(name,),
             capsule_names=tuple(map(str, baked["capsule_names"])),
-            joint_segment=fixed(baked["joint_segment"], np.int64),
-            capsule_segment=fixed(baked["capsule_segment"], np.int64),
-            **{field: fixed(baked[field], np.float64) for field in OWN},
+            joint_segment=freeze(baked["joint_segment"], np.int64),
+            capsule_segment=freeze(baked["capsule_segment"], np.int64),
+            **{field: freeze(baked[field], np.float64) for field in MEASURED},
         )
 
 
 @functools.cache
-def stack(names: tuple[str, ...]) -> Body:
-    """Read several baked workers."""
+def load_bodies(names: tuple[str, ...]) -> Body:
+    """Read the measures of several baked workers."""
     if not names:
         raise ConfigError(f"Expected at least one worker of {', '.join(worker_names())}; got none.")
     bodies = [load_body(name) for name in names]
-    own = {f: fixed(np.stack([getattr(body, f) for body in bodies]), np.float64) for f in OWN}
+    own = {f: freeze(np.stack([getattr(body, f) for body in bodies]), np.float64) for f in MEASURED}
     return replace(bodies[0], names=names, **own)
 
 
@@ -93,8 +97,8 @@ ANY = "any"
 """Stands for all baked workers."""
 
 
-def pool(worker: str | tuple[str, ...]) -> tuple[str, ...]:
-    """The bodies that workers can have: of one name, of several, or all of them (`ANY`)."""
+def select_bodies(worker: str | tuple[str, ...]) -> tuple[str, ...]:
+    """Return the names of bodies that workers can have: one, several, or all (`ANY`)."""
     if worker == ANY:
         return worker_names()
     names = (worker,) if isinstance(worker, str) else tuple(worker)
@@ -111,33 +115,46 @@ def pool(worker: str | tuple[str, ...]) -> tuple[str, ...]:
 
 
 def worker_truth(body: Body, motion: WorkerMotion) -> WorkerTruth:
-    """Where the joints and capsules of bodies in motion are, and how fast the joints.
+    """Return joints, their velocities and capsules of bodies in motion.
 
-    `motion` has segments (..., S, 3 or 4); its `body` says rows of several bodies.
+    Args:
+        body: measures of one body, or of several.
+        motion: segments (..., S, 3 or 4); its `body` holds the rows of several bodies.
     """
     position, quaternion = motion.position_world, motion.quaternion_wxyz
     lead, n_joints = position.shape[:-2], len(body.joint_segment)
-    rows = _rows(body, motion.body, lead)
-    capsules = _capsules_of(body, position, quaternion, rows)
-    segments = (position, quaternion, motion.velocity_world, motion.angular_velocity_world)
+    rows = _find_rows(body, motion.body, lead)
+    capsules = _place_capsules(body, position, quaternion, rows)
+    segments = _Segments(
+        flat(position, 2),
+        flat(quaternion, 2),
+        flat(motion.velocity_world, 2),
+        flat(motion.angular_velocity_world, 2),
+    )
     offset = body.joint_offset.reshape(-1, n_joints, 3)
     joints, velocity = np.empty((2, *lead, n_joints, 3))
-    out = flat(joints, 2), flat(velocity, 2)
-    _joints(tuple(flat(each, 2) for each in segments), rows, body.joint_segment, offset, out)
+    written = _Joints(flat(joints, 2), flat(velocity, 2))
+    _write_joints(segments, rows, body.joint_segment, offset, written)
     radius = body.capsule_radius_m.reshape(-1, len(body.capsule_names))[rows]
     return WorkerTruth(joints, velocity, capsules, radius.reshape(*lead, radius.shape[1]))
 
 
 def worker_capsules(body: Body, path: WorkerPath, which: Ints | None = None) -> Capsules:
-    """(B, T, W, K, 2, 3) the bodies' capsules along a path [m]; `which` (B, W) of several."""
+    """Return the capsules (B, T, W, K, 2, 3) of bodies along a path [m].
+
+    Args:
+        body: measures of one body, or of several.
+        path: path of the segments, arrays (B, T, W, S, ...).
+        which: row (B, W) of each worker's body, if there are several.
+    """
     position = path.position_world
     over_time = None if which is None else np.asarray(which)[..., None, :]
-    rows = _rows(body, over_time, position.shape[:-2])
-    return _capsules_of(body, position, path.quaternion_wxyz, rows)
+    rows = _find_rows(body, over_time, position.shape[:-2])
+    return _place_capsules(body, position, path.quaternion_wxyz, rows)
 
 
-def _rows(body: Body, which: Ints | None, lead: tuple[int, ...]) -> Ints:
-    """(count,) row of every body in motion."""
+def _find_rows(body: Body, which: Ints | None, lead: tuple[int, ...]) -> Ints:
+    """Return the row (count,) of every body in motion."""
     rows, last = np.zeros(lead, np.int64), len(body.names) - 1
     if which is not None and last > 0:
         if which.size and not 0 <= which.min() <= which.max() <= last:
@@ -146,56 +163,112 @@ def _rows(body: Body, which: Ints | None, lead: tuple[int, ...]) -> Ints:
     return rows.reshape(-1)
 
 
-def _capsules_of(
+def _place_capsules(
     body: Body, position: Points3, quaternion: QuaternionsWxyz, rows: Ints
 ) -> Capsules:
+    """Return the capsules (..., K, 2, 3) of bodies.
+
+    Args:
+        body: measures of one body, or of several.
+        position: origins (..., S, 3) of the segments [m].
+        quaternion: orientations (..., S, 4) of the segments.
+        rows: row (count,) of every body in motion.
+    """
     check_shape("position_world", position.shape[-2:], (N_SEGMENTS, 3), "segments, xyz")
     shape = (len(body.capsule_segment), 2, 3)
     ends = np.empty((len(rows), *shape))
     known = body.capsule_ends.reshape(-1, *shape)
-    _capsules(flat(position, 2), flat(quaternion, 2), rows, body.capsule_segment, known, ends)
+    _write_capsules(flat(position, 2), flat(quaternion, 2), rows, body.capsule_segment, known, ends)
     return ends.reshape(*position.shape[:-2], *shape)
 
 
+class _Segments(NamedTuple):
+    """Segments of N bodies in motion, in the world."""
+
+    position: Points3
+    """Origins (N, S, 3) [m]."""
+    quaternion: QuaternionsWxyz
+    """Orientations (N, S, 4), scalar first."""
+    velocity: Velocities3
+    """Velocities (N, S, 3) of the origins [m/s]."""
+    angular_velocity: Floats
+    """Angular velocities (N, S, 3) [rad/s]."""
+
+
+class _Joints(NamedTuple):
+    """Joints of N bodies in motion, in the world."""
+
+    position: Points3
+    """Positions (N, J, 3) [m]."""
+    velocity: Velocities3
+    """Velocities (N, J, 3) [m/s]."""
+
+
 @kernel
-def _joints(segments, rows, segment, offset, out):  # pragma: no cover - compiled
-    """Joints, and how fast their segments carry them: v + omega x r (rigid body kinematics)."""
-    position, quaternion, linear, angular = segments
-    joints, velocity = out
-    for b in range(position.shape[0]):
-        mine = offset[rows[b]]
-        for j in range(len(segment)):
-            s = segment[j]
-            arm = rotate(quaternion[b, s], mine[j])
+def _write_joints(
+    segments: _Segments, rows: Ints, joint_segment: Ints, joint_offset: Floats, joints: _Joints
+) -> None:  # pragma: no cover - compiled
+    """Write joints and the velocities at which their segments carry them, v + omega x r.
+
+    Args:
+        segments: segments of N bodies.
+        rows: row (N,) of each body in the pool.
+        joint_segment: segment (J,) of each joint.
+        joint_offset: positions (P, J, 3) of the joints of each body in their segments' frames [m].
+        joints: positions and velocities, which are written.
+    """
+    for b in range(segments.position.shape[0]):
+        offsets = joint_offset[rows[b]]
+        for j in range(len(joint_segment)):
+            s = joint_segment[j]
+            arm = rotate(segments.quaternion[b, s], offsets[j])
             for i in range(3):
                 k, m = (i + 1) % 3, (i + 2) % 3
-                joints[b, j, i] = position[b, s, i] + arm[i]
-                omega_k, omega_m = angular[b, s, k], angular[b, s, m]
-                velocity[b, j, i] = linear[b, s, i] + omega_k * arm[m] - omega_m * arm[k]
+                joints.position[b, j, i] = segments.position[b, s, i] + arm[i]
+                omega_k = segments.angular_velocity[b, s, k]
+                omega_m = segments.angular_velocity[b, s, m]
+                velocity = segments.velocity[b, s, i] + omega_k * arm[m] - omega_m * arm[k]
+                joints.velocity[b, j, i] = velocity
 
 
 @kernel
-def _capsules(position, quaternion, rows, segment, ends, capsules):  # pragma: no cover - compiled
-    """Both ends of the capsules of bodies."""
+def _write_capsules(
+    position: Floats,
+    quaternion: Floats,
+    rows: Ints,
+    capsule_segment: Ints,
+    capsule_ends: Floats,
+    capsules: Floats,
+) -> None:  # pragma: no cover - compiled
+    """Write both ends of the capsules of bodies.
+
+    Args:
+        position: origins (N, S, 3) of the segments [m].
+        quaternion: orientations (N, S, 4) of the segments.
+        rows: row (N,) of each body in the pool.
+        capsule_segment: segment (K,) of each capsule.
+        capsule_ends: ends (P, K, 2, 3) of the capsules of each body in their segments' frames [m].
+        capsules: ends (N, K, 2, 3) in the world, which are written [m].
+    """
     for b in range(position.shape[0]):
-        mine = ends[rows[b]]
-        for k in range(len(segment)):
-            s = segment[k]
+        ends = capsule_ends[rows[b]]
+        for k in range(len(capsule_segment)):
+            s = capsule_segment[k]
             for end in range(2):
-                arm = rotate(quaternion[b, s], mine[k, end])
+                arm = rotate(quaternion[b, s], ends[k, end])
                 for i in range(3):
                     capsules[b, k, end, i] = position[b, s, i] + arm[i]
 
 
-def baked_path(name: str) -> Path:
-    """The file of a worker; `ConfigError` where none of that name was baked."""
+def find_baked(name: str) -> Path:
+    """Return the file of a worker; `ConfigError` if none of that name was baked."""
     if name not in worker_names():
         raise unknown("worker", name, worker_names())
     return assets_dir() / "workers" / f"{name}.npz"
 
 
-def fixed(array: np.ndarray, dtype: type) -> np.ndarray:
-    """A read-only copy: bodies are shared, nobody may write into them."""
+def freeze(array: np.ndarray, dtype: type) -> np.ndarray:
+    """Return a read-only copy of an array, as bodies are shared."""
     copy = np.array(array, dtype=dtype)
     copy.setflags(write=False)
     return copy

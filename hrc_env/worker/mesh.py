@@ -1,4 +1,4 @@
-"""What a worker looks like: textured surfaces that follow the segments, and a hard hat."""
+"""The appearance of a worker: textured surfaces that follow the segments, and a hard hat."""
 
 import functools
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.core.typing import Floats, Ints, Points3
-from hrc_env.worker.body import N_SEGMENTS, baked_path, fixed
+from hrc_env.worker.body import N_SEGMENTS, find_baked, freeze
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,79 +15,86 @@ class SkinMesh:
     """A textured surface that follows the segments (linear blend skinning)."""
 
     name: str
+    """Name of the surface."""
     vertices: Points3
-    """(V, 3) at rest [m]."""
+    """Vertices (V, 3) at rest [m]."""
     faces: Ints
-    """(F, 3) counter-clockwise seen from outside."""
+    """Triangles (F, 3), counter-clockwise seen from outside."""
     uv: Floats
-    """(V, 2) texture coordinates in [0, 1], v = 0 at the texture's first row."""
+    """Texture coordinates (V, 2) in [0, 1], v = 0 at the texture's first row."""
     weights: Floats
-    """(V, S) share of each segment; at most four a vertex, rows sum to 1."""
+    """Share (V, S) of each segment; at most four a vertex, rows sum to 1."""
     texture: NDArray[np.uint8]
-    """(H, W, 3) RGB."""
+    """Texture (H, W, 3), RGB."""
 
 
 @dataclass(frozen=True, slots=True)
 class HatMesh:
-    """A hard hat; it moves with the head."""
+    """A hard hat, which moves with the head."""
 
     vertices: Points3
-    """(V, 3) in the head's frame [m]."""
+    """Vertices (V, 3) in the head's frame [m]."""
     faces: Ints
-    """(F, 3)."""
+    """Triangles (F, 3)."""
     rgb: tuple[float, float, float]
+    """Colour in [0, 1]."""
 
 
 @dataclass(frozen=True, slots=True)
 class WorkerMesh:
-    """What a worker looks like; the room `scene` draws it."""
+    """The surfaces of a worker, which `scene` draws."""
 
     skins: tuple[SkinMesh, ...]
+    """Textured surfaces."""
     hat: HatMesh | None
-    """None for who wears none."""
+    """Hard hat; None for a worker without one."""
 
 
 @functools.cache
 def load_mesh(name: str = "worker_1") -> WorkerMesh:
-    """Read a baked worker's surfaces and textures; `ConfigError` where none was baked."""
-    with np.load(baked_path(name)) as baked:
-        return WorkerMesh(tuple(_skin(baked, skin) for skin in ("skin", "cloth")), _hat(baked))
+    """Read surfaces and textures of a baked worker; `ConfigError` if there is none."""
+    with np.load(find_baked(name)) as baked:
+        return WorkerMesh(
+            tuple(_read_skin(baked, skin) for skin in ("skin", "cloth")), _read_hat(baked)
+        )
 
 
-def _skin(baked: np.lib.npyio.NpzFile, name: str) -> SkinMesh:
+def _read_skin(baked: np.lib.npyio.NpzFile, name: str) -> SkinMesh:
+    """Return a textured surface of a baked worker."""
     segment, share = baked[f"{name}_weight_segment"], baked[f"{name}_weight"].astype(float)
     weights = np.zeros((len(segment), N_SEGMENTS))
     np.add.at(weights, (np.arange(len(segment))[:, None], segment), share)
     return SkinMesh(
         name=name,
-        vertices=fixed(baked[f"{name}_vertices"] * float(baked["unit_m"]), np.float64),
-        faces=fixed(baked[f"{name}_faces"], np.int64),
-        uv=fixed(baked[f"{name}_uv"] / 65535.0, np.float64),
-        weights=fixed(weights / weights.sum(1, keepdims=True), np.float64),
-        texture=_texture(baked, name),
+        vertices=freeze(baked[f"{name}_vertices"] * float(baked["unit_m"]), np.float64),
+        faces=freeze(baked[f"{name}_faces"], np.int64),
+        uv=freeze(baked[f"{name}_uv"] / 65535.0, np.float64),
+        weights=freeze(weights / weights.sum(1, keepdims=True), np.float64),
+        texture=_read_texture(baked, name),
     )
 
 
-def _hat(baked: np.lib.npyio.NpzFile) -> HatMesh | None:
+def _read_hat(baked: np.lib.npyio.NpzFile) -> HatMesh | None:
+    """Return the hard hat of a baked worker, if there is one."""
     if "hat_vertices" not in baked:
         return None
     red, green, blue = (float(value) / 255 for value in baked["hat_rgb"])
     return HatMesh(
-        vertices=fixed(baked["hat_vertices"] * float(baked["unit_m"]), np.float64),
-        faces=fixed(baked["hat_faces"], np.int64),
+        vertices=freeze(baked["hat_vertices"] * float(baked["unit_m"]), np.float64),
+        faces=freeze(baked["hat_faces"], np.int64),
         rgb=(red, green, blue),
     )
 
 
-def _texture(baked: np.lib.npyio.NpzFile, name: str) -> NDArray[np.uint8]:
-    """Palette colours, darkened by the coarse shade map (creases, folds)."""
+def _read_texture(baked: np.lib.npyio.NpzFile, name: str) -> NDArray[np.uint8]:
+    """Return palette colours, darkened by the coarse map of shades (creases, folds)."""
     colours = baked[f"{name}_palette"][baked[f"{name}_paint"]].astype(np.float32)
-    shade = _enlarged(baked[f"{name}_shade"].astype(np.float32) / 200.0, colours.shape[:2])
-    return fixed(np.clip(colours * shade[..., None], 0.0, 255.0), np.uint8)
+    shade = _enlarge(baked[f"{name}_shade"].astype(np.float32) / 200.0, colours.shape[:2])
+    return freeze(np.clip(colours * shade[..., None], 0.0, 255.0), np.uint8)
 
 
-def _enlarged(image: NDArray[np.float32], shape: tuple[int, ...]) -> NDArray[np.float32]:
-    """(h, w) to a larger (H, W), bilinear, pixel centres at half-integers."""
+def _enlarge(image: NDArray[np.float32], shape: tuple[int, ...]) -> NDArray[np.float32]:
+    """Return an image (h, w) as a larger one (H, W), bilinear, pixel centres at half-integers."""
     for axis in (0, 1):
         size, old = shape[axis], image.shape[axis]
         at = np.clip((np.arange(size) + 0.5) * old / size - 0.5, 0, old - 1)

@@ -1,7 +1,7 @@
-"""What workers hold: shapes and grips of tools, boards, boxes, things on wheels.
+"""Props that workers hold: shapes and grips of tools, boards, boxes and carts.
 
-A prop's frame is the worker's (x ahead, y left, z up) when it is held in front and upright: origin
-in the fist, between two hands, or on the floor below.
+A prop's frame is the worker's (x ahead, y left, z up) when it is held in front and upright, with
+the origin in the fist, between two hands, or on the floor below.
 """
 
 from collections.abc import Sequence
@@ -24,25 +24,29 @@ from hrc_env.geometry.shapes import (
     shape,
 )
 
-Triple = Sequence[float]
+Xyz = Sequence[float]
+"""Three coordinates of a prop's frame [m]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prop:
-    """A thing that can be held; all in its own frame [m]."""
+    """A thing that can be held, in its own frame."""
 
     name: str
+    """Name of the prop."""
     shapes: Floats
-    """(G, `shapes.WIDTH`) its solid parts, capsules and boxes."""
+    """Solid parts (G, `shapes.WIDTH`), capsules and boxes [m]."""
     grips: Points3
-    """(2, 3) where the left and the right hand hold it; NaN: that hand does not."""
+    """Grips (2, 3) of the left and the right hand [m]; NaN for a hand that does not hold it."""
 
 
-def _box(centre: Triple, size: Triple) -> Floats:
+def _make_box(centre: Xyz, size: Xyz) -> Floats:
+    """Return a box as a row of `shapes`."""
     return shape(BOX, np.array(centre, float), np.eye(3), np.array(size) / 2)
 
 
-def _rod(start: Triple, end: Triple, radius: float) -> Floats:
+def _make_rod(start: Xyz, end: Xyz, radius: float) -> Floats:
+    """Return a capsule as a row of `shapes`."""
     ends = np.array([start, end], float)
     along = ends[1] - ends[0]
     length = float(np.linalg.norm(along))
@@ -53,7 +57,15 @@ def _rod(start: Triple, end: Triple, radius: float) -> Floats:
     return shape(CAPSULE, ends.mean(0), axes, np.array([radius, length / 2, 0.0]))
 
 
-def _prop(name: str, parts: Sequence[Floats], left: Triple | None, right: Triple | None) -> Prop:
+def _make_prop(name: str, parts: Sequence[Floats], left: Xyz | None, right: Xyz | None) -> Prop:
+    """Return a prop.
+
+    Args:
+        name: its name.
+        parts: its parts, rows of `shapes`.
+        left: grip of the left hand; None if it does not hold the prop.
+        right: grip of the right hand; None if it does not hold the prop.
+    """
     nowhere = (np.nan,) * 3
     grips = np.array([nowhere if grip is None else grip for grip in (left, right)], float)
     shapes = np.array(parts, float).reshape(-1, WIDTH)
@@ -64,106 +76,142 @@ def _prop(name: str, parts: Sequence[Floats], left: Triple | None, right: Triple
 
 ORIGIN = (0, 0, 0)
 PROPS: tuple[Prop, ...] = (
-    _prop("nothing", [], None, None),
-    _prop(  # its handle stands up from the fist, the face that strikes looks ahead
+    _make_prop("nothing", [], None, None),
+    _make_prop(  # its handle stands up from the fist, the face that strikes looks ahead
         "hammer",
-        [_rod((0, 0, -0.06), (0, 0, 0.24), 0.015), _rod((-0.05, 0, 0.25), (0.05, 0, 0.25), 0.016)],
-        None, ORIGIN,
+        [
+            _make_rod((0, 0, -0.06), (0, 0, 0.24), 0.015),
+            _make_rod((-0.05, 0, 0.25), (0.05, 0, 0.25), 0.016),
+        ],
+        None,
+        ORIGIN,
     ),
-    _prop(  # cordless: the bit points ahead, above the fist
+    _make_prop(  # cordless: the bit points ahead, above the fist
         "drill",
         [
-            _rod((-0.06, 0, 0.09), (0.10, 0, 0.09), 0.034),
-            _rod((0, 0, -0.05), (0, 0, 0.06), 0.020),
-            _box((0.01, 0, -0.09), (0.12, 0.075, 0.06)),
-            _rod((0.13, 0, 0.09), (0.22, 0, 0.09), 0.005),
+            _make_rod((-0.06, 0, 0.09), (0.10, 0, 0.09), 0.034),
+            _make_rod((0, 0, -0.05), (0, 0, 0.06), 0.020),
+            _make_box((0.01, 0, -0.09), (0.12, 0.075, 0.06)),
+            _make_rod((0.13, 0, 0.09), (0.22, 0, 0.09), 0.005),
         ],
-        None, ORIGIN,
+        None,
+        ORIGIN,
     ),
-    _prop(  # a hand saw: the blade runs ahead from the fist, its teeth down
+    _make_prop(  # a hand saw: the blade runs ahead from the fist, its teeth down
         "saw",
-        [_box((0.0, 0, 0.0), (0.09, 0.024, 0.12)), _box((0.30, 0, -0.02), (0.52, 0.004, 0.09))],
-        None, ORIGIN,
+        [
+            _make_box((0.0, 0, 0.0), (0.09, 0.024, 0.12)),
+            _make_box((0.30, 0, -0.02), (0.52, 0.004, 0.09)),
+        ],
+        None,
+        ORIGIN,
     ),
-    _prop(  # drawn out half a metre from the right hand, its end in the left
+    _make_prop(  # drawn out half a metre from the right hand, its end in the left
         "tape_measure",
-        [_box((0, -0.25, 0), (0.07, 0.045, 0.07)), _box((0, 0.0, -0.02), (0.022, 0.50, 0.003))],
-        (0, 0.25, -0.02), (0, -0.25, 0),
+        [
+            _make_box((0, -0.25, 0), (0.07, 0.045, 0.07)),
+            _make_box((0, 0.0, -0.02), (0.022, 0.50, 0.003)),
+        ],
+        (0, 0.25, -0.02),
+        (0, -0.25, 0),
     ),
     # A sawn stud of 2.4 m, crosswise in both hands; a box between the palms.
-    _prop("board", [_box(ORIGIN, (0.089, 2.4, 0.038))], (0, 0.30, 0), (0, -0.30, 0)),
-    _prop("box", [_box(ORIGIN, (0.34, 0.40, 0.30))], (0, 0.20, 0), (0, -0.20, 0)),
-    _prop(  # a platform that is pushed by its bar
+    _make_prop("board", [_make_box(ORIGIN, (0.089, 2.4, 0.038))], (0, 0.30, 0), (0, -0.30, 0)),
+    _make_prop("box", [_make_box(ORIGIN, (0.34, 0.40, 0.30))], (0, 0.20, 0), (0, -0.20, 0)),
+    _make_prop(  # a platform that is pushed by its bar
         "cart",
         [
-            _box((0.56, 0, 0.20), (0.90, 0.58, 0.06)),
-            _box((0.60, 0, 0.41), (0.70, 0.48, 0.36)),
-            _rod((0.0, -0.27, 0.98), (0.0, 0.27, 0.98), 0.016),
-            *(_rod((0.13, y, 0.20), (0.0, y, 0.98), 0.016) for y in (-0.27, 0.27)),
-            *(_box((x, y, 0.08), (0.16, 0.04, 0.16)) for x in (0.25, 0.88) for y in (-0.22, 0.22)),
+            _make_box((0.56, 0, 0.20), (0.90, 0.58, 0.06)),
+            _make_box((0.60, 0, 0.41), (0.70, 0.48, 0.36)),
+            _make_rod((0.0, -0.27, 0.98), (0.0, 0.27, 0.98), 0.016),
+            *(_make_rod((0.13, y, 0.20), (0.0, y, 0.98), 0.016) for y in (-0.27, 0.27)),
+            *(
+                _make_box((x, y, 0.08), (0.16, 0.04, 0.16))
+                for x in (0.25, 0.88)
+                for y in (-0.22, 0.22)
+            ),
         ],
-        (0, 0.20, 0.98), (0, -0.20, 0.98),
+        (0, 0.20, 0.98),
+        (0, -0.20, 0.98),
     ),
-    _prop(  # level on its wheel while its handles are held
+    _make_prop(  # level on its wheel while its handles are held
         "wheelbarrow",
         [
-            *(_rod((-0.10, y, 0.72), (1.15, 0.3 * y, 0.26), 0.018) for y in (-0.29, 0.29)),
-            _box((0.68, 0, 0.63), (0.80, 0.58, 0.36)),
-            _box((1.20, 0, 0.19), (0.34, 0.08, 0.34)),
-            *(_rod((0.42, y, 0.16), (0.40, y, 0.48), 0.016) for y in (-0.20, 0.20)),
+            *(_make_rod((-0.10, y, 0.72), (1.15, 0.3 * y, 0.26), 0.018) for y in (-0.29, 0.29)),
+            _make_box((0.68, 0, 0.63), (0.80, 0.58, 0.36)),
+            _make_box((1.20, 0, 0.19), (0.34, 0.08, 0.34)),
+            *(_make_rod((0.42, y, 0.16), (0.40, y, 0.48), 0.016) for y in (-0.20, 0.20)),
         ],
-        (0, 0.28, 0.685), (0, -0.28, 0.685),
+        (0, 0.28, 0.685),
+        (0, -0.28, 0.685),
     ),
     # A spirit level, flat to a wall ahead, in both hands.
-    _prop("level", [_box(ORIGIN, (0.025, 0.80, 0.06))], (0, 0.22, 0), (0, -0.22, 0)),
+    _make_prop("level", [_make_box(ORIGIN, (0.025, 0.80, 0.06))], (0, 0.22, 0), (0, -0.22, 0)),
     # A piece of a stud, flat, by its ends.
-    _prop("stud", [_box(ORIGIN, (0.089, 0.30, 0.038))], (0, 0.11, 0), (0, -0.11, 0)),
-)  # fmt: skip
-"""Everything that can be held; the first is nothing."""
+    _make_prop("stud", [_make_box(ORIGIN, (0.089, 0.30, 0.038))], (0, 0.11, 0), (0, -0.11, 0)),
+)
+"""All props; the first one stands for nothing."""
 PROP_NAMES: tuple[str, ...] = tuple(prop.name for prop in PROPS)
+"""Names of the props."""
 BOUNDS_M = np.zeros((len(PROPS), 2, 3))
-"""(P, 2, 3) least and greatest corner of the box round each, in its own frame [m]."""
+"""Least and greatest corner (P, 2, 3) of the box around each prop, in its own frame [m]."""
 for _row, _each in zip(BOUNDS_M[1:], PROPS[1:], strict=True):
     _row[:] = bounds(_each.shapes)
 _N_PARTS = max(len(prop.shapes) for prop in PROPS)
 _PARTS = np.tile(absent_shape(), (len(PROPS), _N_PARTS, 1))
-"""(P, n, `shapes.WIDTH`) the parts of every prop; rows that it leaves over are absent."""
+"""Parts (P, n, `shapes.WIDTH`) of every prop; unused rows are absent shapes."""
 for _parts, _each in zip(_PARTS, PROPS, strict=True):
     _parts[: len(_each.shapes)] = _each.shapes
 
 
 def held_shapes(held: Held) -> Floats:
-    """(B, W * n, `shapes.WIDTH`) the solid parts of what workers hold, and of what lies there for
-    them, in the world [m].
+    """Return the solid parts (B, W n, `shapes.WIDTH`) of props in the hands or lying about [m].
 
-    There are rows for the prop of most parts; those that are left over are absent.
+    There are n rows a prop, as many as the prop with the most parts has; unused rows are absent
+    shapes.
     """
-    return placed(held.kind, held.position_world, held.quaternion_wxyz, _PARTS)
+    return place_shapes(held.kind, held.position_world, held.quaternion_wxyz, _PARTS)
 
 
-def placed(
+def place_shapes(
     kind: Ints, position_world: Points3, quaternion_wxyz: QuaternionsWxyz, parts: Floats
 ) -> Floats:
-    """(B, W * n, `shapes.WIDTH`) the parts (P, n, `shapes.WIDTH`) of things of kinds (B, W), each
-    where it is, in the world [m]."""
+    """Return parts of things in the world (B, W n, `shapes.WIDTH`) [m].
+
+    Args:
+        kind: kind (B, W) of each thing.
+        position_world: its position (B, W, 3) [m].
+        quaternion_wxyz: its orientation (B, W, 4).
+        parts: parts (P, n, `shapes.WIDTH`) of every kind in its own frame [m].
+    """
     batch, many = kind.shape
     rows = np.empty((batch, many * parts.shape[1], WIDTH))
-    _place(kind, position_world, quaternion_wxyz, parts, rows)
+    _place_parts(kind, position_world, quaternion_wxyz, parts, rows)
     return rows
 
 
 @kernel
-def _place(kind, position, quaternion, parts, rows):
-    """Parts of the props of B environments, of W workers each, from their frames to the world."""
-    most = parts.shape[1]
+def _place_parts(
+    kind: Ints, position: Floats, quaternion: Floats, parts: Floats, rows: Floats
+) -> None:
+    """Write the parts of props in the world.
+
+    Args:
+        kind: kind (B, W) of each prop.
+        position: position (B, W, 3) of each prop in the world [m].
+        quaternion: orientation (B, W, 4) of each prop.
+        parts: parts (P, n, `shapes.WIDTH`) of every kind in its own frame.
+        rows: parts (B, W n, `shapes.WIDTH`), which are written.
+    """
+    n_parts = parts.shape[1]
     for b in range(len(kind)):
         for k in range(rows.shape[1]):
-            w, row = k // most, rows[b, k]
-            own = parts[kind[b, w], k % most]
+            w, row = k // n_parts, rows[b, k]
+            part = parts[kind[b, w], k % n_parts]
             for i in range(WIDTH):
-                row[i] = own[i]
+                row[i] = part[i]
             for at in range(CENTRE, HALF_SIZE, 3):
-                x, y, z = rotate(quaternion[b, w], own[at : at + 3])
+                x, y, z = rotate(quaternion[b, w], part[at : at + 3])
                 row[at], row[at + 1], row[at + 2] = x, y, z
             for i in range(3):
                 row[CENTRE + i] += position[b, w, i]

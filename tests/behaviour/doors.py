@@ -62,18 +62,20 @@ from hrc_env.geometry.robot_model import RobotModel
 from hrc_env.geometry.rotations import matrix
 from hrc_env.geometry.triangulation import linear_point, triangulate
 from hrc_env.mocap import footing, person, repair, stance
-from hrc_env.mocap.guess import first_guess
-from hrc_env.mocap.poses import joints_in, marks_of, posed
+from hrc_env.mocap.guess import guess_controls
+from hrc_env.mocap.poses import locate_joints, make_marks, pose_segments
 from hrc_env.mocap.read import read_recording as read_capture
 from hrc_env.mocap.record import Capture
-from hrc_env.mocap.retarget import adapted, fitted, retarget
+from hrc_env.mocap.retarget import fit_controls, retarget, scale_joints
 from hrc_env.motion import config as motion_config
 from hrc_env.motion import floorplan, lying, paths, repertoire, routes, schedule, starting, starts
 from hrc_env.motion import generator as motion
-from hrc_env.motion.activities.pieces import stage, stocked
-from hrc_env.motion.anatomy import anatomy
-from hrc_env.motion.clip import Clip, fitted_to, load_clip, placed_at_origin, save_clip
-from hrc_env.motion.traffic import meets
+from hrc_env.motion.activities.pieces import cut_clips as cut_into_pieces
+from hrc_env.motion.activities.pieces import make_stage
+from hrc_env.motion.anatomy import measure_body as measure_anatomy
+from hrc_env.motion.clip import Clip, load_clip, move_to_origin, save_clip, scale_clip
+from hrc_env.motion.points import Point
+from hrc_env.motion.traffic import find_meeting
 from hrc_env.perception import (
     blazepose,
     calibration,
@@ -93,19 +95,19 @@ from hrc_env.pipeline import reacquisition
 from hrc_env.pipeline.bystanders import Bystanders
 from hrc_env.pipeline.pose_tracker import PoseTracker
 from hrc_env.safety import contact, incidents, separation, solver
+from hrc_env.safety.built_in import build_constraints, describe_pose
 from hrc_env.safety.config import PRESETS, ShieldConfig
-from hrc_env.safety.guard import constraints, describe_arm
-from hrc_env.safety.shield import shield_called, shielded
+from hrc_env.safety.shield import apply_shield, find_shield
 from hrc_env.safety.unseen import find_undetected
 from hrc_env.scene import domain_randomization as looks
 from hrc_env.scene import rigs
-from hrc_env.scene.build import SceneConfig, drawing_model, visuals
+from hrc_env.scene.build import SceneConfig, drawing_model, find_visuals
 from hrc_env.scene.build import build as build_scene
-from hrc_env.scene.objects import held_by
+from hrc_env.scene.objects import find_held
 from hrc_env.scene.render import CropRenderer
 from hrc_env.scene.rig import make_cameras
-from hrc_env.scene.rigs import floor as floor_points
-from hrc_env.scene.robot import ROBOTS, chain_of
+from hrc_env.scene.rigs import sample_floor as floor_points
+from hrc_env.scene.robot import ROBOTS, make_chain
 from hrc_env.settings import settle
 from hrc_env.simulation import Simulation
 from hrc_env.tasks.reach import MIDDLE
@@ -113,11 +115,11 @@ from hrc_env.tasks.task import find_task
 from hrc_env.tracking import metrics, oracle, presence
 from hrc_env.tracking.calibration_monitor import forget_monitor, make_monitor, monitor
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.contradiction import Shown, find_unexplained
-from hrc_env.tracking.estimators import ESTIMATORS, estimator_called, make_estimator
+from hrc_env.tracking.contradiction import DetectedPoses, find_unexplained
+from hrc_env.tracking.estimators import ESTIMATORS, find_estimator, make_estimator
 from hrc_env.tracking.forecast import forecast
 from hrc_env.tracking.frozen_frames import (
-    believed,
+    find_live_cameras,
     forget_frozen,
     leave_out_frozen,
     make_frozen,
@@ -212,7 +214,7 @@ DRAWING = (
     ("map", ("znear", "zfar", "fogstart", "fogend", "haze", "shadowclip", "shadowscale", "alpha")),
 )
 """How MuJoCo draws, by its names."""
-RENAMED: dict[str, str] = {}
+RENAMED: dict[str, str] = {"shield/clearance_m": "shield/least_m"}
 """Today's names of observation terms, reward terms and infos that the probes know by another."""
 
 
@@ -328,22 +330,22 @@ class Env:
     def describe_rig(self) -> dict[str, NDArray[Any]]:
         """Return which places the cameras see, and how many sentences there are on the rig."""
         scene = self._simulation.scene
-        places = rigs.workspace(scene.grounds)
+        places = rigs.sample_workspace(scene.grounds)
         return {
-            "places_m": places, "seen": rigs.sees(scene.cameras, scene.obstacles, places).T,
-            "n_findings": np.array([len(rigs.findings(scene))]),
+            "places_m": places, "seen": rigs.find_visible(scene.cameras, scene.obstacles, places).T,
+            "n_findings": np.array([len(rigs.describe_defects(scene))]),
         }  # fmt: skip
 
     def dress(self, appearance: str, seed: int) -> dict[str, NDArray[Any]]:
         """Return how an episode of an appearance looks to the cameras."""
         scene = self._simulation.scene
-        built, model, worn = drawing_model(scene), drawing_model(scene), visuals(scene)
+        built, model, worn = drawing_model(scene), drawing_model(scene), find_visuals(scene)
         rng = np.random.default_rng([seed, 49])
         look = looks.draw_look(looks.APPEARANCES[appearance], scene.n_workers, rng)
         looks.randomize(model, built, worn, look)
-        looks.take_off_hats(model, worn, look)
+        looks.hide_hats(model, worn, look)
         drawn = mujoco.MjvScene(model, maxgeom=80)
-        looks.strew(drawn, scene.grounds, look)
+        looks.add_litter(drawn, scene.grounds, look)
         litter = np.zeros((looks.MOST_LITTER, 19))
         for row, geom in zip(litter, drawn.geoms[: drawn.ngeom], strict=False):
             row[:] = [*geom.size, *geom.pos, *np.ravel(geom.mat), *geom.rgba]
@@ -440,7 +442,7 @@ def _numeric(infos: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
     named = {name: np.where(known[name], infos[name], 0.0) for name in plain if known[name].any()}
     if "is_success" in named:
         named["is_success"] = named["is_success"].astype(bool)
-    return named
+    return {RENAMED.get(name, name): value for name, value in named.items()}
 
 
 FLAGS_OF = {name: entry.flag for name, entry in ENTRIES.items() if entry.flag}
@@ -522,7 +524,7 @@ def can_reach(
     """Return whether a robot at the origin is thought to get its tool to a place."""
     target = ReachTarget("a place", place_m, along, within_m)
     try:
-        check_reach("a probe", robot, chain_of(ROBOTS[robot], (0.0, 0.0, 0.0)), [target])
+        check_reach("a probe", robot, make_chain(ROBOTS[robot], (0.0, 0.0, 0.0)), [target])
     except ConfigError:
         return False
     return True
@@ -559,15 +561,15 @@ def compare_tracks(
 ) -> dict[str, NDArray[np.float64]]:
     """Return the errors of tracks (T, W, J, 3) from workers (T, W, J, 3), and who was whose."""
     n_workers = means_m.shape[1]
-    identities = metrics.no_identities(1, n_workers)
-    prior = oracle.prior(1, n_workers, TrackerConfig())
+    identities = metrics.make_identities(1, n_workers)
+    prior = oracle.estimate_prior(1, n_workers, TrackerConfig())
     found = []
     for mean, joints, known, there in zip(means_m, joints_m, tracked, present, strict=True):
         estimate = dataclasses.replace(prior, mean_world=mean[None], tracked=known[None])
         capsules = np.zeros((1, n_workers, 1, 2, 3)), np.zeros((1, n_workers, 1))
         truth = WorkerTruth(joints[None], np.zeros_like(joints[None]), *capsules)
         found.append(
-            metrics.tracking_error(estimate, truth.joints_world, there[None], identities)[0]
+            metrics.measure_errors(estimate, truth.joints_world, there[None], identities)[0]
         )
     return {name: np.array([each[name] for each in found]) for name in metrics.TRACKING.names}
 
@@ -584,7 +586,7 @@ def objects_in_hand(
     away = np.arange(n_objects)[:, None] * [0.02, 0, 0, 0, 0, 0, 0]
     qpos[:, first:] = (poses[:, None] + away).reshape(n, -1)
     held = [
-        held_by(objects, qpos, points_m, HandState(np.zeros(n), np.zeros(n), closed))
+        find_held(objects, qpos, points_m, HandState(np.zeros(n), np.zeros(n), closed))
         for closed in (np.ones(n, bool), np.arange(n) % 2 == 0)
     ]
     env.close()
@@ -857,7 +859,7 @@ def list_jobs(work: str) -> Arrays:
 def measure_body(name: str) -> Arrays:
     """Return the measures of a baked body, each (1, ...) [m]."""
     body = bodies.load_body(name)
-    bones = anatomy(body)
+    bones = measure_anatomy(body)
     measures = {
         "stature_m": body.stature_m,
         "rest_m": body.rest_position,
@@ -868,15 +870,15 @@ def measure_body(name: str) -> Arrays:
         "capsule_radius_m": body.capsule_radius_m,
         "bone_offset_m": bones.offset,
         "bone_frame": bones.frame,
-        "sizes_m": bones.size,
-        "rounds": bones.round,
+        "sizes_m": bones.lengths,
+        "rounds": bones.trunk_ends,
     }
     return {key: np.asarray(value)[None] for key, value in measures.items()}
 
 
 def pose_body(name: str, controls: NDArray[np.float64]) -> Arrays:
     """Return where the segments of a body are in poses (T, controls)."""
-    position, turn, _ = posed(controls, anatomy(bodies.load_body(name)))
+    position, turn, _ = pose_segments(controls, measure_anatomy(bodies.load_body(name)))
     return {"position_m": position, "turn": turn}
 
 
@@ -886,11 +888,11 @@ def perform_scene(
 ) -> Arrays:  # fmt: skip
     """Return what a worker alone does in a scene of the repertoire, moment by moment; at another
     height than usual if one is given."""
-    me = repertoire.alone(bodies.load_body(body), place[:2], place[2], is_right)
+    me = repertoire.make_worker(bodies.load_body(body), place[:2], place[2], is_right)
     rng = np.random.default_rng(seed)
     acts = repertoire.SCENES[name]
     if height_m is not None:
-        acts = tuple((activity, start, height_m) for activity, start, _ in acts)
+        acts = tuple(act._replace(height_m=height_m) for act in acts)
     return _join_films(repertoire.perform(acts, me, rng, every_s))
 
 
@@ -900,7 +902,7 @@ def perform_reaches(
 ) -> Arrays:  # fmt: skip
     """Return reaches one after the other of a worker beside the robot, or elsewhere."""
     config = motion_config.MotionConfig(people=motion_config.PeopleConfig(sudden_probability=0.3))
-    numbers = motion_config.numbers(config, (0.0, 0.0))
+    numbers = motion_config.make_hand_params(config, Point(0.0, 0.0))
     reach, lift = ACTIVITIES.index("reach"), ACTIVITIES.index("lift")
 
     def start_reach(draws: Any, height: float, me: Any) -> float:
@@ -909,8 +911,9 @@ def perform_reaches(
     def start_lift(draws: Any, height: float, me: Any) -> float:
         return starting.start_lift(draws, numbers, me)
 
-    me = repertoire.alone(bodies.load_body(body), (1.15, 0.1), np.pi + 0.1, is_right)
-    acts = [(reach, start_reach, height_m), (lift, start_lift, 0.0)] * n_acts
+    me = repertoire.make_worker(bodies.load_body(body), (1.15, 0.1), np.pi + 0.1, is_right)
+    reaches = repertoire.Act(reach, start_reach, height_m)
+    acts = [reaches, repertoire.Act(lift, start_lift, 0.0)] * n_acts
     return _join_films(repertoire.perform(acts, me, np.random.default_rng(seed), every_s))
 
 
@@ -931,7 +934,7 @@ def _join_films(films: Any) -> Arrays:
 
 def place_body(names: tuple[str, ...], rows: NDArray[np.int64], segments: Arrays) -> Arrays:
     """Return joints, their velocities and capsules of bodies (N,) whose segments are given."""
-    body, now = bodies.stack(names), _motion_of(segments, rows)
+    body, now = bodies.load_bodies(names), _motion_of(segments, rows)
     truth = bodies.worker_truth(body, now)
     path = WorkerPath(now.position_world[:, None], now.quaternion_wxyz[:, None])
     return {
@@ -983,16 +986,16 @@ def read_clip(path: Path) -> Any:
 
 def time_pieces(clips: Any, names: tuple[str, ...], place: str) -> float:
     """Return how long the pieces last into which clips are cut for bodies in a place [s]."""
-    sizes = np.stack([anatomy(bodies.load_body(name)).size for name in names])
-    plan = floorplan.floorplan(Floor(place).grounds)
-    return stocked(clips, sizes, stage(plan, motion_config.MotionConfig())).lasts_s
+    sizes = np.stack([measure_anatomy(bodies.load_body(name)).lengths for name in names])
+    plan = floorplan.make_floorplan(Floor(place).grounds)
+    return cut_into_pieces(clips, sizes, make_stage(plan, motion_config.MotionConfig())).lasts_s
 
 
 def list_clip(clip: Any) -> Arrays:
     """Return what a clip holds, and its controls from the origin on."""
     return {
         "controls": clip.controls, "contacts": clip.contacts, "size_m": clip.size,
-        "at_origin": placed_at_origin(clip.controls), "fps": np.array([clip.fps]),
+        "at_origin": move_to_origin(clip.controls), "fps": np.array([clip.fps]),
         "source": np.array([clip.source], "U"),
     }  # fmt: skip
 
@@ -1003,7 +1006,7 @@ class Floor:
     def __init__(self, place: str) -> None:
         """Measure the floor of "lab", "site" or "open"."""
         self.grounds = motion.OPEN_FLOOR if place == "open" else build_scene(name=place).grounds
-        self._plan = floorplan.floorplan(self.grounds)
+        self._plan = floorplan.make_floorplan(self.grounds)
         self.x_m, self.y_m = self.grounds.walkable_x_m, self.grounds.walkable_y_m
         self.robot_m = self.grounds.robot_xy_m
 
@@ -1019,24 +1022,24 @@ class Floor:
             "blocked_m": np.asarray(grounds.blocked, float).reshape(1, -1),
             "places": np.array(at),
             "kinds": np.array(words, "U"),
-            "room_for": np.array([floorplan.room_for(self._plan, m) for m in apart]),
+            "room_for": np.array([floorplan.count_room(self._plan, m) for m in apart]),
         }
 
     def measure_slack(self, points_m: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the room (N,) round points (N, 2) [m]."""
         plan = self._plan
-        slack = [floorplan.slack_at(x, y, plan.slack, plan.origin) for x, y in points_m.tolist()]
+        slack = [floorplan.read_slack(x, y, plan.grid) for x, y in points_m.tolist()]
         return np.array(slack)
 
     def lay_loads(self, seed: int) -> Arrays:
         """Return the loads that lie about at first, and a little off their places."""
-        first = lying.at_first(self.grounds.places, schedule.JOBS)
+        first = lying.make_loads(self.grounds.places, schedule.JOBS)
         laid = np.zeros(len(first) + 1, first.dtype)
-        lying.lay_out(laid, first, np.random.default_rng(seed))
+        lying.reset_loads(laid, first, np.random.default_rng(seed))
         return {
             "first": first["pose"].copy(), "shown": laid["shown"].copy(),
-            "stand": laid["stand"].copy(), "at": laid["at"].copy(), "free": lying.on_top(laid),
-            "in_the_way": lying.in_the_way(laid),
+            "stand": laid["stand"].copy(), "at": laid["at"].copy(),
+            "free": lying.find_uncovered(laid), "in_the_way": lying.list_load_discs(laid),
         }  # fmt: skip
 
     def find_way(
@@ -1045,10 +1048,13 @@ class Floor:
     ) -> Arrays:  # fmt: skip
         """Return whether there is a way past discs (n, 3), and its points and directions at shares
         of its length."""
-        me, plan = repertoire.alone(bodies.load_body()), self._plan
-        ends = tuple(map(float, start_m)), tuple(map(float, end_m))
-        found = routes.route(*ends, bow, discs, plan.slack, plan.origin, me)
-        ways = [(*paths.along(s, me), paths.facing(s, me)) for s in shares * me["length"]]
+        me, plan = repertoire.make_worker(bodies.load_body()), self._plan
+        ends = Point(*map(float, start_m)), Point(*map(float, end_m))
+        found = routes.find_route(*ends, bow, discs, plan.grid, me)
+        ways = [
+            (*paths.locate_on_path(s, me), paths.average_heading(s, me))
+            for s in shares * me["length"]
+        ]
         facts = float(me["length"]), float(me["sharpest"]), float(me["n_pieces"])
         way = np.array(ways) if found else np.full((len(shares), 3), np.nan)
         return {"found": found, "way": way, "facts": np.array(facts if found else (0.0,) * 3)}
@@ -1085,7 +1091,7 @@ class Crew:
         )
         grounds = dataclasses.replace(grounds, places=(*grounds.places, *more))
         self.robot_m = grounds.robot_xy_m
-        self.names, self._body = names, bodies.stack(names)
+        self.names, self._body = names, bodies.load_bodies(names)
         self._state = motion.make_state(
             batch, n_workers, self._body, config, grounds, fewest, girth_m
         )
@@ -1111,7 +1117,11 @@ class Crew:
     def move(self) -> Arrays:
         """Return the bodies now: arrays (B, W, ...), and what they are about."""
         now, held, workers = self._now, self._now.held, self._state.workers
-        fields = ("job", "going", "at", "doing", "reaction", "time_s", "duration_s", "pace", "spot")
+        fields = {
+            "job": "job", "going": "travel", "at": "place_kind", "doing": "current_reaction",
+            "reaction": "planned_reaction", "time_s": "time_s", "duration_s": "duration_s",
+            "pace": "pace", "spot": "place",
+        }  # fmt: skip
         return {
             "activity": motion.activity(self._state),
             "position_m": now.position_world,
@@ -1121,7 +1131,7 @@ class Crew:
             "body": now.body,
             "held": held.kind, "held_m": held.position_world, "held_turn": held.quaternion_wxyz,
             "path_m": self._path.position_world,
-            **{f"plan/{name}": np.array(workers[name]) for name in fields},
+            **{f"plan/{name}": np.array(workers[field]) for name, field in fields.items()},
         }  # fmt: skip
 
     def list_deeds(self) -> Arrays:
@@ -1145,7 +1155,7 @@ class Crew:
         """Return when and where workers would come too near to another if those of all environments
         were in one, (B W, 3)."""
         everyone = self._state.workers.reshape(-1)
-        return np.array([meets(w, everyone) for w in range(len(everyone))], float)
+        return np.array([find_meeting(w, everyone) for w in range(len(everyone))], float)
 
 
 # --- Tracker and geometry (tracker.py) -----------------------------------------------------------
@@ -1171,7 +1181,7 @@ class Tracker:
         settings: Mapping[str, Any], seed: int = 0,
     ) -> None:  # fmt: skip
         """Begin `shape` (places, workers) of an estimator by its name."""
-        kind = estimator_called(estimator).config
+        kind = find_estimator(estimator).config
         config = kind(**{TRACKER_SETTINGS[name]: value for name, value in settings.items()})
         self._made, self._P = make_estimator(estimator, P, step_s, config), P
         self._rngs = [np.random.default_rng([seed, b]) for b in range(shape[0])]
@@ -1216,8 +1226,8 @@ class Tracker:
             "count": state.n_alive.copy(),
             "log_weight": np.where(alive, state.trees["log_weight"], 0.0),
             "pose_log_prior": np.where(alive, state.trees["pose_log_prior"], 0.0),
-            "waited_s": state.waited_s.copy(),
-            "waited_updates": best["waited"].copy(),
+            "waited_s": state.since_search_s.copy(),
+            "waited_updates": best["one_view_updates"].copy(),
             "conflicts": best["conflict"].copy(),
             "size_std": best["size_std"].copy(),
             "bone_m": best["bone_length"].copy(),
@@ -1227,17 +1237,17 @@ class Tracker:
             "slope": best["slope"].copy(),
             "speed_std": np.sqrt(np.diagonal(best["cov"], axis1=-2, axis2=-1)[..., 3:]),
             "swap_chance": views["swap_chance"].copy(),
-            "blind": views["blind"].copy(),
-            "believed": views["believed"].copy(),
+            "blind": views["unseen_updates"].copy(),
+            "believed": views["trusted_updates"].copy(),
             "noise_factor": noise["factor"].copy(),
             "noise_sums": noise["sums"].copy(),
             "turn_rad": best["pair"]["turn"].copy(),
             "turn_std_rad": np.sqrt(
                 np.diagonal(best["pair"]["turn_cov"], axis1=-2, axis2=-1).clip(0)
             ),
-            "turn_fits": best["pair"]["fits"].copy(),
-            "is_askew": best["pair"]["askew"].copy(),
-            "pair_waited": best["pair"]["waited"].copy(),
+            "turn_fits": best["pair"]["meeting_share"].copy(),
+            "is_askew": best["pair"]["is_misaligned"].copy(),
+            "pair_waited": best["pair"]["untracked_updates"].copy(),
             "displaced_m": np.sqrt(np.diagonal(best["displaced_m2"], axis1=-2, axis2=-1).clip(0)),
         }
 
@@ -1308,7 +1318,8 @@ def believe_truth(joints_world: NDArray[Any], velocity_world: NDArray[Any]) -> d
 
 def believe_prior(shape: tuple[int, int]) -> dict[str, Any]:
     """Return the beliefs in nobody, and in whoever may be there."""
-    nobody, prior = oracle.nobody(*shape, TrackerConfig()), oracle.prior(*shape, TrackerConfig())
+    nobody = oracle.estimate_absence(*shape, TrackerConfig())
+    prior = oracle.estimate_prior(*shape, TrackerConfig())
     return {f"{kind}/{name}": value for kind, each in (("nobody", nobody), ("prior", prior))
             for name, value in _as_values(each).items()}  # fmt: skip
 
@@ -1344,13 +1355,14 @@ class Presence:
         """
         enough = presence.SEARCHES if by_search else presence.IMAGES
         nobody = np.zeros_like(looked)
-        poses = Shown(*(nobody if each is None else each for each in (shown, unexplained)))
+        poses = DetectedPoses(*(nobody if each is None else each for each in (shown, unexplained)))
         others = no_others(len(looked))
         if others_m is not None:
             others = Others(others_m, np.where(np.isnan(others_m[..., 0]), np.inf, 0.0))
+        searches = presence.ImageSearches(looked, age_s, enough, poses, others)
         said = self._known.update(
             np.arange(len(looked)), _as_estimate(belief), _as_keypoints(found), _as_keypoints(own),
-            presence.Looks(looked, age_s, enough, poses, others), self._step_s, TrackerConfig(),
+            searches, self._step_s, TrackerConfig(),
         )  # fmt: skip
         return _as_values(said)
 
@@ -1375,7 +1387,7 @@ class Watchers:
     def leave_out_stuck(self, seen: dict[str, Any]) -> NDArray[np.bool_]:
         """Take stuck cameras' frames out, in place, and return which cameras are believed."""
         leave_out_frozen(self._frozen, self._ids, _as_keypoints(seen))
-        return believed(self._frozen, self._ids)
+        return find_live_cameras(self._frozen, self._ids)
 
     def monitor(
         self, seen: Mapping[str, Any], age_s: NDArray[np.float64], belief: Mapping[str, Any]
@@ -1902,7 +1914,7 @@ def name_joints() -> tuple[str, ...]:
 
 def joints_of_segments(segments: Arrays, body: str) -> NDArray[np.float64]:
     """Return joints (T, 15, 3) as the network means them, of segments (T, 22, ...)."""
-    marks = marks_of(bodies.load_body(body), landmarks=True)
+    marks = make_marks(bodies.load_body(body), landmarks=True)
     arm = matrix(segments["turn"])[:, marks.segment] @ marks.offset[..., None]
     return segments["position_m"][:, marks.segment] + arm[..., 0]
 
@@ -1931,11 +1943,11 @@ def read_recording(
         read = read_capture(path, fps, source_fps, None, is_off_floor_allowed)
     except ConfigError:
         return None
-    facts = read.fps, read.landmarks, len(read.repaired)
+    facts = read.fps, read.are_landmarks, len(read.notes)
     return {
         "joints_m": read.joints_world,
         "facts": np.array([facts], float),
-        "names": np.array(read.found, "U"),
+        "names": np.array(read.node_names, "U"),
     }
 
 
@@ -1960,21 +1972,21 @@ def describe_clip(clip: Any, error: Any) -> Arrays:
 def fit_steps(joints_m: Any, fps: float, body: str) -> Arrays:
     """Return what comes of joints (T, 15, 3) step by step: wished, guessed, fitted, with
     feet locked."""
-    marks = marks_of(bodies.load_body(body), landmarks=True)
-    wished = adapted(np.asarray(joints_m, float), fps, marks)
-    poses = fitted(wished, fps, marks)
-    locked, stands = stance.locked(poses, fps, marks.anatomy.size)
+    marks = make_marks(bodies.load_body(body), landmarks=True)
+    wished = scale_joints(np.asarray(joints_m, float), fps, marks)
+    poses = fit_controls(wished, fps, marks)
+    locked, stands = stance.lock_feet(poses, fps, marks.anatomy.lengths)
     return {
-        "wished_m": wished, "guess": first_guess(wished, fps, marks), "poses": poses,
+        "wished_m": wished, "guess": guess_controls(wished, fps, marks), "poses": poses,
         "locked": locked, "stands": stands,
-        "joints_m": joints_in(locked, marks),
-        "slip_m_s": stance.slip(locked, stands, fps, marks.anatomy),
+        "joints_m": locate_joints(locked, marks),
+        "slip_m_s": stance.measure_slip(locked, stands, fps, marks.anatomy),
     }  # fmt: skip
 
 
 def fit_clip(clip: Any, body: str) -> NDArray[np.float64]:
     """Return a clip's controls for a worker of other measures."""
-    return fitted_to(clip, anatomy(bodies.load_body(body)).size)
+    return scale_clip(clip, measure_anatomy(bodies.load_body(body)).lengths)
 
 
 def made_clip(values: Arrays, fps: float) -> Any:
@@ -1987,9 +1999,11 @@ def made_clip(values: Arrays, fps: float) -> Any:
 def cut_clips(clips: Any, names: tuple[str, ...], place: str) -> Arrays | None:
     """Return the pieces into which clips are cut for bodies in a place; None: refused."""
     config = motion_config.MotionConfig()
-    sizes = np.stack([anatomy(bodies.load_body(name)).size for name in names])
+    sizes = np.stack([measure_anatomy(bodies.load_body(name)).lengths for name in names])
     try:
-        pieces = stocked(clips, sizes, stage(floorplan.floorplan(Floor(place).grounds), config))
+        pieces = cut_into_pieces(
+            clips, sizes, make_stage(floorplan.make_floorplan(Floor(place).grounds), config)
+        )
     except ConfigError:
         return None
     return {
@@ -2000,23 +2014,27 @@ def cut_clips(clips: Any, names: tuple[str, ...], place: str) -> Arrays | None:
 
 def judge_floor(joints_m: NDArray[np.float64], fps: float) -> Arrays:
     """Return where feet rest, the floor's height, and joints on a level floor."""
-    height, rests = footing.supports(joints_m, fps)
-    levelled, changes = footing.level(joints_m, fps)
-    faults_found = len(footing.off_floor(joints_m, fps))
-    facts = footing.floor_height(joints_m, fps), len(changes), faults_found
+    height, rests = footing.find_support(joints_m, fps)
+    levelled, changes = footing.level_floor(joints_m, fps)
+    faults_found = len(footing.describe_floor_faults(joints_m, fps))
+    facts = footing.measure_floor_height(joints_m, fps), len(changes), faults_found
     return {"height_m": height, "rests": rests, "level_m": levelled, "facts": np.array(facts)}
 
 
 def measure_person(joints_m: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return stature, leg, two bones, and whether the first frame is a rest pose."""
-    bones = (person.length(joints_m, a, b) for a, b in (("shoulder", "elbow"), ("knee", "ankle")))
-    rest = repair.without_rest_pose(joints_m)[0]
-    return np.array([person.stature(joints_m), person.legs(joints_m), *bones, float(rest)])
+    bones = (
+        person.measure_bone(joints_m, a, b) for a, b in (("shoulder", "elbow"), ("knee", "ankle"))
+    )
+    rest = repair.skip_rest_pose(joints_m)[0]
+    return np.array(
+        [person.measure_stature(joints_m), person.measure_legs(joints_m), *bones, float(rest)]
+    )
 
 
 def resample(values: NDArray[np.float64], fps: float, wished_fps: float) -> NDArray[np.float64]:
     """Return values (T, ...) at another rate."""
-    return person.resampled(values, fps, wished_fps)
+    return person.resample(values, fps, wished_fps)
 
 
 # --- The detector (detector.py) ------------------------------------------------------------------
@@ -2355,14 +2373,27 @@ class Searches:
 # --- Shield and incidents (shield.py) ------------------------------------------------------------
 
 SHIELD_SETTINGS: dict[str, str] = {
-    name: name
-    for name in (
-        "kind", "margin_m", "hand_margin_m", "sigmas", "least_sigmas_m", "predicted_m_s",
-        "doubtful_m", "doubtful_sigmas", "human_m_s", "human_margin_m_s", "human_s", "latency_s",
-        "reaction_s", "deceleration_m_s2", "gain_hz", "retreat_m_s", "unseen_s", "unknown_m_s",
-        "welcome_m_s", "still_m_s",
-    )
-}  # fmt: skip
+    "kind": "kind",
+    "margin_m": "margin_m",
+    "hand_margin_m": "hand_margin_m",
+    "sigmas": "n_sigmas",
+    "least_sigmas_m": "min_uncertainty_m",
+    "predicted_m_s": "prediction_growth_m_s",
+    "doubtful_m": "single_view_std_m",
+    "doubtful_sigmas": "single_view_sigmas",
+    "human_m_s": "worker_speed_m_s",
+    "human_margin_m_s": "worker_speed_margin_m_s",
+    "human_s": "worker_time_s",
+    "latency_s": "latency_s",
+    "reaction_s": "reaction_s",
+    "deceleration_m_s2": "deceleration_m_s2",
+    "gain_hz": "retreat_gain_hz",
+    "retreat_m_s": "max_retreat_m_s",
+    "unseen_s": "stale_after_s",
+    "unknown_m_s": "unknown_speed_limit_m_s",
+    "welcome_m_s": "contact_speed_m_s",
+    "still_m_s": "creep_m_s",
+}
 """Names of the probes for settings of shields, and today's fields."""
 N_SEGMENTS = len(contact.SEGMENT_REGIONS)
 BODY_REGIONS = tuple(contact.REGIONS)
@@ -2421,25 +2452,25 @@ class Guarded:
         chosen = settings
         if not isinstance(settings, str):
             chosen = {SHIELD_SETTINGS[name]: value for name, value in settings.items()}
-        shield = shield_called(chosen)
+        shield = find_shield(chosen)
         assert shield is not None, "These settings are of a shield."
-        allowed, given = shielded(shield, self._now, wanted, step_s)
-        return {"allowed": allowed, **given}
+        allowed, given = apply_shield(shield, self._now, wanted, step_s)
+        return {"allowed": allowed, **{RENAMED.get(k, k): value for k, value in given.items()}}
 
     def constrain(
         self, wanted: NDArray[np.float64], step_s: float, settings: Mapping[str, Any]
     ) -> dict[str, NDArray[Any]]:
         """Return the rows that a shield keeps, as sums over them."""
         config = ShieldConfig(**{SHIELD_SETTINGS[name]: each for name, each in settings.items()})
-        arm, lost = describe_arm(self._now), find_undetected(self._now, config).lost
-        found = constraints(self._now, arm, lost, wanted, step_s, config)
+        pose, lost = describe_pose(self._now), find_undetected(self._now, config).is_lost
+        found = build_constraints(self._now, pose, lost, wanted, step_s, config)
         is_row = np.arange(found.b.shape[1]) < found.n_rows[:, None]
         J, b = np.where(is_row[..., None], found.J, 0.0), np.where(is_row, found.b, 0.0)
         return {
             "n_rows": found.n_rows, "J": J.sum(1), "b": b.sum(1),
             "Jb": np.einsum("brn,br->bn", J, b), "JJ": (J**2).sum(1), "low": found.low,
             "high": found.high,
-            "least_m": np.where(np.isinf(found.least_m), 9.0, found.least_m),
+            "least_m": np.where(np.isinf(found.clearance_m), 9.0, found.clearance_m),
         }  # fmt: skip
 
     def measure(self) -> dict[str, NDArray[np.float64]]:
@@ -2456,8 +2487,11 @@ class Guarded:
 
 def default_shields() -> dict[str, NDArray[Any]]:
     """Return the numbers of the shields that come with the package."""
-    return {name: np.array([config.record()[0][field] for field in config.record().dtype.names])
-            for name, config in PRESETS.items()}  # fmt: skip
+    fields = [field for field in SHIELD_SETTINGS.values() if field != "kind"]
+    return {
+        name: np.array([getattr(config, field) for field in fields], float)
+        for name, config in PRESETS.items()
+    }
 
 
 def solve_rows(
@@ -2466,7 +2500,8 @@ def solve_rows(
 ) -> NDArray[np.float64]:  # fmt: skip
     """Return the nearest velocities that keep rows as far as their weights ask."""
     x = np.empty_like(wanted)
-    solver.solve(J, b, weight, low, high, wanted, x, np.empty((len(x) + 3, len(x))))
+    problem = solver.Problem(J, b, weight, low, high, wanted)
+    solver.solve(problem, x, np.empty((len(x) + 3, len(x))))
     return x
 
 
@@ -2515,14 +2550,14 @@ class Watched:
         state = chains.robot_state(self._chain, np.zeros_like(qd), qd)
         nowhere, turn = np.zeros((*held.shape, 3)), np.zeros((*held.shape, 4))
         world = World(robot=state, objects=ObjectState(nowhere, turn, nowhere, nowhere, held))
-        paths = incidents.measured(robot, robot_m, workers, worker_m)
+        paths = incidents.measure_paths(robot, robot_m, workers, worker_m)
         found = self._watch.step(world, paths)
-        told = incidents.summed_up(found, self._watch.known)
-        values = {f"one/{name}": found[name].copy() for name in found.dtype.names}
-        values |= {f"all/{name}": told[name].copy() for name in told.dtype.names}
-        known = self._watch.known
-        values |= {f"known/{name}": known[name].copy() for name in known.dtype.names}
-        return {**values, "stop_s": self._watch.stop_s(state)}
+        told = incidents.summarize(found, self._watch.history)
+        values = {}
+        for group, records in (("one", found), ("all", told), ("known", self._watch.history)):
+            for name in records.dtype.names:
+                values[f"{group}/{name.removeprefix('is_')}"] = records[name].copy()
+        return {**values, "stop_s": self._watch.find_stop_time(state)}
 
 
 def start_near(home: NDArray[np.float64], spread: NDArray[np.float64], seeds: list[int]) -> Any:
@@ -2537,8 +2572,8 @@ def start_apart(n: int, seed: int, spread_rad: float, people: str) -> dict[str, 
     ids, chain, state = np.arange(n), simulation.chain, simulation.motion
     home = np.tile(np.zeros(chain.n_joints), (1, 1))[0]
     spread = np.full(chain.n_joints, spread_rad)
-    q = starts.apart(
+    q = starts.begin_apart(
         ids, lambda some: starts.draw_near(home, spread, [rngs[b] for b in some]), state, rngs,
         chain, simulation.bodies,
     )  # fmt: skip
-    return {"q": q, "gap_m": starts.gap_m(ids, q, state, chain, simulation.bodies)}
+    return {"q": q, "gap_m": starts.measure_gap_m(ids, q, state, chain, simulation.bodies)}

@@ -13,7 +13,7 @@ from hrc_env.cli.play import Demo, Play
 from hrc_env.cli.train import Train
 from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCEnv
-from hrc_env.env_words import EnvironmentArguments, cameras_named, read_config
+from hrc_env.env_words import EnvironmentArguments, read_cameras, read_config
 from hrc_env.safety.config import ShieldConfig
 from hrc_env.settings import settle
 
@@ -62,11 +62,11 @@ def test_looks_and_clips_are_passed_on():
 
 
 def test_cameras_are_a_rig_a_file_or_names_and_numbers():
-    assert cameras_named(["lab_gopro"]) == "lab_gopro"
-    assert cameras_named(["rig.toml"]) == "rig.toml"
-    assert cameras_named(["camera_1"]) == ["camera_1"]
-    assert cameras_named(["0", "camera_4"]) == [0, "camera_4"]
-    assert cameras_named([]) == []
+    assert read_cameras(["lab_gopro"]) == "lab_gopro"
+    assert read_cameras(["rig.toml"]) == "rig.toml"
+    assert read_cameras(["camera_1"]) == ["camera_1"]
+    assert read_cameras(["0", "camera_4"]) == [0, "camera_4"]
+    assert read_cameras([]) == []
 
 
 def test_changes_come_from_words_and_files_and_later_ones_win(tmp_path: Path):

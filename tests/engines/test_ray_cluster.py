@@ -22,8 +22,10 @@ from calls import (
 
 import hrc_env
 from hrc_env import run_experiment
+from hrc_env.__main__ import main
 from hrc_env.agents import checkpoints, ppo
 from hrc_env.agents.learner_settings import PPOSettings
+from hrc_env.agents.rllib import training
 from hrc_env.agents.rllib.learner import RLlibPPO, RunnerSettings
 from hrc_env.agents.rllib.runner_env import RunnerEnv, make_envs, try_environment
 from hrc_env.core.errors import ConfigError, HRCError
@@ -33,9 +35,12 @@ from hrc_env.engines.ray_tasks import RayTasks
 from hrc_env.engines.registrations import pack
 from hrc_env.evaluation.episodes import play_shards
 from hrc_env.experiments.impact.experiment import Impact
+from hrc_env.experiments.price.experiment import Price
 from hrc_env.experiments.runner import cache_of
 from hrc_env.experiments.setups import REFERENCE
 from hrc_env.experiments.site.experiment import Site
+from hrc_env.registration import import_files
+from hrc_env.safety.shield import SHIELDS
 from hrc_env.sb3 import HRCVecEnv
 
 pytestmark = pytest.mark.slow
@@ -63,17 +68,50 @@ def half(belief, velocities, dt_s):
 hrc_env.register_task(Short)
 hrc_env.register_shield("half", half)
 """
+FAILING = """
+import os
+
+import hrc_env
+
+
+def failing(fail):
+    def shield(belief, velocities, dt_s):
+        if len(velocities) == 7:  # one or two are tried where it is registered and checked
+            fail()
+        return velocities, {}
+
+    return shield
+
+
+def fail():
+    raise ValueError("this shield is broken")
+
+
+hrc_env.register_shield("raises", failing(fail))
+hrc_env.register_shield("exits", failing(lambda: os._exit(1)))
+"""
+
+
+@pytest.fixture(scope="module")
+def shields(tmp_path_factory):
+    """Shields of a user's file that fail, or end their process, where seven environments step."""
+    path = tmp_path_factory.mktemp("shields") / "failing_shields.py"
+    path.write_text(FAILING)
+    import_files(str(path))
+    yield
+    for name in ("raises", "exits"):
+        del SHIELDS[name]
 
 
 def silent(k, share):
     """Say nothing."""
 
 
-def learning(n_runners: int, num_envs: int = 4, n_steps: int = 8):
+def learning(n_runners: int, num_envs: int = 4, n_steps: int = 8, **of_runners: str):
     """A small PPO of both libraries."""
     settings = PPOSettings(n_steps=n_steps, batch_size=16)
     learner = ppo.make_learner(HRCVecEnv(1, **REACH), settings, 0)
-    runners = RunnerSettings(REACH, n_runners, num_envs, 0, 1.0, pack())
+    runners = RunnerSettings({**REACH, **of_runners}, n_runners, num_envs, 0, 1.0, pack())
     return learner, RLlibPPO(learner, settings, runners)
 
 
@@ -104,6 +142,46 @@ def test_a_worker_that_dies_again_and_again_ends_it_with_its_error(cluster):
         list(RayTasks().run([fail], silent))
 
 
+@pytest.mark.parametrize(
+    ("shield", "error"),
+    [
+        ("raises", "A worker of Ray failed: ValueError: this shield is broken"),
+        ("exits", "The worker of call 1 died 3 times"),
+    ],
+    ids=["raises", "exits"],
+)
+def test_episodes_that_end_every_worker_end_with_its_error(cluster, shields, capsys, shield, error):
+    asked = ["--shield", shield, "--episodes", "7", "--engine", "ray", "--workers", "1"]
+    assert main(["evaluate", "HRCReach-v0", *asked]) == 2
+    assert error in " ".join(capsys.readouterr().err.split())
+
+
+@pytest.mark.parametrize(
+    ("shield", "error"),
+    [
+        ("raises", "The last error: ValueError: this shield is broken. What was learnt is in"),
+        ("exits", "The last error: a process that was killed, or ran out of memory"),
+    ],
+    ids=["raises", "exits"],
+)
+def test_training_that_ends_every_worker_ends_with_its_error(
+    cluster, shields, tmp_path, capsys, monkeypatch, shield, error
+):
+    monkeypatch.setattr(training, "WITHOUT_STEPS", 2)
+    asked = ["--shield", shield, "--engine", "ray", "--workers", "1", "--num-envs", "7"]
+    asked += ["--timesteps", "1000", "--no-film", "--out", str(tmp_path / "run")]
+    assert main(["train", *asked]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert "No worker has stepped in 2 updates" in said
+    assert error in said
+    assert (tmp_path / "run" / "policy.zip").exists()
+
+
+def test_workers_that_cannot_begin_say_why(cluster):
+    with pytest.raises(HRCError, match="could make its environments: Unknown estimator 'nonsense'"):
+        learning(1, estimator="nonsense")
+
+
 def test_scores_are_those_of_one_process(cluster):
     asked = {**REACH, "max_episode_steps": 6}
     make = partial(hrc_env.make_agent, "random")
@@ -114,8 +192,6 @@ def test_scores_are_those_of_one_process(cluster):
 def test_what_a_file_registers_is_known_to_workers(cluster, tmp_path):
     path = tmp_path / "own_things.py"
     path.write_text(OWN)
-    from hrc_env.registration import import_files
-
     import_files(str(path))
     asked = {"task": "HRCTravelled-v0", "shield": "half", "perception": "keypoints"}
     make = partial(hrc_env.make_agent, "random")
@@ -281,8 +357,9 @@ def test_more_workers_than_cores_are_said_and_find_a_place(cluster):
     [
         Impact(n_seeds=3, n_steps=8, policies=("scripted",), setups=("truth", REFERENCE)),
         Site(n_seeds=1, seconds=1.5, n_closed=1, estimators=("particle",)),
+        Price(eyes=("truth", "particle"), n_seeds=2, n_fresh=2, n_search=1, n_pixels=0, n_steps=8),
     ],
-    ids=["impact", "site"],
+    ids=["impact", "site", "price"],
 )
 def test_experiments_have_the_parts_of_one_process(cluster, weights, tmp_path, experiment):
     played = {}

@@ -2,7 +2,9 @@
 
 import json
 import signal
+from collections.abc import Callable, Generator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from hrc_env.agents import experts
 from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Floats
+from hrc_env.engines.local import Processes
 from hrc_env.experiments.cache import PartCache
 from hrc_env.experiments.price import experiment
 from hrc_env.experiments.price.declaration import QUESTIONS
@@ -23,7 +26,7 @@ from hrc_env.experiments.price.experiment import (
 from hrc_env.experiments.price.eyes import ELSEWHERE, QUICK, all_eyes, eyes_called
 from hrc_env.experiments.price.metrics import CONTRASTS, Row, metrics_of, supposed_m
 from hrc_env.experiments.price.report import choose_bars
-from hrc_env.experiments.price.search import Tried, draws, searched
+from hrc_env.experiments.price.search import Tried, draws, run_together, searched
 from hrc_env.experiments.price.shield import Widened
 from hrc_env.experiments.runner import run_experiment
 from hrc_env.experiments.setups import PerceptionSetup
@@ -52,15 +55,44 @@ def contacts_at(margin_m: float) -> float:
     return 0.18 * np.exp((0.11 - margin_m) / 0.05)
 
 
+def tried_by_a_search(rate: Callable[[float], float], *given: Any) -> list[float]:
+    """The margins that a search tries of a function."""
+
+    def asked(margin_m: float) -> Generator[float, float, float]:
+        return (yield margin_m)
+
+    (found,) = run_together([searched(asked, *given)], lambda margins_m: [*map(rate, margins_m)])
+    return found
+
+
 def test_a_search_halves_its_bracket_and_looks_beside():
-    margins_m = searched(contacts_at, -0.4, 0.4, 0.18, 4)
+    margins_m = tried_by_a_search(contacts_at, -0.4, 0.4, 0.18, 4)
     assert margins_m == pytest.approx([0.0, 0.2, 0.1, 0.15, 0.05])
-    assert searched(contacts_at, -0.4, 0.4, 0.18, 12)[11] == pytest.approx(0.11, abs=0.8 / 2**12)
+    assert tried_by_a_search(contacts_at, -0.4, 0.4, 0.18, 12)[11] == pytest.approx(
+        0.11, abs=0.8 / 2**12
+    )
 
 
 def test_a_search_goes_to_the_end_of_a_bracket_that_lacks_the_level():
-    assert max(searched(lambda margin: 1.0, -0.4, 0.4, 0.5, 4)) == pytest.approx(0.45)
-    assert min(searched(lambda margin: 0.0, -0.4, 0.4, 0.5, 4)) == pytest.approx(-0.45)
+    assert max(tried_by_a_search(lambda margin: 1.0, -0.4, 0.4, 0.5, 4)) == pytest.approx(0.45)
+    assert min(tried_by_a_search(lambda margin: 0.0, -0.4, 0.4, 0.5, 4)) == pytest.approx(-0.45)
+
+
+def test_searches_take_their_steps_together():
+    rounds: list[list[str]] = []
+
+    def search(name: str, n_steps: int) -> Generator[str, int, int]:
+        total = 0
+        for k in range(n_steps):
+            total += yield f"{name}{k}"
+        return total
+
+    def answer(asked: list[str]) -> list[int]:
+        rounds.append(asked)
+        return [int(each[1:]) for each in asked]
+
+    assert run_together([search("a", 3), search("b", 0), search("c", 2)], answer) == [3, 0, 1]
+    assert rounds == [["a0", "c0"], ["a1", "c1"], ["a2"]]
 
 
 def test_a_search_supposes_the_level_between_two_margins():
@@ -71,7 +103,7 @@ def test_a_search_supposes_the_level_between_two_margins():
 def tried(rng, n: int = 300, m: int = 1000, fresh_more: float = 1.0) -> Tried:
     """A search on a synthetic curve: contacts as `contacts_at`, goals 40 - 50 x margin a minute;
     every seed has a number of its own, so that margins differ by what they do."""
-    margins_m = np.sort(searched(contacts_at, -0.4, 0.4, 0.18, 4))
+    margins_m = np.sort(tried_by_a_search(contacts_at, -0.4, 0.4, 0.18, 4))
     expected = np.array([contacts_at(margin) for margin in margins_m]) / 6.0
     luck, fresh_luck = rng.uniform(size=n), rng.uniform(size=m)
     goals = (40 - 50 * margins_m) / 6.0
@@ -242,15 +274,26 @@ def test_a_run_that_is_killed_goes_on_to_the_same_numbers(end_to_end, process, t
         "from hrc_env.experiments.runner import run_experiment\n"
         f"config = {TINY!r}\n"
         "def say(share, label):\n"
-        "    if label.startswith('HRCReach-v0.two_cameras'): os.kill(os.getpid(), 9)\n"
+        "    if label.startswith('HRCReach-v0.two_cameras.fresh'): os.kill(os.getpid(), 9)\n"
         "run_experiment(config, Path(sys.argv[1]), say)"
     )
     assert process("-c", script, tmp_path).returncode == -signal.SIGKILL
     kept = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "parts").iterdir()}
-    assert len(kept) >= 6  # without a shield; of the truth four that were searched, and the fresh
+    assert len(kept) >= 10  # without a shield; of both four that were searched; of one the fresh
     assert run_experiment(TINY, tmp_path, silent) == metrics
     for name, time_ns in kept.items():
         assert (tmp_path / "parts" / name).stat().st_mtime_ns == time_ns
+
+
+@pytest.mark.slow
+def test_parts_do_not_depend_on_the_engine(end_to_end, tmp_path):
+    out, metrics = end_to_end
+    assert run_experiment(TINY, tmp_path, silent, engine=Processes(2)) == metrics
+    for path in (out / "parts").glob("*.json"):
+        one, other = (
+            json.loads((each / "parts" / path.name).read_text()) for each in (out, tmp_path)
+        )
+        assert (one["key"], one["part"]) == (other["key"], other["part"])
 
 
 def row(rng, goals: float) -> Row:
@@ -290,8 +333,9 @@ def test_a_search_goes_on_where_fresh_seeds_say_so(tmp_path, monkeypatch):
         return {name: [value] * len(seeds) for name, value in one.items()}
 
     monkeypatch.setattr(Watched, "play", play)
-    cache = PartCache(tmp_path, "", 1, silent)
-    row = experiment.search_margin(TINY, cache, "HRCReach-v0", all_eyes()["truth"])
+    cache, alone = PartCache(tmp_path, "", 1, silent), {"walk": [0] * TINY.n_fresh}
+    search = experiment.search_margin(TINY, "HRCReach-v0", all_eyes()["truth"], alone)
+    (row,) = run_together([search], cache.parts)
     assert sorted(row.searched) == pytest.approx([-0.8, -0.4, 0.0, 0.4, 0.45, 0.55, 0.75])
     assert row.ends_at(row.at(30.0)[0, 0])
     assert row.margin_m == pytest.approx(0.75)  # what is achieved at the end is played there

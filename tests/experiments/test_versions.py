@@ -15,7 +15,7 @@ from hrc_env.experiments.versions import (
     source_digest,
     versions_of,
 )
-from hrc_env.tracking.estimators import estimator_called
+from hrc_env.tracking.estimators import find_estimator
 
 
 @pytest.fixture
@@ -93,5 +93,5 @@ def test_the_file_of_an_estimator_of_ones_own_counts_and_ours_have_a_version():
     here = Path(__file__).read_bytes()
     mine = source_digest(test_the_file_of_this_repository_names_every_subsystem)
     assert mine == hashlib.sha256(here).hexdigest()
-    assert source_digest(estimator_called("particle").make) == ""
+    assert source_digest(find_estimator("particle").make) == ""
     assert source_digest(3) == ""

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from hrc_env.core.errors import ConfigError
 from hrc_env.geometry import chains
 from hrc_env.scene.build import build
-from hrc_env.scene.robot import DEFAULT, ROBOTS, chain_of
+from hrc_env.scene.robot import DEFAULT, ROBOTS, make_chain
 
-ARM = replace(chain_of(ROBOTS[DEFAULT], (0.0, 0.0, 0.0)), T_world_from_base=np.eye(4))
+ARM = replace(make_chain(ROBOTS[DEFAULT], (0.0, 0.0, 0.0)), T_world_from_base=np.eye(4))
 FLANGE = replace(ARM, link_from_tool=np.eye(4) + 0.11655 * np.eye(4, k=1)[[3, 3, 2, 3]])
 angles = st.lists(st.floats(-3, 3), min_size=6, max_size=6).map(np.array)
 
@@ -92,7 +92,7 @@ def test_too_few_angles_are_refused_with_the_number_that_is_expected():
         chains.link_frames(ARM, np.zeros(5))
 
 
-BASE = chain_of(ROBOTS["mobile_base"], (0.0, 0.0, 0.0))
+BASE = make_chain(ROBOTS["mobile_base"], (0.0, 0.0, 0.0))
 places = st.tuples(st.floats(-8, 8), st.floats(-8, 8), st.floats(-9, 9)).map(np.array)
 
 

@@ -10,7 +10,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.geometry.chains import SerialChain
 from hrc_env.geometry.reach import ReachTarget, Triple, check_reach
 from hrc_env.scene.build import build
-from hrc_env.scene.robot import Robot, chain_of
+from hrc_env.scene.robot import Robot, make_chain
 from hrc_env.world import FOOT_WORLD
 
 FOOT = (0.1, -0.2, 0.3)
@@ -48,7 +48,7 @@ def arm_of(*ranges_rad: tuple[float, float], slide: bool = False) -> SerialChain
         f"<actuator>{''.join(servos.values())}</actuator></mujoco>"
     )
     home = tuple(low for low, _ in ranges_rad)
-    return chain_of(Robot("own", text, tuple(names), ("rod",), (), "tip", home, home), FOOT)
+    return make_chain(Robot("own", text, tuple(names), ("rod",), (), "tip", home, home), FOOT)
 
 
 def farthest_m(chain: SerialChain, shoulder: Triple, way: Triple, **spot: object) -> float:

@@ -11,7 +11,7 @@ from hrc_env.env import HRCEnv
 from hrc_env.geometry.camera_config import CameraConfig, read_rig, write_rig
 from hrc_env.scene.build import SceneConfig, build
 from hrc_env.scene.rig_distribution import RigDistribution
-from hrc_env.scene.rigs import RIGS, findings, sees, workspace
+from hrc_env.scene.rigs import RIGS, describe_defects, find_visible, sample_workspace
 from hrc_env.settings import settle
 
 ODD = replace(
@@ -146,11 +146,11 @@ def test_who_needs_no_pairs_is_told_nothing_of_drawn_rigs():
 def test_the_scenes_own_rigs_see_their_workspace():
     for name in ("lab", "site"):
         scene = build(name=name)
-        assert findings(scene) == []
-        seen = sees(scene.cameras, scene.obstacles, workspace(scene.grounds))
+        assert describe_defects(scene) == []
+        seen = find_visible(scene.cameras, scene.obstacles, sample_workspace(scene.grounds))
         assert (seen.sum(0) >= 2).mean() > 0.9
 
 
 def test_two_gopros_are_no_poor_rig():
     scene = build(SceneConfig(cameras=RIGS["lab_gopro"][:2]))
-    assert findings(scene) == []
+    assert describe_defects(scene) == []

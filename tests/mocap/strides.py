@@ -9,7 +9,7 @@ from written import ORDERS, Y_UP, write_acclaim, write_bvh
 from benchmarks.tracking.walks import Gait, walk
 from hrc_env.core.skeleton import JOINTS
 from hrc_env.core.typing import Floats, Points3, Rotations
-from hrc_env.mocap.poses import joints_in, marks_of, posed
+from hrc_env.mocap.poses import locate_joints, make_marks, pose_segments
 from hrc_env.mocap.record import Capture
 from hrc_env.mocap.retarget import retarget
 from hrc_env.worker.body import Body, load_body, worker_names
@@ -48,9 +48,9 @@ def stride(seed: int) -> Stride:
 
 def stride_of(controls: Floats, body: Body) -> Stride:
     """Poses (T, N_CONTROLS) of a body as a recording has them."""
-    marks = marks_of(body, landmarks=True)
-    position, _, rotation = posed(controls, marks.anatomy)
-    return Stride(body, position, rotation, joints_in(controls, marks))
+    marks = make_marks(body, landmarks=True)
+    position, _, rotation = pose_segments(controls, marks.anatomy)
+    return Stride(body, position, rotation, locate_joints(controls, marks))
 
 
 def written_as(form: str, walked: Stride, folder: Path, seed: int = 0) -> Path:

@@ -24,7 +24,7 @@ def written(work, folder, **traps):
 
 def test_a_bvh_file_reads_back(work, tmp_path):
     capture = read_recording(written(work, tmp_path))
-    assert capture.repaired == ()
+    assert capture.notes == ()
     assert capture.fps == work.fps
     assert np.abs(capture.joints_world - work.centres)[:, KNOWN].max() < 1e-4
 
@@ -36,29 +36,29 @@ def test_a_bvh_file_full_of_traps_reads_the_same_and_says_what_it_met(work, tmp_
     )  # fmt: skip
     capture = read_recording(path)
     assert np.abs(capture.joints_world - work.centres)[:, KNOWN].max() < 1e-4
-    said = " ".join(capture.repaired)
+    said = " ".join(capture.notes)
     for trap in ("centimetres", "T-pose", "+y axis"):
         assert trap in said
-    assert capture.found[JOINTS.index("left_elbow")] == "mixamorig:LeftForeArm"
+    assert capture.node_names[JOINTS.index("left_elbow")] == "mixamorig:LeftForeArm"
 
 
 def test_acclaim_files_read_back_in_cmus_unit(work, tmp_path):
     path = write_acclaim(tmp_path, work.position, work.rotation)
     capture = read_recording(path, source_fps=work.fps)
     assert np.abs(capture.joints_world - work.centres)[:, KNOWN].max() < 1e-4
-    assert "inches" in " ".join(capture.repaired)
+    assert "inches" in " ".join(capture.notes)
 
 
 def test_acclaim_files_without_a_rate_are_taken_to_be_of_120_hz(work, tmp_path):
     capture = read_recording(write_acclaim(tmp_path, work.position, work.rotation))
     assert capture.fps == 120.0
-    assert "120 Hz" in " ".join(capture.repaired)
+    assert "120 Hz" in " ".join(capture.notes)
 
 
 def test_joints_in_an_npz_file_are_the_projects_own(work, tmp_path):
     np.savez(tmp_path / "walk.npz", joints=work.joints, fps=work.fps)
     capture = read_recording(tmp_path / "walk.npz")
-    assert capture.landmarks
+    assert capture.are_landmarks
     assert np.array_equal(capture.joints_world, work.joints)
 
 
@@ -125,7 +125,7 @@ def test_a_file_with_too_few_of_its_frames_is_refused(work, tmp_path):
 def test_a_file_that_lost_its_last_frames_is_read_with_a_warning(work, tmp_path):
     capture = read_recording(shortened(written(work, tmp_path), 0.9))
     assert 0.8 < len(capture.joints_world) / len(work.joints) < 1.0
-    assert "frames are announced" in " ".join(capture.repaired)
+    assert "frames are announced" in " ".join(capture.notes)
 
 
 @pytest.mark.parametrize(

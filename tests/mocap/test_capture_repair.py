@@ -9,7 +9,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import JOINT, MIRROR
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.mocap import repair
-from hrc_env.mocap.person import resampled, smoothed
+from hrc_env.mocap.person import resample, smooth
 from hrc_env.mocap.read import read_recording
 
 UPS = {
@@ -54,7 +54,7 @@ def test_short_gaps_are_bridged_and_said(work, tmp_path):
     joints[:4, 0] = np.inf
     capture = imported(tmp_path, joints)
     assert np.abs(capture.joints_world - work.joints)[100:108].max() < 0.02
-    assert "left_wrist (8 frames)" in capture.repaired[0]
+    assert "left_wrist (8 frames)" in capture.notes[0]
 
 
 def test_long_gaps_are_refused_with_their_place(work, tmp_path):
@@ -77,7 +77,7 @@ def test_who_lies_down_has_no_upward_axis(work, tmp_path):
 
 def test_left_and_right_that_are_exchanged_everywhere_are_a_mirror_image(work, tmp_path):
     capture = imported(tmp_path, work.joints[:, MIRROR])
-    assert "mirror" in " ".join(capture.repaired)
+    assert "mirror" in " ".join(capture.notes)
 
 
 def test_left_and_right_that_are_exchanged_in_part_are_refused(work, tmp_path):
@@ -101,13 +101,13 @@ def test_joints_in_another_order_are_no_person(work, tmp_path):
 
 def test_only_a_first_frame_that_is_another_pose_is_left_out(work):
     t_pose = work.joints[:1] + np.random.default_rng(0).normal(0, 0.1, (1, 15, 3))
-    assert repair.without_rest_pose(np.concatenate([t_pose, work.joints]))[0] == 1
-    assert repair.without_rest_pose(work.joints) == (0, ())
+    assert repair.skip_rest_pose(np.concatenate([t_pose, work.joints]))[0] == 1
+    assert repair.skip_rest_pose(work.joints) == (0, ())
 
 
 def test_a_floor_that_is_elsewhere_is_moved_to_0(work, tmp_path):
     capture = imported(tmp_path, work.joints + np.array([0.0, 0.0, 0.9]))
-    assert "floor" in " ".join(capture.repaired)
+    assert "floor" in " ".join(capture.notes)
     assert np.abs(capture.joints_world - work.joints).max() < 0.03
 
 
@@ -124,12 +124,12 @@ def test_another_rate_is_the_same_motion(work, tmp_path, fps):
 @settings(max_examples=30, deadline=None)
 def test_a_straight_line_is_one_at_a_higher_rate_too(n, fps):
     line = np.arange(float(n))[:, None]
-    again = resampled(line, 100.0, fps)[:, 0]
+    again = resample(line, 100.0, fps)[:, 0]
     at = np.arange(len(again)) * 100.0 / fps
     inside = (at >= 1.0) & (at <= n - 2.0)
     assert np.allclose(again[inside], at[inside])
 
 
 def test_smoothing_keeps_what_does_not_change():
-    assert np.allclose(smoothed(np.full((20, 3), 2.5), 4.0), 2.5)
-    assert np.array_equal(smoothed(np.eye(4), 0.0), np.eye(4))
+    assert np.allclose(smooth(np.full((20, 3), 2.5), 4.0), 2.5)
+    assert np.array_equal(smooth(np.eye(4), 0.0), np.eye(4))

@@ -15,8 +15,8 @@ from hrc_env.mocap.retarget import retarget
 from hrc_env.motion import controls as c
 from hrc_env.motion import generator
 from hrc_env.motion import state as st
-from hrc_env.motion.clip import load_clip, placed_at_origin
-from hrc_env.motion.fit import describe_fit, played_s
+from hrc_env.motion.clip import load_clip, move_to_origin
+from hrc_env.motion.fit import describe_fit, measure_played_s
 from hrc_env.scene.build import all_grounds, build
 from hrc_env.scene.places import SCENES
 from hrc_env.worker.body import load_body
@@ -56,7 +56,7 @@ def test_every_walk_in_every_form_plays_in_every_scene(tmp_path, seed, form, cap
     path = written_as(form, stride(seed), tmp_path, seed)
     clip = imported(path, FPS if form == "amc" else None)
     said = " ".join(capsys.readouterr().out.split())
-    played = played_s(load_clip(clip), all_grounds(), "any")
+    played = measure_played_s(load_clip(clip), all_grounds(), "any")
     assert set(played) == set(SCENES)
     for scene, seconds in played.items():
         assert seconds > 1.0
@@ -127,7 +127,7 @@ def retargeted(joints):
 @pytest.mark.parametrize(("seconds", "area_m"), [(30, (40.0, 40.0)), (60, (3.0, 3.0))])
 def test_long_clips_are_played_in_pieces_that_fit(seconds, area_m):
     clip = retargeted(walk(area_m, [seconds], seconds * 25)[:, 0])
-    for scene, played in played_s(clip, all_grounds()).items():
+    for scene, played in measure_played_s(clip, all_grounds()).items():
         assert played > 0.9 * seconds
         assert plays(clip, scene)
 
@@ -135,7 +135,7 @@ def test_long_clips_are_played_in_pieces_that_fit(seconds, area_m):
 def leap(length_m):
     """A straight walk with both feet on the floor at its ends only."""
     clip = retargeted(walk((40.0, 40.0), [2], 100)[:, 0])
-    q = placed_at_origin(clip.controls)
+    q = move_to_origin(clip.controls)
     ahead = np.linspace(0.0, length_m, len(q))
     for at in (c.ROOT_X, c.ANKLE, c.ANKLE + 6):
         q[:, at : at + 2] += np.column_stack([ahead, 0.0 * ahead]) - q[:, [c.ROOT_X, c.ROOT_Y]]
@@ -145,11 +145,11 @@ def leap(length_m):
 
 def test_a_clip_without_room_is_refused_with_the_scenes_that_have_it():
     clip = leap(5.5)
-    assert played_s(clip, all_grounds())["lab"] == 0.0
+    assert measure_played_s(clip, all_grounds())["lab"] == 0.0
     with pytest.raises(ConfigError, match=r"leap: there is no room.*plays in site \(.*lab\."):
         gymnasium.make("HRCReach-v0", perception="none", motions=[clip])
     assert plays(clip, "site")
     far = leap(30.0)
-    assert describe_fit(far, played_s(far, all_grounds())) == "It has no room in lab, site."
+    assert describe_fit(far, measure_played_s(far, all_grounds())) == "It has no room in lab, site."
     with pytest.raises(ConfigError, match="leap: there is no room"):
         gymnasium.make("HRCReach-v0", perception="none", scene="site", motions=[far])

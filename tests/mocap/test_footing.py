@@ -10,12 +10,12 @@ from written import write_acclaim
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import JOINT
 from hrc_env.geometry.rotations import about_axis
-from hrc_env.mocap.footing import floor_height, off_floor
+from hrc_env.mocap.footing import describe_floor_faults, measure_floor_height
 from hrc_env.mocap.read import read_recording
 from hrc_env.mocap.retarget import retarget
 from hrc_env.motion import controls as c
 from hrc_env.motion.anatomy import ANKLE_Z
-from hrc_env.motion.clip import footprints
+from hrc_env.motion.clip import find_footprints
 from hrc_env.worker.body import load_body
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -40,7 +40,7 @@ def test_resting_feet_are_on_the_floor_wherever_the_files_floor_is(work, tmp_pat
     path = saved(tmp_path, work.joints + floor_m * UP)
     clip, _ = retarget(read_recording(path), load_body())
     for side in range(2):
-        feet = footprints(clip.controls[:, c.ANKLE + 6 * side :], clip.size)
+        feet = find_footprints(clip.controls[:, c.ANKLE + 6 * side :], clip.size)
         above = feet[clip.contacts[:, side], 2] - clip.size[ANKLE_Z]
         assert np.abs(above).max() < 1e-3
 
@@ -49,18 +49,18 @@ def test_resting_feet_are_on_the_floor_wherever_the_files_floor_is(work, tmp_pat
 def test_a_floor_that_is_slightly_aslant_is_levelled_and_said(work, tmp_path, degrees):
     aslant = work.joints @ about_axis("y", np.radians(degrees)).T
     capture = read_recording(saved(tmp_path, aslant))
-    assert re.search(rf"aslant by {abs(degrees):.1f} degrees", " ".join(capture.repaired))
+    assert re.search(rf"aslant by {abs(degrees):.1f} degrees", " ".join(capture.notes))
     assert np.abs(capture.joints_world - work.joints)[..., 2].max() < 0.03
 
 
 def test_ordinary_walks_are_on_their_floor():
     for seed in range(N_STRIDES):
-        assert off_floor(stride(seed).joints, FPS) == ()
+        assert describe_floor_faults(stride(seed).joints, FPS) == ()
 
 
 def test_who_jumps_is_on_the_floor(work):
     t = np.clip(times(work.joints) - 2.0, 0.0, 0.6)
-    assert off_floor(raised(work.joints, 0.5 * 9.81 * t * (0.6 - t)), 50.0) == ()
+    assert describe_floor_faults(raised(work.joints, 0.5 * 9.81 * t * (0.6 - t)), 50.0) == ()
 
 
 def ledge(t):
@@ -94,7 +94,7 @@ def test_who_is_off_the_floor_is_refused_unless_that_is_accepted(work, tmp_path,
     with pytest.raises(ConfigError, match=rf"joints\.npz: .*({told}).*--allow-off-floor"):
         read_recording(path)
     capture = read_recording(path, allow_off_floor=True)
-    assert re.search(told, " ".join(capture.repaired))
+    assert re.search(told, " ".join(capture.notes))
 
 
 def test_who_hangs_above_the_files_floor_is_refused(work, tmp_path):
@@ -131,13 +131,13 @@ def test_a_skeleton_of_other_lengths_is_refused(acclaim, share):
     skeleton.write_text(longer)
     with pytest.raises(ConfigError, match=r"With this skeleton, feet stand [+-]0\.\d\d m above"):
         read_recording(acclaim, source_fps=FPS)
-    assert read_recording(acclaim, source_fps=FPS, allow_off_floor=True).repaired
+    assert read_recording(acclaim, source_fps=FPS, allow_off_floor=True).notes
 
 
 def test_the_own_skeleton_is_not_refused(tmp_path):
     for seed in range(N_STRIDES):
         capture = read_recording(written_as("amc", stride(seed), tmp_path), source_fps=FPS)
-        assert abs(floor_height(capture.joints_world, FPS)) < 0.06
+        assert abs(measure_floor_height(capture.joints_world, FPS)) < 0.06
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from hrc_env.cli.import_motion import ImportMotion
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import JOINT, JOINTS
 from hrc_env.geometry.rotations import about_axis
-from hrc_env.mocap.names import names_given
+from hrc_env.mocap.names import read_joint_names
 from hrc_env.mocap.read import read_recording
 from hrc_env.worker.body import SEGMENT, SEGMENTS
 
@@ -88,10 +88,10 @@ def test_files_that_differ_in_names_alone_are_the_same_person(work, tmp_path, pr
 
 def test_what_hangs_where_an_unknown_name_stands_is_said(work, tmp_path):
     called = segment_names(*PROGRAMS["a program of its own"])
-    said = " ".join(read_recording(written(work, tmp_path, name=called)[0]).repaired)
+    said = " ".join(read_recording(written(work, tmp_path, name=called)[0]).notes)
     assert "left_elbow was taken to be L_Cubitus, which hangs between L_UpperArm and L_Ha" in said
     called = segment_names(*PROGRAMS["Rigify"])
-    said = " ".join(read_recording(written(work, tmp_path, name=called)[0]).repaired)
+    said = " ".join(read_recording(written(work, tmp_path, name=called)[0]).notes)
     assert "The head was taken to be spine.006" in said
 
 
@@ -115,7 +115,7 @@ def test_names_that_say_nothing_are_told_by_hand(work, tmp_path):
     with pytest.raises(ConfigError, match=r"Missed: left_shoulder.*--joint left_shoulder=NAME"):
         read_recording(path)
     capture = read_recording(path, joints=BY_HAND)
-    assert capture.found[JOINT["left_knee"]] == BY_HAND["left_knee"]
+    assert capture.node_names[JOINT["left_knee"]] == BY_HAND["left_knee"]
     usual = read_recording(written(work, tmp_path)[0]).joints_world
     known = [j for j, joint in enumerate(JOINTS) if not joint.endswith(("nose", "foot"))]
     assert np.allclose(capture.joints_world[:, known], usual[:, known])
@@ -128,7 +128,7 @@ def test_the_command_takes_names_one_by_one_or_from_a_file(work, tmp_path):
     lines = [f'{joint} = "{name}"' for joint, name in BY_HAND.items() if joint != "head"]
     (tmp_path / "names.toml").write_text("\n".join(lines))
     entries = (str(tmp_path / "names.toml"), f"head={BY_HAND['head']}")
-    assert names_given(entries) == BY_HAND
+    assert read_joint_names(entries) == BY_HAND
     assert ImportMotion(path, tmp_path / "clip.npz", joint=entries, up="y").run() == 0
 
 
@@ -148,7 +148,7 @@ def test_names_by_hand_that_cannot_be_are_refused(work, tmp_path, joints, told):
 
 def test_an_entry_that_is_no_name_and_no_file_is_refused():
     with pytest.raises(ConfigError, match=r"Expected JOINT=NAME.*got 'left_knee'"):
-        names_given(["left_knee"])
+        read_joint_names(["left_knee"])
 
 
 # --- Text ----------------------------------------------------------------------------------------
@@ -186,7 +186,7 @@ def test_a_file_is_read_however_its_text_is_written(work, tmp_path, form):
     path.write_bytes(TEXTS[form](text))
     other = read_recording(path)
     assert np.array_equal(other.joints_world, usual.joints_world)
-    assert (other.fps, other.repaired) == (usual.fps, usual.repaired)
+    assert (other.fps, other.notes) == (usual.fps, usual.notes)
 
 
 @pytest.mark.parametrize("nothing", ["nan", "-nan(ind)", "-1.#IND", "inf"])
@@ -197,7 +197,7 @@ def test_numbers_that_are_none_are_missing_joints_and_never_0(work, tmp_path, no
     lines[-30] = " ".join([*words[:6], nothing, *words[7:]])
     path.write_text("\n".join(lines))
     mended = read_recording(path)
-    assert "were filled in" in mended.repaired[0]
+    assert "were filled in" in mended.notes[0]
     assert np.abs(mended.joints_world - usual.joints_world).max() < 0.02
 
 
@@ -240,7 +240,7 @@ def test_places_stand_for_offset_and_nobody_is_said_to_hang(work, tmp_path, offs
     path.write_text(under_a_root(text, offset))
     other = read_recording(path)
     assert np.allclose(other.joints_world, usual.joints_world)
-    assert other.repaired == usual.repaired
+    assert other.notes == usual.notes
 
 
 def test_places_that_are_0_at_rest_are_added_to_offset_and_that_is_said(work, tmp_path):
@@ -254,7 +254,7 @@ def test_places_that_are_0_at_rest_are_added_to_offset_and_that_is_said(work, tm
     path.write_text(f"{head}MOTION\n" + "\n".join(rows))
     other = read_recording(path)
     assert np.allclose(other.joints_world, usual.joints_world)
-    assert "Places were added to OFFSET" in " ".join(other.repaired)
+    assert "Places were added to OFFSET" in " ".join(other.notes)
 
 
 # --- People --------------------------------------------------------------------------------------

@@ -24,11 +24,11 @@ from hrc_env.core.errors import ConfigError, DownloadError
 from hrc_env.core.records import WorkerMotion
 from hrc_env.core.skeleton import JOINT
 from hrc_env.geometry.rotations import about_axis
-from hrc_env.mocap.person import length, middle
+from hrc_env.mocap.person import measure_bone, midpoint
 from hrc_env.mocap.read import read_recording
 from hrc_env.motion import generator
 from hrc_env.motion import state as st
-from hrc_env.motion.fit import played_s
+from hrc_env.motion.fit import measure_played_s
 from hrc_env.scene.build import all_grounds
 from hrc_env.worker.body import load_body, worker_truth
 
@@ -229,7 +229,7 @@ def test_every_listed_clip_is_imported_and_near_the_person(imported):
 @pytest.mark.long
 @pytest.mark.parametrize("k", range(len(CLIPS)), ids=lambda k: CLIPS[k].name)
 def test_every_listed_clip_is_played(imported, k):
-    assert played_s(imported[k][1], all_grounds())["lab"] > 0.6
+    assert measure_played_s(imported[k][1], all_grounds())["lab"] > 0.6
     config = generator.MotionConfig(motions=(imported[k][1],), motions_probability=1.0)
     state, rngs = started(8, seed=2, config=config)
     for _ in range(60 * 10):
@@ -247,7 +247,7 @@ def test_synthetic_clips_are_imported_with_their_proportions_and_played():
     )
     assert fitted.isdisjoint(validated)
     for _, clip, error in made:
-        assert played_s(clip, all_grounds())["lab"] > 1.5
+        assert measure_played_s(clip, all_grounds())["lab"] > 1.5
         assert error.mean_m.mean() < 0.06
 
 
@@ -259,8 +259,8 @@ def test_a_synthetic_person_stands_on_the_floor_with_legs_and_arms_of_their_own(
         read_recording(write(each, tmp_path, number)).joints_world for each in (style, usual)
     )
     for first, second, share in (("hip", "knee", 1.2), ("shoulder", "elbow", 0.8)):
-        assert length(tall, first, second) == pytest.approx(
-            share * length(same, first, second), rel=1e-4
+        assert measure_bone(tall, first, second) == pytest.approx(
+            share * measure_bone(same, first, second), rel=1e-4
         )
     for joints in (tall, same):
         assert 0.0 < np.percentile(joints[:, JOINT["left_foot"], 2], 20) < 0.06
@@ -270,5 +270,5 @@ def test_a_synthetic_person_stands_on_the_floor_with_legs_and_arms_of_their_own(
 
 def uprightness(joints):
     """(T,) cosine of the trunk with the vertical."""
-    trunk = middle(joints, "shoulder") - middle(joints, "hip")
+    trunk = midpoint(joints, "shoulder") - midpoint(joints, "hip")
     return trunk[:, 2] / np.linalg.norm(trunk, axis=-1)

@@ -7,12 +7,12 @@ import pytest
 from written import BODY, write_bvh
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.mocap.poses import joints_in, marks_of, posed
+from hrc_env.mocap.poses import locate_joints, make_marks, pose_segments
 from hrc_env.mocap.read import read_recording
-from hrc_env.mocap.retarget import aligned_errors, retarget
+from hrc_env.mocap.retarget import align, retarget
 from hrc_env.motion import controls as c
-from hrc_env.motion.anatomy import LEG, anatomy
-from hrc_env.motion.clip import fitted_to, load_clip, save_clip
+from hrc_env.motion.anatomy import LEG, measure_body
+from hrc_env.motion.clip import load_clip, save_clip, scale_clip
 from hrc_env.worker.body import SEGMENT, load_body, worker_names
 
 
@@ -50,7 +50,7 @@ def test_joints_of_the_projects_own_sense_are_followed_in_that_sense(work, tmp_p
 def test_standing_feet_do_not_slide(imported, capture):
     clip, error = imported
     assert error.slip_m_s < 0.05
-    position, _, _ = posed(clip.controls, anatomy(BODY))
+    position, _, _ = pose_segments(clip.controls, measure_body(BODY))
     for side, name in enumerate(("left", "right")):
         ball = position[:, SEGMENT[f"{name}_toes"]]
         stands = clip.contacts[1:, side] & clip.contacts[:-1, side]
@@ -70,7 +70,7 @@ def test_nothing_jumps_where_feet_were_locked(imported, capture):
 
 def test_feet_do_not_go_through_the_floor(imported):
     clip, _ = imported
-    position, _, _ = posed(clip.controls, anatomy(BODY))
+    position, _, _ = pose_segments(clip.controls, measure_body(BODY))
     resting = BODY.rest_position[[SEGMENT["left_toes"], SEGMENT["right_toes"]], 2]
     toes = position[:, [SEGMENT["left_toes"], SEGMENT["right_toes"]], 2]
     assert (toes > resting - 0.01).mean() > 0.99
@@ -85,7 +85,7 @@ def test_the_best_alignment_undoes_any_similarity(work):
     from hrc_env.geometry.rotations import about_axis
 
     moved = 1.3 * work.joints @ about_axis("z", 0.7).T + [1.0, 2.0, 3.0]
-    scale, apart = aligned_errors(work.joints, moved)
+    scale, apart = align(work.joints, moved)
     assert scale == pytest.approx(1.3)
     assert apart.max() < 1e-9
 
@@ -93,11 +93,13 @@ def test_the_best_alignment_undoes_any_similarity(work):
 def test_a_clip_scales_to_another_body(imported):
     clip, _ = imported
     other = clip.size * 0.9
-    q = fitted_to(clip, other)
-    small = dataclasses.replace(anatomy(BODY), offset=0.9 * anatomy(BODY).offset, size=other)
-    marks = dataclasses.replace(marks_of(BODY, False), anatomy=small, offset=np.zeros((15, 3)))
-    big = dataclasses.replace(marks_of(BODY, False), offset=np.zeros((15, 3)))
-    assert np.allclose(joints_in(q, marks), 0.9 * joints_in(clip.controls, big), atol=5e-3)
+    q = scale_clip(clip, other)
+    small = dataclasses.replace(
+        measure_body(BODY), offset=0.9 * measure_body(BODY).offset, lengths=other
+    )
+    marks = dataclasses.replace(make_marks(BODY, False), anatomy=small, offset=np.zeros((15, 3)))
+    big = dataclasses.replace(make_marks(BODY, False), offset=np.zeros((15, 3)))
+    assert np.allclose(locate_joints(q, marks), 0.9 * locate_joints(clip.controls, big), atol=5e-3)
     assert q[-1, c.ROOT_X] == pytest.approx(
         clip.controls[-1, c.ROOT_X] * other[LEG] / clip.size[LEG]
     )

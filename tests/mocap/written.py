@@ -19,7 +19,7 @@ from assets.recordings.written import (
 )
 from assets.rotations import matrix_from_quaternion
 from hrc_env.core.records import WorkerMotion
-from hrc_env.mocap.poses import marks_of
+from hrc_env.mocap.poses import make_marks
 from hrc_env.worker.body import worker_truth
 
 __all__ = ["BODY", "ORDERS", "Y_UP", "angles_of", "cmu_name", "write_acclaim", "write_bvh"]
@@ -33,7 +33,7 @@ def filmed(motion, worker=0):
 
 def centres(position):
     """(T, 14, 3) where bones turn, all joints but the nose, foot tips left out as NaN."""
-    marks = marks_of(BODY, landmarks=False)
+    marks = make_marks(BODY, landmarks=False)
     out = position[:, marks.segment].copy()
     out[:, [0, 13, 14]] = np.nan
     return out

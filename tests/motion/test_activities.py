@@ -18,7 +18,7 @@ from benchmarks.motion.statistics import (
 )
 from hrc_env.motion import controls as c
 from hrc_env.motion import state as st
-from hrc_env.motion.repertoire import REPERTOIRE, SCENES, alone, perform
+from hrc_env.motion.repertoire import REPERTOIRE, SCENES, make_worker, perform
 from hrc_env.worker.body import SEGMENT, load_body, worker_names
 from hrc_env.worker.props import PROP_NAMES, PROPS
 
@@ -47,7 +47,7 @@ def scene(request):
     """The films of a scene by three people, right-handed but for the last."""
     played = []
     for k, stature_m in enumerate(STATURES_M):
-        me = alone(of_stature(stature_m), (0.3, -0.2), 0.7, right=k < 2)
+        me = make_worker(of_stature(stature_m), (0.3, -0.2), 0.7, right=k < 2)
         played.append(perform(REPERTOIRE[request.param], me, np.random.default_rng(k), DT_S))
     return request.param, played
 
@@ -68,7 +68,7 @@ def test_hands_are_where_they_work_and_on_what_they_hold(scene):
 @pytest.mark.parametrize("name", worker_names())
 @pytest.mark.parametrize("held", ["board in both hands", "wheelbarrow", "cart"])
 def test_arms_of_every_body_reach_what_they_carry_and_push(name, held):
-    me = alone(load_body(name))
+    me = make_worker(load_body(name))
     films = perform(REPERTOIRE[held], me, np.random.default_rng(0), 0.04)
     assert (np.concatenate([misses(film) for film in films]) > 0.01).mean() <= 0.02
 

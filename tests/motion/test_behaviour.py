@@ -10,7 +10,7 @@ from recorded import started
 from hrc_env.core.errors import ConfigError
 from hrc_env.motion import generator
 from hrc_env.motion import state as st
-from hrc_env.motion.schedule import JOBS, WORK, Job, picked, schedule_at
+from hrc_env.motion.schedule import JOBS, WORK, Choice, Job, make_schedule, pick_job
 from hrc_env.motion.traffic import APART_M
 from hrc_env.worker.body import load_body, worker_truth
 from hrc_env.worker.props import PROP_NAMES
@@ -43,7 +43,7 @@ def test_nobody_waits_long_for_a_way():
     longest = 0.0
     for _ in range(60):
         go_on(state, rngs, 1.0)
-        since = state.workers["since_s"]
+        since = state.workers["waiting_since_s"]
         longest = max(longest, np.where(since > 0.0, state.workers["clock_s"] - since, 0.0).max())
     assert longest < 9.0
 
@@ -55,13 +55,14 @@ def test_a_workers_day_does_not_depend_on_the_other_environments():
 
 
 def test_every_task_leads_to_tasks_that_there_are():
-    schedule = schedule_at(JOBS, ("wall", "pile"))
+    schedule = make_schedule(JOBS, ("wall", "pile"))
     assert {job.at for job in schedule.jobs} == {"robot", "here", "wall", "pile"}
     for shares in schedule.then:
         assert not shares or shares[-1][1] == pytest.approx(1.0)
         assert all(0 <= k < len(schedule.jobs) for k, _ in shares)
-    assert picked(((4, 0.25), (7, 1.0)), 0.2) == 4
-    assert picked(((4, 0.25), (7, 1.0)), 0.3) == 7
+    choices = (Choice(4, 0.25), Choice(7, 1.0))
+    assert pick_job(choices, 0.2) == 4
+    assert pick_job(choices, 0.3) == 7
 
 
 def test_a_task_of_ones_own_is_what_workers_do():
@@ -163,7 +164,7 @@ def test_walkers_come_to_a_stand_and_then_go_where_they_wanted():
     runs = ["" for _ in range(24)]
     for _ in range(300):
         setting_out = (state.workers["activity"] == st.WALK) & (state.workers["time_s"] < 1.0)
-        state.workers["calm_until"] = np.where(setting_out, 0.0, np.inf)  # only these startle
+        state.workers["calm_until_s"] = np.where(setting_out, 0.0, np.inf)  # only these startle
         _, doing = go_on(state, rngs, 0.1, robot=np.full(3, 0.5))
         runs = [run + "sw"[int(k == st.WALK)] for run, k in zip(runs, doing[0, :, 0], strict=True)]
     braked = [re.search("sw{5,30}s{7,9}w{8}", run) for run in runs]
@@ -174,7 +175,7 @@ def test_the_number_of_workers_is_drawn_and_the_others_are_far():
     state = generator.make_state(30, 3, load_body(), generator.MotionConfig(), fewest=1)
     rngs = [np.random.default_rng([8, b]) for b in range(30)]
     generator.reset(state, np.arange(30), rngs)
-    assert set(state.workers["present"].sum(1)) == {1, 2, 3}
+    assert set(state.workers["is_present"].sum(1)) == {1, 2, 3}
     roots, _ = go_on(state, rngs, 5.0)
     away = np.abs(roots).max((0, 3)) > 20.0
-    np.testing.assert_array_equal(away, ~state.workers["present"])
+    np.testing.assert_array_equal(away, ~state.workers["is_present"])

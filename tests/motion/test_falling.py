@@ -12,7 +12,8 @@ from hrc_env.motion import generator
 from hrc_env.motion import state as st
 from hrc_env.motion.activities.falling import plan_fall
 from hrc_env.motion.paths import lay_path
-from hrc_env.motion.repertoire import HASTY, OPEN, alone, perform
+from hrc_env.motion.points import Point
+from hrc_env.motion.repertoire import HASTY, OPEN, make_worker, perform
 from hrc_env.motion.schedule import Job
 from hrc_env.motion.state import N_START
 from hrc_env.scene.build import build
@@ -27,7 +28,7 @@ def falls(request):
     """The films of a worker's falls, and the lowest points (T, K) of their capsules."""
     body, films = load_body(request.param), []
     for k in range(4):
-        me = alone(body, (0.3, -0.2), 0.7, right=k < 2)
+        me = make_worker(body, (0.3, -0.2), 0.7, right=k < 2)
         film = perform(HASTY["fall"], me, np.random.default_rng([2, k]), DT_S)[0]
         truth = worker_truth(body, film.motion)
         low = truth.capsules_world[:, 0, :, :, 2].min(-1) - truth.capsule_radius_m[:, 0]
@@ -154,14 +155,16 @@ def test_who_falls_falls_where_there_is_room(scene):
 
 
 def test_where_there_is_no_room_nobody_falls():
-    me = alone(load_body())
-    lay_path((0.0, 0.0), np.zeros((0, 3)), (4.0, 0.0), me)
+    me = make_worker(load_body())
+    lay_path(Point(0.0, 0.0), np.zeros((0, 3)), Point(4.0, 0.0), me)
     draws = np.random.default_rng(0).random(N_START)
-    assert plan_fall(draws, 0.0, 1.2, 2.0, *OPEN, me) > 6.0
-    narrow = np.full((401, 401), -0.1)
-    assert plan_fall(draws, 0.0, 1.2, 2.0, narrow, OPEN[1], me) == -1.0
-    lay_path((0.0, 0.0), np.zeros((0, 3)), (1.0, 0.0), me)  # too short a way to stumble on
-    assert plan_fall(draws, 0.0, 1.2, 2.0, *OPEN, me) == -1.0
+    assert plan_fall(draws, 0.0, 1.2, 2.0, OPEN, me) > 6.0
+    narrow = OPEN._replace(slack=np.full((401, 401), -0.1))
+    assert plan_fall(draws, 0.0, 1.2, 2.0, narrow, me) == -1.0
+    lay_path(
+        Point(0.0, 0.0), np.zeros((0, 3)), Point(1.0, 0.0), me
+    )  # too short a way to stumble on
+    assert plan_fall(draws, 0.0, 1.2, 2.0, OPEN, me) == -1.0
 
 
 def test_others_keep_clear_of_who_lies():

@@ -12,6 +12,7 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.motion import generator, lying
 from hrc_env.motion import state as st
 from hrc_env.motion.activities.going import CART_AHEAD_M
+from hrc_env.motion.points import Place
 from hrc_env.motion.schedule import WORK, Job
 from hrc_env.scene.build import build, drawing_model
 from hrc_env.scene.worker_visuals import PARKED_M
@@ -21,7 +22,7 @@ from hrc_env.world import Workplace
 
 BOARD, BOX, STUD = map(PROP_NAMES.index, ("board", "box", "stud"))
 PILE = Workplace("pile", "pile", (1.4, 0.9), 0.6, 0.4, loads=("box", "box"))
-SPOT = lying.spot_of(PILE)
+SPOT = lying.get_place(PILE)
 
 
 def started(batch, n_workers=1, seed=0, grounds=None, **settings):
@@ -66,11 +67,11 @@ def test_what_lies_there_at_first_rests_on_what_is_drawn(scene):
     mujoco.mj_kinematics(model, data)
     groups, geom = np.array([1, 1, 0, 0, 0, 0], np.uint8), np.zeros(1, np.int32)
     down = np.array([0.0, 0.0, -1.0])
-    rows = lying.at_first(place.grounds.places, WORK["framing"])
+    rows = lying.make_loads(place.grounds.places, WORK["framing"])
     assert len(rows) > 4
     for row in rows:
         if (
-            rows["pose"][lying._under(int(row["shown"][0]), row["pose"], rows), 2].min()
+            rows["pose"][lying._find_overlapping(int(row["shown"][0]), row["pose"], rows), 2].min()
             < (row["pose"][2])
         ):
             continue
@@ -94,35 +95,37 @@ def test_carts_stand_where_hands_take_them(scene):
 
 
 def test_loads_lie_on_each_other_and_the_uppermost_is_taken_first():
-    rows = lying.at_first((PILE,), ())
+    rows = lying.make_loads((PILE,), ())
     np.testing.assert_allclose(rows["pose"][:, 2], [0.55, 0.85])
-    assert lying.on_top(rows).tolist() == [False, True]
-    third = lying.resting(BOX, "pile", SPOT, PILE.ahead_m, rows)
+    assert lying.find_uncovered(rows).tolist() == [False, True]
+    third = lying.find_rest_pose(BOX, "pile", SPOT, PILE.ahead_m, rows)
     assert third[2] == pytest.approx(1.15)
-    assert list(lying.stands(rows, BOX, "pile")) == [SPOT]
-    assert not list(lying.stands(rows, BOX, "bench"))
-    assert not list(lying.stands(rows, BOARD, "pile"))
-    lying.take(rows, 1)
-    assert lying.on_top(rows).tolist() == [True, False]
+    assert list(lying.list_stands(rows, BOX, "pile")) == [SPOT]
+    assert not list(lying.list_stands(rows, BOX, "bench"))
+    assert not list(lying.list_stands(rows, BOARD, "pile"))
+    lying.remove_load(rows, 1)
+    assert lying.find_uncovered(rows).tolist() == [True, False]
 
 
 def test_boards_are_put_flat_to_a_wall_below_each_other_and_stand_elsewhere_on_the_floor():
-    spot = (0.0, 0.0, 0.0, 1.4)
+    spot = Place(0.0, 0.0, 0.0, 1.4)
     rows = np.zeros(2, lying.LOAD)
-    first = lying.resting(BOARD, "wall", spot, 0.65, rows)
+    first = lying.find_rest_pose(BOARD, "wall", spot, 0.65, rows)
     np.testing.assert_allclose(first, [0.631, 0.0, 1.2, 0.0, np.pi / 2, 0.0])
     rows["shown"][0, 0], rows["pose"][0] = BOARD, first
-    second = lying.resting(BOARD, "wall", spot, 0.65, rows)
+    second = lying.find_rest_pose(BOARD, "wall", spot, 0.65, rows)
     assert second[2] == pytest.approx(1.2 - 0.089)
-    assert lying.resting(BOX, "", spot, 0.43, rows[1:])[2] == pytest.approx(0.15)
+    assert lying.find_rest_pose(BOX, "", spot, 0.43, rows[1:])[2] == pytest.approx(0.15)
 
 
 def test_loads_beside_each_other_do_not_lie_on_each_other_however_they_are_turned():
     rows = np.zeros(1, lying.LOAD)
     rows["shown"][0, 0], rows["pose"][0] = BOARD, (0.0, 0.0, 0.7, 0.5 * np.pi, 0.0, 0.0)
     over = np.array([1.0, 0.0, 0.0, 0.6, 0.0, 0.0])
-    assert lying._under(BOX, over, rows).all()
-    assert not lying._under(BOX, over + np.array([0.0, 0.5, 0.0, 0.0, 0.0, 0.0]), rows).any()
+    assert lying._find_overlapping(BOX, over, rows).all()
+    assert not lying._find_overlapping(
+        BOX, over + np.array([0.0, 0.5, 0.0, 0.0, 0.0, 0.0]), rows
+    ).any()
 
 
 def test_what_lies_about_does_not_depend_on_other_environments_and_comes_back_with_the_state():
@@ -154,7 +157,7 @@ def test_an_episode_begins_with_whole_piles_a_little_off_their_places():
 def test_where_a_job_takes_up_what_no_place_has_one_lies_at_the_first():
     jobs = (Job("work", "reach", "robot"), Job("lift it", "pick up", "floor", prop="board"))
     places = (Workplace("here", "floor", (1.0, 0.0), 0.0, 0.0), PILE)
-    rows = lying.at_first(places, jobs)
+    rows = lying.make_loads(places, jobs)
     assert rows["shown"][:, 0].tolist() == [BOARD, BOX, BOX]
 
 
@@ -180,7 +183,7 @@ def test_who_is_to_pick_up_where_nothing_lies_looks_round_and_who_brings_wheels_
 def test_a_load_that_there_is_not_is_refused_with_those_there_are():
     place = Workplace("pile", "pile", (1.4, 0.9), 0.6, 0.4, loads=("piano",))
     with pytest.raises(ConfigError, match=r"load at 'pile'.*piano.*box"):
-        lying.at_first((place,), ())
+        lying.make_loads((place,), ())
 
 
 def test_hands_wait_to_set_out_for_a_load_while_the_robot_is_near_it():
@@ -188,10 +191,10 @@ def test_hands_wait_to_set_out_for_a_load_while_the_robot_is_near_it():
     me = state.workers[0, 0]
     me["activity"], me["time_s"], me["duration_s"], me["pace"] = st.PICK_UP, 0.0, 9.0, 1.0
     me["out_at"], me["out_s"], me["raise_s"] = 0.1, 1.0, 1.0
-    me["reaction"], me["tool_pose"][:3] = st.NO_REACTION, (0.5, 0.0, 0.8)
+    me["planned_reaction"], me["tool_pose"][:3] = st.NO_REACTION, (0.5, 0.0, 0.8)
     motion = generator.current(state)
     near, far = np.full((1, 2, 3), (0.5, 0.2, 0.8)), np.full((1, 2, 3), (0.5, 0.9, 0.8))
     for robot, time_s, wished in ((near, 0.0, 0.0), (far, 0.0, 1.0), (near, 0.9, 1.0)):
         me["time_s"] = time_s
         generator.watch(state, robot, motion, 0.04)
-        assert me["pace_wished"] == wished
+        assert me["wanted_pace"] == wished

@@ -10,20 +10,21 @@ from hrc_env.core.batching import one
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import WorkerMotion
 from hrc_env.core.skeleton import JOINTS
-from hrc_env.mocap.poses import posed
+from hrc_env.mocap.poses import pose_segments
 from hrc_env.mocap.record import Capture
 from hrc_env.mocap.retarget import retarget
 from hrc_env.motion import controls as c
 from hrc_env.motion import generator
 from hrc_env.motion import state as st
-from hrc_env.motion.activities.pieces import LONGEST_S, stage, stocked
+from hrc_env.motion.activities.pieces import LONGEST_S, cut_clips, make_stage
 from hrc_env.motion.activities.playing import PACE_S, SETTLE_S
-from hrc_env.motion.blending import settle as settle_at
+from hrc_env.motion.blending import place_standing as settle_at
 from hrc_env.motion.clip import load_clip, save_clip
-from hrc_env.motion.floorplan import floorplan
+from hrc_env.motion.floorplan import make_floorplan
 from hrc_env.motion.paths import lay_path
+from hrc_env.motion.points import Point
 from hrc_env.motion.state import N_ROOTS
-from hrc_env.motion.traffic import meets
+from hrc_env.motion.traffic import find_meeting
 from hrc_env.motion.walk import plan_walk
 from hrc_env.settings import settle
 from hrc_env.worker.body import SEGMENT, load_body, worker_truth
@@ -99,7 +100,7 @@ def test_the_recorded_pose_is_the_one_that_is_seen(clip):
     q = np.zeros((1, c.N_CONTROLS))
     q[0, : c.N_BLENDED] = piece.frames[k, : c.N_BLENDED]
     q[0, c.ANKLE : c.ANKLE + 12] = piece.frames[k, c.N_BLENDED :]
-    recorded = posed(q, one(state.mind.anatomy, 0))[0][0]
+    recorded = pose_segments(q, one(state.mind.anatomy, 0))[0][0]
     between = np.linalg.norm(position[:, None] - position[None], axis=-1)
     assert (
         np.abs(between - np.linalg.norm(recorded[:, None] - recorded[None], axis=-1)).max() < 0.02
@@ -113,7 +114,9 @@ def test_a_long_clip_is_played_in_pieces_from_both_feet_to_both_feet(clip):
         again[:, at : at + 2] += step[:, None] * (clip.controls[-1, :2] - clip.controls[0, :2])
     long = dataclasses.replace(clip, controls=again, contacts=np.concatenate([clip.contacts] * 20))
     hall = dataclasses.replace(generator.OPEN_FLOOR, walkable_x_m=(-99.0, 99.0))
-    pieces = stocked([long], clip.size[None], stage(floorplan(hall), generator.MotionConfig()))
+    pieces = cut_clips(
+        [long], clip.size[None], make_stage(make_floorplan(hall), generator.MotionConfig())
+    )
     assert len(pieces.count) > 2
     assert (pieces.count / pieces.fps <= LONGEST_S + 1 / FPS).all()
     first = pieces.frames[pieces.row]
@@ -139,10 +142,10 @@ def test_who_arrives_early_does_not_stay_in_the_way_of_a_clip(clip):
     player["roots"] = np.column_stack([np.linspace(0.0, 10.0, N_ROOTS), np.zeros(N_ROOTS)])
     for end_y_m, early in ((-0.2, True), (-2.0, False)):
         settle_at(8.0, -4.0, 0.0, walker)
-        lay_path((8.0, -4.0), np.zeros((0, 3)), (8.0, end_y_m), walker)
+        lay_path(Point(8.0, -4.0), np.zeros((0, 3)), Point(8.0, end_y_m), walker)
         begin(walker, st.WALK, plan_walk(0.0, 1.2, walker))
         assert walker["duration_s"] < 8.0  # the player comes by after 16 s
-        assert (meets(1, state.workers[0])[0] > 0.0) == early
+        assert (find_meeting(1, state.workers[0]).time_s > 0.0) == early
 
 
 def test_motions_come_as_paths_or_clips(clip, tmp_path):

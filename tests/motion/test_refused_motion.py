@@ -9,16 +9,16 @@ import pytest
 from hrc_env.core.errors import ConfigError
 from hrc_env.motion import controls as c
 from hrc_env.motion import generator
-from hrc_env.motion.activities.pieces import stage, stocked
-from hrc_env.motion.anatomy import ANKLE_Z, LEG, N_SIZES, STAND_Z
+from hrc_env.motion.activities.pieces import cut_clips, make_stage
+from hrc_env.motion.anatomy import ANKLE_Z, LEG, N_SIZES, STAND_Z, measure_bodies
 from hrc_env.motion.clip import RECORDED, Clip, load_clip, save_clip
 from hrc_env.motion.config import PeopleConfig
-from hrc_env.motion.floorplan import CELL_M, floorplan, room_for
+from hrc_env.motion.floorplan import CELL_M, count_room, make_floorplan
 from hrc_env.motion.schedule import Job, check_jobs
 from hrc_env.worker.body import load_body
 from hrc_env.world import Grounds, Workplace
 
-SIZE = generator.anatomies(load_body()).size[0]
+SIZE = measure_bodies(load_body()).lengths[0]
 STILL = Clip(np.zeros((3, c.N_CONTROLS)), 100.0, np.ones((3, 2), bool), SIZE, "still")
 
 
@@ -174,13 +174,13 @@ def test_a_clip_is_played_from_feet_on_the_floor_to_feet_on_the_floor_half_a_sec
 ):
     """Below 5 cm both are on the floor."""
     pile = Workplace("pile", "pile", (1.2, 0.0), 0.0, 0.4)
-    where = stage(floorplan(grounds_of(pile)), generator.MotionConfig())
+    where = make_stage(make_floorplan(grounds_of(pile)), generator.MotionConfig())
     if n_found is None:
-        assert len(stocked([clip], SIZE[None], where).count) > 0
+        assert len(cut_clips([clip], SIZE[None], where).count) > 0
         return
     said = f"own: both feet are within 5 cm of the floor at {n_found} frames within 0.5 s only"
     with pytest.raises(ConfigError, match=said):
-        stocked([clip], SIZE[None], where)
+        cut_clips([clip], SIZE[None], where)
 
 
 PEOPLE = [
@@ -287,10 +287,10 @@ def test_who_works_at_a_wall_stands_22_cm_away_from_it(gap_m, taken):
     half_wall_m = place.xy_m[0] - gap_m
     grounds = grounds_of(place, half_wall_m=half_wall_m)
     if taken:
-        assert floorplan(grounds).grounds is grounds
+        assert make_floorplan(grounds).grounds is grounds
         return
     with pytest.raises(ConfigError, match=r"'wall' at .* leaves no room to stand: .* 0\.22 m"):
-        floorplan(grounds)
+        make_floorplan(grounds)
 
 
 @pytest.mark.parametrize("bad_place", [0, 1])
@@ -298,30 +298,30 @@ def test_one_workplace_without_room_is_enough(bad_place):
     good = Workplace("a", "wall", (1.0, 0.0), 0.0, 1.0)
     bad = replace(good, name="b", xy_m=(0.6, 0.0))
     with pytest.raises(ConfigError, match="'b' at"):
-        floorplan(grounds_of(*((bad, good) if bad_place == 0 else (good, bad))))
+        make_floorplan(grounds_of(*((bad, good) if bad_place == 0 else (good, bad))))
 
 
 @pytest.mark.parametrize(("half_wall_m", "taken"), [(1.5999, True), (1.6001, False)])
 def test_people_need_40_cm_beside_a_wall(half_wall_m, taken):
     """At the far sides of the ground, 2 m from its middle."""
     if taken:
-        floorplan(grounds_of(half_wall_m=half_wall_m))
+        make_floorplan(grounds_of(half_wall_m=half_wall_m))
         return
     with pytest.raises(ConfigError, match="everything is blocked"):
-        floorplan(grounds_of(half_wall_m=half_wall_m))
+        make_floorplan(grounds_of(half_wall_m=half_wall_m))
 
 
 def test_grounds_are_measured_from_edge_to_edge():
-    plan = floorplan(grounds_of())
+    plan = make_floorplan(grounds_of())
     n = round(4.0 / CELL_M) + 1
-    assert plan.slack.shape == (n, n)
-    assert plan.origin.tolist() == [-2.0, -2.0]
-    assert plan.slack[[0, -1], 0] == pytest.approx(1.1)  # 1.5 m from the wall, less 0.4 m
+    assert plan.grid.slack.shape == (n, n)
+    assert plan.grid.origin.tolist() == [-2.0, -2.0]
+    assert plan.grid.slack[[0, -1], 0] == pytest.approx(1.1)  # 1.5 m from the wall, less 0.4 m
 
 
 def test_as_many_workers_as_fit_are_taken():
     body, grounds = load_body(), grounds_of(half_wall_m=1.0)
-    fit = room_for(floorplan(grounds), 1.1)
+    fit = count_room(make_floorplan(grounds), 1.1)
     job = (Job("stay", "stand", "robot", (("stay", 1.0),)),)
     config = generator.MotionConfig(jobs=job, near_probability=0.0)
     assert fit > 1

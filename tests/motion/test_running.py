@@ -10,7 +10,7 @@ from benchmarks.motion.statistics import ANKLES, HEAD, WRISTS, knee_flexion_deg,
 from hrc_env.core.errors import ConfigError
 from hrc_env.motion import generator
 from hrc_env.motion import state as st
-from hrc_env.motion.repertoire import HASTY, REPERTOIRE, alone, perform
+from hrc_env.motion.repertoire import HASTY, REPERTOIRE, make_worker, perform
 from hrc_env.worker.body import SEGMENT, load_body
 
 DT_S = 0.01
@@ -19,7 +19,7 @@ RUNS = {name: float(name.split()[1]) for name in HASTY if name.startswith("run")
 
 
 def played(scene, body="worker_1"):
-    return perform(scene, alone(load_body(body)), np.random.default_rng(0), DT_S)[0]
+    return perform(scene, make_worker(load_body(body)), np.random.default_rng(0), DT_S)[0]
 
 
 @pytest.fixture(scope="module", params=[(n, b) for n in RUNS for b in ("worker_1", "worker_5")])
@@ -170,7 +170,7 @@ def test_runners_who_notice_the_robot_brake():
     lasted, braked = np.zeros(16), 0
     for _ in range(400):
         setting_out = (state.workers["activity"] == st.RUN) & (state.workers["time_s"] < 0.6)
-        state.workers["calm_until"] = np.where(setting_out, 0.0, np.inf)  # only these startle
+        state.workers["calm_until_s"] = np.where(setting_out, 0.0, np.inf)  # only these startle
         planned = state.workers["duration_s"][:, 0].copy()
         _, motion = generator.advance(state, rngs, 0.1, 1)
         generator.watch(state, np.full((16, 2, 3), 0.5), motion, 0.1)

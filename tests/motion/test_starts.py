@@ -20,7 +20,7 @@ class Room:
         self.worker_m, self.step_m = np.array(worker_m, float), step_m
         self.n_drawn, self.n_moved = np.zeros(len(worker_m), int), np.full(len(worker_m), -1)
         monkeypatch.setattr(starts.generator, "reset", lambda motion, ids, *rest: self.move(ids))
-        monkeypatch.setattr(starts, "gap_m", lambda ids, q, *rest: self.gap_m(ids, q))
+        monkeypatch.setattr(starts, "measure_gap_m", lambda ids, q, *rest: self.gap_m(ids, q))
 
     def draw(self, ids):
         self.n_drawn[ids] += 1
@@ -31,7 +31,7 @@ class Room:
         self.worker_m[ids] += self.n_moved[ids] > 0
 
     def start(self):
-        return starts.apart(np.arange(len(self.worker_m)), self.draw, None, [], None, None)
+        return starts.begin_apart(np.arange(len(self.worker_m)), self.draw, None, [], None, None)
 
     def gap_m(self, ids, q):
         return np.abs(self.worker_m[ids] - q[:, 0]) + 1e-9

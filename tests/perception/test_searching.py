@@ -16,7 +16,7 @@ from hrc_env.perception.searching import FITTING, ImageSource, search_windows
 from hrc_env.scene.build import build
 from hrc_env.scene.domain_randomization import APPEARANCES, draw_look
 from hrc_env.scene.render import CropRenderer
-from hrc_env.scene.rigs import floor
+from hrc_env.scene.rigs import sample_floor
 from hrc_env.worker.body import load_body, worker_truth
 
 HIPS = [JOINT["left_hip"], JOINT["right_hip"]]
@@ -37,7 +37,7 @@ class Search:
         self.scene = build(name=name, n_workers=1)
         self.renderer = CropRenderer(self.scene)
         self.source = LensRenderer(self.renderer, self.scene.cameras)
-        self.detector = PoseDetector(self.scene.cameras, None, floor(self.scene.grounds))
+        self.detector = PoseDetector(self.scene.cameras, None, sample_floor(self.scene.grounds))
 
     def detect(self, q, motion, look=None):
         self.renderer.randomize(look)
@@ -82,7 +82,7 @@ def test_a_source_of_images_gives_windows_of_them_and_nothing_else():
 @pytest.mark.parametrize("name", ["lab", "site"])
 def test_whoever_stands_on_the_floor_is_inside_a_window_that_fits(name):
     scene = build(name=name, n_workers=1)
-    feet = floor(scene.grounds)
+    feet = sample_floor(scene.grounds)
     for camera in scene.cameras:
         windows = search_windows(camera, feet)
         people = feet + np.array([0, 0.875, 1.75])[:, None, None] * np.array([0, 0, 1.0])

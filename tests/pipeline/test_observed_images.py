@@ -15,7 +15,7 @@ from hrc_env.agents.registry import make_agent
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Roi
 from hrc_env.env import HRCEnv
-from hrc_env.scene.camera_images import COARSE, SMOOTHING, ImageConfig, images_called
+from hrc_env.scene.camera_images import COARSE, SMOOTHING, ImageConfig, parse_images
 from hrc_env.scene.canvas import Canvas
 from hrc_env.scene.render import CROP_QUALITY
 from hrc_env.vector.env import HRCVectorEnv
@@ -246,7 +246,7 @@ def test_agents_that_read_the_belief_act_beside_images(name):
 def test_the_arguments_survive_json_and_toml(tmp_path):
     config = hrc_env.EnvConfig(observe_images=ImageConfig(32, 40, ("camera_1", 2)))
     config.save(tmp_path / "env.toml")
-    assert images_called(hrc_env.EnvConfig.load(tmp_path / "env.toml").observe_images) == (
+    assert parse_images(hrc_env.EnvConfig.load(tmp_path / "env.toml").observe_images) == (
         ImageConfig(32, 40, ("camera_1", 2))
     )
     env = gymnasium.make("HRCReach-v0", perception="none", observe_images=ONE)

@@ -92,14 +92,14 @@ def meet_shields(rng):
 
 def meet_robots(rng):
     """A robot given directly, with fields that are something else."""
-    from hrc_env.scene.robot import ROBOTS, robot_called
+    from hrc_env.scene.robot import ROBOTS, find_robot
 
     arm = ROBOTS["ur10e_like"]
     fields = [name for name in arm.__dataclass_fields__ if name != "name"]
     values = {name: getattr(arm, name) for name in arm.__dataclass_fields__} | {"name": "mine"}
     for name in rng.choice(fields, rng.integers(1, 3), replace=False):
         values[name] = odd(rng)
-    robot_called(values if rng.random() < 0.7 else odd(rng))
+    find_robot(values if rng.random() < 0.7 else odd(rng))
 
 
 def meet_trackers(rng):

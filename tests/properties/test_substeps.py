@@ -14,7 +14,7 @@ from hrc_env.core.typing import Floats
 from hrc_env.geometry import chains
 from hrc_env.geometry.distances import least_separation
 from hrc_env.scene.build import Scene, SceneConfig, build
-from hrc_env.scene.physics import Physics, no_workers
+from hrc_env.scene.physics import Physics, make_empty_path
 from hrc_env.worker.body import load_body, worker_capsules
 
 CTRL_DT_S = 0.04
@@ -46,7 +46,7 @@ def make_commands(kind: str, seed: int, n_steps: int = 150, batch: int = 32) -> 
 def measure_tool_error_mm(scene: Scene, wanted: Floats) -> Floats:
     """Return the distances of the tool from the exact integral of slew-limited commands."""
     batch, slew = wanted.shape[1], scene.config.slew_rad_s2
-    physics, nobody = Physics(scene, batch), no_workers(batch, n_substeps(scene))
+    physics, nobody = Physics(scene, batch), make_empty_path(batch, n_substeps(scene))
     command, reference, errors_mm = np.zeros((batch, 6)), physics.q, []
     for target in wanted:
         change = np.clip(target - command, -slew * CTRL_DT_S, slew * CTRL_DT_S)
@@ -90,7 +90,7 @@ def push_into_floor() -> tuple[float, float, float]:
         return float((arm[..., 2].min(-1) - scene.chain.capsule_radius_m).min())
 
     start = [0.0, -0.8, 0.6, -1.37, -1.57, 0.0], [0, 0.8, 0, 0, 0, 0.0]
-    return push_into(scene, start, no_workers(1, n_substeps(scene)), gap_m)
+    return push_into(scene, start, make_empty_path(1, n_substeps(scene)), gap_m)
 
 
 def push_into_worker() -> tuple[float, float, float]:

@@ -20,7 +20,7 @@ from benchmarks.tracking.sequences import Sequences
 from benchmarks.tracking.walks import walk
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Bools, Ints
-from hrc_env.tracking.config import PaperConfig, of_kind
+from hrc_env.tracking.config import PaperConfig, cast_config
 
 LOCKED = {"lab": (5, 0.1), "site": (15, 0.2)}
 """Frames after which the median joint is within a distance [m], for `HELD` frames."""
@@ -43,7 +43,7 @@ def find_locks(rig: Rig, design: str, seeds: list[int]) -> tuple[Bools, Ints]:
     after, within_m = LOCKED[rig.name]
     joints = walk(rig.walk_m, seeds, after + HELD)
     px = detect(rig.P, joints, Damage(), seeds)[:, :, :, None]
-    config = replace(of_kind(rig.tracker, PaperConfig), **DESIGNS[design])
+    config = replace(cast_config(rig.tracker, PaperConfig), **DESIGNS[design])
     given = Sequences(joints[:, :, None], px, {}, config)
     off = np.stack([mean for mean, _ in beliefs("paper", rig, given, seeds)]) - given.joints
     near = np.median(np.linalg.norm(off, axis=-1), axis=(2, 3)) < within_m

@@ -10,8 +10,8 @@ from hrc_env.safety.contact import (
     SEGMENT_REGIONS,
     contact_force,
     effective_mass,
+    find_region,
     permitted_contact_speed,
-    region_called,
 )
 
 UR5E_KG = 17.0
@@ -35,7 +35,7 @@ TABLE = {
 @pytest.mark.parametrize("name", TABLE)
 def test_a_region_is_that_of_the_table(name):
     region, (clamped_n, hit_n, stiffness_n_mm, mass_kg, speed_m_s) = (
-        region_called(name),
+        find_region(name),
         TABLE[name],
     )
     assert (region.quasi_static_n, region.transient_n) == (clamped_n, hit_n)
@@ -60,7 +60,7 @@ def test_a_hit_at_the_permitted_speed_is_the_permitted_force():
 @pytest.mark.parametrize(
     ("ask", "said"),
     [
-        (lambda: region_called("cheast"), "Did you mean 'chest'"),
+        (lambda: find_region("cheast"), "Did you mean 'chest'"),
         (lambda: effective_mass(-1.0), "moving_kg must be positive"),
         (lambda: effective_mass(1.0, -1.0), "load_kg not be negative"),
         (lambda: contact_force("chest", 1.0, 0.0), "robot_kg must be a positive mass"),

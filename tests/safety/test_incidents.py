@@ -7,25 +7,25 @@ from hrc_env.agents.env_info import env_info
 from hrc_env.agents.registry import make_agent
 from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCEnv
-from hrc_env.motion.starts import gap_m
-from hrc_env.safety import incidents
+from hrc_env.motion.starts import measure_gap_m
+from hrc_env.safety import contact, incidents
 from hrc_env.safety.contact import contact_force
 from hrc_env.safety.cost import COMPONENTS, CostConfig
-from hrc_env.safety.incidents import KINDS, noted, nothing_yet
+from hrc_env.safety.incidents import KINDS, detect_incidents, make_history
 from hrc_env.settings import settle
 from hrc_env.simulation import Simulation
 from hrc_env.vector.env import HRCVectorEnv
 from hrc_env.worker.body import load_body
 
 DT, T = 0.04, 5
-REGIONS = incidents.regions_of(["left_hand", "head"])
+REGIONS = incidents.find_regions(["left_hand", "head"])
 
 
 class Line:
     """A robot of one ball and a worker of a hand, and a head 5 m behind it, that move along x."""
 
     def __init__(self, gap_m=0.5, n_workers=1):
-        self.state, self.robot_m = nothing_yet(1, n_workers), 0.0
+        self.state, self.robot_m = make_history(1, n_workers), 0.0
         self.hand_m = np.full(n_workers, gap_m + 0.2)
         self.time_to_stop_s = 0.1
 
@@ -38,8 +38,10 @@ class Line:
         robots, workers = np.zeros((1, T, 1, 2, 3)), np.zeros((1, T, n, 2, 2, 3))
         robots[..., 0] = robot[None, :, None, None]
         workers[..., 0] = hand[None, :, :, None, None] + [[0.0], [5.0]]
-        paths = incidents.measured(robots, np.array([0.1]), workers, np.full((1, n, 2), 0.1))
-        return noted(self.state, paths, REGIONS, np.array([15.0]), np.array([0.1]), DT)[0]
+        paths = incidents.measure_paths(robots, np.array([0.1]), workers, np.full((1, n, 2), 0.1))
+        return detect_incidents(self.state, paths, REGIONS, np.array([15.0]), np.array([0.1]), DT)[
+            0
+        ]
 
 
 def begun(line, *speeds):
@@ -85,28 +87,29 @@ def test_how_hard_a_contact_is_follows_from_region_and_closing_speed():
 
 def test_the_head_is_never_to_be_hit():
     assert incidents.CAPSULE_REGIONS["head"] == "skull and forehead"
-    hit = np.zeros((), incidents.INCIDENT)
-    hit["region"], hit["closing_m_s"] = incidents.regions_of(["head"])[0], 0.01
-    incidents._weigh(hit, 15.0)
-    assert hit["severity"] == incidents.NEVER
-    assert 0 < hit["force_ratio"] < 1
+    hits = np.zeros((1, 1), incidents.INCIDENT)
+    hits["closing_m_s"] = 0.01
+    head = contact.REGIONS[incidents.REGION_NAMES[incidents.find_regions(["head"])[0]]]
+    incidents._rate_contact(hits, 0, 0, head, 15.0)
+    assert hits["severity"] == incidents.NEVER
+    assert 0 < hits["force_ratio"] < 1
 
 
 def test_a_near_miss_ends_without_a_touch():
     line = Line(0.12)
-    passed = [line.step(*v)[0]["near_miss"] for v in [(2.0, 0.0), (-1.0, 0.0), (-1.0, 0.0)]]
+    passed = [line.step(*v)[0]["is_near_miss"] for v in [(2.0, 0.0), (-1.0, 0.0), (-1.0, 0.0)]]
     assert passed == [False, False, True]
     touched = Line(0.12)
     for speed in (3.0, 2.0, -4.0, -4.0, -4.0):
-        assert not touched.step(speed)[0]["near_miss"]
+        assert not touched.step(speed)[0]["is_near_miss"]
     assert touched.state["near_misses"] == 0
 
 
 def test_too_near_is_nearer_than_the_protective_distance_while_the_robot_comes():
     """S_p = 1.6 x 0.2 + 0.5 x 0.15 = 0.395 m."""
-    assert Line(0.40).step(0.5, -1.6)[0]["too_near"]
-    assert not Line(0.50).step(0.5, -1.6)[0]["too_near"]
-    assert not Line(0.20).step(0.0, -1.6)[0]["too_near"]
+    assert Line(0.40).step(0.5, -1.6)[0]["is_too_near"]
+    assert not Line(0.50).step(0.5, -1.6)[0]["is_too_near"]
+    assert not Line(0.20).step(0.0, -1.6)[0]["is_too_near"]
 
 
 def test_every_worker_has_contacts_of_their_own():
@@ -166,9 +169,9 @@ def test_info_says_what_happened_and_chosen_parts_are_the_cost():
 def test_directed_speeds_add_up_to_how_the_gap_closes():
     simulation, _ = played(40, batch=40)
     moving = simulation.motion, simulation.chain, simulation.bodies
-    before = gap_m(np.arange(40), simulation.physics.q, *moving)
+    before = measure_gap_m(np.arange(40), simulation.physics.q, *moving)
     info = simulation.step(np.zeros((40, 6))).info
-    closing = (before - gap_m(np.arange(40), simulation.physics.q, *moving)) / DT
+    closing = (before - measure_gap_m(np.arange(40), simulation.physics.q, *moving)) / DT
     both = info["safety/robot_towards_m_s"] + info["safety/worker_towards_m_s"]
     near = np.isfinite(both)
     assert near.sum() > 10
@@ -194,13 +197,13 @@ def test_a_batch_counts_what_its_environments_do_and_states_keep_it():
         for name, value in alone.items():
             if name.startswith("safety/"):
                 assert told[name][1] == value
-    watched = single.simulation.monitor.known
+    watched = single.simulation.monitor.history
     watched["contacts"], watched["since_s"] = 7, 0.1
     state = single.get_state()
     single.reset(seed=1)
-    assert not single.simulation.monitor.known["contacts"].any()
+    assert not single.simulation.monitor.history["contacts"].any()
     single.set_state(state)
-    assert single.simulation.monitor.known["contacts"].sum() == 21
+    assert single.simulation.monitor.history["contacts"].sum() == 21
 
 
 def test_what_is_carried_hits_harder():

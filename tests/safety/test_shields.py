@@ -21,13 +21,13 @@ from hrc_env.geometry import chains
 from hrc_env.geometry.distances import least_separation
 from hrc_env.motion import generator
 from hrc_env.render.overlay import SHIELD
+from hrc_env.safety.built_in import limit_command
 from hrc_env.safety.config import PRESETS, ShieldConfig
-from hrc_env.safety.guard import guarded
 from hrc_env.safety.incidents import MOVING_M_S
 from hrc_env.safety.unseen import find_undetected
 
 VELOCITIES = ("velocity_world", "angular_velocity_world")
-NO_DOUBT = {"sigmas": 0.0, "least_sigmas_m": 0.0, "human_m_s": 0.0}
+NO_DOUBT = {"n_sigmas": 0.0, "min_uncertainty_m": 0.0, "worker_speed_m_s": 0.0}
 
 
 def vector(n, shield, **arguments):
@@ -229,7 +229,9 @@ def never_seen(now, *places, level=POSSIBLE):
 @pytest.mark.parametrize("task", ["HRCReach-v0", "HRCDelivery-v0"])
 def test_where_nobody_has_looked_a_robot_stands(task):
     part, now = believed(task)
-    allowed, said = guarded(never_seen(now), part.model.fastest_rad_s[None], 0.04, ShieldConfig())
+    allowed, said = limit_command(
+        never_seen(now), part.model.fastest_rad_s[None], 0.04, ShieldConfig()
+    )
     assert said["unknown"] == 1.0
     np.testing.assert_array_equal(allowed, 0.0)
 
@@ -238,14 +240,14 @@ def test_where_nobody_has_looked_a_robot_stands(task):
 @pytest.mark.parametrize("limit_m_s", [0.25, 0.0])
 def test_near_floor_that_one_camera_alone_has_seen_empty_no_point_is_faster(task, limit_m_s):
     part, now = believed(task)
-    wanted, config = part.model.fastest_rad_s[None], ShieldConfig(unknown_m_s=limit_m_s)
+    wanted, config = part.model.fastest_rad_s[None], ShieldConfig(unknown_speed_limit_m_s=limit_m_s)
     near = never_seen(now, (0.3, 0.0), level=PROBABLY_EMPTY)
-    allowed, said = guarded(near, wanted, 0.04, config)
+    allowed, said = limit_command(near, wanted, 0.04, config)
     assert said["unknown"] == 1.0
     assert fastest_m_s(part, allowed) == pytest.approx(limit_m_s, abs=1e-4)
     np.testing.assert_allclose(np.cross(allowed[0, :3], wanted[0, :3]), 0.0, atol=1e-12)
     far = never_seen(now, (3.0, 0.0), level=PROBABLY_EMPTY)
-    allowed, said = guarded(far, wanted, 0.04, config)
+    allowed, said = limit_command(far, wanted, 0.04, config)
     assert said["unknown"] == 0.0
     np.testing.assert_array_equal(allowed, wanted)
 
@@ -257,12 +259,12 @@ def test_to_floor_that_no_camera_has_seen_a_robot_comes_no_nearer_and_may_leave_
     near, empty = (never_seen(now, (0.15, 0.0), level=level) for level in (POSSIBLE, EMPTY))
     closing = []
     for wanted in moves:
-        allowed, said = guarded(near, wanted[None], 0.04, ShieldConfig())
+        allowed, said = limit_command(near, wanted[None], 0.04, ShieldConfig())
         moved = chains.capsules(part.chain, now.robot.q + 1e-6 * allowed)
         gaps = [floor_gap_m(near, capsules) for capsules in (now.robot.capsules_world, moved)]
         closing.append((gaps[0] - gaps[1]) / 1e-6)
         assert said["unknown"] == 1.0
-        free, said = guarded(empty, wanted[None], 0.04, ShieldConfig())
+        free, said = limit_command(empty, wanted[None], 0.04, ShieldConfig())
         assert said["unknown"] == 0.0
         np.testing.assert_array_equal(free[0], wanted)
     assert max(closing) < 2e-3
@@ -285,7 +287,7 @@ def test_where_shoulders_are_hardly_known_hands_are_not_either(depth_m, slow):
     mean[...] += now.robot.tool_world[:, None] + np.array([0.9, 0.0, 0.2]) - mean[:, :, 1:2]
     cov[..., JOINT["left_shoulder"], :, :] = np.diag(np.square((0.04, 0.05, depth_m)))
     vague = replace(now.estimate, mean_world=mean, cov_world=cov)
-    limit = find_undetected(replace(now, estimate=vague), ShieldConfig()).limit_m_s
+    limit = find_undetected(replace(now, estimate=vague), ShieldConfig()).speed_limit_m_s
     assert np.isfinite(limit[0]) == slow
 
 
@@ -305,10 +307,10 @@ def test_hands_that_no_camera_shows_may_be_anywhere_within_an_arm_of_their_shoul
     mean[..., JOINT["right_wrist"], :] += (3.0, 0.0, 0.0)
     cov[..., JOINT["right_wrist"], :, :] = np.diag(np.square(wide_m))
     far = replace(estimate, mean_world=mean, cov_world=cov)
-    limit = find_undetected(replace(now, estimate=far), ShieldConfig()).limit_m_s
+    limit = find_undetected(replace(now, estimate=far), ShieldConfig()).speed_limit_m_s
     assert np.isfinite(limit[0]) == slow
     if slow:
-        allowed, _ = guarded(replace(now, estimate=far), wanted, 0.04, ShieldConfig())
+        allowed, _ = limit_command(replace(now, estimate=far), wanted, 0.04, ShieldConfig())
         assert fastest_m_s(part, allowed) <= limit[0] + 1e-4
 
 
@@ -330,7 +332,7 @@ def test_towards_where_somebody_unseen_may_be_it_comes_no_nearer_and_elsewhere_i
     moves = np.random.default_rng(0).uniform(-1, 1, (30, 6)) * part.model.fastest_rad_s
     closing, speeds = [], []
     for wanted in moves:
-        allowed, said = guarded(blind, wanted[None], 0.04, ShieldConfig())
+        allowed, said = limit_command(blind, wanted[None], 0.04, ShieldConfig())
         moved = chains.capsules(part.chain, now.robot.q + 1e-6 * allowed)
         robot = replace(now.robot, capsules_world=moved)
         there = replace(now.estimate, mean_world=blind.estimate.seen_world)
@@ -347,7 +349,7 @@ def test_whom_another_environment_has_lost_slows_nobody():
     envs.reset(seed=0)
     lost = unseen(envs.unwrapped.shards.first.belief, 0.9)
     lost.estimate.blind_s[1] = 0.0
-    limits = find_undetected(lost, ShieldConfig()).limit_m_s
+    limits = find_undetected(lost, ShieldConfig()).speed_limit_m_s
     assert np.isfinite(limits).tolist() == [True, False]
 
 
@@ -371,10 +373,10 @@ def test_robots_whose_cameras_all_fail_come_no_nearer_to_where_people_were():
 def test_it_stands_near_where_somebody_was_and_one_seen_just_now_changes_nothing():
     part, now = believed()
     wanted = part.model.fastest_rad_s[None]
-    near, _ = guarded(unseen(now, 0.3), wanted, 0.04, ShieldConfig())
+    near, _ = limit_command(unseen(now, 0.3), wanted, 0.04, ShieldConfig())
     np.testing.assert_array_equal(near, 0.0)
-    lately, _ = guarded(unseen(now, 0.3, blind_s=0.2), wanted, 0.04, ShieldConfig())
-    seen, said = guarded(now, wanted, 0.04, ShieldConfig())
+    lately, _ = limit_command(unseen(now, 0.3, blind_s=0.2), wanted, 0.04, ShieldConfig())
+    seen, said = limit_command(now, wanted, 0.04, ShieldConfig())
     np.testing.assert_array_equal(lately, seen)
     assert said["unknown"] == 0.0
 
@@ -390,9 +392,9 @@ def test_what_is_carried_counts_as_robot():
     free = replace(now, robot=replace(now.robot, capsules_world=capsules))
     capsules[:, -1] = hand[:, None]  # a board's last capsule
     wanted = np.full((1, 6), 0.3)
-    alone, _ = guarded(now, wanted, 0.04, ShieldConfig())
-    laden, said = guarded(free, wanted, 0.04, ShieldConfig())
-    assert said["least_m"] < 0.0
+    alone, _ = limit_command(now, wanted, 0.04, ShieldConfig())
+    laden, said = limit_command(free, wanted, 0.04, ShieldConfig())
+    assert said["clearance_m"] < 0.0
     assert np.abs(alone - laden).max() > 1e-3
 
 
@@ -416,7 +418,7 @@ def comes_m_s(beside, welcome, shield):
     moved = chains.capsules(part.chain, turns)[:, c].mean(1)
     towards = (moved - chains.capsules(part.chain, part.physics.q)[0, c].mean(0)) @ aside / 1e-6
     wanted = 0.6 * towards / (towards @ towards)
-    return guarded(now, wanted[None], 0.04, shield)[0][0] @ towards
+    return limit_command(now, wanted[None], 0.04, shield)[0][0] @ towards
 
 
 def arm_of(worker):
@@ -428,7 +430,7 @@ def arm_of(worker):
 
 @pytest.mark.parametrize(("beside", "most_m_s"), [("tool", 0.1), ("forearm", 0.02)])
 def test_to_a_welcome_hand_the_last_link_may_come_and_others_stand_still(beside, most_m_s):
-    shield = ShieldConfig(welcome_m_s=0.1)
+    shield = ShieldConfig(contact_speed_m_s=0.1)
     assert comes_m_s(beside, arm_of(0), shield) == pytest.approx(most_m_s, abs=5e-3)
     assert comes_m_s(beside, arm_of(1), shield) < 1e-3
     assert comes_m_s(beside, np.zeros((1, 2, 16), bool), shield) < 1e-3
@@ -439,10 +441,13 @@ def test_to_a_welcome_hand_the_last_link_may_come_and_others_stand_still(beside,
     [
         ("cbf", "Unknown shield 'cbf'. Valid: 'ssm', 'qp', 'pfl'"),
         ({"kind": "cbf"}, "kind of shield 'cbf'"),
-        ({"sigmas": -0.1}, r"shield\.sigmas must not be negative, got -0.1"),
+        ({"n_sigmas": -0.1}, r"shield\.n_sigmas must not be negative, got -0.1"),
         ({"margin": 0.1}, r"shield\.margin"),
-        ({"retreat_m_s": "fast"}, r"shield\.retreat_m_s must be a finite number"),
-        ({"unknown_m_s": -1.0}, r"shield\.unknown_m_s must not be negative"),
+        ({"max_retreat_m_s": "fast"}, r"shield\.max_retreat_m_s must be a finite number"),
+        (
+            {"unknown_speed_limit_m_s": -1.0},
+            r"shield\.unknown_speed_limit_m_s must not be negative",
+        ),
         ({"deceleration_m_s2": 0.0}, r"shield\.deceleration_m_s2 must be positive"),
         (3, "shield must be a name, a ShieldConfig or a mapping"),
     ],
@@ -464,7 +469,7 @@ def test_margins_that_are_no_numbers_are_refused():
 def test_what_a_shield_lacks_is_said(missing, said):
     _, now = believed()
     with pytest.raises(ConfigError, match=said):
-        guarded(replace(now, **{missing: None}), np.zeros((1, 6)), 0.04, ShieldConfig())
+        limit_command(replace(now, **{missing: None}), np.zeros((1, 6)), 0.04, ShieldConfig())
 
 
 def test_the_observation_ends_with_what_it_changed_if_asked():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hrc_env.safety.solver import MOST_STEPS, solve
+from hrc_env.safety.solver import MAX_STEPS, Problem, solve
 
 N, MOST = 6, 40
 
@@ -21,7 +21,8 @@ def problem(seed):
 
 def solved(J, b, weight, low, high, wanted):
     x, n = np.empty(len(wanted)), len(wanted)
-    steps = solve(J, b, weight, low, high, wanted, x, np.empty((n + 3, n)))
+    problem = Problem(J, b, weight, low, high, wanted)
+    steps = solve(problem, x, np.empty((n + 3, n)))
     return x, steps
 
 
@@ -33,7 +34,7 @@ def value(J, b, weight, wanted, x):
 def test_nothing_within_reach_is_better(seed):
     J, b, weight, low, high, wanted = problem(seed)
     x, steps = solved(J, b, weight, low, high, wanted)
-    assert steps < MOST_STEPS
+    assert steps < MAX_STEPS
     assert ((low <= x) & (x <= high)).all()
     rng = np.random.default_rng(seed)
     near = np.clip(x + rng.normal(0, 1e-3, (2000, N)), low, high)

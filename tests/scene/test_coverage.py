@@ -6,8 +6,15 @@ import pytest
 from hrc_env.geometry.cameras import pinhole
 from hrc_env.geometry.shapes import WIDTH
 from hrc_env.scene.build import build
-from hrc_env.scene.places import within
-from hrc_env.scene.rigs import LEAST_SEEN, PIECE_M, common_views, coverage, coverage_of, sees
+from hrc_env.scene.places import is_within
+from hrc_env.scene.rigs import (
+    LEAST_SEEN,
+    PIECE_M,
+    common_views,
+    coverage,
+    coverage_of,
+    find_visible,
+)
 
 NOTHING = np.zeros((0, WIDTH))
 
@@ -20,12 +27,12 @@ def camera(name, eye, target, hfov_deg=60.0):
 def test_pieces_lie_all_over_the_free_floor_and_each_has_the_cameras_that_see_it(scene):
     made_scene = build(name=scene)
     found, grounds = coverage(made_scene), made_scene.grounds
-    assert not within(found.floor_world, grounds.blocked).any()
+    assert not is_within(found.floor_world, grounds.blocked).any()
     (x0, x1), (y0, y1) = grounds.walkable_x_m, grounds.walkable_y_m
     rng = np.random.default_rng(1)
     free = np.stack([rng.uniform(x0, x1, 500), rng.uniform(y0, y1, 500), np.zeros(500)], 1)
     away_m = np.linalg.norm(free[:, None] - found.floor_world, axis=-1).min(1)
-    outside = within(free, grounds.blocked)
+    outside = is_within(free, grounds.blocked)
     outside |= np.linalg.norm(free[:, :2] - grounds.robot_xy_m, axis=1) < grounds.robot_clearance_m
     assert away_m[~outside].max() < 2.5 * PIECE_M
     for k in rng.integers(len(found.group), size=20):
@@ -33,7 +40,7 @@ def test_pieces_lie_all_over_the_free_floor_and_each_has_the_cameras_that_see_it
         for height_m in (0.2, 0.6, 1.0, 1.4, 1.8):
             aside = [(0.0, 0.0), (0.2, 0.0), (-0.2, 0.0), (0.0, 0.2), (0.0, -0.2)]
             points = found.floor_world[k] + [(*each, height_m) for each in aside]
-            finds += sees(made_scene.cameras, made_scene.obstacles, points).any(1)
+            finds += find_visible(made_scene.cameras, made_scene.obstacles, points).any(1)
         np.testing.assert_array_equal(found.cameras[found.group[k]], finds >= LEAST_SEEN)
     several = found.cameras.sum(1)[found.group] >= 2
     assert several.mean() > (0.99 if scene == "site" else 0.999)

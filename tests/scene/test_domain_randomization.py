@@ -16,8 +16,8 @@ from hrc_env.scene.domain_randomization import (
     VARIED,
     AppearanceConfig,
     draw_look,
+    hide_hats,
     randomize,
-    take_off_hats,
 )
 from hrc_env.scene.render import CropRenderer
 from hrc_env.vector.env import HRCVectorEnv
@@ -120,15 +120,15 @@ def test_a_look_is_drawn_as_by_a_renderer_that_never_had_another(name):
 
 
 def test_hats_come_off_and_lamps_stay_above():
-    from hrc_env.scene.build import drawing_model, visuals
+    from hrc_env.scene.build import drawing_model, find_visuals
 
     scene = build(None, "lab", 1)
-    built, seen = drawing_model(scene), visuals(scene)
+    built, seen = drawing_model(scene), find_visuals(scene)
     model = copy.copy(built)
     look = draw_look(VARIED, 1, stream())._replace(has_hat=np.zeros(1), tilt_rad=1.0)
     worn = model.geom_group.copy()
     randomize(model, built, seen, look)
-    take_off_hats(model, seen, look)
+    hide_hats(model, seen, look)
     assert (model.light_dir[:, 2] < -0.3).all()
     assert (model.geom_group != worn).sum() <= len(seen.hats)
     assert (model.mat_rgba != built.mat_rgba).any()

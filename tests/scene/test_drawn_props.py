@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hrc_env.core.records import Held
-from hrc_env.scene.build import build, drawing_model, visuals
+from hrc_env.scene.build import build, drawing_model, find_visuals
 from hrc_env.scene.primitives import DECORATION
 from hrc_env.scene.worker_visuals import PARKED_M, show_props
 from hrc_env.worker.props import BOUNDS_M, PROP_NAMES
@@ -24,7 +24,7 @@ def drawn():
 
 def drawn_rows():
     """(n,) mocap rows of all things."""
-    rows = visuals(SCENE).props
+    rows = find_visuals(SCENE).props
     return np.sort(rows[rows >= 0])
 
 
@@ -38,13 +38,13 @@ def test_what_is_not_held_is_under_the_floor(drawn):
     rows = drawn_rows()
     np.testing.assert_allclose(data.mocap_pos[rows], [PARKED_M] * rows.size)
     nothing = Held(np.zeros(2, int), np.ones((2, 3)), np.ones((2, 4)))
-    show_props(model, data, visuals(SCENE).props, nothing)
+    show_props(model, data, find_visuals(SCENE).props, nothing)
     assert (data.mocap_pos[rows][:, 2] < -10).all()
 
 
 def test_what_is_held_is_where_the_record_says_and_is_put_away_after(drawn):
     model, data = drawn
-    rows, quaternion = visuals(SCENE).props, np.array([[1.0, 0, 0, 0], [0, 0, 0, 1.0]])
+    rows, quaternion = find_visuals(SCENE).props, np.array([[1.0, 0, 0, 0], [0, 0, 0, 1.0]])
     kinds = np.array([PROP_NAMES.index("saw"), PROP_NAMES.index("box")])
     show_props(model, data, rows, Held(kinds, np.array([[1.0, 2, 3], [4, 5, 6]]), quaternion))
     assert (data.mocap_pos[drawn_rows()][:, 2] > 0).sum() == 2
@@ -62,7 +62,7 @@ def test_all_that_lies_about_is_drawn_beside_what_everybody_holds(drawn):
     model, data = drawn
     box, places = PROP_NAMES.index("box"), np.arange(12.0).reshape(4, 3)
     boxes = Held(np.full(4, box), places, np.tile([1.0, 0, 0, 0], (4, 1)))
-    show_props(model, data, visuals(SCENE).props, boxes)
+    show_props(model, data, find_visuals(SCENE).props, boxes)
     shown = data.mocap_pos[drawn_rows()]
     np.testing.assert_array_equal(shown[shown[:, 2] > 0], places)
 

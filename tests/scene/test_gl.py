@@ -101,7 +101,7 @@ def test_tritons_library_is_there_before_the_first_context(monkeypatch, tmp_path
 def test_pictures_need_no_display(process):
     """A dead display is everyday in ssh."""
     done = process("-c", STATUS, MUJOCO_GL=None, DISPLAY=":99")
-    assert "True, 'OpenGL works (MUJOCO_GL=egl" in done.stdout, done.stderr
+    assert "True, message='OpenGL works (MUJOCO_GL=egl" in done.stdout, done.stderr
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import pytest
 
 from hrc_env.motion.generator import OPEN_FLOOR
 from hrc_env.scene.build import SceneConfig, build
-from hrc_env.scene.places import SCENES, footprints
+from hrc_env.scene.places import SCENES, find_footprints
 from hrc_env.world import WORKPLACE_KINDS
 
 BODY_M = 0.2
@@ -57,6 +57,6 @@ def test_without_clutter_nothing_blocks_the_way():
 def test_a_footprint_is_where_its_box_stands():
     scene = build()
     cart = scene.model.geom("tool_cart").id
-    near = footprints(scene.obstacles, scene.grounds.robot_xy_m)
+    near = find_footprints(scene.obstacles, scene.grounds.robot_xy_m)
     row = near[np.argmin(np.hypot(*(near[:, :2] - scene.model.geom_pos[cart, :2]).T))]
     np.testing.assert_allclose(row, [-2.42, -2.02, 0.33, 0.22, 0.12], atol=1e-9)

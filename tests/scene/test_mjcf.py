@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from hrc_env.scene.build import SceneConfig, build, drawing_model, visuals
+from hrc_env.scene.build import SceneConfig, build, drawing_model, find_visuals
 from hrc_env.scene.places import SCENES
 from hrc_env.scene.primitives import SOLID
 from hrc_env.scene.robot import BUILT_IN
@@ -51,7 +51,7 @@ def test_every_camera_of_the_site_is_at_a_mast():
 
 
 def test_every_thing_that_can_be_held_is_drawn():
-    assert (visuals(build(n_workers=1)).props[0] >= 0).all()
+    assert (find_visuals(build(n_workers=1)).props[0] >= 0).all()
 
 
 @pytest.mark.parametrize(

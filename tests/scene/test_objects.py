@@ -10,9 +10,9 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import HandState
 from hrc_env.geometry.chains import robot_path, tool_frame
 from hrc_env.scene.build import HARD, SceneConfig, build
-from hrc_env.scene.cups import seals
-from hrc_env.scene.objects import box_capsules, held_by, surfaces, with_load
-from hrc_env.scene.physics import Physics, no_workers
+from hrc_env.scene.cups import find_sealed
+from hrc_env.scene.objects import attach_objects, find_held, fit_capsules, place_parts
+from hrc_env.scene.physics import Physics, make_empty_path
 from hrc_env.scene.places import SCENES
 from hrc_env.world import FOOT_WORLD, Effects, TaskScene, Weld
 
@@ -35,7 +35,7 @@ def test_capsules_stand_for_a_box_to_a_centimetre():
     rng = np.random.default_rng(0)
     for half in ((0.019, 0.15, 0.0445), (0.3, 0.6, 0.00625), (0.02, 0.02, 0.2)):
         half = np.array(half)
-        rods = box_capsules(np.zeros(3), half)
+        rods = fit_capsules(np.zeros(3), half)
         # Points at arm's length of a limb round the box: a limb is no thinner than 4 cm.
         points = rng.uniform(-1, 1, (4000, 3)) * (half + 0.06)
         out = np.maximum(np.abs(points) - half, 0.0)
@@ -56,10 +56,10 @@ def test_what_lies_rests_and_hides():
     place = scene()
     physics = Physics(place, 2)
     for _ in range(25):
-        physics.step(np.zeros((2, 6)), no_workers(2, T))
+        physics.step(np.zeros((2, 6)), make_empty_path(2, T))
     at = place.objects.poses(physics.qpos)[:, 0]
     np.testing.assert_allclose(at[:, :3], np.array([[-0.05, 0.0, 0.80]] * 2), atol=1e-3)
-    assert surfaces(place.objects, physics.qpos).shape[:2] == (2, 1)
+    assert place_parts(place.objects, physics.qpos).shape[:2] == (2, 1)
     still = place.surroundings(physics.qpos)
     assert still.moving.shape[1] == 1
 
@@ -71,7 +71,7 @@ def test_fingers_hold_what_is_between_them(inside):
     point = np.array([[-0.05, 0.02, 0.80 if inside else 0.90]])
     for closed in (True, False):
         hand = HandState(np.array([0.02]), np.array([200.0]), np.array([closed]))
-        assert held_by(place.objects, qpos, point, hand)[0, 0] == (inside and closed)
+        assert find_held(place.objects, qpos, point, hand)[0, 0] == (inside and closed)
 
 
 def test_what_is_carried_is_part_of_the_robot():
@@ -80,7 +80,7 @@ def test_what_is_carried_is_part_of_the_robot():
     path = physics.qpos[:, None]
     robot, arm = robot_path(place.chain, path[..., :6], physics.qd)
     for held, near in ((True, True), (False, False)):
-        loaded, along = with_load(robot, arm, place.objects, path, np.array([[held]]))
+        loaded, along = attach_objects(robot, arm, place.objects, path, np.array([[held]]))
         n = along.shape[2] - arm.shape[2]
         assert n == place.objects.capsule_radius_m.size
         assert (np.abs(loaded.capsules_world[0, -n:]) < 2.0).all() == near
@@ -105,7 +105,7 @@ def test_what_is_light_is_not_pressed_into_what_it_lies_on():
     for push_n in (0.0, -300.0):
         physics.apply(Effects({}, np.array([[[0.0, 0.0, push_n, 0.0, 0.0, 0.0]]])))
         for _ in range(15):
-            physics.step(np.zeros((1, 6)), no_workers(1, T))
+            physics.step(np.zeros((1, 6)), make_empty_path(1, T))
         sunk_m = FOOT_WORLD[2] + 0.05 - place.objects.poses(physics.qpos)[0, 0, 2]
         assert sunk_m < 1e-3
 
@@ -135,7 +135,7 @@ def test_cups_seal_only_where_they_sit():
         at[0, :3, 3] = 0.0, 0.0, 0.05 + off_m
         c, s = np.cos(turn), np.sin(turn)
         at[0, :3, :3] = at[0, :3, :3] @ [[1, 0, 0], [0, c, -s], [0, s, c]]
-        assert seals(place.cups, at, poses)[0, 0] == holds
+        assert find_sealed(place.cups, at, poses)[0, 0] == holds
 
 
 def test_cups_let_go_of_what_is_vented_and_of_what_is_too_heavy():
@@ -144,7 +144,7 @@ def test_cups_let_go_of_what_is_vented_and_of_what_is_too_heavy():
         for _ in range(12):
             physics._push[:, place.object_bodies, 2] = push_n
             physics.step(
-                np.zeros((1, 6)), no_workers(1, T), grip=np.array([-1.0 if vents else 1.0])
+                np.zeros((1, 6)), make_empty_path(1, T), grip=np.array([-1.0 if vents else 1.0])
             )
         hand = physics.hand_state(np.array([0]))
         assert hand.closed_on[0] == holds
@@ -172,7 +172,7 @@ def test_a_batch_of_objects_is_so_many_single_ones():
     def run(rows):
         physics = Physics(place, len(rows))
         for command, grip in zip(commands, grips, strict=True):
-            physics.step(command[rows], no_workers(len(rows), T), grip=grip[rows])
+            physics.step(command[rows], make_empty_path(len(rows), T), grip=grip[rows])
         return physics.qpos
 
     whole = run([0, 1, 2])
@@ -182,7 +182,7 @@ def test_a_batch_of_objects_is_so_many_single_ones():
 
 def test_states_with_objects_come_back():
     physics = Physics(scene(), 1)
-    still, close = no_workers(1, T), np.array([1.0])
+    still, close = make_empty_path(1, T), np.array([1.0])
     physics.step(np.full((1, 6), 0.2), still, grip=close)
     kept = physics.get_state()
     ahead = [physics.step(np.full((1, 6), 0.3), still, grip=close) for _ in range(3)]

@@ -9,7 +9,7 @@ from hrc_env.geometry.chains import capsules
 from hrc_env.geometry.shapes import WIDTH
 from hrc_env.geometry.sight import NEAR_POINT_M, Surroundings, find_hidden
 from hrc_env.scene.build import SceneConfig, build
-from hrc_env.scene.places import obstacles
+from hrc_env.scene.places import find_obstacles
 from hrc_env.scene.primitives import ROBOT_CAPSULES, SOLID
 
 TIE_M = 1e-9
@@ -63,7 +63,7 @@ def test_every_kind_of_geom_hides_as_for_mujoco(kind):
     )
     data, rng = mujoco.MjData(model), np.random.default_rng(6)
     mujoco.mj_kinematics(model, data)
-    alone = Surroundings(obstacles(model), *EMPTY)
+    alone = Surroundings(find_obstacles(model), *EMPTY)
     eyes, points = rng.uniform(-1, 1, (40, 3)), rng.uniform(-1, 1, (60, 3))
     assert assert_same(alone, model, data, eyes, points) > 0.03
 
@@ -73,7 +73,7 @@ def test_what_cannot_be_asked_is_refused():
         '<mujoco><worldbody><geom name="egg" type="ellipsoid" size="1 2 3"/></worldbody></mujoco>'
     )
     with pytest.raises(HRCError, match="'egg' cannot block sight"):
-        obstacles(model)
+        find_obstacles(model)
 
 
 def test_a_point_behind_the_pedestal_is_hidden_and_one_beside_it_is_not():

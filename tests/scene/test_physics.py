@@ -9,7 +9,7 @@ from assets.workers.poses import rest_motion
 from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.core.records import WorkerPath
 from hrc_env.scene.build import build
-from hrc_env.scene.physics import Physics, no_workers
+from hrc_env.scene.physics import Physics, make_empty_path
 from hrc_env.worker.body import load_body
 
 LAB = build()
@@ -29,14 +29,14 @@ def commands(batch: int, n_steps: int = 12) -> np.ndarray:
 
 
 def run(physics: Physics, sequence: np.ndarray) -> np.ndarray:
-    still = no_workers(physics.batch, T)
+    still = make_empty_path(physics.batch, T)
     return np.stack([physics.step(command, still) for command in sequence])
 
 
 def test_the_arm_moves_as_fast_as_it_is_told():
     physics = Physics(LAB, 1)
     for _ in range(15):
-        physics.step(np.full((1, 6), 0.4), no_workers(1, T))
+        physics.step(np.full((1, 6), 0.4), make_empty_path(1, T))
     np.testing.assert_allclose(physics.qd, 0.4, atol=5e-3)
 
 
@@ -48,14 +48,14 @@ def test_no_command_means_no_motion():
 
 def test_the_trace_ends_where_the_arm_is():
     physics = Physics(LAB, 3)
-    trace = physics.step(commands(3)[0], no_workers(3, T))
+    trace = physics.step(commands(3)[0], make_empty_path(3, T))
     assert trace.shape == (3, T, 6)
     np.testing.assert_array_equal(trace[:, -1], physics.q)
 
 
 def test_a_sudden_command_is_slewed():
     physics = Physics(LAB, 1)
-    physics.step(np.full((1, 6), 2.0), no_workers(1, T))
+    physics.step(np.full((1, 6), 2.0), make_empty_path(1, T))
     assert np.abs(physics.qd).max() < 1.15 * LAB.config.slew_rad_s2 * DT
 
 
@@ -65,14 +65,14 @@ def test_the_arm_stops_before_the_end_of_a_joint():
     near[5] = LAB.chain.range_rad[5, 1] - 0.5
     physics.reset(np.array([0]), near[None])
     for _ in range(40):
-        physics.step(np.array([[0, 0, 0, 0, 0, 3.0]]), no_workers(1, T))
+        physics.step(np.array([[0, 0, 0, 0, 0, 3.0]]), make_empty_path(1, T))
     assert LAB.chain.range_rad[5, 1] - 0.05 < physics.q[0, 5] < LAB.chain.range_rad[5, 1]
     assert abs(physics.qd[0, 5]) < 1e-3
 
 
 def test_commands_that_are_not_numbers_count_as_zero():
     physics = Physics(LAB, 1)
-    physics.step(np.full((1, 6), np.nan), no_workers(1, T))
+    physics.step(np.full((1, 6), np.nan), make_empty_path(1, T))
     np.testing.assert_allclose(physics.q[0], LAB.home_q, atol=1e-6)
 
 
@@ -145,7 +145,7 @@ def test_a_broken_simulation_is_named():
     state[1] = 1e12
     physics.set_state(state)
     with pytest.raises(HRCError, match="environment 1 broke down"):
-        physics.step(np.zeros((3, 6)), no_workers(3, 5))
+        physics.step(np.zeros((3, 6)), make_empty_path(3, 5))
 
 
 def test_an_arm_out_of_reach_moves_as_it_would_alone():
@@ -169,10 +169,10 @@ SITE = build(name="site", robot="mobile_base")
 
 def test_a_base_drives_as_it_is_told_and_no_harder_than_its_slew():
     physics = Physics(SITE, 1)
-    physics.step(np.array([[1.0, -0.5, 0.8]]), no_workers(1, T))
+    physics.step(np.array([[1.0, -0.5, 0.8]]), make_empty_path(1, T))
     assert np.abs(physics.qd[0, :2]).max() < 1.2 * 1.5 * DT
     for _ in range(40):
-        physics.step(np.array([[1.0, -0.5, 0.8]]), no_workers(1, T))
+        physics.step(np.array([[1.0, -0.5, 0.8]]), make_empty_path(1, T))
     np.testing.assert_allclose(physics.qd, [[1.0, -0.5, 0.8]], atol=5e-3)
 
 
@@ -181,7 +181,7 @@ def test_a_base_stops_before_the_end_of_its_slides():
     end_m = SITE.chain.range_rad[1, 1]
     physics.reset(np.array([0]), np.array([[-1.0, end_m - 1.5, 0.0]]))
     for _ in range(80):
-        physics.step(np.array([[0.0, 1.5, 0.0]]), no_workers(1, T))
+        physics.step(np.array([[0.0, 1.5, 0.0]]), make_empty_path(1, T))
     assert end_m - 0.1 < physics.q[0, 1] < end_m
     assert abs(physics.qd[0, 1]) < 1e-2
 
@@ -189,6 +189,6 @@ def test_a_base_stops_before_the_end_of_its_slides():
 def test_a_wall_stops_a_base():
     physics = Physics(SITE, 1)
     for _ in range(100):  # to the north, where the stack of boards is
-        physics.step(np.array([[-0.35, 1.5, 0.0]]), no_workers(1, T))
+        physics.step(np.array([[-0.35, 1.5, 0.0]]), make_empty_path(1, T))
     assert physics.q[0, 1] < 1.6
     assert np.isfinite(physics.qpos).all()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.scene.robot import ROBOTS, Hand, Robot, Suction, chain_of, check_robot, robot_called
+from hrc_env.scene.robot import ROBOTS, Hand, Robot, Suction, check_robot, find_robot, make_chain
 
 WEIGHT = '<inertial pos="0 0 .1" mass="1" diaginertia=".01 .01 .01"/>'
 RODS = {name: f'<geom name="{name}" type="capsule" size=".03" fromto="0 0 0 0 0 .2"/>'
@@ -183,20 +183,20 @@ def test_a_record_that_fits_no_robot_is_refused(fields, said):
 @pytest.mark.parametrize("robot", [3, None, ("ur10e_like",), "ur10e_lik"])
 def test_what_is_neither_a_name_nor_a_robot_is_none(robot):
     with pytest.raises(ConfigError, match="robot"):
-        robot_called(robot)
+        find_robot(robot)
 
 
 def test_a_robot_is_called_by_its_name_or_itself():
-    assert robot_called(ARM) == ARM
-    assert robot_called(asdict(ARM)) == ARM
-    assert robot_called("ur10e_like") is ROBOTS["ur10e_like"]
+    assert find_robot(ARM) == ARM
+    assert find_robot(asdict(ARM)) == ARM
+    assert find_robot("ur10e_like") is ROBOTS["ur10e_like"]
 
 
 def test_what_is_refused_is_told_with_the_robots_name():
     """What the MJCF's reader says counts as well."""
     for robot in (replace(ARM, tool_site="top"), replace(ARM, mjcf="<mujoco><")):
         with pytest.raises(ConfigError, match=r"^arm: "):
-            chain_of(robot, (0.0, 0.0, 0.0))
+            make_chain(robot, (0.0, 0.0, 0.0))
 
 
 def test_what_is_refused_compiles():

@@ -10,9 +10,9 @@ from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.geometry.camera_config import CameraConfig
 from hrc_env.scene.build import build
 from hrc_env.scene.domain_randomization import MOST_LITTER, AppearanceConfig
-from hrc_env.scene.objects import objects_of
-from hrc_env.scene.physics import Physics, no_workers
-from hrc_env.scene.places import obstacles
+from hrc_env.scene.objects import find_objects
+from hrc_env.scene.physics import Physics, make_empty_path
+from hrc_env.scene.places import find_obstacles
 from hrc_env.scene.primitives import DECORATION, SOLID
 from hrc_env.scene.rig import select
 
@@ -74,7 +74,7 @@ def body_of(*geoms: str) -> mujoco.MjSpec:
      (BOX.replace("/>", ' pos="0 0 4e-7"/>'),)],
 )  # fmt: skip
 def test_an_object_of_boxes_round_its_origin_is_taken(geoms):
-    assert objects_of(body_of(*geoms), 0).names == ("it",)
+    assert find_objects(body_of(*geoms), 0).names == ("it",)
 
 
 @pytest.mark.parametrize(
@@ -94,7 +94,7 @@ def test_an_object_of_boxes_round_its_origin_is_taken(geoms):
 def test_an_object_in_which_one_thing_is_wrong_is_refused(geoms, said):
     geoms = geoms or ('<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>',)
     with pytest.raises(ConfigError, match=rf"'it' {said}"):
-        objects_of(body_of(*geoms), 0)
+        find_objects(body_of(*geoms), 0)
 
 
 def standing(kind: str, parent: str = '<body name="foot">', group: int = SOLID) -> mujoco.MjModel:
@@ -110,8 +110,8 @@ MOVING = '<body name="foot"><joint type="slide" axis="1 0 0"/>'
 
 @pytest.mark.parametrize("kind", ["box", "sphere", "capsule", "cylinder"])
 def test_what_stands_still_blocks_sight(kind):
-    assert len(obstacles(standing(kind))) == 1
-    assert len(obstacles(standing(kind, MOVING, DECORATION))) == 0
+    assert len(find_obstacles(standing(kind))) == 1
+    assert len(find_obstacles(standing(kind, MOVING, DECORATION))) == 0
 
 
 @pytest.mark.parametrize(
@@ -119,7 +119,7 @@ def test_what_stands_still_blocks_sight(kind):
 )
 def test_what_moves_or_is_of_another_kind_does_not_block_sight(kind, parent):
     with pytest.raises(HRCError, match="'it' cannot block sight"):
-        obstacles(standing(kind, parent))
+        find_obstacles(standing(kind, parent))
 
 
 SHARES = ("warmth", "plain", "tint", "clothing", "skin", "hat")
@@ -160,4 +160,4 @@ def test_physics_that_break_down_are_told_of_beside_workers_and_without(alone):
     physics.set_state(state)
     away = np.full(2, alone)
     with pytest.raises(HRCError, match="physics of environment 1 broke down"):
-        physics.step(np.zeros((2, 6)), no_workers(2, 5), out_of_reach=away)
+        physics.step(np.zeros((2, 6)), make_empty_path(2, 5), out_of_reach=away)

@@ -9,11 +9,11 @@ import pytest
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCEnv
-from hrc_env.scene.capsule_fit import fit_rods, outside_m, surface_of_rod
-from hrc_env.scene.robot import ROBOTS, robot_called
-from hrc_env.scene.robot_chain import parsed
+from hrc_env.scene.capsule_fit import fit_rods, outside_m, sample_rod
+from hrc_env.scene.robot import ROBOTS, find_robot
+from hrc_env.scene.robot_chain import parse_mjcf
 from hrc_env.scene.robot_import import robot_from_mjcf
-from hrc_env.scene.robot_looks import bare_capsules, compare_looks, warn_of_looks
+from hrc_env.scene.robot_looks import bare_capsules, compare_looks, warn_of_mismatch
 
 SERVOED = """
 <mujoco model="servoed">
@@ -130,7 +130,7 @@ def test_a_robot_given_directly_is_checked_as_a_registered_one_is():
         ({"mjcf": "<mujoco"}, "cannot be used"),
     ):
         with pytest.raises(ConfigError, match=said):
-            robot_called({**{"name": "mine"}, **_fields(arm), **changes})
+            find_robot({**{"name": "mine"}, **_fields(arm), **changes})
 
 
 def _fields(robot):
@@ -146,18 +146,18 @@ def test_rods_hold_the_points_they_are_fitted_to():
         rods = fit_rods(points)
         assert np.min([outside_m(points, rod) for rod in rods], axis=0).max() < 0.02
         for rod in rods:
-            np.testing.assert_allclose(outside_m(surface_of_rod(rod), rod), 0.0, atol=1e-9)
+            np.testing.assert_allclose(outside_m(sample_rod(rod), rod), 0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("sticks_out", [False, True])
 def test_looks_that_no_capsule_holds_are_told(servoed, sticks_out):
-    spec = parsed(servoed)
+    spec = parse_mjcf(servoed)
     if sticks_out:
         spec.body("jib").add_geom(
             type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.05, 0, 0], pos=[0.2, 0, 0.2], mass=0.0
         )
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
-        warn_of_looks(replace(servoed, mjcf=spec.to_xml()))
+        warn_of_mismatch(replace(servoed, mjcf=spec.to_xml()))
     assert bool(told) == sticks_out
     assert all("out of all capsules" in str(each.message) for each in told)

@@ -8,7 +8,7 @@ from hrc_env.geometry.chains import capsules
 from hrc_env.scene.build import SceneConfig, build, drawing_model
 from hrc_env.scene.places import SCENES
 from hrc_env.scene.rig import CameraConfig
-from hrc_env.scene.robot_chain import reach_m
+from hrc_env.scene.robot_chain import capsule_reach_m
 
 SITE = build(name="site")
 EYES = np.stack([camera.eye_world for camera in SITE.cameras])
@@ -31,7 +31,7 @@ def test_the_arm_never_reaches_beyond_the_reach_that_its_pairs_allow_for():
     q = rng.uniform(low, high, (4000, 6))
     ends = capsules(chain, q) - chain.T_world_from_base[:3, 3]
     farthest = np.linalg.norm(ends, axis=-1).max((0, 2)) + chain.capsule_radius_m
-    assert (farthest <= reach_m(chain) + 1e-9).all()
+    assert (farthest <= capsule_reach_m(chain) + 1e-9).all()
 
 
 @pytest.mark.parametrize("scene", SCENES)

@@ -15,12 +15,12 @@ from hrc_env.geometry.ways import find_overlaps, gaps_m, ranges_m, value_at, way
 from hrc_env.motion import generator
 from hrc_env.motion.anatomy import CHEST
 from hrc_env.scene.build import build
-from hrc_env.scene.robot import ROBOTS, chain_of
+from hrc_env.scene.robot import ROBOTS, make_chain
 from hrc_env.tasks import delivery
 from hrc_env.world import World
 
 ID = "HRCDelivery-v0"
-BASE = chain_of(ROBOTS["mobile_base"], (0.0, 0.0, 0.0))
+BASE = make_chain(ROBOTS["mobile_base"], (0.0, 0.0, 0.0))
 SITE = build(name="site", robot="mobile_base")
 TASK = delivery.Delivery()
 CONFIG = TASK.config

@@ -8,7 +8,7 @@ from hrc_env.agents.experts import PickPlacer
 from hrc_env.core.records import ObjectState
 from hrc_env.env import HRCEnv
 from hrc_env.observations import split
-from hrc_env.tasks.pick_place import PickPlace, places_world
+from hrc_env.tasks.pick_place import PLACES_WORLD, PickPlace
 from hrc_env.world import World
 
 TASK = PickPlace()
@@ -52,14 +52,14 @@ def test_pieces_that_are_pushed_to_and_fro_earn_nothing():
     rng, first, earned = np.random.default_rng(0), potential(state), np.zeros(8)
     before = state["poses"][..., :3].copy()
     for _ in range(300):
-        near = places_world() + rng.normal(0, 0.005, (8, 3, 3))
+        near = PLACES_WORLD + rng.normal(0, 0.005, (8, 3, 3))
         far = before + rng.normal(0, 0.3, (8, 3, 3))
         studs = np.where(rng.random((8, 3, 1)) < 0.5, near, far)
         tool = tool + rng.normal(0, 0.2, (8, 3))
         earned += worth(state, rngs, studs, tool, held=bool(rng.random() < 0.3))
         np.testing.assert_allclose(earned, potential(state) - first, atol=1e-9)
         assert (earned <= CONFIG.placed_bonus * 3 - first + 1e-9).all()
-    there, back = np.tile(places_world(), (8, 1, 1)), before
+    there, back = np.tile(PLACES_WORLD, (8, 1, 1)), before
     cycles = []
     for _ in range(10):
         once = worth(state, rngs, there, tool)

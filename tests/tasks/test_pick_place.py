@@ -27,13 +27,13 @@ def make(**kwargs):
 def placed_pieces():
     """(1, 3) pieces that rest in their places."""
     at, turn = np.zeros((1, 3, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (1, 3, 1))
-    at[:] = pick_place.places_world()
+    at[:] = pick_place.PLACES_WORLD
     return ObjectState(at, turn, np.zeros((1, 3, 3)), np.zeros((1, 3, 3)), np.zeros((1, 3), bool))
 
 
 def test_a_piece_counts_when_it_rests_in_its_place_and_is_let_go():
     config = PickPlaceConfig()
-    assert pick_place.in_place(placed_pieces(), config).all()
+    assert pick_place.is_in_place(placed_pieces(), config).all()
     half = np.radians(4.0) / 2
     for change, counts in (
         (
@@ -57,7 +57,7 @@ def test_a_piece_counts_when_it_rests_in_its_place_and_is_let_go():
     ):
         pieces = placed_pieces()
         change(pieces)
-        assert pick_place.in_place(pieces, config)[0].tolist() == [True, bool(counts), True]
+        assert pick_place.is_in_place(pieces, config)[0].tolist() == [True, bool(counts), True]
 
 
 def test_pieces_rest_on_the_table_and_are_laid_out_by_the_seed():

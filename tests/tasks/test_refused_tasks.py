@@ -16,10 +16,10 @@ from hrc_env.tasks import delivery
 from hrc_env.tasks.check import REQUIRED, check_task
 from hrc_env.tasks.delivery import Delivery, DeliveryConfig
 from hrc_env.tasks.drywall import DrywallConfig
-from hrc_env.tasks.goal import judged
+from hrc_env.tasks.goal import compute_reward
 from hrc_env.tasks.pick_place_goal import PickPlaceGoalConfig
 from hrc_env.tasks.reach import ReachConfig
-from hrc_env.tasks.task import TASKS, Task, TaskType, find_task, goal_of
+from hrc_env.tasks.task import TASKS, Task, TaskType, find_task, require_goal
 from tests.tasks.variants import vary
 
 REACH, WITH_GOAL = find_task("HRCReach-v0"), find_task("HRCReachGoal-v0")
@@ -161,9 +161,9 @@ def test_a_task_that_there_is_not_is_refused(name):
 
 
 def test_goals_are_those_of_tasks_that_have_some():
-    assert goal_of(WITH_GOAL()) is WITH_GOAL.goal
+    assert require_goal(WITH_GOAL()) is WITH_GOAL.goal
     with pytest.raises(NoGoalError, match="HRCReach-v0 has no goals"):
-        goal_of(REACH())
+        require_goal(REACH())
 
 
 @pytest.mark.parametrize(
@@ -181,12 +181,14 @@ def test_goals_are_those_of_tasks_that_have_some():
 )
 def test_goals_that_cannot_be_compared_are_refused(achieved, desired):
     with pytest.raises(ConfigError, match=r"must (both have|have|be finite)"):
-        judged(WITH_GOAL.goal, achieved, desired, None, WITH_GOAL.config_type())
+        compute_reward(WITH_GOAL.goal, achieved, desired, None, WITH_GOAL.config_type())
 
 
 @pytest.mark.parametrize("shape", [(3,), (1, 3), (4, 3)])
 def test_goals_that_can_be_compared_are(shape):
-    value = judged(WITH_GOAL.goal, np.zeros(shape), np.zeros(shape), None, WITH_GOAL.config_type())
+    value = compute_reward(
+        WITH_GOAL.goal, np.zeros(shape), np.zeros(shape), None, WITH_GOAL.config_type()
+    )
     assert np.shape(value) == shape[:-1]
 
 

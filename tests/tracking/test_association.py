@@ -12,7 +12,7 @@ from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import make_estimator
-from hrc_env.tracking.oracle import prior
+from hrc_env.tracking.oracle import estimate_prior
 from hrc_env.tracking.people.association import AssociationConfig, associate
 
 PLACES = [(0.3, -1.2), (1.2, 0.9), (1.6, -0.6), (0.2, 0.7)]
@@ -59,7 +59,7 @@ def known(people, std_m=0.05):
 
 def nobody(n_workers):
     """A belief (1, W, ...) of people whom nobody has seen."""
-    return prior(1, n_workers, TrackerConfig())
+    return estimate_prior(1, n_workers, TrackerConfig())
 
 
 def blank(keypoints, cameras):
@@ -214,7 +214,7 @@ def test_an_environment_does_not_depend_on_its_neighbours():
         first = np.stack([e.mean_world[0] for e in alone])
         if b == 0:  # the estimator's own noise is environment 0's
             np.testing.assert_array_equal(first, together[:, 0])
-    belief = prior(8, 2, TrackerConfig())
+    belief = estimate_prior(8, 2, TrackerConfig())
     whole = associate(LAB, frame(seen, 3), belief).pose
     for b in range(8):
         part = frame(Keypoints(*(getattr(seen, n)[:, [b]] for n in ("px", "confidence",

@@ -11,8 +11,8 @@ from hrc_env.core.skeleton import MIRROR, N_JOINTS
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.tracking.config import TrackerConfig
 from hrc_env.tracking.estimators import ESTIMATORS, make_estimator
-from hrc_env.tracking.forecast import forecast, mixed
-from hrc_env.tracking.oracle import prior
+from hrc_env.tracking.forecast import forecast, mix_hypotheses
+from hrc_env.tracking.oracle import estimate_prior
 from hrc_env.tracking.tree.state import STANDING_M
 
 CONFIG = TrackerConfig()
@@ -80,7 +80,7 @@ def test_horizons_between_the_networks_own_have_no_jumps():
 
 
 def test_who_is_nobody_relaxes_to_the_prior_and_the_prior_stays():
-    nobody = prior(1, 1, CONFIG)
+    nobody = estimate_prior(1, 1, CONFIG)
     later = forecast(nobody, 1.0, CONFIG)
     np.testing.assert_allclose(later.mean_world, nobody.mean_world)
     np.testing.assert_allclose(later.cov_world, nobody.cov_world)
@@ -172,17 +172,17 @@ def test_one_hypothesis_is_its_own_mixture_and_two_that_differ_spread():
         *(np.concatenate([getattr(one, f), getattr(two, f)], 1) for f in PoseEstimate.__slots__)
     )
     weights = np.log([[[0.75, 0.25]]])
-    alone = mixed(both, np.zeros((1, 1, 2)), np.array([[1]]))
+    alone = mix_hypotheses(both, np.zeros((1, 1, 2)), np.array([[1]]))
     np.testing.assert_array_equal(alone.mean_world, one.mean_world)
     np.testing.assert_array_equal(alone.cov_world, one.cov_world)
-    mixture = mixed(both, weights, np.array([[2]]))
+    mixture = mix_hypotheses(both, weights, np.array([[2]]))
     np.testing.assert_allclose(mixture.mean_world, one.mean_world + np.array([0.25, 0, 0]))
     expected = 0.02**2 + 0.75 * 0.25**2 + 0.25 * 0.75**2
     np.testing.assert_allclose(mixture.cov_world[..., 0, 0], expected)
 
 
 def test_where_no_workers_are_none_are_expected():
-    nobody = prior(2, 0, CONFIG)
+    nobody = estimate_prior(2, 0, CONFIG)
     assert forecast(nobody, 0.5, CONFIG).mean_world.shape == (2, 0, N_JOINTS, 3)
-    later = mixed(nobody, np.zeros((2, 0, 1)), np.ones((2, 0), np.int64))
+    later = mix_hypotheses(nobody, np.zeros((2, 0, 1)), np.ones((2, 0), np.int64))
     assert later.cov_world.shape == (2, 0, N_JOINTS, 3, 3)

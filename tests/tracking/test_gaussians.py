@@ -8,7 +8,7 @@ from hrc_env.core.skeleton import MIRROR
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.tracking.tracks import least_eigenvalue
 from hrc_env.tracking.tree.gaussian import PARENT
-from hrc_env.tracking.tree.predict import SPEED_M_S, SPREAD_M, damped_joints
+from hrc_env.tracking.tree.predict import SPEED_M_S, SPREAD_M, discretise_joints
 
 gaussian = pytest.mark.parametrize("name", ["kalman", "particle"])
 
@@ -99,7 +99,7 @@ def test_bone_lengths_are_learnt_from_population_values():
 
 
 def test_the_motion_model_keeps_its_stationary_spread():
-    F, Q = damped_joints(DT, 0.5, 1e-12)
+    F, Q = discretise_joints(DT, 0.5, 1e-12)
     stationary = np.zeros_like(F)
     stationary[:, 0, 0], stationary[:, 1, 1] = SPREAD_M**2, SPEED_M_S**2
     np.testing.assert_allclose(F @ stationary @ F.swapaxes(1, 2) + Q, stationary, atol=1e-9)
@@ -107,8 +107,8 @@ def test_the_motion_model_keeps_its_stationary_spread():
 
 
 def test_two_half_steps_of_the_motion_model_are_one_step():
-    F, Q = damped_joints(DT, 0.5, 1e-12)
-    half, noise = damped_joints(DT / 2, 0.5, 1e-12)
+    F, Q = discretise_joints(DT, 0.5, 1e-12)
+    half, noise = discretise_joints(DT / 2, 0.5, 1e-12)
     np.testing.assert_allclose(half @ half, F, atol=1e-12)
     np.testing.assert_allclose(half @ noise @ half.swapaxes(1, 2) + noise, Q, atol=1e-12)
 

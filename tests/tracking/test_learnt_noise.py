@@ -127,7 +127,7 @@ def test_nothing_that_a_camera_shows_makes_it_leave_its_bounds():
     px[90:100, :, 2] *= 1e6
     px[100:110] = 0.0
     state, means, _ = follow(px)
-    for part in (state.noise["factor"], state.noise["sums"], state.noise["last"], means):
+    for part in (state.noise["factor"], state.noise["sums"], state.noise["last_residual"], means):
         assert np.isfinite(part).all()
     assert (state.noise["factor"] >= 1.0).all()
     assert (state.noise["factor"] <= 6.0).all()

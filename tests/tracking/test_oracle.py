@@ -4,7 +4,7 @@ import numpy as np
 
 from hrc_env.core.records import WorkerTruth
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.oracle import estimate_from_truth, prior
+from hrc_env.tracking.oracle import estimate_from_truth, estimate_prior
 
 
 def test_the_truth_becomes_a_sure_and_present_belief():
@@ -24,7 +24,7 @@ def test_the_truth_becomes_a_sure_and_present_belief():
 
 def test_the_prior_covers_the_working_area_and_claims_no_track():
     config = TrackerConfig(prior_mean_world=(1.0, 0.5, 0.9), prior_std_m=2.0, max_age_s=7.0)
-    belief = prior(2, 1, config)
+    belief = estimate_prior(2, 1, config)
     assert belief.mean_world.shape == (2, 1, 15, 3)
     np.testing.assert_array_equal(belief.mean_world[1, 0, 14], [1.0, 0.5, 0.9])
     np.testing.assert_array_equal(belief.cov_world[1, 0, 14], 4.0 * np.eye(3))

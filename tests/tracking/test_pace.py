@@ -6,7 +6,7 @@ import pytest
 from benchmarks.tracking.rigs import DT_S, make_rig
 from benchmarks.tracking.sequences import make_sequences
 from hrc_env.tracking.estimators import make_estimator
-from hrc_env.tracking.tree.report import MOST_MOVING, forget_pace, update_pace, widening
+from hrc_env.tracking.tree.report import MOST_MOVING, find_pace_factor, forget_pace, update_pace
 from hrc_env.tracking.tree.state import PACE
 
 STANDS = np.zeros((15, 6))
@@ -25,7 +25,7 @@ def moved(turn_rad_s=0.0, tip_rad_s=0.0, speed_m_s=0.0, n=60):
         body[:, :3] = body[:, :3] @ np.transpose(about_y) @ np.transpose(about_z)
         body[:, 3] = speed_m_s
         update_pace(known, body, 0.04 if k else 0.0)
-    return widening(known)
+    return find_pace_factor(known)
 
 
 def test_people_who_stand_and_walk_and_turn_as_workers_do_are_reported_as_the_model_says():
@@ -66,12 +66,12 @@ def test_how_fast_a_body_moves_is_known_from_its_second_moment_on():
     known = np.zeros(1, PACE)[0]
     for dt_s in (0.04, 0.0):  # first seen, then seen again at the same time
         update_pace(known, STANDS, dt_s)
-        assert [known[name] for name in ("turns", "tips", "travels")] == [0.0] * 3
+        assert [known[name] for name in ("turn_rad_s", "tip_rad_s", "speed_m_s")] == [0.0] * 3
 
 
 def test_a_lost_track_begins_with_no_pace():
     known = np.zeros(1, PACE)[0]
     update_pace(known, STANDS, 0.0)
-    known["turns"] = 9.0
+    known["turn_rad_s"] = 9.0
     forget_pace(known)
-    assert widening(known) == 1.0
+    assert find_pace_factor(known) == 1.0

@@ -7,7 +7,7 @@ from simulated import DT, LAB, Damage, detections, generators, keypoints, track,
 from hrc_env.core.errors import ConfigError
 from hrc_env.tracking.config import PaperConfig
 from hrc_env.tracking.estimators import make_estimator
-from hrc_env.tracking.paper import place_of, roll
+from hrc_env.tracking.paper import find_place, roll
 
 SIGMA_PX, FOCAL_PX = 3.0, 100.0
 AFFINE = np.array(
@@ -121,9 +121,9 @@ def test_particles_begin_all_over_the_room_that_the_cameras_stand_round():
 
 def test_cameras_on_one_wall_leave_the_depth_of_the_place_to_the_prior():
     wall = make_estimator("paper", LAB[[0, 3]], DT, PaperConfig(prior_std_m=1.0))
-    np.testing.assert_allclose(place_of(wall.P, wall.config)[0], [-0.7, 3.3])
+    np.testing.assert_allclose(find_place(wall.P, wall.config)[0], [-0.7, 3.3])
     told = PaperConfig(place_m=((-1, 2), (-3, 4), (0, 1)))
-    np.testing.assert_array_equal(place_of(LAB, told), told.place_m)
+    np.testing.assert_array_equal(find_place(LAB, told), told.place_m)
 
 
 @pytest.mark.parametrize("place_m", [((0, 1), (0, 1)), ((0, 1), (0, 1), (2, 2)), (1, 2, 3)])

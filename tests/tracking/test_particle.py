@@ -8,16 +8,22 @@ from hrc_env.core.errors import ConfigError
 from hrc_env.tracking.config import ParticleConfig
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.tracking.tree.branching import (
-    heads_like,
-    lone_camera,
-    open_depth,
+    find_lone_camera,
+    find_other_turn,
+    has_same_heading,
+    measure_depth_std,
     reflect,
     turn_body,
-    turn_of,
 )
-from hrc_env.tracking.tree.evidence import anatomy, exchange_slots, merge, normalise, tree_measure
+from hrc_env.tracking.tree.evidence import (
+    exchange_slots,
+    measure_change,
+    merge_close,
+    normalise_weights,
+    score_pose,
+)
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT
-from hrc_env.tracking.tree.state import WORK, Hypotheses
+from hrc_env.tracking.tree.state import WORK, WorkerHypotheses
 
 EYES = -np.linalg.solve(LAB[:, :, :3], LAB[:, :, 3:])[..., 0]
 
@@ -51,8 +57,11 @@ def followed(px, config=None):
 
 def slots(state):
     """The first worker's hypotheses alone."""
-    return Hypotheses(
-        *(array[0, 0] for array in state[:3]), state.n_alive[0], state.waited_s[0], state.pace[0]
+    return WorkerHypotheses(
+        *(array[0, 0] for array in state[:3]),
+        state.n_alive[0],
+        state.since_search_s[0],
+        state.pace[0],
     )
 
 
@@ -206,16 +215,16 @@ def test_the_other_body_has_its_shoulders_reflected_and_its_nose_in_front():
     body, eye = standing(0.4), EYES[1]
     cov, slope = np.tile(0.01 * np.eye(6), (15, 1, 1)), np.zeros((15, 6, 6))
     other = body.copy()
-    turn_body(eye, turn_of(eye, body), other, cov, slope)
-    assert not heads_like(body, other)
+    turn_body(eye, find_other_turn(eye, body), other, cov, slope)
+    assert not has_same_heading(body, other)
     middle = body[[1, 2, 7, 8], :2].mean(0)
     ray = (middle - EYES[1, :2]) / np.linalg.norm(middle - EYES[1, :2])
     expected = left(body) - 2 * (left(body) @ ray) * ray
     expected *= np.linalg.norm(left(other)) / np.linalg.norm(expected)
     np.testing.assert_allclose(left(other), expected, atol=0.02)
-    assert anatomy(other) == pytest.approx(anatomy(body))
+    assert score_pose(other) == pytest.approx(score_pose(body))
     again = other.copy()
-    turn_body(eye, turn_of(eye, other), again, cov, slope)
+    turn_body(eye, find_other_turn(eye, other), again, cov, slope)
     np.testing.assert_allclose(again, body, atol=1e-9)
 
 
@@ -223,7 +232,7 @@ def test_a_body_that_is_inside_out_is_unlikely():
     body = standing()
     inside_out = body.copy()
     inside_out[:, 0] = 2 * body[[1, 2, 7, 8], 0].mean() - body[:, 0]  # its front behind
-    assert anatomy(body) - anatomy(inside_out) > 5.0
+    assert score_pose(body) - score_pose(inside_out) > 5.0
 
 
 def test_a_reflected_limb_keeps_its_pixels_nearly_and_changes_its_depth():
@@ -237,24 +246,24 @@ def test_a_reflected_limb_keeps_its_pixels_nearly_and_changes_its_depth():
 
 def test_a_part_is_ambiguous_only_where_one_camera_sees_it():
     ok = np.ones((15, 4), bool)
-    assert lone_camera(0, ok) == lone_camera(1, ok) == -1
+    assert find_lone_camera(0, ok) == find_lone_camera(1, ok) == -1
     ok[[3, 5], 1:] = False
-    assert lone_camera(1, ok) == 0
-    assert lone_camera(0, ok) == -1
+    assert find_lone_camera(1, ok) == 0
+    assert find_lone_camera(0, ok) == -1
     ok[:, [0, 1, 3]] = False
-    assert lone_camera(0, ok) == 2
-    assert lone_camera(0, np.zeros((15, 4), bool)) == -1
+    assert find_lone_camera(0, ok) == 2
+    assert find_lone_camera(0, np.zeros((15, 4), bool)) == -1
 
 
 def test_a_parts_depth_is_open_as_far_as_its_best_known_joint_is():
     body, cov = standing(), np.tile(1e-4 * np.eye(6), (15, 1, 1))
-    assert open_depth(1, EYES[0], body, cov) == pytest.approx(0.01)
+    assert measure_depth_std(1, EYES[0], body, cov) == pytest.approx(0.01)
     for j, std in ((3, 0.2), (5, 0.3)):  # an arm, along the camera's rays only
         ray = (body[j, :3] - EYES[0]) / np.linalg.norm(body[j, :3] - EYES[0])
         cov[j, :3, :3] += (std**2 - 1e-4) * np.outer(ray, ray)
-    assert open_depth(1, EYES[0], body, cov) == pytest.approx(0.2)
-    assert open_depth(3, EYES[0], body, cov) == pytest.approx(0.3)  # its forearm
-    assert open_depth(0, EYES[0], body, cov) == pytest.approx(0.01)  # the whole body
+    assert measure_depth_std(1, EYES[0], body, cov) == pytest.approx(0.2)
+    assert measure_depth_std(3, EYES[0], body, cov) == pytest.approx(0.3)  # its forearm
+    assert measure_depth_std(0, EYES[0], body, cov) == pytest.approx(0.01)  # the whole body
 
 
 def test_the_trees_determinant_and_square_are_those_of_the_whole_matrix():
@@ -270,7 +279,7 @@ def test_the_trees_determinant_and_square_are_those_of_the_whole_matrix():
         whole[j, j] = cov[j]
     matrix = whole.transpose(0, 2, 1, 3).reshape(90, 90)
     change = np.random.default_rng(0).normal(0, 0.05, (15, 6))
-    square, log_det = tree_measure(tree, change.copy(), np.zeros(1, WORK).view(np.recarray)[0])
+    square, log_det = measure_change(tree, change.copy(), np.zeros(1, WORK).view(np.recarray)[0])
     assert log_det == pytest.approx(np.linalg.slogdet(matrix)[1], rel=1e-6)
     expected = change.ravel() @ np.linalg.solve(matrix, change.ravel())
     assert square == pytest.approx(expected, rel=1e-5)
@@ -284,12 +293,12 @@ def test_hypotheses_that_have_come_close_are_one_and_light_ones_are_dropped():
     own.trees["body"][2, :, 0] += 1.0
     own.n_alive[0] = 3
     own.trees["log_weight"][:3] = np.log([0.3, 0.4, 0.3])
-    merge(own, 4.0, np.zeros(1, WORK).view(np.recarray)[0])
-    normalise(own, np.log(1e-3))
+    merge_close(own, 4.0, np.zeros(1, WORK).view(np.recarray)[0])
+    normalise_weights(own, np.log(1e-3))
     assert own.n_alive[0] == 2
     np.testing.assert_allclose(np.exp(own.trees["log_weight"][:2]), [0.7, 0.3])
     own.trees["log_weight"][1] = -20.0
-    normalise(own, np.log(1e-3))
+    normalise_weights(own, np.log(1e-3))
     assert own.n_alive[0] == 1
 
 

@@ -8,8 +8,8 @@ from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.vacancy import EMPTY, POSSIBLE, PROBABLY_EMPTY, Coverage, no_others
 from hrc_env.tracking import oracle
 from hrc_env.tracking.config import TrackerConfig
-from hrc_env.tracking.contradiction import Shown
-from hrc_env.tracking.presence import AGREED, CONTRADICTED, IMAGES, SEVERAL, Looks, Presence
+from hrc_env.tracking.contradiction import DetectedPoses
+from hrc_env.tracking.presence import AGREED, CONTRADICTED, IMAGES, SEVERAL, ImageSearches, Presence
 
 DT, CONFIG = 0.04, TrackerConfig()
 LOST_AFTER = round(CONFIG.lost_after_s / DT)
@@ -33,8 +33,8 @@ def looks(whole, age_s=0.0, strangers=None):
     """Of one update: which cameras (B, C) looked, and which of them show strangers."""
     whole = np.asarray(whole, bool)
     strange = np.zeros(whole.shape, bool) if strangers is None else strangers
-    shown = Shown(np.zeros_like(whole), strange)
-    return Looks(whole, np.full(whole.shape, age_s), IMAGES, shown, no_others(len(whole)))
+    shown = DetectedPoses(np.zeros_like(whole), strange)
+    return ImageSearches(whole, np.full(whole.shape, age_s), IMAGES, shown, no_others(len(whole)))
 
 
 def floor(cameras):
@@ -154,7 +154,7 @@ def test_somebody_whom_a_camera_shows_beside_those_who_are_tracked_is_unknown():
 def test_a_reset_forgets_what_was_known_of_its_environment():
     known, nobody = Presence(2, 1, everywhere(4)), shown(np.zeros((4, 1), bool).tolist())
     both = Keypoints(*(np.repeat(a, 2, 0) for a in (nobody.px, nobody.confidence, nobody.sigma_px)))
-    two, ids, seen = oracle.prior(2, 1, CONFIG), np.arange(2), looks(np.ones((2, 4)))
+    two, ids, seen = oracle.estimate_prior(2, 1, CONFIG), np.arange(2), looks(np.ones((2, 4)))
     for _ in range(2):
         said = known.update(ids, two, both, both, seen, DT, CONFIG)
     assert not said.unknown.any()

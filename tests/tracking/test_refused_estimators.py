@@ -17,7 +17,7 @@ from hrc_env.tracking.estimators import (
     ESTIMATORS,
     EstimatorSpec,
     check_estimator,
-    estimator_called,
+    find_estimator,
     make_estimator,
 )
 from hrc_env.tracking.forecast import forecast
@@ -195,13 +195,13 @@ def test_who_handles_late_frames_gets_them_as_they_arrive():
 
 def test_an_estimator_is_called_by_its_name_itself_or_what_makes_it():
     for name, spec in ESTIMATORS.items():
-        assert estimator_called(name) is spec
-        assert estimator_called(spec) is spec
-    made = estimator_called(Told)
+        assert find_estimator(name) is spec
+        assert find_estimator(spec) is spec
+    made = find_estimator(Told)
     assert (made.name, made.make) == ("Told", Told)
     for name, said in (("smoother", "needs the future"), ("partikel", "Unknown estimator")):
         with pytest.raises(ConfigError, match=said):
-            estimator_called(name)
+            find_estimator(name)
 
 
 TIMES = [(True, DT), (True, 1e-3), (False, 0.0), (False, -DT), (False, np.nan)]

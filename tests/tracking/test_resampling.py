@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hrc_env.tracking.paper import multinomial
+from hrc_env.tracking.paper import draw_multinomial
 
 WEIGHTS = np.array([0.05, 0.4, 0.0, 0.3, 0.25])
 
@@ -12,7 +12,7 @@ def counts(n, rng):
     weights = np.zeros(n)
     weights[: len(WEIGHTS)] = WEIGHTS
     ancestors = np.empty(n, np.int64)
-    multinomial(weights, rng.standard_exponential(n + 1), ancestors)
+    draw_multinomial(weights, rng.standard_exponential(n + 1), ancestors)
     return np.bincount(ancestors, minlength=n)[: len(WEIGHTS)]
 
 

@@ -8,7 +8,7 @@ from hrc_env.core.skeleton import JOINT, MIRROR
 from hrc_env.geometry.rotations import about_axis
 from hrc_env.tracking.config import ParticleConfig
 from hrc_env.tracking.estimators import make_estimator
-from hrc_env.tracking.tree.predict import leaning, set_axes
+from hrc_env.tracking.tree.predict import TorsoState, measure_lean, set_axes
 
 gaussian = pytest.mark.parametrize("name", ["kalman", "particle"])
 WRIST, N = JOINT["left_wrist"], 60
@@ -98,11 +98,12 @@ def test_reports_of_who_lies_are_wider_by_the_setting_and_of_who_stands_are_not(
 @pytest.mark.parametrize("angle_deg", [0.0, 20.0, 90.0, 150.0])
 def test_axes_are_upright_until_a_trunk_lies(angle_deg):
     body = laid_down(walk(6, 1), np.array([angle_deg / 90]))[0]
-    root, axes = body[[1, 2, 7, 8]].mean(0), np.empty((2, 3, 3))
+    root = TorsoState(*body[[1, 2, 7, 8]].mean(0), 0.0, 0.0, 0.0)
+    axes = np.empty((2, 3, 3))
     assert set_axes(body, root, np.zeros((15, 3)), axes)
     np.testing.assert_allclose(axes[0].T @ axes[0], np.eye(3), atol=1e-9)
     np.testing.assert_allclose(np.linalg.det(axes[0]), 1.0)
-    lies, along = leaning(body)
+    lies, along = measure_lean(body)
     np.testing.assert_allclose(axes[0][:, 2], along if lies == 1.0 else [0.0, 0.0, 1.0], atol=1e-9)
     assert lies == (angle_deg > 45.0)
     left = body[1] - body[2]

@@ -8,8 +8,14 @@ from simulated import DT
 from hrc_env.core.skeleton import BONES, N_JOINTS, TORSO
 from hrc_env.tracking.tree.gaussian import EDGE_BONE, ORDER, PARENT, ROOT, invert
 from hrc_env.tracking.tree.learning import learn_lengths
-from hrc_env.tracking.tree.predict import damped_joints, predict_tree, whole_body_noise
-from hrc_env.tracking.tree.state import STANDING_M, TREE, WORK, population_edges
+from hrc_env.tracking.tree.predict import (
+    MotionModel,
+    discretise_joints,
+    make_motion_model,
+    make_shared_noise,
+    predict_tree,
+)
+from hrc_env.tracking.tree.state import STANDING_M, TREE, WORK, make_bone_prior
 from hrc_env.tracking.tree.update import update_tree
 
 J = N_JOINTS
@@ -118,10 +124,10 @@ def test_a_prediction_is_the_dense_one_projected_on_the_tree(seed):
     tree = random_tree(rng)
     body, cov, slope = tree.body, tree.cov, tree.slope
     prior, mean = dense(cov, slope), body.copy()
-    F, Q = damped_joints(DT, 0.5, 4.0)
-    shared = whole_body_noise(DT, 4.0)
+    F, Q = discretise_joints(DT, 0.5, 4.0)
+    shared = make_shared_noise(DT, 4.0)
     travel = np.array([[1, DT], [0, 1]]) - F
-    predict_tree(tree, (F, travel, Q, shared), DT, work())
+    predict_tree(tree, MotionModel(F, travel, Q, shared), DT, work())
     moves, noise = np.zeros((J, 6, J, 6)), np.zeros((J, 6, J, 6))
     for j in range(J):
         moves[j, :, j] += np.kron(F[j], _I3)
@@ -144,7 +150,7 @@ def test_a_body_that_nobody_sees_keeps_its_shape_but_not_its_place():
     tree = random_tree(rng)
     tree.body[:, 3:], tree.slope[:] = 0.0, 0.0
     tree.cov[:] = 1e-4 * np.eye(6)
-    model = (*_model(), whole_body_noise(DT, 4.0))
+    model = make_motion_model(DT, 0.5, 4.0)
     for _ in range(50):
         predict_tree(tree, model, DT, work())
     full = dense(tree.cov, tree.slope)
@@ -155,15 +161,10 @@ def test_a_body_that_nobody_sees_keeps_its_shape_but_not_its_place():
     assert np.sqrt(apart[:3, :3].trace() / 3) < 0.35 * spread[j]
 
 
-def _model():
-    F, Q = damped_joints(DT, 0.5, 4.0)
-    return F, np.array([[1, DT], [0, 1]]) - F, Q
-
-
 def test_lengths_are_learnt_although_errors_across_a_bone_lengthen_it():
     rng = np.random.default_rng(1)
     tree = np.zeros(1, TREE).view(np.recarray)[0]
-    tree.bone_length, tree.bone_variance = population_edges()
+    tree.bone_length, tree.bone_variance = make_bone_prior()
     true, std = 1.07 * tree.bone_length, 0.03
     tree.cov = 1e-6 * np.eye(6)
     tree.cov[:, range(3), range(3)] = std**2

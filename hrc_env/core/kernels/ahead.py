@@ -19,27 +19,31 @@ from hrc_env.core.machine import n_cores
 
 log = logging.getLogger("hrc_env.core.kernels")
 Say = Callable[[float, str], None]
-"""Told by how much the share that is done grew, and what is being done."""
+"""A function of (added share, current activity) that shows progress."""
 AT_ONCE_S = 3.0
-"""What takes less is compiled when it is called [s]: a process takes as long to start."""
+"""Compile time below which a kernel is compiled on its first call [s]: a process takes as long to
+start."""
 LOG_EVERY_S = 10.0
 
 
 def missing(level: str | None = None) -> list[Signature]:
-    """What a perception level calls (None: any) that has not been compiled yet."""
+    """Return the kernels of a perception level (None: any) that are not compiled yet."""
     return [each for each in recorded(level) if not each.is_compiled()]
 
 
 @lru_cache(maxsize=8)
 def ensure(level: str) -> None:
-    """Compile what a perception level calls, unless it lies on disk; the log says so."""
+    """Compile the kernels of a perception level unless they lie on disk; progress goes to the
+    log."""
     if sum(each.seconds for each in missing(level)) > AT_ONCE_S:
         compile_missing(level, _logged())
 
 
 def compile_missing(level: str | None, say: Say) -> int:
-    """Compile what is missing in as many processes as there are cores; how many there were. Where
-    no process can be started, or one dies, kernels are compiled when they are called."""
+    """Compile missing kernels in one process a core, and return their number.
+
+    Where no process can be started, or one dies, kernels are compiled on their first call.
+    """
     with alone(folder(), lambda: say(0.0, "waiting for another program that compiles")):
         todo = missing(level)
         wanted, total_s = iter(todo), sum(each.seconds for each in todo)
@@ -51,7 +55,8 @@ def compile_missing(level: str | None, say: Say) -> int:
 
 
 def _serve(wanted: Iterator[Signature], total_s: float, say: Say) -> None:
-    """Let one process compile until nothing is left, beside others that take of the same."""
+    """Let one process compile until none are left, beside others that take from the same
+    kernels."""
     quiet = f"ignore:{UNTESTED}"  # said once, by the process that needs them
     command = [sys.executable, "-W", quiet, "-m", "hrc_env.core.kernels.ahead"]
     pipes: Any = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True, "bufsize": 1}
@@ -74,7 +79,7 @@ def _serve(wanted: Iterator[Signature], total_s: float, say: Say) -> None:
 
 
 def _logged() -> Say:
-    """Progress as lines of the log."""
+    """Return a function that writes progress to the log."""
     began_s = said_s = time.monotonic()
     done = 0.0
     log.warning("Compiling hrc_env's kernels for this machine, once (a minute or two) ...")
@@ -91,7 +96,8 @@ def _logged() -> Say:
 
 
 def main() -> None:
-    """Compile kernels by lines of JSON [kernel, args], answering each: what `_serve` starts."""
+    """Compile the kernels that lines of JSON [kernel, args] name, and answer each; `_serve` starts
+    it."""
     for line in sys.stdin:
         name, args = json.loads(line)
         try:

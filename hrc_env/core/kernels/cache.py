@@ -1,9 +1,12 @@
 """Compiled kernels on disk: one file for each kernel, signature and processor.
 
-numba's own cache goes by the time of a function's file: a copied tree compiles everything again,
-and a callee's change in another file is not seen. Here a file's name holds a digest of what the
-kernel is made of (`digest`), so that what is found always fits.
+numba's own cache depends on the modification time of a function's file: a copied tree is compiled
+again, and a change of a callee in another file is missed. Here the name of a file holds a digest of
+everything that the kernel depends on (`digest`), so that a file that is found always fits.
 """
+
+# numba's compiler, on whose inside this builds, has no types.
+# pyright: standard
 
 import contextlib
 import hashlib
@@ -30,8 +33,11 @@ SUFFIX = ".nbc"
 
 @lru_cache(maxsize=1)
 def folder() -> Path:
-    """Where compiled kernels are kept: in NUMBA_CACHE_DIR; else beside the package's bytecode, so
-    that a copied tree keeps them; where that cannot be written, in the user's cache folder."""
+    """Return the folder of compiled kernels.
+
+    It is NUMBA_CACHE_DIR if that is set; else a folder beside the package's bytecode, so that a
+    copied tree keeps them; where that is read-only, one in the user's caches.
+    """
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     if chosen:
         return Path(chosen) / "hrc_env"
@@ -56,7 +62,7 @@ class KernelCache(NullCache):
         self._dispatcher = dispatcher
 
     def path(self, args: tuple[Any, ...]) -> Path:
-        """The file of a signature."""
+        """Return the file of a signature."""
         context: Any = self._dispatcher.targetctx
         processor = context.codegen().magic_tuple()
         kind = _hashed(repr((str(args), processor)))[:10]
@@ -72,7 +78,7 @@ class KernelCache(NullCache):
     def load_overload(  # type: ignore[override]
         self, sig: Any, target_context: Any
     ) -> CompileResult | None:
-        """A compiled form, if there is one."""
+        """Return a compiled form; None: there is none."""
         target_context.refresh()
         try:
             parts = pickle.loads(self.path(_args(sig)).read_bytes())
@@ -81,9 +87,9 @@ class KernelCache(NullCache):
         return CompileResult._rebuild(target_context, *parts)
 
     def save_overload(self, sig: Any, data: CompileResult) -> None:  # type: ignore[override]
-        """Keep a compiled form; where nothing can be written, nowhere.
+        """Keep a compiled form, if files can be written.
 
-        Older ones go, but not from a folder of the user's choice, which several checkouts may use.
+        Older forms are removed, but not from NUMBA_CACHE_DIR, which several checkouts may share.
         """
         path = self.path(_args(sig))
         draft = path.with_name(f"{uuid.uuid4().hex}.tmp")

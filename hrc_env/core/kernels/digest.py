@@ -1,5 +1,8 @@
-"""What a kernel is made of, as a digest: its module, its bytecode, its options, the values of the
-constants it names, and the same of every kernel that it calls."""
+"""The digest of a kernel: of its module, bytecode, options, constants and all kernels that it
+calls."""
+
+# numba's compiler, on whose inside this builds, has no types.
+# pyright: standard
 
 import dis
 import hashlib
@@ -28,7 +31,7 @@ def digest_of(dispatcher: Dispatcher) -> str:
 
 
 def _function(function: Any) -> list[str]:
-    """Code and what it names."""
+    """Return texts of a function's code and of the values that it names."""
     codes, names = [function.__code__], set()
     parts = [repr(function.__defaults__)]
     for code in codes:
@@ -44,7 +47,7 @@ def _function(function: Any) -> list[str]:
 
 
 def _instructions(code: types.CodeType) -> tuple[bytes, list[Any]]:
-    """Return the bytecode without constants' places, and the constants in order of loading.
+    """Return the bytecode without places of constants, and the constants in order of loading.
 
     A docstring shifts the places of other constants, and no instruction loads it.
     """
@@ -59,7 +62,7 @@ def _instructions(code: types.CodeType) -> tuple[bytes, list[Any]]:
 
 
 def _value(value: Any, names: set[str]) -> str:
-    """A digest or a text of what a name stands for."""
+    """Return a digest or a text of a value."""
     if isinstance(value, Dispatcher):
         return digest_of(value)
     if isinstance(value, types.ModuleType):

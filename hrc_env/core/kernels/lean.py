@@ -2,12 +2,15 @@
 
 numba links, optimises and emits the code of every callee again at every level of calls. Here a
 callee is left in LLVM's intermediate form; the kernel that Python calls links each of them once,
-optimises once and emits once: half the time and memory to compile.
+optimises once and emits once, in half the time and memory.
 
-Everything is done by subclasses, so that other people's numba functions are compiled as ever. What
-is subclassed is numba's inside: other releases than those that this is tested with (`LEAN_WITH`)
-get `plain`.
+Everything is done by subclasses, so that other numba functions are compiled as usual. The
+subclassed classes are internals of numba: releases other than the tested ones (`LEAN_WITH`) get
+`plain`.
 """
+
+# numba's compiler, on whose inside this builds, has no types.
+# pyright: standard
 
 import copy
 from collections.abc import Callable, Iterator
@@ -22,18 +25,19 @@ from hrc_env.core.kernels.cache import KernelCache
 
 
 class LeanLibrary(codegen.JITCodeLibrary):
-    """The code of one function: a kernel's is compiled, a callee's is only kept for its callers."""
+    """The code of one function: that of a kernel is compiled, that of a callee is kept for its
+    callers."""
 
     _is_callee = False
 
     def get_pointer_to_function(self, name: str) -> int:
-        """Compile, and the address of the wrapper by which Python calls; callees have none."""
+        """Compile, and return the address of the wrapper that Python calls; 0 for a callee."""
         if not self._finalized and name not in {each.name for each in self._final_module.functions}:
             self.keep_as_callee()
         return 0 if self._is_callee else super().get_pointer_to_function(name)
 
     def keep_as_callee(self) -> None:
-        """Neither link nor optimise nor emit: whoever links this does."""
+        """Leave linking, optimising and emitting to the callers."""
         self._finalize_dynamic_globals()
         for function in self._final_module.functions:
             if not function.is_declaration and function.linkage == llvm.Linkage.external:
@@ -41,17 +45,17 @@ class LeanLibrary(codegen.JITCodeLibrary):
         self._is_callee = self._finalized = True
 
     def add_linking_library(self, library: codegen.CPUCodeLibrary) -> None:
-        """Note a function that this one calls."""
+        """Register a function that this one calls."""
         if isinstance(library, LeanLibrary) and not library._finalized:
             library.keep_as_callee()
         super().add_linking_library(library)
 
     def _optimize_functions(self, ll_module: Any) -> None:
-        """Left to the optimiser of the whole."""
+        """Do nothing: the kernel that Python calls is optimised as a whole."""
         ll_module.data_layout = self._codegen._data_layout
 
     def finalize(self) -> None:
-        """Link everything that is called, from callers to callees, optimise and emit."""
+        """Link all callees, from callers to callees, optimise and emit."""
         self._codegen._check_llvm_bugs()
         self._raise_if_finalized()
         for library in self._callers_first():
@@ -64,7 +68,7 @@ class LeanLibrary(codegen.JITCodeLibrary):
         self._finalize_final_module()
 
     def _callers_first(self) -> Iterator[codegen.CPUCodeLibrary]:
-        """What this calls, directly or not, each once; nobody before all who call it."""
+        """Yield all direct and indirect callees once, each after all of its callers."""
         seen: set[int] = set()
         order: list[codegen.CPUCodeLibrary] = []
 
@@ -81,10 +85,10 @@ class LeanLibrary(codegen.JITCodeLibrary):
 
 
 class LeanContext(cpu.CPUContext):
-    """numba's own context, everything shared with it but how libraries are compiled."""
+    """numba's own context with another way to compile libraries."""
 
     def get_executable(self, library: LeanLibrary, fndesc: Any, env: Any) -> Any:
-        """What Python calls; of a callee something that nobody can call."""
+        """Return the function that Python calls; for a callee, a placeholder."""
         if library.get_pointer_to_function(fndesc.llvm_cpython_wrapper_name):
             return super().get_executable(library, fndesc, env)
         return _dynfunc.make_function(
@@ -94,7 +98,7 @@ class LeanContext(cpu.CPUContext):
 
 @cache
 def _lean_context() -> LeanContext:
-    """One for all kernels."""
+    """Return the context that all kernels share."""
     usual: Any = registry.cpu_target.target_context
     generator = copy.copy(usual.codegen())
     generator._library_class = LeanLibrary
@@ -131,9 +135,9 @@ class KernelDispatcher(registry.CPUDispatcher):
         self._cache: Any = KernelCache(self)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
-        """How a kernel types its call."""
+        """Return the signature with which another kernel calls this one."""
         return self.callee.get_call_template(args, kws)
 
     def get_overload(self, sig: Any) -> Any:
-        """What a kernel calls."""
+        """Return the compiled callee for a signature."""
         return self.callee.get_overload(sig)

@@ -1,4 +1,4 @@
-"""The usual way through numba's compiler, for releases that `lean` was not tested with.
+"""The usual way through numba's compiler, for releases with which `lean` was not tested.
 
 Callees are compiled at every level of calls: kernels take about twice as long to compile, and run
 as fast.

@@ -1,5 +1,10 @@
-"""Which kernels Python calls, with which types of arguments: `signatures.json`, written by
-`python -m assets.kernels.record`."""
+"""The kernels that Python calls, with the types of their arguments, in `signatures.json`.
+
+`python -m assets.kernels.record` writes the file.
+"""
+
+# numba's compiler, on whose inside this builds, has no types.
+# pyright: standard
 
 import importlib
 import json
@@ -20,24 +25,24 @@ PATH = Path(__file__).with_name("signatures.json")
 
 @dataclass(frozen=True, slots=True)
 class Signature:
-    """A kernel with types of arguments that it is called with."""
+    """A kernel with the types of the arguments that it is called with."""
 
     kernel: str
     """"module:name"."""
     args: list[Any]
-    """As `encode` writes them."""
+    """Types of the arguments, as `encode` writes them."""
     levels: list[str]
-    """The perception levels that call it."""
+    """Perception levels that call it."""
     seconds: float
-    """What compiling it took where this was recorded [s]; what comes first, and how much is left,
-    goes by it."""
+    """Time to compile it when this was recorded [s]; it determines the order and the remaining
+    time."""
 
     def types(self) -> tuple[Any, ...]:
-        """The types as numba has them."""
+        """Return the types as numba's."""
         return tuple(decode(each) for each in self.args)
 
     def is_compiled(self) -> bool:
-        """Whether it lies on disk, or there is no such kernel any more."""
+        """Return whether it lies on disk, or does not exist any more."""
         try:
             return kernel_named(self.kernel)._cache.path(self.types()).exists()
         except (ImportError, KeyError, AttributeError):
@@ -45,13 +50,13 @@ class Signature:
 
 
 def kernel_named(name: str) -> Any:
-    """A kernel by "module:name"; its module is imported."""
+    """Return a kernel by "module:name"; its module is imported."""
     importlib.import_module(name.partition(":")[0])
     return KERNELS[name]
 
 
 def recorded(level: str | None = None) -> list[Signature]:
-    """What a perception level calls, or any of them; slowest to compile first."""
+    """Return the signatures of a perception level (None: any), slowest to compile first."""
     known = [Signature(**each) for each in json.loads(PATH.read_text())]
     return [each for each in known if level is None or level in each.levels]
 
@@ -64,9 +69,14 @@ def write(signatures: Sequence[Signature]) -> None:
 
 
 def encode(kind: Any) -> Any:
-    """A type of numba's as JSON: "float64", "float64[3C]" ("!" behind it: not to be written),
-    "module:DTYPE" for a record and "module:DTYPE[2C]" for a structured array, a list for a tuple,
-    {"module:name": [...]} for a named one; `TypeError` for others, which no kernel has had so far.
+    """Return a type of numba's as JSON.
+
+    It is "float64", "float64[3C]" ("!" after it: read-only), "module:DTYPE" for a record and
+    "module:DTYPE[2C]" for a structured array, a list for a tuple, {"module:name": [...]} for a
+    named tuple.
+
+    Raises:
+        TypeError: a type that no kernel has had so far.
     """
     text: Any = str(kind)
     inside = [encode(each) for each in getattr(kind, "types", ())]
@@ -85,7 +95,7 @@ def encode(kind: Any) -> Any:
 
 
 def decode(text: Any) -> Any:
-    """The type that `encode` wrote."""
+    """Return the type that `encode` wrote."""
     if isinstance(text, list):
         return types.Tuple([decode(each) for each in text])
     if isinstance(text, dict):
@@ -104,7 +114,7 @@ def decode(text: Any) -> Any:
 
 
 def _name_of(record: types.Record) -> str:
-    """The module's constant that holds a record's dtype, as "module:DTYPE"."""
+    """Return the module's constant that holds a record's dtype, as "module:DTYPE"."""
     dtype = as_dtype(record)
     for module in [name for name in sys.modules if name.startswith("hrc_env.")]:
         for name, value in vars(sys.modules[module]).items():

@@ -30,8 +30,8 @@ from hrc_env.pipeline.levels import make_pipeline
 from hrc_env.pipeline.sensor_input import Generators, TrueSensorInput
 from hrc_env.pipeline.tracking import PoseTracking
 from hrc_env.scene.build import Scene, build
-from hrc_env.tracking.metrics import no_identities, tracking_error
-from hrc_env.worker.body import Body, pool, stack, worker_truth
+from hrc_env.tracking.metrics import make_identities, measure_errors
+from hrc_env.worker.body import Body, load_bodies, select_bodies, worker_truth
 
 LEVEL = "keypoints"
 BODIES = "any"
@@ -56,7 +56,7 @@ class Walks:
 @lru_cache(maxsize=1)
 def walks_of(scene: str, n_workers: int, seeds: tuple[int, ...], n_steps: int) -> Walks:
     """Episodes of workers at their work, one a seed, each of n_steps."""
-    config, bodies = HRCConfig(), stack(pool(BODIES))
+    config, bodies = HRCConfig(), load_bodies(select_bodies(BODIES))
     place = build(config.scene, scene, n_workers, bodies.names)
     state = generator.make_state(len(seeds), n_workers, bodies, config.motion, place.grounds)
     rngs = [np.random.default_rng([seed, 0]) for seed in seeds]
@@ -101,7 +101,7 @@ def _jobs(turns: Sequence[Turn], n_episodes: int) -> list[tuple[Turn, Ints]]:
 def _episodes(setting: Setting, turn: Turn, walks: Walks, seeds: Sequence[int], ids: Ints) -> Sums:
     """Sums of some of the episodes, with these cameras, after the warm-up."""
     errors, inside, lost, seeing, scene = [], [], [], [], scene_of(setting, turn)
-    known, identities = [], no_identities(len(ids), setting.n_workers)
+    known, identities = [], make_identities(len(ids), setting.n_workers)
     for said, now, _ in islice(watch(setting, turn, walks, seeds, ids), N_WARM_UP, None):
         joints_world = now.truth.joints_world
         order = matched(said.mean_world, said.tracked, joints_world)
@@ -111,7 +111,7 @@ def _episodes(setting: Setting, turn: Turn, walks: Walks, seeds: Sequence[int], 
         squares = np.einsum("...i,...i->...", off, np.linalg.solve(cov, off[..., None])[..., 0])
         inside.append(squares < INSIDE_95)
         lost.append(~said.tracked[episode, order])
-        known.append(tracking_error(said, joints_world, now.present, identities))
+        known.append(measure_errors(said, joints_world, now.present, identities))
         if setting.by_sight:
             seeing.append(n_seeing(now, scene, turn))
     error_m, is_inside, is_lost = (np.stack(each, 1) for each in (errors, inside, lost))

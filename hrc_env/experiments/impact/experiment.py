@@ -39,10 +39,10 @@ from hrc_env.experiments.setups import (
 )
 from hrc_env.experiments.stage import N_TOGETHER, PEOPLE
 from hrc_env.experiments.versions import key_of, source_digest
-from hrc_env.safety.shield import shield_called
+from hrc_env.safety.shield import find_shield
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import find_task
-from hrc_env.tracking.estimators import estimator_called
+from hrc_env.tracking.estimators import find_estimator
 
 FIRST_SEED = 1_000_000
 """Of the episodes, far from those that the policy learns in."""
@@ -80,7 +80,7 @@ class Impact:
     def __post_init__(self) -> None:
         """Raise `ConfigError` for what cannot work."""
         find_task(self.task)
-        shield_called(self.shield)
+        find_shield(self.shield)
         at_least_one(self, "n_seeds", "n_pixels", "n_steps", "learning_steps")
         for name in self.policies:
             if name in POLICIES:
@@ -208,7 +208,7 @@ class Impact:
             "seeds": list(seeds),
             "n_steps": self.n_steps,
             "setup": asdict(setup),
-            "estimator": source_digest(estimator_called(setup.estimator).make),
+            "estimator": source_digest(find_estimator(setup.estimator).make),
         }
         return key_of(shared | made_of(policy, ppo), self.depends)
 
@@ -255,7 +255,7 @@ def make_experiment(
         Impact(**QUICK) if quick else whole, task=task, shield=shield, control=control,
         policies=tuple(dict.fromkeys(robots)) or None, trust=trust,
     )  # fmt: skip
-    asked = [PerceptionSetup(estimator=estimator_called(name).name).name for name in estimator]
+    asked = [PerceptionSetup(estimator=find_estimator(name).name).name for name in estimator]
     setups = tuple(dict.fromkeys(("truth", "none", REFERENCE, *asked))) if asked else None
     return changed(config, n_seeds=seeds, setups=setups)
 

@@ -8,7 +8,7 @@ from hrc_env.core.batching import rows
 from hrc_env.core.records import WorkerMotion
 from hrc_env.experiments.recording import concatenated
 from hrc_env.experiments.site.walk import walk
-from hrc_env.motion.repertoire import REPERTOIRE, Act, alone, perform
+from hrc_env.motion.repertoire import REPERTOIRE, Act, make_worker, perform
 from hrc_env.scene.build import Scene
 from hrc_env.worker.body import load_body
 
@@ -38,7 +38,7 @@ def play(scene: Scene, motion: str, seed: int, n_frames: int, dt_s: float) -> Wo
         start, yaw = (x, side * START_Y_M), -side * math.pi / 2
     else:
         start, yaw = (x, rng.uniform(-0.8, 0.8)), rng.uniform(-math.pi, math.pi)
-    me = alone(load_body(scene.bodies[0]), start, yaw, right=bool(rng.random() < 0.9))
+    me = make_worker(load_body(scene.bodies[0]), start, yaw, right=bool(rng.random() < 0.9))
     films = perform(ACTS[motion], me, rng, dt_s)
     whole = concatenated([film.motion for film in films])
     return rows(whole, np.arange(min(n_frames, len(whole.position_world))))

@@ -6,6 +6,7 @@ robot; contacts are those of `safety.incidents`.
 
 import zlib
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -101,6 +102,26 @@ class Watched:
     def close(self) -> None:
         """Release threads and graphics contexts."""
         self._stage.close()
+
+
+def play_episodes(
+    eyes: Eyes,
+    task: str,
+    n_steps: int,
+    is_shielded: bool,
+    driver: Driver,
+    seeds: Sequence[int],
+    margin_m: float,
+    tick: PartProgress,
+) -> Rows:
+    """Return what `Watched.play` does, in environments of its own.
+
+    Args:
+        eyes, task, n_steps, is_shielded, driver: as of `Watched`.
+        seeds, margin_m, tick: as of `Watched.play`.
+    """
+    with closing(Watched(eyes, task, n_steps, is_shielded, driver)) as watched:
+        return watched.play(seeds, margin_m, tick)
 
 
 def run(

@@ -1,7 +1,6 @@
 """What sight costs at one rate of contacts: every pair of eyes has the margin that it needs."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
@@ -12,11 +11,12 @@ import numpy as np
 from hrc_env.agents.experts import EXPERTS
 from hrc_env.core.errors import ConfigError, HRCError
 from hrc_env.core.results import Metric
+from hrc_env.engines.files import carried
 from hrc_env.experiments.agents import check_choice
-from hrc_env.experiments.cache import PartCache
+from hrc_env.experiments.cache import Part, PartCache
 from hrc_env.experiments.columns import Column
 from hrc_env.experiments.price import declaration
-from hrc_env.experiments.price.episodes import SCRIPTED, Driver, Watched
+from hrc_env.experiments.price.episodes import SCRIPTED, Driver, play_episodes
 from hrc_env.experiments.price.eyes import (
     ELSEWHERE,
     FOUR,
@@ -28,7 +28,7 @@ from hrc_env.experiments.price.eyes import (
 )
 from hrc_env.experiments.price.metrics import PER, Played, Row, metrics_of, supposed_m
 from hrc_env.experiments.price.report import report
-from hrc_env.experiments.price.search import searched
+from hrc_env.experiments.price.search import run_together, searched
 from hrc_env.experiments.price.shield import SHIELD
 from hrc_env.experiments.report import Metrics, Report, Table, quick_words
 from hrc_env.experiments.rigs import DT_S
@@ -37,7 +37,7 @@ from hrc_env.experiments.stage import PEOPLE, Rows
 from hrc_env.experiments.versions import key_of, source_digest
 from hrc_env.tasks import BUILT_IN, DEFAULT
 from hrc_env.tasks.task import Task, find_task
-from hrc_env.tracking.estimators import estimator_called
+from hrc_env.tracking.estimators import find_estimator
 
 QUICK_FRESH = 600
 """Episodes that confirm a margin in the short form."""
@@ -148,12 +148,16 @@ class Price:
 
     def play(self, cache: PartCache) -> Played:
         """Return what every search came to."""
+        alone = cache.parts([_unshielded(self, task) for task in self.tasks])
+        unshielded = dict(zip(self.tasks, alone, strict=True))
+        searches = [
+            search_margin(self, task, eyes, unshielded[task]) for task, eyes in self.pairs()
+        ]
         table: dict[str, dict[str, Row]] = {}
-        alone = {task: _unshielded(self, cache, task) for task in self.tasks}
-        for task, eyes in self.pairs():
-            table.setdefault(task, {})[eyes.name] = row = search_margin(self, cache, task, eyes)
-            check_walks(task, alone[task], row)
-        return Played(table, alone, _pixels(self, cache, table))
+        rows = run_together(searches, cache.parts)
+        for (task, eyes), row in zip(self.pairs(), rows, strict=True):
+            table.setdefault(task, {})[eyes.name] = row
+        return Played(table, unshielded, _pixels(self, cache, table))
 
     def metrics(self, played: Played) -> dict[str, Metric]:
         """Return every number."""
@@ -221,56 +225,61 @@ def make_experiment(
     return config
 
 
-def search_margin(config: Price, cache: PartCache, task: str, eyes: Eyes) -> Row:
-    """Search the margin of one pair of eyes, play on with it."""
+def search_margin(config: Price, task: str, eyes: Eyes, alone: Rows) -> Generator[Part, Rows, Row]:
+    """Search the margin of one pair of eyes, and play on with it.
+
+    Yields the parts that it needs, one after the other, and is sent the rows of each.
+
+    Args:
+        config: the settings of the study.
+        task: the environment's id.
+        eyes: whose margin is sought.
+        alone: the rows of the unshielded robot.
+
+    Raises:
+        HRCError: workers walked otherwise than beside the unshielded robot.
+    """
     tried: dict[float, Rows] = {}
-    with closing(_watched(config, eyes, task)) as stage:
-        part = partial(_part, config, cache, stage)
+    part = partial(_part, config, task, eyes)
 
-        def rate(margin_m: float) -> float:
-            tried[margin_m] = rows = part(config.seeds_of(task, config.n_seeds), margin_m)
-            return float(PER * np.sum(rows["towards"]) / np.sum(rows["minutes"]))
+    def rate(margin_m: float) -> Generator[Part, Rows, float]:
+        tried[margin_m] = rows = yield part(config.seeds_of(task, config.n_seeds), margin_m)
+        return float(PER * np.sum(rows["towards"]) / np.sum(rows["minutes"]))
 
-        def confirmed(margin_m: float) -> Row:
-            fresh = part(config.seeds_of(task, config.n_fresh, FIRST_FRESH), margin_m)
-            return Row(tried, margin_m, fresh)
+    def confirmed(margin_m: float) -> Generator[Part, Rows, Row]:
+        fresh = yield part(config.seeds_of(task, config.n_fresh, FIRST_FRESH), margin_m)
+        row = Row(tried, margin_m, fresh)
+        check_walks(task, alone, row)
+        return row
 
-        searched(rate, *config.bracket_m, config.level, config.n_search)
-        row = confirmed(supposed_m(tried, config.level))
-        for beyond_m in BEYOND_M:  # where fresh seeds say so
-            end_m = float(row.at(config.level)[0, 0])
-            if not row.ends_at(end_m):
-                return row
-            rate(end_m + (beyond_m if end_m == max(tried) else -beyond_m))
+    yield from searched(rate, *config.bracket_m, config.level, config.n_search)
+    row = yield from confirmed(supposed_m(tried, config.level))
+    for beyond_m in BEYOND_M:  # where fresh seeds say so
         end_m = float(row.at(config.level)[0, 0])
-        # At the last margin of all, throughput is played, not derived from far away.
-        return confirmed(end_m) if row.ends_at(end_m) else row
+        if not row.ends_at(end_m):
+            return row
+        yield from rate(end_m + (beyond_m if end_m == max(tried) else -beyond_m))
+    end_m = float(row.at(config.level)[0, 0])
+    # At the last margin of all, throughput is played, not derived from far away.
+    return (yield from confirmed(end_m)) if row.ends_at(end_m) else row
 
 
-def _watched(config: Price, eyes: Eyes, task: str, is_shielded: bool = True) -> Watched:
-    """Return a task's episodes with one pair of eyes."""
-    return Watched(eyes, task, config.steps_of(task), is_shielded, config.driver)
-
-
-def _unshielded(config: Price, cache: PartCache, task: str) -> Rows:
+def _unshielded(config: Price, task: str) -> Part:
+    """Return the episodes without a shield."""
     (eyes,) = eyes_called([TRUTH])
     seeds = config.seeds_of(task, config.n_fresh, FIRST_FRESH)
-    with closing(_watched(config, eyes, task, is_shielded=False)) as stage:
-        return _part(config, cache, stage, seeds, 0.0)
+    return _part(config, task, eyes, seeds, 0.0, is_shielded=False)
 
 
 def _pixels(config: Price, cache: PartCache, table: Any) -> dict[str, Rows]:
     """The same few episodes with the emulator and with rendered images, with one margin."""
     if not config.n_pixels or FOUR not in table[config.task]:
         return {}
-    margin_m, found = table[config.task][FOUR].margin_m, {}
+    margin_m, levels = table[config.task][FOUR].margin_m, ("keypoints", "pixels")
     (eyes,) = eyes_called([FOUR])
-    for level in ("keypoints", "pixels"):
-        of_level = _at_level(eyes, level)
-        with closing(_watched(config, of_level, config.task)) as stage:
-            seeds = [FIRST_PIXELS + k for k in range(config.n_pixels)]
-            found[level] = _part(config, cache, stage, seeds, margin_m)
-    return found
+    seeds = [FIRST_PIXELS + k for k in range(config.n_pixels)]
+    parts = [_part(config, config.task, _at_level(eyes, each), seeds, margin_m) for each in levels]
+    return dict(zip(levels, cache.parts(parts), strict=True))
 
 
 def _at_level(eyes: Eyes, level: str) -> Eyes:
@@ -280,23 +289,28 @@ def _at_level(eyes: Eyes, level: str) -> Eyes:
 
 
 def _part(
-    config: Price, cache: PartCache, stage: Watched, seeds: list[int], margin_m: float
-) -> Rows:
-    """Episodes with one margin, from the cache or anew."""
-    eyes = stage.eyes
+    config: Price,
+    task: str,
+    eyes: Eyes,
+    seeds: list[int],
+    margin_m: float,
+    is_shielded: bool = True,
+) -> Part:
+    """Return the episodes with one margin."""
     sight = {name: each for name, each in asdict(eyes).items() if name not in ("words", "group")}
+    n_steps, driver = config.steps_of(task), config.driver
     made_of = {
-        "people": PEOPLE, "task": stage.task, "seeds": seeds, "n_steps": stage.n_steps,
-        "eyes": sight, "margin_m": margin_m, "shield": SHIELD if stage.is_shielded else "",
-        "estimator": source_digest(estimator_called(eyes.setup.estimator).make),
-        **config.driver.settings(),
+        "people": PEOPLE, "task": task, "seeds": seeds, "n_steps": n_steps,
+        "eyes": sight, "margin_m": margin_m, "shield": SHIELD if is_shielded else "",
+        "estimator": source_digest(find_estimator(eyes.setup.estimator).make),
+        **driver.settings(),
     }  # fmt: skip
     which = {FIRST_SEED: "searched", FIRST_FRESH: "fresh", FIRST_PIXELS: "pixels"}[seeds[0]]
-    kept = f"{1e4 * margin_m:+.0f}" if stage.is_shielded else "unshielded"
-    key = key_of(made_of, config.depends)
-    make = partial(stage.play, seeds, margin_m)
-    label = f"{stage.task}.{eyes.name}.{which}.{kept}"
-    return cache.part(label, make, key, {"margin_m": margin_m})
+    kept = f"{1e4 * margin_m:+.0f}" if is_shielded else "unshielded"
+    driver = changed(driver, agent=carried(driver.agent))
+    make = partial(play_episodes, eyes, task, n_steps, is_shielded, driver, seeds, margin_m)
+    label = f"{task}.{eyes.name}.{which}.{kept}"
+    return Part(label, make, key_of(made_of, config.depends), {"margin_m": margin_m})
 
 
 def replay(config: Price, cache: PartCache, margins_m: Mapping[str, float]) -> None:
@@ -307,6 +321,7 @@ def replay(config: Price, cache: PartCache, margins_m: Mapping[str, float]) -> N
         cache: is asked for every part.
         margins_m: the margin of each, by its label (`_part`).
     """
+    parts: list[Part] = []
     for label, margin_m in margins_m.items():
         task, _, rest = label.partition(".")
         name, which, kept = rest.rsplit(".", 2)
@@ -319,9 +334,8 @@ def replay(config: Price, cache: PartCache, margins_m: Mapping[str, float]) -> N
         (eyes,) = eyes_called([known])
         if level is not None:
             eyes = _at_level(eyes, level)
-        is_shielded = kept != "unshielded"
-        with closing(_watched(config, eyes, task, is_shielded)) as stage:
-            _part(config, cache, stage, seeds, margin_m)
+        parts.append(_part(config, task, eyes, seeds, margin_m, kept != "unshielded"))
+    cache.parts(parts)
 
 
 def check_walks(task: str, alone: Rows, row: Row) -> None:

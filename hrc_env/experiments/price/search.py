@@ -8,8 +8,9 @@ y_search(m_0), a ratio estimator of two samples (Cochran 1977, Sampling Techniqu
 search chose the margin, its own seeds have no say in the height of the curve.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 from scipy.optimize import isotonic_regression
@@ -18,28 +19,68 @@ from hrc_env.core.typing import Floats, Ints
 from hrc_env.evaluation import intervals
 from hrc_env.evaluation.intervals import crossing
 
+AskedT = TypeVar("AskedT")
+AnswerT = TypeVar("AnswerT")
+FoundT = TypeVar("FoundT")
 HALF = 0.5
 """Of an event, added to counts whose logarithm is asked for."""
 
 
 def searched(
-    rate: Callable[[float], float], low: float, high: float, level: float, n_steps: int
-) -> list[float]:
-    """The arguments that were tried of a falling rate: `n_steps` that halve the bracket round the
-    level, and one as wide as what is left of it on either side."""
+    rate: Callable[[float], Generator[AskedT, AnswerT, float]],
+    low: float,
+    high: float,
+    level: float,
+    n_steps: int,
+) -> Generator[AskedT, AnswerT, list[float]]:
+    """Search where a falling rate comes down to a level.
+
+    Args:
+        rate: a generator function, whose yields are passed on.
+        low, high: the bracket.
+        level: of the rate.
+        n_steps: halvings of the bracket round the level; then one argument as wide as what is left
+            of it is tried on either side.
+
+    Returns:
+        All arguments that were tried.
+    """
     tried: list[float] = []
     for _ in range(n_steps):
         tried.append(middle := 0.5 * (low + high))
-        if rate(middle) > level:
+        if (yield from rate(middle)) > level:
             low = middle
         else:
             high = middle
     width = high - low
     for beside in (low - width, low, high, high + width):
         if not np.isclose(tried, beside).any():
-            rate(beside)
+            yield from rate(beside)
             tried.append(beside)
     return tried
+
+
+def run_together(
+    searches: Sequence[Generator[AskedT, AnswerT, FoundT]],
+    answer: Callable[[list[AskedT]], list[AnswerT]],
+) -> list[FoundT]:
+    """Run searches side by side, a step of each in a round; return what they found.
+
+    Args:
+        searches: each yields what it asks for, and is sent the answer.
+        answer: of all that is asked for in a round, in that order.
+    """
+    found: dict[int, FoundT] = {}
+    answers: dict[int, Any] = dict.fromkeys(range(len(searches)))
+    while answers:
+        asked: dict[int, AskedT] = {}
+        for k, sent in answers.items():
+            try:
+                asked[k] = searches[k].send(sent)
+            except StopIteration as end:
+                found[k] = end.value
+        answers = dict(zip(asked, answer([*asked.values()]), strict=True)) if asked else {}
+    return [found[k] for k in range(len(searches))]
 
 
 def falling(events: Floats, minutes: Floats) -> Floats:

@@ -1,83 +1,114 @@
-"""Climbing a step or a low ladder and coming down backwards; looking round where one stands."""
+"""Climbing a step or a low ladder and coming down backwards; looking round on the spot."""
 
 import math
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
-from hrc_env.motion.activities.planning import between, blank
+from hrc_env.motion.activities.planning import clear_plan, scale_draw
 from hrc_env.motion.curves import cruise, min_jerk, shift
-from hrc_env.motion.feet import step_time
+from hrc_env.motion.feet import to_step_time
 from hrc_env.motion.posture import RELAXED_ELBOW, RELAXED_PITCH, hang
 from hrc_env.motion.state import Worker
 
 HIGHEST_RISER_M = 0.32
 """Greatest rise of one step [m]; ladders have rungs 0.25 to 0.30 m apart (EN 131-1)."""
-FIRST_M, TREAD_M = 0.40, 0.24
-"""Where a foot goes on the first tread, and from tread to tread [m]."""
-STEP_AT_S, PERIOD_S, SWING_S, TURN_S = 0.12, 0.72, 0.56, 0.75
-"""First lift-off, period and swing of a climber's steps; to turn the head across [s]; judgement."""
+FIRST_M = 0.40
+"""Distance from the stance to the first tread [m]."""
+TREAD_M = 0.24
+"""Distance from tread to tread [m]."""
+STEP_AT_S = 0.12
+"""Time of a climber's first lift-off [s]; judgement."""
+PERIOD_S = 0.72
+"""Period of a climber's steps [s]; judgement."""
+SWING_S = 0.56
+"""Time that a climber's foot is in the air [s]; judgement."""
+TURN_S = 0.75
+"""Time to turn the head from one side to the other [s]; judgement."""
 
 
 @kernel
-def climb(t: float, me: Worker) -> None:
-    """Let a standing q climb, stay, and come down as it went up."""
-    q = me.q
-    up_s, treads = me.up_s, me.treads
-    when = step_time(t, me)
+def climb(t: float, worker: Worker) -> None:
+    """Let a standing worker climb, stay, and come down the way they went up.
+
+    Args:
+        t: time since the activity began [s].
+        worker: record with the plan; its `q`, standing at ease, is changed.
+    """
+    q = worker.q
+    up_s, treads = worker.up_s, worker.treads
+    when = to_step_time(t, worker)
     along = cruise((when - 0.25) / (up_s - 0.25), 0.4)
     risen = cruise((when - 0.50) / (up_s - 0.55), 0.4)
-    shift(q, c.ROOT_X, me.start_yaw, (FIRST_M + TREAD_M * (treads - 1.0)) * along, 0.0)
-    q[c.PELVIS_Z] += treads * me.riser_m * risen
+    shift(q, c.ROOT_X, worker.start_yaw, (FIRST_M + TREAD_M * (treads - 1.0)) * along, 0.0)
+    q[c.PELVIS_Z] += treads * worker.riser_m * risen
     going = min_jerk(when / 0.5) - min_jerk((when - up_s + 0.3) / 0.6)
     q[c.SPINE_FLEX] += 0.14 * going
     q[c.PELVIS_PITCH] += 0.10 * going
     q[c.HEAD_PITCH] += 0.20 * going
     for side in range(2):
-        hang(side, RELAXED_PITCH - 0.05 * going, RELAXED_ELBOW + 0.25 * going, me)
+        hang(side, RELAXED_PITCH - 0.05 * going, RELAXED_ELBOW + 0.25 * going, worker)
 
 
 @kernel
-def start_climb(draws: Floats, height: float, me: Worker) -> float:
-    """Plan to climb to the height; returns how long it takes [s]."""
-    blank(me)
-    prints = me.prints
-    high = height if height > 0.0 else between(draws[0], 0.18, 0.30)
+def start_climb(draws: Floats, height: float, worker: Worker) -> float:
+    """Plan to climb to a height.
+
+    Args:
+        draws: uniform draws (N_START,) in [0, 1).
+        height: height to climb to [m]; 0 to draw one.
+        worker: record that the plan is written into.
+
+    Returns:
+        The duration [s].
+    """
+    clear_plan(worker)
+    prints = worker.footprints
+    high = height if height > 0.0 else scale_draw(draws[0], 0.18, 0.30)
     treads = max(1, math.ceil(high / HIGHEST_RISER_M))
-    me.treads, me.riser_m = treads, high / treads
+    worker.treads, worker.riser_m = treads, high / treads
     first = 1 if draws[1] < 0.5 else 0
-    me.step_start, me.step_period, me.step_swing = STEP_AT_S, PERIOD_S, SWING_S
-    me.step_first, me.step_count = first, treads + 1
+    worker.step_start, worker.step_period, worker.step_swing = STEP_AT_S, PERIOD_S, SWING_S
+    worker.step_first, worker.step_count = first, treads + 1
     for k in range(treads + 1):
         side, tread = (k + first) % 2, min(k + 1, treads)
         for i in range(3):
-            prints[k, i] = me.stance[side, i]
-        shift(prints[k], 0, me.start_yaw, FIRST_M + TREAD_M * (tread - 1.0), 0.0)
-        prints[k, 3], prints[k, 4] = 0.25, tread * me.riser_m
-    me.up_s = STEP_AT_S + treads * PERIOD_S + SWING_S + 0.1
-    me.undo_at = me.up_s + 0.5 * between(draws[2], 0.5, 4.0)
-    return 2.0 * me.undo_at
+            prints[k, i] = worker.stance[side, i]
+        shift(prints[k], 0, worker.start_yaw, FIRST_M + TREAD_M * (tread - 1.0), 0.0)
+        prints[k, 3], prints[k, 4] = 0.25, tread * worker.riser_m
+    worker.up_s = STEP_AT_S + treads * PERIOD_S + SWING_S + 0.1
+    worker.undo_at = worker.up_s + 0.5 * scale_draw(draws[2], 0.5, 4.0)
+    return 2.0 * worker.undo_at
 
 
 @kernel
-def look_round(t: float, me: Worker) -> None:
-    """Let a standing q look about."""
-    q = me.q
-    there, across = min_jerk(t / TURN_S), min_jerk((t - me.left_s) / TURN_S)
-    back = min_jerk((t - me.right_s) / TURN_S)
-    gaze = me.left_rad * (there - across) + me.right_rad * (across - back)
+def look_round(t: float, worker: Worker) -> None:
+    """Let a standing worker look about."""
+    q = worker.q
+    there, across = min_jerk(t / TURN_S), min_jerk((t - worker.left_s) / TURN_S)
+    back = min_jerk((t - worker.right_s) / TURN_S)
+    gaze = worker.left_rad * (there - across) + worker.right_rad * (across - back)
     q[c.HEAD_YAW] += 0.62 * gaze
     q[c.SPINE_TWIST] += 0.26 * gaze
     q[c.PELVIS_YAW] += 0.12 * gaze
 
 
 @kernel
-def start_look_round(draws: Floats, height: float, me: Worker) -> float:
-    """Plan to look round; returns how long it takes [s]."""
-    blank(me)
+def start_look_round(draws: Floats, height: float, worker: Worker) -> float:
+    """Plan to look round; the height has no effect.
+
+    Args:
+        draws: uniform draws (N_START,) in [0, 1).
+        height: height of the work [m].
+        worker: record that the plan is written into.
+
+    Returns:
+        The duration [s].
+    """
+    clear_plan(worker)
     first = 1.0 if draws[0] < 0.5 else -1.0
-    me.left_rad = first * between(draws[1], 0.6, 1.5)
-    me.right_rad = -first * between(draws[2], 0.6, 1.5)
-    me.left_s = TURN_S + between(draws[3], 0.3, 1.2)
-    me.right_s = me.left_s + TURN_S + between(draws[4], 0.3, 1.2)
-    return me.right_s + TURN_S + 0.05
+    worker.left_rad = first * scale_draw(draws[1], 0.6, 1.5)
+    worker.right_rad = -first * scale_draw(draws[2], 0.6, 1.5)
+    worker.left_s = TURN_S + scale_draw(draws[3], 0.3, 1.2)
+    worker.right_s = worker.left_s + TURN_S + scale_draw(draws[4], 0.3, 1.2)
+    return worker.right_s + TURN_S + 0.05

@@ -1,7 +1,7 @@
-"""Falling: a walker's foot is caught, hands go out, knees, hands and trunk come to the floor.
+"""Falling: a walker's foot is caught, hands go out, and knees, hands and trunk come to the floor.
 
-They lie there, and get up over hands and knees and one foot. What is between two of POSES is a
-monotone cubic of Fritsch & Butland (1984, doi:10.1137/0905021): nothing is overshot.
+The worker lies there, and gets up over hands and knees and one foot. Between two of `POSES` runs a
+monotone cubic of Fritsch & Butland (1984, doi:10.1137/0905021), so nothing overshoots.
 """
 
 import math
@@ -11,31 +11,42 @@ import numpy as np
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
-from hrc_env.motion.activities.planning import between
+from hrc_env.motion.activities.planning import scale_draw
 from hrc_env.motion.anatomy import ANKLE_Z, BALL_X, BALL_Z, LEG
-from hrc_env.motion.curves import min_jerk, placed
+from hrc_env.motion.curves import min_jerk, move_point
 from hrc_env.motion.feet import raise_heel
-from hrc_env.motion.floorplan import slack_at
-from hrc_env.motion.paths import along
+from hrc_env.motion.floorplan import FloorGrid, read_slack
+from hrc_env.motion.paths import locate_on_path
+from hrc_env.motion.points import Point
 from hrc_env.motion.posture import STANCE_HALF_WIDTH_M, TOE_OUT_RAD, stand
-from hrc_env.motion.state import MAX_STEPS, Pair, Worker
+from hrc_env.motion.state import MAX_STEPS, Worker
 from hrc_env.motion.walk import (
     LEG_M,
     WALK_HALF_WIDTH_M,
-    footprint,
+    locate_root,
+    measure_travel,
     plan_walk,
-    root,
-    travelled,
     walk,
+    write_footprint,
 )
 
-(PELVIS_X, PELVIS_Z, PITCH, ROLL, FLEX, NOD, TURN, GRASP, ELBOWS, KNEES) = range(10)
-HANDS, FEET, FREED, RISEN = 10, 16, 26, 27
-"""Columns of POSES. Pelvis ahead of where they stumble and its height, its pitch, the share of
-lying on a side, the spine, the head; share of the hands' places; elbows and knees outwards; ahead,
-outwards and height of the hand on the side of the foot that gets up first, and of the other; the
-same of the balls of the feet above a standing foot's, pitch of foot and of toes; shares of the feet
-that have left their prints, of each that stands where they get up. Lengths of a leg of LEG_M."""
+PELVIS_X, PELVIS_Z, PITCH, ROLL, FLEX, NOD, TURN, GRASP, ELBOWS, KNEES = range(10)
+"""Columns of `PLACES` for the trunk, in lengths of a leg of `LEG_M` and radians.
+
+Pelvis ahead of the stumble and its height, its pitch, the share of lying on a side, flexion of the
+spine, pitch and turn of the head; shares of the hands' targets, elbows and knees outwards.
+"""
+HANDS = 10
+"""First of three columns for a hand: ahead, outwards, height; the rising foot's side first."""
+FEET = 16
+"""First of five columns for a foot: the rising foot's, then the other's.
+
+Ball of the foot ahead, outwards and above that of a standing foot, pitch of foot and of toes.
+"""
+FREED = 26
+"""Column for the share by which the feet have left their footprints."""
+RISEN = 27
+"""First of two columns for the share by which each foot stands where the worker gets up."""
 _PUSHED, _STEM = (1.42, 0.38, 0.12), (1.42, 0.36, 0.14)
 POSES = np.array([
     # time, pelvis x z, pitch, roll, flex, nod, turn, grasp, elbows, knees, hands, feet, shares
@@ -66,26 +77,40 @@ POSES = np.array([
     (5.70, 1.22, 0.957, 0.02, 0, 0.05, 0.05, 0.0, 0, 0.2, 0.0, 1.42, 0.22, 0.84, 1.2, 0.36, 0.74,
      1.30, 0.12, 0.0, 0.0, 0.0, 1.30, 0.12, 0.0, 0.0, 0.0, 1, 1, 1),
 ])  # fmt: skip
-TIMES_S, PLACES = POSES[:, 0].copy(), POSES[:, 1:].copy()
-LIES_S, STANDS_S = 1.2, 5.7
-"""At which of these times they lie, and stand again."""
-THROWN_S, ERECT_S = 0.32, 0.7
-"""In which a walk becomes a fall, and the last pose one who stands [s]."""
-CAUGHT_AT, CAUGHT_LEGS = 0.7, 0.14
-"""Share of the caught foot's swing; how far before the other it comes down, in lengths of the leg;
-judgement."""
-RISES_AT, TALL = 1.22, 1.7
-"""How far from where they stumble they stand again, and their head, hands or both are; the same
-lengths as in POSES."""
+"""Poses of a fall: time [s], then the columns of `PLACES`."""
+TIMES_S = POSES[:, 0].copy()
+"""Times of the poses [s]."""
+PLACES = POSES[:, 1:].copy()
+"""Poses without their times."""
+LIES_S = 1.2
+"""Time in `POSES` at which the worker lies [s]."""
+STANDS_S = 5.7
+"""Time in `POSES` at which the worker stands again [s]."""
+THROWN_S = 0.32
+"""Time in which a walk becomes a fall [s]."""
+ERECT_S = 0.7
+"""Time in which the last pose becomes standing [s]."""
+CAUGHT_AT = 0.7
+"""Share of the caught foot's swing at which it is caught; judgement."""
+CAUGHT_LEGS = 0.14
+"""Distance at which the caught foot lands before the other, in lengths of the leg; judgement."""
+RISES_AT = 1.22
+"""Distance from the stumble to where the worker stands again, in lengths as in `POSES`."""
+TALL = 1.7
+"""Distance from the stumble that head and hands reach, in lengths as in `POSES`."""
 TURNS_RAD = (0.0, 0.35, -0.35, 0.7, -0.7)
-"""Ways to fall, from where they go, that are tried for room."""
-QUICKEST, SLOWEST, MOST_ROLL_RAD = 1.15, 0.9, 0.9
-"""Between these shares of the times of POSES people go down; how far they lie on a side at most."""
+"""Directions of a fall, from the heading, that are tried for room [rad]."""
+QUICKEST = 1.15
+"""Greatest rate of a fall relative to `POSES`."""
+SLOWEST = 0.9
+"""Least rate of a fall relative to `POSES`."""
+MOST_ROLL_RAD = 0.9
+"""Greatest turn of a lying trunk onto a side [rad]."""
 
 
 @kernel
-def _slope(k: int, column: int) -> float:
-    """Rate of a column at pose k."""
+def _find_slope(k: int, column: int) -> float:
+    """Return the rate of a column at pose k."""
     if k == 0 or k == PLACES.shape[0] - 1:
         return 0.0
     before, after = TIMES_S[k] - TIMES_S[k - 1], TIMES_S[k + 1] - TIMES_S[k]
@@ -98,141 +123,202 @@ def _slope(k: int, column: int) -> float:
 
 
 @kernel
-def _posed(at: float, column: int) -> float:
-    """A column of POSES at one of their times."""
+def _interpolate(at: float, column: int) -> float:
+    """Return a column of `POSES` at a time."""
     k = 0
     while k < PLACES.shape[0] - 2 and TIMES_S[k + 1] <= at:
         k += 1
-    lasts = TIMES_S[k + 1] - TIMES_S[k]
-    u = min(max((at - TIMES_S[k]) / lasts, 0.0), 1.0)
+    duration_s = TIMES_S[k + 1] - TIMES_S[k]
+    u = min(max((at - TIMES_S[k]) / duration_s, 0.0), 1.0)
     a, b = PLACES[k, column], PLACES[k + 1, column]
-    p, r = _slope(k, column) * lasts, _slope(k + 1, column) * lasts
+    p, r = _find_slope(k, column) * duration_s, _find_slope(k + 1, column) * duration_s
     return a + u * (p + u * (3.0 * (b - a) - 2.0 * p - r + u * (2.0 * (a - b) + p + r)))
 
 
 @kernel
-def _moment(since: float, me: Worker) -> float:
-    """Which of the times of POSES it is so long after the foot was caught."""
-    down = me.fall_pace * since
-    return min(down, LIES_S) + max(since - LIES_S / me.fall_pace - me.lie_s, 0.0)
+def _to_pose_time(since: float, worker: Worker) -> float:
+    """Return the time in `POSES` a time `since` [s] after the foot was caught."""
+    down = worker.fall_pace * since
+    return min(down, LIES_S) + max(since - LIES_S / worker.fall_pace - worker.lie_s, 0.0)
 
 
 @kernel
-def fall(t: float, clock_s: float, me: Worker) -> None:
-    """Let the feet in q, and all of it, become those of who falls and gets up again."""
-    at = _moment(t - me.trip_at, me)
+def fall(t: float, clock_s: float, worker: Worker) -> None:
+    """Change the feet, and the whole posture, into those of falling and getting up again.
+
+    Args:
+        t: time since the activity began [s].
+        clock_s: time since the episode began [s].
+        worker: record with the plan; its `q` holds the feet of the walk and is written.
+    """
+    at = _to_pose_time(t - worker.trip_at, worker)
     if at <= LIES_S:
-        walk(t, clock_s, me)
+        walk(t, clock_s, worker)
     else:
-        stand(me.end_x, me.end_y, me.end_yaw, clock_s, me)
+        stand(worker.end_x, worker.end_y, worker.end_yaw, clock_s, worker)
     if at <= 0.0:
         return
     share = min_jerk(at / THROWN_S) * min_jerk((STANDS_S - at) / ERECT_S)
-    me.fallen, me.rolled = share, me.lie_roll * _posed(at, ROLL)
-    me.elbows_out, me.knees_out = _posed(at, ELBOWS), _posed(at, KNEES)
-    _trunk(at, share, me)
+    worker.fall_share, worker.trunk_roll = share, worker.lie_roll * _interpolate(at, ROLL)
+    worker.elbows_out, worker.knees_out = _interpolate(at, ELBOWS), _interpolate(at, KNEES)
+    _fall_trunk(at, share, worker)
     for side in range(2):
-        of = 0 if side == me.front else 1
-        sign, scale = 1.0 - 2.0 * side, me.size[LEG] / LEG_M
-        hand, goal = HANDS + 3 * of, c.HAND_TARGET + 3 * side
-        ahead, out = scale * _posed(at, hand), sign * scale * _posed(at, hand + 1)
-        me.q[goal], me.q[goal + 1] = placed(me.fall_x, me.fall_y, me.fall_yaw, ahead, out)
-        me.q[goal + 2] = scale * _posed(at, hand + 2)
-        me.q[c.HAND_SHARE + side] = _posed(at, GRASP)
-        _foot(at, side, FEET + 5 * of, sign, me)
+        row = 0 if side == worker.front else 1
+        sign, scale = 1.0 - 2.0 * side, worker.lengths[LEG] / LEG_M
+        hand, goal = HANDS + 3 * row, c.HAND_TARGET + 3 * side
+        ahead, out = scale * _interpolate(at, hand), sign * scale * _interpolate(at, hand + 1)
+        worker.q[goal], worker.q[goal + 1] = move_point(
+            worker.fall_x, worker.fall_y, worker.fall_yaw, ahead, out
+        )
+        worker.q[goal + 2] = scale * _interpolate(at, hand + 2)
+        worker.q[c.HAND_SHARE + side] = _interpolate(at, GRASP)
+        _fall_foot(at, side, FEET + 5 * row, sign, worker)
 
 
 @kernel
-def _trunk(at: float, share: float, me: Worker) -> None:
-    """Let a share of what stands in q become the root, the pelvis, the spine and the head."""
-    q, scale = me.q, me.size[LEG] / LEG_M
-    side = 1.0 - 2.0 * me.front
-    x, y = placed(me.fall_x, me.fall_y, me.fall_yaw, scale * _posed(at, PELVIS_X), 0.0)
+def _fall_trunk(at: float, share: float, worker: Worker) -> None:
+    """Change root, pelvis, spine and head by a share into those of the fall.
+
+    Args:
+        at: time in `POSES` [s].
+        share: share of the fall in the posture.
+        worker: record; its `q` is changed.
+    """
+    q, scale = worker.q, worker.lengths[LEG] / LEG_M
+    side = 1.0 - 2.0 * worker.front
+    x, y = move_point(
+        worker.fall_x, worker.fall_y, worker.fall_yaw, scale * _interpolate(at, PELVIS_X), 0.0
+    )
     q[c.ROOT_X] += share * (x - q[c.ROOT_X])
     q[c.ROOT_Y] += share * (y - q[c.ROOT_Y])
-    q[c.HEADING] += share * (me.fall_yaw - q[c.HEADING])
+    q[c.HEADING] += share * (worker.fall_yaw - q[c.HEADING])
     for column in range(c.PELVIS_ROLL, c.HEAD_YAW + 1):
         q[column] *= 1.0 - share
-    q[c.PELVIS_Z] += share * (scale * _posed(at, PELVIS_Z) - q[c.PELVIS_Z])
-    q[c.PELVIS_PITCH] += share * (_posed(at, PITCH) - q[c.PELVIS_PITCH])
-    q[c.SPINE_FLEX] += share * _posed(at, FLEX)
-    q[c.HEAD_PITCH] += share * _posed(at, NOD)
-    q[c.HEAD_YAW] += share * side * _posed(at, TURN)
+    q[c.PELVIS_Z] += share * (scale * _interpolate(at, PELVIS_Z) - q[c.PELVIS_Z])
+    q[c.PELVIS_PITCH] += share * (_interpolate(at, PITCH) - q[c.PELVIS_PITCH])
+    q[c.SPINE_FLEX] += share * _interpolate(at, FLEX)
+    q[c.HEAD_PITCH] += share * _interpolate(at, NOD)
+    q[c.HEAD_YAW] += share * side * _interpolate(at, TURN)
 
 
 @kernel
-def _foot(at: float, side: int, column: int, sign: float, me: Worker) -> None:
-    """Let the foot in q, on its print, go on its ball, away, and to where they get up."""
-    q, ankle = me.q, c.ANKLE + 6 * side
-    scale, length, low = me.size[LEG] / LEG_M, me.size[BALL_X], me.size[BALL_Z]
-    pitch, toes = _posed(at, column + 3), _posed(at, column + 4)
-    freed, risen = _posed(at, FREED), _posed(at, RISEN + (column - FEET) // 5)
-    raise_heel(side, pitch, me)
-    ahead, out = scale * _posed(at, column), sign * scale * _posed(at, column + 1)
-    x, y = placed(me.fall_x, me.fall_y, me.fall_yaw, ahead, out)
-    last = me.prints[me.step_count + (me.step_count + me.step_first + side) % 2]
-    end_x, end_y = placed(last[0], last[1], last[2], length, 0.0)
-    x, y, yaw = x + risen * (end_x - x), y + risen * (end_y - y), me.fall_yaw + sign * TOE_OUT_RAD
+def _fall_foot(at: float, side: int, column: int, sign: float, worker: Worker) -> None:
+    """Move a foot from its footprint onto its ball, away, and to where the worker gets up.
+
+    Args:
+        at: time in `POSES` [s].
+        side: 0 left, 1 right.
+        column: first column of the foot in `POSES`.
+        sign: 1 on the left, -1 on the right.
+        worker: record; its `q` is changed.
+    """
+    q, ankle = worker.q, c.ANKLE + 6 * side
+    scale, length, low = worker.lengths[LEG] / LEG_M, worker.lengths[BALL_X], worker.lengths[BALL_Z]
+    pitch, toes = _interpolate(at, column + 3), _interpolate(at, column + 4)
+    freed, risen = _interpolate(at, FREED), _interpolate(at, RISEN + (column - FEET) // 5)
+    raise_heel(side, pitch, worker)
+    ahead, out = scale * _interpolate(at, column), sign * scale * _interpolate(at, column + 1)
+    x, y = move_point(worker.fall_x, worker.fall_y, worker.fall_yaw, ahead, out)
+    last = worker.footprints[worker.step_count + (worker.step_count + worker.step_first + side) % 2]
+    end_x, end_y = move_point(last[0], last[1], last[2], length, 0.0)
+    x, y, yaw = (
+        x + risen * (end_x - x),
+        y + risen * (end_y - y),
+        worker.fall_yaw + sign * TOE_OUT_RAD,
+    )
     cos, sin = math.cos(pitch), math.sin(pitch)
-    x, y = placed(x, y, yaw, -length * cos - low * sin, 0.0)
-    z = me.size[ANKLE_Z] + low + scale * _posed(at, column + 2) + length * sin - low * cos
+    x, y = move_point(x, y, yaw, -length * cos - low * sin, 0.0)
+    z = (
+        worker.lengths[ANKLE_Z]
+        + low
+        + scale * _interpolate(at, column + 2)
+        + length * sin
+        - low * cos
+    )
     for i, goal in enumerate((x, y, z, yaw, pitch, toes)):
         q[ankle + i] += freed * (goal - q[ankle + i])
 
 
 @kernel
 def plan_fall(
-    draws: Floats, end_yaw: float, pace_m_s: float, lie_s: float, slack: Floats, origin: Floats,
-    me: Worker,
-) -> float:  # fmt: skip
-    """Plan to fall on the way along the path that is laid; how long it takes [s], -1: no room."""
-    plan_walk(end_yaw, pace_m_s, me)
-    n = me.step_count - 5
-    if me.follow == 0.0 or n < 1 or me.step_count > MAX_STEPS - 2:
+    draws: Floats, end_yaw: float, pace_m_s: float, lie_s: float, grid: FloorGrid, worker: Worker
+) -> float:
+    """Plan to fall on the way along the path that is laid.
+
+    Args:
+        draws: uniform draws (N_START,) in [0, 1).
+        end_yaw: heading at the end of the path [rad].
+        pace_m_s: walking speed [m/s].
+        lie_s: time to lie on the floor [s].
+        grid: free distance on the floor.
+        worker: record with the path; the plan is written into it.
+
+    Returns:
+        The duration [s]; -1 where there is no room.
+    """
+    plan_walk(end_yaw, pace_m_s, worker)
+    n = worker.step_count - 5
+    if worker.follow == 0.0 or n < 1 or worker.step_count > MAX_STEPS - 2:
         return -1.0
-    me.fall_pace, me.lie_s = between(draws[1], SLOWEST, QUICKEST), lie_s
-    me.lie_roll = MOST_ROLL_RAD * (2.0 * draws[2] - 1.0)
-    me.front = 1 if draws[3] < 0.5 else 0
+    worker.fall_pace, worker.lie_s = scale_draw(draws[1], SLOWEST, QUICKEST), lie_s
+    worker.lie_roll = MOST_ROLL_RAD * (2.0 * draws[2] - 1.0)
+    worker.front = 1 if draws[3] < 0.5 else 0
     first = int(draws[0] * n)
     for k in range(n):
         for turn in TURNS_RAD:
-            if _stumbles(2 + (first + k) % n, turn, slack, origin, me):
-                me.lasts = me.trip_at + LIES_S / me.fall_pace + lie_s + STANDS_S - LIES_S
-                return me.lasts
+            if _plan_stumble(2 + (first + k) % n, turn, grid, worker):
+                worker.total_s = (
+                    worker.trip_at + LIES_S / worker.fall_pace + lie_s + STANDS_S - LIES_S
+                )
+                return worker.total_s
     return -1.0
 
 
 @kernel
-def _stumbles(step: int, turn: float, slack: Floats, origin: Floats, me: Worker) -> bool:
-    """Plan to fall in that step, turned from the way; whether there is room for it."""
-    scale, side = me.size[LEG] / LEG_M, (step + me.step_first) % 2
-    sign, stands = 1.0 - 2.0 * side, me.prints[step - 1]
-    trip_at = me.step_start + step * me.step_period + CAUGHT_AT * me.step_swing
-    _, _, yaw = root(trip_at, me)
-    ahead, over = CAUGHT_LEGS * me.size[LEG], sign * WALK_HALF_WIDTH_M
-    x, y = placed(stands[0], stands[1], yaw, 0.5 * ahead + me.size[BALL_X], over)
+def _plan_stumble(step: int, turn: float, grid: FloorGrid, worker: Worker) -> bool:
+    """Plan to fall in a step, turned from the path, if there is room.
+
+    Args:
+        step: index of the step in which the foot is caught.
+        turn: angle of the fall from the heading [rad].
+        grid: free distance on the floor.
+        worker: record with the walk; the plan is written into it.
+
+    Returns:
+        Whether there is room.
+    """
+    scale, side = worker.lengths[LEG] / LEG_M, (step + worker.step_first) % 2
+    sign, stands = 1.0 - 2.0 * side, worker.footprints[step - 1]
+    trip_at = worker.step_start + step * worker.step_period + CAUGHT_AT * worker.step_swing
+    yaw = locate_root(trip_at, worker).yaw
+    ahead, over = CAUGHT_LEGS * worker.lengths[LEG], sign * WALK_HALF_WIDTH_M
+    x, y = move_point(stands[0], stands[1], yaw, 0.5 * ahead + worker.lengths[BALL_X], over)
     for k in range(9):
-        px, py = placed(x, y, yaw + turn, 0.125 * k * TALL * scale, 0.0)
-        if slack_at(px, py, slack, origin) < 0.0:
+        px, py = move_point(x, y, yaw + turn, 0.125 * k * TALL * scale, 0.0)
+        if read_slack(px, py, grid) < 0.0:
             return False
-    me.trip_at, me.fall_x, me.fall_y, me.fall_yaw = trip_at, x, y, yaw + turn
-    caught = me.prints[step]
-    caught[0], caught[1] = placed(stands[0], stands[1], yaw, ahead, 2.0 * over)
+    worker.trip_at, worker.fall_x, worker.fall_y, worker.fall_yaw = trip_at, x, y, yaw + turn
+    caught = worker.footprints[step]
+    caught[0], caught[1] = move_point(stands[0], stands[1], yaw, ahead, 2.0 * over)
     caught[2], caught[3] = yaw + sign * TOE_OUT_RAD, 0.4 * caught[3]
-    me.step_count = step + 1
-    me.end_x, me.end_y = placed(x, y, me.fall_yaw, RISES_AT * scale, 0.0)
-    me.end_yaw = me.fall_yaw
+    worker.step_count = step + 1
+    worker.end_x, worker.end_y = move_point(x, y, worker.fall_yaw, RISES_AT * scale, 0.0)
+    worker.end_yaw = worker.fall_yaw
     for side in range(2):
-        last = me.prints[me.step_count + (me.step_count + me.step_first + side) % 2]
-        footprint(side, me.end_x, me.end_y, me.end_yaw, STANCE_HALF_WIDTH_M, last, me)
+        last = worker.footprints[
+            worker.step_count + (worker.step_count + worker.step_first + side) % 2
+        ]
+        write_footprint(
+            side, worker.end_x, worker.end_y, worker.end_yaw, STANCE_HALF_WIDTH_M, last, worker
+        )
     return True
 
 
 @kernel
-def fallen_root(t: float, me: Worker) -> Pair:
-    """About where the root of someone who falls is on the floor at time t, and after."""
-    at = _moment(t - me.trip_at, me)
+def predict_fallen_root(t: float, worker: Worker) -> Point:
+    """Return the approximate root on the floor at time t of a fall, and after it."""
+    at = _to_pose_time(t - worker.trip_at, worker)
     if at <= 0.0:
-        return along(travelled(t, me), me)
-    ahead = me.size[LEG] / LEG_M * _posed(at, PELVIS_X)
-    return placed(me.fall_x, me.fall_y, me.fall_yaw, ahead, 0.0)
+        return locate_on_path(measure_travel(t, worker), worker)
+    ahead = worker.lengths[LEG] / LEG_M * _interpolate(at, PELVIS_X)
+    return move_point(worker.fall_x, worker.fall_y, worker.fall_yaw, ahead, 0.0)

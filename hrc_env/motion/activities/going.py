@@ -1,4 +1,4 @@
-"""Going somewhere: walking, turning, with a cart, stumbling, a few quick steps back."""
+"""Going somewhere: turning, stumbling, a few quick steps back, pushing a cart."""
 
 import math
 
@@ -7,120 +7,180 @@ import numpy as np
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
-from hrc_env.motion.activities.planning import between, in_reach, shoulders
+from hrc_env.motion.activities.planning import locate_shoulders, measure_reach, scale_draw
 from hrc_env.motion.anatomy import LEG, STAND_Z
-from hrc_env.motion.curves import min_jerk, placed, shift
+from hrc_env.motion.curves import min_jerk, move_point, shift
 from hrc_env.motion.holding import grip_load, place_load, take_load
 from hrc_env.motion.paths import lay_path
+from hrc_env.motion.points import Point, SagittalShift
 from hrc_env.motion.posture import lean
-from hrc_env.motion.state import Pair, Worker
-from hrc_env.motion.walk import plan_pace, plan_walk, root, speed, walk
+from hrc_env.motion.state import Worker
+from hrc_env.motion.walk import Pace, locate_root, measure_speed, plan_pace, plan_walk, walk
 from hrc_env.worker.props import PROP_NAMES
 
-CART, WHEELBARROW = PROP_NAMES.index("cart"), PROP_NAMES.index("wheelbarrow")
-CART_AHEAD_M, WHEELBARROW_AHEAD_LEGS = 0.47, 0.26
-"""Handles ahead of the root: a cart's [m]; a level wheelbarrow's in lengths of the leg."""
-PUSHING_SHARE, STOOPED_M, CART_LEAN = 0.99, 0.4, 0.06
-"""Arms push stretched to this share, then trunks lean: 1 brings shoulders so far [m]; always."""
-WHEEL_AHEAD_M, WHEEL_UP_M, STANDS_RAD = 1.2, 0.17, 0.2
-"""A wheelbarrow's axle in its frame [m], and how far it tips back onto its legs."""
-KNUCKLES_SHARE, BEND = 0.97, 1.3
-"""Handles are carried as high as this share of the pelvis; the bow to take them; judgement."""
-TAKE_S, LIFT_S = 0.7, 0.5
-"""For the hands to go to the handles; to lift a wheelbarrow by them [s]."""
-STEP_BACK_PACE, TURN_PACE = (0.0, 0.62, 0.42), (0.0, 0.2, 0.36)
-"""Of `plan_pace`: quick steps back; turning without one foot stepping on the other; judgement."""
+CART = PROP_NAMES.index("cart")
+WHEELBARROW = PROP_NAMES.index("wheelbarrow")
+CART_AHEAD_M = 0.47
+"""Distance of a cart's handles ahead of the root [m]."""
+WHEELBARROW_AHEAD_LEGS = 0.26
+"""Distance of a level wheelbarrow's handles ahead of the root, in lengths of the leg."""
+PUSHING_SHARE = 0.99
+"""Share of the arm's length to which arms are stretched in pushing."""
+STOOPED_M = 0.4
+"""Distance by which a lean of 1 brings the shoulders forward [m]."""
+CART_LEAN = 0.06
+"""Least lean in pushing a cart."""
+WHEEL_AHEAD_M = 1.2
+"""Distance of a wheelbarrow's axle ahead of its origin [m]."""
+WHEEL_UP_M = 0.17
+"""Height of a wheelbarrow's axle above its origin [m]."""
+STANDS_RAD = 0.2
+"""Tilt of a wheelbarrow that stands on its legs [rad]."""
+KNUCKLES_SHARE = 0.97
+"""Height of carried handles as a share of the pelvis's height."""
+BEND = 1.3
+"""Lean to take the handles of a wheelbarrow; judgement."""
+TAKE_S = 0.7
+"""Time for the hands to go to the handles [s]."""
+LIFT_S = 0.5
+"""Time to lift a wheelbarrow by its handles [s]."""
+STEP_BACK_PACE = Pace(0.0, 0.62, 0.42)
+"""Pace of quick steps back; judgement."""
+TURN_PACE = Pace(0.0, 0.2, 0.36)
+"""Pace of turning on the spot without one foot stepping on the other; judgement."""
 CAUGHT_LEGS = 0.115
-"""How much too short the step is in which a foot catches, in lengths of the leg; judgement."""
+"""Shortening of the step in which a foot catches, in lengths of the leg; judgement."""
 
 
 @kernel(makes_arrays=True)
-def start_turn(yaw: float, me: Worker) -> float:
-    """Plan to turn on the spot to a yaw; returns how long it takes [s]."""
-    here = (me.start_x, me.start_y)
-    lay_path(here, np.empty((0, 3)), here, me)
-    return plan_pace(TURN_PACE, yaw, me)
+def start_turn(yaw: float, worker: Worker) -> float:
+    """Plan to turn on the spot to a heading [rad]; return the duration [s]."""
+    here = Point(worker.start_x, worker.start_y)
+    lay_path(here, np.empty((0, 3)), here, worker)
+    return plan_pace(TURN_PACE, yaw, worker)
 
 
 @kernel(makes_arrays=True)
-def start_step_back(draws: Floats, height: float, me: Worker) -> float:
-    """Plan to step straight back without looking; returns how long it takes [s]."""
-    x, y, yaw = me.start_x, me.start_y, me.start_yaw
-    end = placed(x, y, yaw, -between(draws[0], 0.30, 0.75), 0.0)
-    lay_path((x, y), np.empty((0, 3)), end, me)
-    return plan_pace(STEP_BACK_PACE, yaw, me)
+def start_step_back(draws: Floats, height: float, worker: Worker) -> float:
+    """Plan to step straight back without looking; the height has no effect.
+
+    Args:
+        draws: uniform draws (N_START,) in [0, 1).
+        height: height of the work [m].
+        worker: record that the plan is written into.
+
+    Returns:
+        The duration [s].
+    """
+    x, y, yaw = worker.start_x, worker.start_y, worker.start_yaw
+    end = move_point(x, y, yaw, -scale_draw(draws[0], 0.30, 0.75), 0.0)
+    lay_path(Point(x, y), np.empty((0, 3)), end, worker)
+    return plan_pace(STEP_BACK_PACE, yaw, worker)
 
 
 @kernel
-def start_stumble(draws: Floats, end_yaw: float, speed_m_s: float, me: Worker) -> float:
-    """Plan a walk in which a foot catches; returns how long it takes [s]."""
-    lasts = plan_walk(end_yaw, speed_m_s, me)
-    count = me.step_count
-    if me.follow == 0.0 or count < 6:
-        return lasts
+def start_stumble(draws: Floats, end_yaw: float, speed_m_s: float, worker: Worker) -> float:
+    """Plan a walk along the path that is laid, in which a foot catches.
+
+    Args:
+        draws: uniform draws (N_START,) in [0, 1).
+        end_yaw: heading at the end [rad].
+        speed_m_s: top speed [m/s].
+        worker: record with the path; the plan is written into it.
+
+    Returns:
+        The duration [s].
+    """
+    duration_s = plan_walk(end_yaw, speed_m_s, worker)
+    count = worker.step_count
+    if worker.follow == 0.0 or count < 6:
+        return duration_s
     step = 2 + int(draws[0] * (count - 5))
-    me.trip_at = me.step_start + step * me.step_period + 0.35 * me.step_swing
-    me.trip = between(draws[1], 0.7, 1.0)
-    shift(me.prints[step], 0, me.prints[step, 2], -CAUGHT_LEGS * me.size[LEG], 0.0)
-    return lasts
+    worker.trip_at = worker.step_start + step * worker.step_period + 0.35 * worker.step_swing
+    worker.trip = scale_draw(draws[1], 0.7, 1.0)
+    shift(
+        worker.footprints[step],
+        0,
+        worker.footprints[step, 2],
+        -CAUGHT_LEGS * worker.lengths[LEG],
+        0.0,
+    )
+    return duration_s
 
 
 @kernel
-def start_push(end_yaw: float, speed_m_s: float, prop: int, me: Worker) -> float:
-    """Plan to push a cart or wheelbarrow; returns how long it takes [s]."""
-    take_load(prop, me)
-    lasts = plan_walk(end_yaw, speed_m_s, me)
-    me.taken_s = TAKE_S + (LIFT_S if prop == WHEELBARROW else 0.0)
-    _to_handles(prop, me)
-    me.lasts = lasts + 2.0 * me.taken_s
-    return me.lasts
+def start_push(end_yaw: float, speed_m_s: float, prop: int, worker: Worker) -> float:
+    """Plan to push a cart or wheelbarrow along the path that is laid.
+
+    Args:
+        end_yaw: heading at the end [rad].
+        speed_m_s: top speed [m/s].
+        prop: the cart or wheelbarrow, an index into `PROPS`.
+        worker: record with the path; the plan is written into it.
+
+    Returns:
+        The duration [s].
+    """
+    take_load(prop, worker)
+    duration_s = plan_walk(end_yaw, speed_m_s, worker)
+    worker.grasp_s = TAKE_S + (LIFT_S if prop == WHEELBARROW else 0.0)
+    _plan_handles(prop, worker)
+    worker.total_s = duration_s + 2.0 * worker.grasp_s
+    return worker.total_s
 
 
 @kernel
-def _to_handles(prop: int, me: Worker) -> None:
-    """Plan how far ahead the handles are, how far they are raised, and how far the trunk leans."""
-    forward, aside, up = shoulders(me)
-    across, high = me.load_grip[1] - aside, me.load_grip[2]
+def _plan_handles(prop: int, worker: Worker) -> None:
+    """Plan the distance of the handles ahead, their height, and the lean of the trunk to them."""
+    forward, aside, up = locate_shoulders(worker)
+    across, high = worker.load_grip[1] - aside, worker.load_grip[2]
     if prop == WHEELBARROW:
-        handles = KNUCKLES_SHARE * me.size[STAND_Z] - high
-        me.tipped = math.asin(min(max(handles / WHEEL_AHEAD_M, 0.0), 0.24))
-        me.load_at[0] = WHEELBARROW_AHEAD_LEGS * me.size[LEG]
+        handles = KNUCKLES_SHARE * worker.lengths[STAND_Z] - high
+        worker.tilt = math.asin(min(max(handles / WHEEL_AHEAD_M, 0.0), 0.24))
+        worker.load_at[0] = WHEELBARROW_AHEAD_LEGS * worker.lengths[LEG]
     else:
-        me.tipped, me.load_at[0] = 0.0, CART_AHEAD_M
-    ahead, raised = _tipped(-me.tipped, high)
-    reach = forward + in_reach(PUSHING_SHARE, across, up - high - raised, me)
-    me.stoop = max(me.load_at[0] + ahead - reach, 0.0) / STOOPED_M
+        worker.tilt, worker.load_at[0] = 0.0, CART_AHEAD_M
+    ahead, raised = _tilt_point(-worker.tilt, high)
+    reach = forward + measure_reach(PUSHING_SHARE, across, up - high - raised, worker)
+    worker.stoop = max(worker.load_at[0] + ahead - reach, 0.0) / STOOPED_M
 
 
 @kernel
-def push(t: float, clock_s: float, me: Worker) -> None:
-    """The control vector, but for the feet, of someone who takes a handle, pushes and lets go."""
-    q = me.q
-    going = t - me.taken_s
-    walk(going, clock_s, me)
-    near_end = min(t, me.lasts - t)
-    held, effort = min_jerk(near_end / TAKE_S), speed(going, me)
-    stooped = me.stoop * max(1.0 - effort, 0.0)
+def push(t: float, clock_s: float, worker: Worker) -> None:
+    """Write the control vector, but for the feet, of taking a handle, pushing and letting go.
+
+    Args:
+        t: time since the activity began [s].
+        clock_s: time since the episode began [s].
+        worker: record with the plan; its `q` is written.
+    """
+    q = worker.q
+    going = t - worker.grasp_s
+    walk(going, clock_s, worker)
+    near_end = min(t, worker.total_s - t)
+    held, effort = min_jerk(near_end / TAKE_S), measure_speed(going, worker)
+    stooped = worker.stoop * max(1.0 - effort, 0.0)
     q[c.PELVIS_PITCH] += 0.05 * effort
     q[c.SPINE_FLEX] += 0.10 * effort
-    x, y, yaw = root(going, me)
-    place_load(x, y, yaw, 0.0, me)
-    if me.load_prop == WHEELBARROW:
+    x, y, yaw = locate_root(going, worker)
+    place_load(x, y, yaw, 0.0, worker)
+    if worker.load_prop == WHEELBARROW:
         low = 1.0 - min_jerk((near_end - TAKE_S) / LIFT_S)
-        lean((BEND * low + stooped * (1.0 - low)) * held, 0.1, 0.0, me)
-        tipped = STANDS_RAD * low - me.tipped * (1.0 - low)  # back about its axle, handles down
-        ahead, up = _tipped(tipped, 0.0)
+        lean((BEND * low + stooped * (1.0 - low)) * held, 0.1, 0.0, worker)
+        tipped = STANDS_RAD * low - worker.tilt * (1.0 - low)  # back about its axle, handles down
+        ahead, up = _tilt_point(tipped, 0.0)
         shift(q, c.PROP_POSE, yaw, ahead, 0.0)
         q[c.PROP_POSE + 2] += up
         q[c.PROP_POSE + 4] -= tipped
     else:
-        lean((CART_LEAN + stooped) * held, 0.0, 0.0, me)
-    grip_load(held * (2.0 - held), me)  # before the bent trunk takes them to the knees
+        lean((CART_LEAN + stooped) * held, 0.0, 0.0, worker)
+    grip_load(held * (2.0 - held), worker)  # before the bent trunk takes them to the knees
 
 
 @kernel
-def _tipped(back_rad: float, z: float) -> Pair:
-    """How far ahead and up a point goes at height z over the wheelbarrow's origin."""
+def _tilt_point(back_rad: float, z: float) -> SagittalShift:
+    """Return the displacement of a point at height z [m] when a wheelbarrow tilts back."""
     cos, sin = math.cos(back_rad), math.sin(back_rad)
     above = z - WHEEL_UP_M
-    return WHEEL_AHEAD_M * (1.0 - cos) - above * sin, -WHEEL_AHEAD_M * sin - above * (1.0 - cos)
+    ahead = WHEEL_AHEAD_M * (1.0 - cos) - above * sin
+    return SagittalShift(ahead, -WHEEL_AHEAD_M * sin - above * (1.0 - cos))

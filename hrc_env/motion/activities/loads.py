@@ -1,167 +1,252 @@
-"""Loads: picked up and set down (that backwards), taken from somebody and handed over.
+"""Loads: picked up and set down (the reverse), received from a person and handed over.
 
-Recorded lifts: pelvis 0.57 to 1.01 m high, wrists at 1.3 m/s at most in the median trial.
+In recorded lifts the pelvis is 0.57 to 1.01 m high, and the wrists of the median trial move at no
+more than 1.3 m/s.
 """
 
 import math
 
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Floats
+from hrc_env.core.typing import Floats, Vector3
 from hrc_env.motion import controls as c
 from hrc_env.motion.activities import planning as to
-from hrc_env.motion.activities.planning import between
+from hrc_env.motion.activities.planning import scale_draw
 from hrc_env.motion.activities.work import get_down
 from hrc_env.motion.anatomy import LEFT, SIDE_STRIDE, STAND_Z, UPPER_ARM
 from hrc_env.motion.curves import hump, min_jerk, shift, wrap
 from hrc_env.motion.holding import GRIPS, grip, place_load, take_load
 from hrc_env.motion.kinematics import pose
-from hrc_env.motion.posture import from_here, lean, look_at, stand
-from hrc_env.motion.state import Triple, Worker
+from hrc_env.motion.posture import lean, locate_ahead, look_at, stand
+from hrc_env.motion.state import Worker
 from hrc_env.worker.props import PROP_NAMES
 from hrc_env.world import AWAY_M
 
-BOX, BOARD = PROP_NAMES.index("box"), PROP_NAMES.index("board")
-BOX_HELD, BOARD_HELD, GIVEN = (0.37, 1.10), (0.27, 0.96), (0.60, 1.14)
-"""A load's middle when held or handed over: ahead [m], height in the pelvis's; judgement."""
+BOX = PROP_NAMES.index("box")
+BOARD = PROP_NAMES.index("board")
+BOX_AHEAD_M = 0.37
+"""Distance of a held box ahead of the root [m]; judgement."""
+BOX_HEIGHT = 1.10
+"""Height of a held box, in heights of the pelvis; judgement."""
+BOARD_AHEAD_M = 0.27
+"""Distance of a held board ahead of the root [m]; judgement."""
+BOARD_HEIGHT = 0.96
+"""Height of a held board, in heights of the pelvis; judgement."""
+GIVEN_AHEAD_M = 0.60
+"""Distance of a load that is handed over ahead of the root [m]; judgement."""
+GIVEN_HEIGHT = 1.14
+"""Height of a load that is handed over, in heights of the pelvis; judgement."""
 CARRYING_SHARE = 0.95
-"""Arms carry stretched to this share at most: swinging trunks need the rest; judgement."""
-ON_SHOULDER, STEADY_M, NOSE_UP_RAD = (0.12, 0.165, 0.075), 0.26, 0.08
-"""A board on the shoulder: ahead and aside of the root, above the shoulder's joint [m]; the hand
-that steadies it: ahead of the root [m]; how much its front is higher; judgement."""
-CROUCH_M = (0.15, 0.45)
-"""A load at this height is gripped on the haunches; at that one, bent [m]; judgement."""
+"""Greatest stretch of carrying arms; swinging trunks need the rest; judgement."""
+ON_SHOULDER_M = (0.12, 0.165, 0.075)
+"""A board on the shoulder: ahead and to the side of the root, above the shoulder joint [m]."""
+STEADY_M = 0.26
+"""Distance ahead of the root of the hand that steadies a board on the shoulder [m]; judgement."""
+NOSE_UP_RAD = 0.08
+"""Pitch of a board on the shoulder, its front end up [rad]; judgement."""
+CROUCH_M = 0.15
+"""Height of a load that is gripped on the haunches [m]; judgement."""
+BENT_M = 0.45
+"""Height of a load that is gripped with a bent trunk [m]; judgement."""
 GAZE_PAST_M = 0.35
-"""Who is on the haunches looks past the load, over which their head is [m]."""
-GRIP_S, SHOULDER_S = 0.3, 1.0
-"""To grip; from before the body to the shoulder [s]."""
+"""Distance past the load at which a worker on the haunches looks [m]; the head is over the load."""
+GRIP_S = 0.3
+"""Time to grip a load [s]."""
+SHOULDER_S = 1.0
+"""Time to bring a load from before the body to the shoulder [s]."""
 
 
 @kernel
-def pick_up(t: float, me: Worker) -> None:
-    """Let a standing q bend down to a load, grip it and come up with it."""
-    q, yaw = me.q, me.start_yaw
-    gripped = me.out_at + me.out_s
+def pick_up(t: float, worker: Worker) -> None:
+    """Let a standing worker bend down to a load, grip it and come up with it.
+
+    Args:
+        t: time since the activity began [s].
+        worker: record with the plan; its `q`, standing at ease, is changed.
+    """
+    q, yaw = worker.q, worker.start_yaw
+    gripped = worker.out_at + worker.out_s
     rise = gripped + GRIP_S
-    down = min_jerk((t - me.out_at) / me.out_s)
-    up = min_jerk((t - rise) / me.raise_s)
-    onto = t - rise - me.raise_s
-    turned = min_jerk(onto / me.shoulder_s) if me.shoulder_s > 0.0 else 0.0
-    get_down(down - up, me)
-    lean(me.lean * (down - up), me.squat, 0.0, me)
-    look_at(me.gaze[0], me.gaze[1], me.gaze[2], down - up, me)
-    place_load(me.start_x, me.start_y, yaw, 0.0, me)
+    down = min_jerk((t - worker.out_at) / worker.out_s)
+    up = min_jerk((t - rise) / worker.raise_s)
+    onto = t - rise - worker.raise_s
+    turned = min_jerk(onto / worker.shoulder_s) if worker.shoulder_s > 0.0 else 0.0
+    get_down(down - up, worker)
+    lean(worker.lean * (down - up), worker.squat, 0.0, worker)
+    look_at(worker.gaze[0], worker.gaze[1], worker.gaze[2], down - up, worker)
+    place_load(worker.start_x, worker.start_y, yaw, 0.0, worker)
     for i in range(6):
-        at, mid = me.tool_pose[i], me.midway[i]
+        at, mid = worker.tool_pose[i], worker.midway[i]
         q[c.PROP_POSE + i] = at + up * (mid - at) + turned * (q[c.PROP_POSE + i] - mid)
     shift(q, c.PROP_POSE, yaw, 0.06 * hump(up) + 0.15 * hump(turned), 0.0)
     q[c.PROP_POSE + 2] += 0.10 * hump(turned)
-    prop = me.tool
-    q[c.PROP] = prop if t >= gripped or me.hidden == 0.0 else 0.0
+    prop = worker.tool
+    q[c.PROP] = prop if t >= gripped or not worker.is_hidden else 0.0
     for side in range(2):
-        here, own = GRIPS[prop, side], me.load_grip[3 * side : 3 * side + 3]
+        here, own = GRIPS[prop, side], worker.load_grip[3 * side : 3 * side + 3]
         x, y = here[0] + turned * (own[0] - here[0]), here[1] + turned * (own[1] - here[1])
-        grip(side, x, y, here[2] + turned * (own[2] - here[2]), me)
-        used = 1.0 + turned * (me.load_used[side] - 1.0)
+        grip(side, x, y, here[2] + turned * (own[2] - here[2]), worker)
+        used = 1.0 + turned * (worker.load_used[side] - 1.0)
         q[c.HAND_SHARE + side] = down * used
 
 
 @kernel
-def plan_pick_up(draws: Floats, height: float, prop: int, on_shoulder: bool, me: Worker) -> float:
-    """Plan to pick a box or board up, gripped at the height; its pace [s]."""
-    _hold(prop, on_shoulder and prop == BOARD, to.dominant(draws[0], me), me)
-    z = height if height > 0.0 else between(draws[1], 0.18, 0.45)
-    _lay_out(prop, (AWAY_M, 0.0, z), me)
-    return between(draws[2], 1.0, 1.35)
+def plan_pick_up(
+    draws: Floats, height: float, prop: int, on_shoulder: bool, worker: Worker
+) -> float:
+    """Plan to pick up a box or board.
+
+    Args:
+        draws: uniform draws (N_START,) in [0, 1).
+        height: height of the grips [m]; 0 to draw one.
+        prop: the load, an index into `PROPS`.
+        on_shoulder: whether to carry a board on the shoulder.
+        worker: record that the plan is written into.
+
+    Returns:
+        The time to raise the load by a metre [s].
+    """
+    _plan_carrying(prop, on_shoulder and prop == BOARD, to.choose_hand(draws[0], worker), worker)
+    z = height if height > 0.0 else scale_draw(draws[1], 0.18, 0.45)
+    _plan_load_place(prop, Vector3(AWAY_M, 0.0, z), worker)
+    return scale_draw(draws[2], 1.0, 1.35)
 
 
 @kernel
-def plan_receive(draws: Floats, height: float, me: Worker) -> float:
-    """Plan to take a box that somebody ahead holds out; its pace [s]."""
-    _hold(BOX, False, 1, me)
-    _lay_out(BOX, _given(height, me), me)
-    me.hidden = 1.0
-    return between(draws[2], 0.9, 1.1)
+def plan_receive(draws: Floats, height: float, worker: Worker) -> float:
+    """Plan to take a box that another person holds out.
+
+    Args:
+        draws: uniform draws (N_START,) in [0, 1).
+        height: height of the box [m]; 0 for the usual one.
+        worker: record that the plan is written into.
+
+    Returns:
+        The time to raise the load by a metre [s].
+    """
+    _plan_carrying(BOX, False, 1, worker)
+    _plan_load_place(BOX, _find_handover_point(height, worker), worker)
+    worker.is_hidden = True
+    return scale_draw(draws[2], 0.9, 1.1)
 
 
 @kernel
-def plan_set_down(draws: Floats, height: float, me: Worker) -> float:
-    """Plan to set down what is held, onto the height; its pace [s]."""
-    z = height if height > 0.0 else between(draws[1], 0.18, 0.45)
-    _lay_out(me.load_prop, (AWAY_M, 0.0, z), me)
-    return between(draws[2], 1.0, 1.35)
+def plan_set_down(draws: Floats, height: float, worker: Worker) -> float:
+    """Plan to set down the load that is held.
+
+    Args:
+        draws: uniform draws (N_START,) in [0, 1).
+        height: height of the grips at rest [m]; 0 to draw one.
+        worker: record that the plan is written into.
+
+    Returns:
+        The time to raise the load by a metre [s].
+    """
+    z = height if height > 0.0 else scale_draw(draws[1], 0.18, 0.45)
+    _plan_load_place(worker.load_prop, Vector3(AWAY_M, 0.0, z), worker)
+    return scale_draw(draws[2], 1.0, 1.35)
 
 
 @kernel
-def plan_hand_over(draws: Floats, height: float, me: Worker) -> float:
-    """Plan to hold out what is carried until somebody has it; its pace [s]."""
-    _lay_out(me.load_prop, _given(height, me), me)
-    me.hidden = 1.0
-    return between(draws[2], 0.9, 1.1)
+def plan_hand_over(draws: Floats, height: float, worker: Worker) -> float:
+    """Plan to hold out the load until another person has taken it.
+
+    Args:
+        draws: uniform draws (N_START,) in [0, 1).
+        height: height of the load [m]; 0 for the usual one.
+        worker: record that the plan is written into.
+
+    Returns:
+        The time to raise the load by a metre [s].
+    """
+    _plan_load_place(worker.load_prop, _find_handover_point(height, worker), worker)
+    worker.is_hidden = True
+    return scale_draw(draws[2], 0.9, 1.1)
 
 
 @kernel
-def _given(height: float, me: Worker) -> Triple:
-    """Where loads change hands."""
-    return GIVEN[0], 0.0, height if height > 0.0 else GIVEN[1] * me.size[STAND_Z]
+def _find_handover_point(height: float, worker: Worker) -> Vector3:
+    """Return the point ahead of a worker where loads change hands: ahead, left, height [m]."""
+    usual = GIVEN_HEIGHT * worker.lengths[STAND_Z]
+    return Vector3(GIVEN_AHEAD_M, 0.0, height if height > 0.0 else usual)
 
 
 @kernel
-def _hold(prop: int, on_shoulder: bool, side: int, me: Worker) -> None:
-    """Write how a load will be carried into `load_at` and on."""
-    at = me.load_at
-    take_load(prop, me)
-    ahead, share = BOX_HELD if prop == BOX else BOARD_HELD
-    forward, aside, up = to.shoulders(me)
-    lowest = up - to.in_reach(CARRYING_SHARE, ahead - forward, GRIPS[prop, 0, 1] - aside, me)
-    at[0], at[2] = ahead, max(share * me.size[STAND_Z], lowest)
+def _plan_carrying(prop: int, on_shoulder: bool, side: int, worker: Worker) -> None:
+    """Plan how a load is carried.
+
+    Args:
+        prop: the load, an index into `PROPS`.
+        on_shoulder: whether it is carried on the shoulder.
+        side: side of that shoulder, 0 left, 1 right.
+        worker: record; its `load_...` fields are written.
+    """
+    at = worker.load_at
+    take_load(prop, worker)
+    ahead = BOX_AHEAD_M if prop == BOX else BOARD_AHEAD_M
+    share = BOX_HEIGHT if prop == BOX else BOARD_HEIGHT
+    forward, aside, up = to.locate_shoulders(worker)
+    lowest = up - to.measure_reach(
+        CARRYING_SHARE, ahead - forward, GRIPS[prop, 0, 1] - aside, worker
+    )
+    at[0], at[2] = ahead, max(share * worker.lengths[STAND_Z], lowest)
     if not on_shoulder:
         return
-    stand(me.start_x, me.start_y, me.start_yaw, 0.0, me)
-    pose(me)
+    stand(worker.start_x, worker.start_y, worker.start_yaw, 0.0, worker)
+    pose(worker)
     upper = LEFT + SIDE_STRIDE * side + UPPER_ARM
-    at[0], at[1] = ON_SHOULDER[0], (1.0 - 2.0 * side) * ON_SHOULDER[1]
-    at[2] = me.p[upper, 2] + ON_SHOULDER[2]
+    at[0], at[1] = ON_SHOULDER_M[0], (1.0 - 2.0 * side) * ON_SHOULDER_M[1]
+    at[2] = worker.p[upper, 2] + ON_SHOULDER_M[2]
     sign = 1.0 - 2.0 * side  # the end of the other hand comes to the front
     at[3], at[5] = 0.5 * math.pi * sign, -NOSE_UP_RAD * sign
-    me.load_used[1 - side] = 0.0
-    me.load_grip[3 * side + 1] = -STEADY_M * sign
+    worker.load_used[1 - side] = 0.0
+    worker.load_grip[3 * side + 1] = -STEADY_M * sign
 
 
 @kernel
-def _lay_out(prop: int, at: Triple, me: Worker) -> None:
-    """Plan where the load stands: ahead, left [m], height."""
-    to.blank(me)
-    to.put_tool(prop, 1, at, (0.0, 0.0, 0.0), me)
-    to.look_to(at, me)
+def _plan_load_place(prop: int, at: Vector3, worker: Worker) -> None:
+    """Plan where the load stands: ahead, to the left, height [m]."""
+    to.clear_plan(worker)
+    to.plan_tool(prop, 1, at, Vector3(0.0, 0.0, 0.0), worker)
+    to.plan_gaze(at, worker)
 
 
 @kernel
-def put_load(pose_: Floats, me: Worker) -> None:
-    """Plan that the load that is taken up or laid down is at a pose (6,) then."""
+def plan_load_pose(pose_world: Floats, worker: Worker) -> None:
+    """Plan the pose (6,) in the world of the load when it is taken up or laid down."""
     for i in range(6):
-        me.tool_pose[i] = pose_[i]
-    me.tool_pose[3] = me.start_yaw + wrap(pose_[3] - me.start_yaw)
+        worker.tool_pose[i] = pose_world[i]
+    worker.tool_pose[3] = worker.start_yaw + wrap(pose_world[3] - worker.start_yaw)
     for i in range(3):
-        me.gaze[i] = pose_[i]
+        worker.gaze[i] = pose_world[i]
 
 
 @kernel
-def finish_lift(raise_s: float, me: Worker) -> float:
-    """Settle trunk, way and times of a load; from the time to raise it by a metre, how long [s]."""
-    size, z = me.size, me.tool_pose[2]
+def finish_lift(raise_s: float, worker: Worker) -> float:
+    """Settle the trunk, the way and the times of a load.
+
+    Args:
+        raise_s: time to raise the load by a metre [s].
+        worker: record that the plan is written into.
+
+    Returns:
+        The duration [s].
+    """
+    size, z = worker.lengths, worker.tool_pose[2]
     low = min(max((size[STAND_Z] - z) / 0.6, 0.0), 1.0)
-    me.crouch = min(max((CROUCH_M[1] - z) / (CROUCH_M[1] - CROUCH_M[0]), 0.0), 1.0)
-    me.squat = me.squat_share * low * (1.0 - me.crouch)
-    shift(me.gaze, 0, me.start_yaw, GAZE_PAST_M * me.crouch, 0.0)
-    to.settle_lean(me)
-    shoulder = me.load_at[3] != 0.0
-    mid_z = 1.15 * size[STAND_Z] if shoulder else me.load_at[2]
-    ahead = 0.36 if shoulder else me.load_at[0]
-    me.midway[0], me.midway[1], me.midway[2] = from_here((ahead, 0.0, mid_z), me)
-    me.midway[3] = me.start_yaw
+    worker.crouch = min(max((BENT_M - z) / (BENT_M - CROUCH_M), 0.0), 1.0)
+    worker.squat = worker.squat_share * low * (1.0 - worker.crouch)
+    shift(worker.gaze, 0, worker.start_yaw, GAZE_PAST_M * worker.crouch, 0.0)
+    to.find_lean(worker)
+    shoulder = worker.load_at[3] != 0.0
+    mid_z = 1.15 * size[STAND_Z] if shoulder else worker.load_at[2]
+    ahead = 0.36 if shoulder else worker.load_at[0]
+    worker.midway[0], worker.midway[1], worker.midway[2] = locate_ahead(ahead, 0.0, mid_z, worker)
+    worker.midway[3] = worker.start_yaw
     way = abs(mid_z - z)
-    me.raise_s = max(raise_s * (0.50 + 0.48 * way), 0.6)
-    me.out_s = max(raise_s * (0.7 + 0.35 * low), 0.7)
-    me.shoulder_s = SHOULDER_S if shoulder else 0.0
-    me.lasts = me.out_at + me.out_s + GRIP_S + me.raise_s + me.shoulder_s + 0.1
-    return me.lasts
+    worker.raise_s = max(raise_s * (0.50 + 0.48 * way), 0.6)
+    worker.out_s = max(raise_s * (0.7 + 0.35 * low), 0.7)
+    worker.shoulder_s = SHOULDER_S if shoulder else 0.0
+    worker.total_s = (
+        worker.out_at + worker.out_s + GRIP_S + worker.raise_s + worker.shoulder_s + 0.1
+    )
+    return worker.total_s

@@ -1,212 +1,283 @@
-"""Planning of work in place: where tool and hands go, how far the trunk, for how long."""
+"""Plans of work in place: where tool and hands go, how far the trunk leans, and for how long."""
 
 import math
 
 from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Vector3
 from hrc_env.motion import anatomy as an
 from hrc_env.motion import controls as c
-from hrc_env.motion.activities.strokes import PAUSE_S, stroke
-from hrc_env.motion.activities.work import FRONT_LEG, LOW_M, REAR_LEG, extend, hands_on, step_into
-from hrc_env.motion.feet import feet
+from hrc_env.motion.activities.strokes import PAUSE_S, apply_stroke
+from hrc_env.motion.activities.work import (
+    FRONT_LEG,
+    LOW_M,
+    REAR_LEG,
+    extend,
+    place_hands,
+    step_into,
+)
+from hrc_env.motion.feet import place_feet
 from hrc_env.motion.holding import TWO_HANDED
-from hrc_env.motion.posture import MOST_LEAN, beyond, farthest, from_here, stand
-from hrc_env.motion.state import Triple, Worker
+from hrc_env.motion.points import Sides
+from hrc_env.motion.posture import MOST_LEAN, find_farthest, locate_ahead, measure_overreach, stand
+from hrc_env.motion.state import Worker
 
-TAKE_S, STEP_S, KNEEL_S, CROUCH_S = 0.55, 0.9, 1.5, 1.1
-"""To reach the belt, step into a stance, get down on a knee, on the haunches [s]; judgement."""
-KNEEL_STEPS_S = (0.15, 0.62, 0.60)
-"""First lift-off, period and swing of the steps onto a knee [s], slow or the knee would jerk."""
+TAKE_S = 0.55
+"""Time to take a tool from the belt [s]; judgement."""
+STEP_S = 0.9
+"""Time to step into a stance [s]; judgement."""
+KNEEL_S = 1.5
+"""Time to get down on a knee [s]; judgement."""
+CROUCH_S = 1.1
+"""Time to get down on the haunches [s]; judgement."""
+KNEEL_STEP_AT_S = 0.15
+"""Time of the first lift-off on the way onto a knee [s]."""
+KNEEL_PERIOD_S = 0.62
+"""Period of the steps onto a knee [s]; they are slow, or the knee would jerk."""
+KNEEL_SWING_S = 0.60
+"""Time that a foot is in the air on the way onto a knee [s]."""
 CALM_M_S = 1.1
 """Peak speed of hands that go to their work [m/s]; calm manual work."""
-KNEE_ASIDE_M, SPARE_M, SLUMP_M = 0.17, 0.03, 0.01
-"""Kneeling hands work so far aside of the other leg; arms keep so much in hand, for bodies sway;
-a standing trunk brings shoulders so far forward [m]."""
+KNEE_ASIDE_M = 0.17
+"""Distance of kneeling hands to the side of the other leg [m]."""
+SPARE_M = 0.03
+"""Reserve of the reach of the arms [m], because bodies sway."""
+SLUMP_M = 0.01
+"""Distance by which the shoulders of a standing trunk are forward [m]."""
 TO_SHOULDER = (*range(1, an.CHEST + 1), an.LEFT + an.CLAVICLE, an.LEFT + an.UPPER_ARM)
-"""The segments from the pelvis on, each the child of the one before."""
+"""Segments from the pelvis to the shoulder, each the child of the one before."""
 FAR = 1e3
-"""A time by which every step is done [s]."""
+"""Time at which every step is done [s]."""
 
 
 @kernel
-def between(draw: float, low: float, high: float) -> float:
-    """A uniform draw in [0, 1) stretched to (low, high)."""
+def scale_draw(draw: float, low: float, high: float) -> float:
+    """Return a uniform draw in [0, 1), scaled to [low, high)."""
     return low + draw * (high - low)
 
 
 @kernel
-def dominant(draw: float, me: Worker) -> int:
-    """The side that holds the tool: 1 right."""
-    return 1 if draw < 0.5 + (me.right_handed - 0.5) * 1.25 else 0
+def choose_hand(draw: float, worker: Worker) -> int:
+    """Return the hand that holds the tool, 0 left or 1 right, by a draw in [0, 1)."""
+    return 1 if draw < 0.5 + (worker.right_handed - 0.5) * 1.25 else 0
 
 
 @kernel
-def blank(me: Worker) -> None:
-    """A plan without steps and work of its own; what is carried stays."""
-    me.lean = me.twist = me.squat = me.kneel = me.crouch = me.ahead = 0.0
-    me.hold_s = me.take_s = me.wander_m = me.down_m = me.stroke_m = me.stroke_hz = me.burst_s = 0.0
-    me.tool = me.side = me.stroke = 0
-    me.target[:] = me.used[:] = 0.0
-    me.hidden = False
-    me.undo_at = me.step_count = 0.0
-    me.step_start, me.step_period, me.step_swing = 0.0, 1.0, 0.5
-    me.settle_s = me.out_at = 0.1
+def clear_plan(worker: Worker) -> None:
+    """Clear the plan: no steps and no work; a load that is carried stays."""
+    worker.lean = worker.twist = worker.squat = worker.kneel = worker.crouch = worker.ahead = 0.0
+    worker.hold_s = worker.take_s = worker.wander_m = worker.down_m = worker.stroke_m = (
+        worker.stroke_hz
+    ) = worker.burst_s = 0.0
+    worker.tool = worker.side = worker.stroke = 0
+    worker.target[:] = worker.hands_used[:] = 0.0
+    worker.is_hidden = False
+    worker.undo_at, worker.step_count = 0.0, 0
+    worker.step_start, worker.step_period, worker.step_swing = 0.0, 1.0, 0.5
+    worker.settle_s = worker.out_at = 0.1
 
 
 @kernel
-def begin(draw: float, me: Worker) -> tuple[int, float]:
-    """A blank plan; the side that holds the tool, and 1 if that is the left one, else -1."""
-    blank(me)
-    side = dominant(draw, me)
-    return side, 1.0 - 2.0 * side
+def begin_plan(draw: float, worker: Worker) -> int:
+    """Clear the plan, and return the tool's hand, 0 left or 1 right, by a draw in [0, 1)."""
+    clear_plan(worker)
+    return choose_hand(draw, worker)
 
 
 @kernel
-def kneel_down(side: int, me: Worker) -> None:
-    """Plan to kneel on the knee of that side."""
-    leg = me.size[an.LEG]
-    me.kneel, me.ahead = 1.0, -0.08
-    me.settle_s, me.out_at = KNEEL_S, 0.4
-    step_into(side, REAR_LEG * leg, FRONT_LEG * leg, 0.02, me)
-    me.step_start, me.step_period, me.step_swing = KNEEL_STEPS_S
+def plan_kneeling(side: int, worker: Worker) -> None:
+    """Plan to kneel on the knee of a side, 0 left or 1 right."""
+    leg = worker.lengths[an.LEG]
+    worker.kneel, worker.ahead = 1.0, -0.08
+    worker.settle_s, worker.out_at = KNEEL_S, 0.4
+    step_into(side, REAR_LEG * leg, FRONT_LEG * leg, 0.02, worker)
+    worker.step_start, worker.step_period = KNEEL_STEP_AT_S, KNEEL_PERIOD_S
+    worker.step_swing = KNEEL_SWING_S
 
 
 @kernel
-def before_knee(me: Worker) -> float:
-    """How far to the left the hands work of one who kneels: before the knee that is down [m]."""
-    return KNEE_ASIDE_M * (1.0 - 2.0 * me.step_first) if me.kneel > 0.0 else 0.0
+def offset_before_knee(worker: Worker) -> float:
+    """Return the offset to the left at which the hands of a kneeling worker work [m].
+
+    They work before the knee that is down; the offset is 0 for all others.
+    """
+    return KNEE_ASIDE_M * (1.0 - 2.0 * worker.step_first) if worker.kneel > 0.0 else 0.0
 
 
 @kernel
-def step_ahead(side: int, ahead: float, me: Worker) -> None:
-    """Plan to work with the foot of that side ahead."""
-    step_into(side, ahead, 0.0, 0.02, me)
-    me.ahead, me.settle_s = 0.45 * ahead, STEP_S
+def plan_step_ahead(side: int, ahead: float, worker: Worker) -> None:
+    """Plan to work with the foot of a side (0 left, 1 right) a distance ahead [m]."""
+    step_into(side, ahead, 0.0, 0.02, worker)
+    worker.ahead, worker.settle_s = 0.45 * ahead, STEP_S
 
 
 @kernel
-def get_ready(z: float, knee: int, foot: int, ahead: float, me: Worker) -> float:
-    """Plan to kneel for low work, else to step ahead; how far to the left hands work then [m]."""
+def plan_stance(z: float, knee: int, foot: int, ahead: float, worker: Worker) -> float:
+    """Plan to kneel for low work, else to step ahead.
+
+    Args:
+        z: height of the work [m].
+        knee: side of the knee that goes down, 0 left, 1 right.
+        foot: side of the foot that steps ahead.
+        ahead: length of the step [m].
+        worker: record that the plan is written into.
+
+    Returns:
+        The offset of the hands to the left [m].
+    """
     if z < LOW_M:
-        kneel_down(knee, me)
+        plan_kneeling(knee, worker)
     else:
-        step_ahead(foot, ahead, me)
-    return before_knee(me)
+        plan_step_ahead(foot, ahead, worker)
+    return offset_before_knee(worker)
 
 
 @kernel
-def shoulders(me: Worker) -> Triple:
-    """Where the shoulders' joints of one who stands are: ahead of the root, aside, height [m]."""
-    bones = me.bones
-    ahead, aside, up = SLUMP_M, 0.0, me.size[an.STAND_Z]
+def locate_shoulders(worker: Worker) -> Vector3:
+    """Return a standing worker's shoulder joint: ahead of the root, to a side, height [m]."""
+    bones = worker.bones
+    ahead, aside, up = SLUMP_M, 0.0, worker.lengths[an.STAND_Z]
     for segment in TO_SHOULDER:
         ahead += bones[segment, 0]
         aside += bones[segment, 1]
         up += bones[segment, 2]
-    return ahead, aside, up
+    return Vector3(ahead, aside, up)
 
 
 @kernel
-def in_reach(share: float, one: float, other: float, me: Worker) -> float:
-    """How far arms, stretched by a share, reach along an axis if so far along the others [m]."""
-    reach = share * me.size[an.ARM]
+def measure_reach(share: float, one: float, other: float, worker: Worker) -> float:
+    """Return the reach of an arm along an axis [m].
+
+    Args:
+        share: share of the arm's length that is used.
+        one: distance of the target along the second axis [m].
+        other: distance of the target along the third axis [m].
+        worker: record with the lengths of the body.
+    """
+    reach = share * worker.lengths[an.ARM]
     return math.sqrt(max(reach * reach - one * one - other * other, 0.0))
 
 
 @kernel
-def put_tool(tool: int, side: int, at: Triple, turn: Triple, me: Worker) -> None:
-    """Plan where the tool is at work: ahead, left [m], height; yaw, pitch, roll."""
-    me.tool, me.side = tool, side
-    me.take_s = TAKE_S if tool > 0 else 0.0
-    pose = me.tool_pose
-    pose[0], pose[1], pose[2] = from_here(at, me)
-    pose[3], pose[4], pose[5] = turn[0] + me.start_yaw, turn[1], turn[2]
-    if TWO_HANDED[tool]:
-        me.used[0] = me.used[1] = 1.0
+def plan_tool(tool: int, side: int, at: Vector3, turn: Vector3, worker: Worker) -> None:
+    """Plan the pose of the tool at work.
 
-
-@kernel
-def put_other(at: Triple, me: Worker) -> None:
-    """Plan where the other hand works: ahead, left [m], height."""
-    other = 1 - me.side
-    target = me.target[3 * other :]
-    target[0], target[1], target[2] = from_here(at, me)
-    me.used[other] = 1.0
-
-
-@kernel
-def look_to(at: Triple, me: Worker) -> None:
-    """Plan where the eyes are: ahead, left [m], height."""
-    me.gaze[0], me.gaze[1], me.gaze[2] = from_here(at, me)
-
-
-@kernel
-def strokes(kind: int, size_m: float, rate_hz: float, burst_s: float, n: int, me: Worker) -> None:
-    """Plan n bursts of a stroke."""
-    me.stroke, me.stroke_m, me.stroke_hz = kind, size_m, rate_hz
-    me.burst_s, me.hold_s = burst_s, n * (burst_s + PAUSE_S)
-
-
-@kernel
-def at_work(me: Worker) -> None:
-    """Fill q as it is in the middle of the work, before the first stroke."""
-    feet(FAR, me)
-    stand(me.start_x, me.start_y, me.start_yaw, 0.0, me)
-    extend(1.0, 1.0, me)
-    stroke(0.0, me)
-    hands_on(1.0, 1.0, 1.0, me)
-
-
-@kernel
-def finish(peak_m_s: float, me: Worker) -> float:
-    """Settle trunk and times of work whose hands, strokes and steps are planned; how long [s].
-
-    No plan function calls it: each would be compiled with all of it once more.
+    Args:
+        tool: the prop, an index into `PROPS`; 0 for empty hands.
+        side: hand that holds it, 0 left, 1 right.
+        at: position ahead, to the left, and height [m].
+        turn: yaw from the heading, pitch and roll [rad].
+        worker: record that the plan is written into.
     """
-    low = min(max((0.95 * me.size[an.STAND_Z] - me.tool_pose[2]) / 0.5, 0.0), 1.0)
-    is_down = me.kneel + me.crouch > 0.0
-    me.squat = 0.0 if is_down else 0.8 * low
-    settle_lean(me)
-    down_s = me.settle_s - me.out_at - me.take_s if is_down else 0.35
-    slowly = 1.7 if TWO_HANDED[me.tool] else 1.0
-    me.out_s = max(1.875 * slowly * _way(me) / peak_m_s, down_s)
-    done = me.out_at + me.take_s + me.out_s
-    me.lasts = 2.0 * done + me.hold_s
-    me.undo_at = 0.5 * me.lasts if me.step_count > 0.0 else 0.0
-    return me.lasts
+    worker.tool, worker.side = tool, side
+    worker.take_s = TAKE_S if tool > 0 else 0.0
+    pose = worker.tool_pose
+    pose[0], pose[1], pose[2] = locate_ahead(at.x, at.y, at.z, worker)
+    pose[3], pose[4], pose[5] = turn.x + worker.start_yaw, turn.y, turn.z
+    if TWO_HANDED[tool]:
+        worker.hands_used[0] = worker.hands_used[1] = 1.0
 
 
 @kernel
-def settle_lean(me: Worker) -> None:
-    """Smallest lean that brings what the hands hold within reach; else that comes nearer."""
-    low, high, me.lean = 0.0, MOST_LEAN, 0.0
-    upright = _short(me)
+def plan_other_hand(at: Vector3, worker: Worker) -> None:
+    """Plan where the other hand works: ahead, to the left, height [m]."""
+    other = 1 - worker.side
+    target = worker.target[3 * other :]
+    target[0], target[1], target[2] = locate_ahead(at.x, at.y, at.z, worker)
+    worker.hands_used[other] = 1.0
+
+
+@kernel
+def plan_gaze(at: Vector3, worker: Worker) -> None:
+    """Plan the point that the worker looks at: ahead, to the left, height [m]."""
+    worker.gaze[0], worker.gaze[1], worker.gaze[2] = locate_ahead(at.x, at.y, at.z, worker)
+
+
+@kernel
+def plan_strokes(
+    kind: int, size_m: float, rate_hz: float, burst_s: float, n: int, worker: Worker
+) -> None:
+    """Plan bursts of strokes.
+
+    Args:
+        kind: kind of stroke, see `strokes`.
+        size_m: size of a stroke [m].
+        rate_hz: rate of the strokes [Hz].
+        burst_s: duration of a burst [s].
+        n: number of bursts.
+        worker: record that the plan is written into.
+    """
+    worker.stroke, worker.stroke_m, worker.stroke_hz = kind, size_m, rate_hz
+    worker.burst_s, worker.hold_s = burst_s, n * (burst_s + PAUSE_S)
+
+
+@kernel
+def pose_at_work(worker: Worker) -> None:
+    """Write the control vector in the middle of the work, before the first stroke."""
+    place_feet(FAR, worker)
+    stand(worker.start_x, worker.start_y, worker.start_yaw, 0.0, worker)
+    extend(1.0, 1.0, worker)
+    apply_stroke(0.0, worker)
+    place_hands(1.0, 1.0, 1.0, worker)
+
+
+@kernel
+def finish_plan(peak_m_s: float, worker: Worker) -> float:
+    """Plan trunk and times of work, after its hands, strokes and steps.
+
+    No plan function calls this kernel, or each would be compiled with all of it once more.
+
+    Args:
+        peak_m_s: peak speed of hands that go to the work [m/s].
+        worker: record that the plan is written into.
+
+    Returns:
+        The duration [s].
+    """
+    low = min(max((0.95 * worker.lengths[an.STAND_Z] - worker.tool_pose[2]) / 0.5, 0.0), 1.0)
+    is_down = worker.kneel + worker.crouch > 0.0
+    worker.squat = 0.0 if is_down else 0.8 * low
+    find_lean(worker)
+    down_s = worker.settle_s - worker.out_at - worker.take_s if is_down else 0.35
+    slowly = 1.7 if TWO_HANDED[worker.tool] else 1.0
+    worker.out_s = max(1.875 * slowly * _measure_hand_way(worker) / peak_m_s, down_s)
+    done = worker.out_at + worker.take_s + worker.out_s
+    worker.total_s = 2.0 * done + worker.hold_s
+    worker.undo_at = 0.5 * worker.total_s if worker.step_count > 0.0 else 0.0
+    return worker.total_s
+
+
+@kernel
+def find_lean(worker: Worker) -> None:
+    """Find the smallest lean that brings the work within reach; else move the work nearer."""
+    low, high, worker.lean = 0.0, MOST_LEAN, 0.0
+    upright = _measure_shortfall(worker)
     if upright <= 0.0:
         return
     for _ in range(9):
-        me.lean = 0.5 * (low + high)
-        if _short(me) > 0.0:
-            low = me.lean
+        worker.lean = 0.5 * (low + high)
+        if _measure_shortfall(worker) > 0.0:
+            low = worker.lean
         else:
-            high = me.lean
-    me.lean = high
-    far = _short(me)
+            high = worker.lean
+    worker.lean = high
+    far = _measure_shortfall(worker)
     if far > 0.0:
-        me.lean = 0.0 if upright < far else high
-        _come_nearer(_short(me), me)
+        worker.lean = 0.0 if upright < far else high
+        _move_nearer(_measure_shortfall(worker), worker)
 
 
 @kernel
-def _short(me: Worker) -> float:
-    """By how much an arm is too short for the work that is planned [m]."""
-    at_work(me)
-    return beyond(me) + (SPARE_M + 0.4 * abs(me.wander_m))
+def _measure_shortfall(worker: Worker) -> float:
+    """Return the distance by which an arm is too short for the planned work [m]."""
+    pose_at_work(worker)
+    return measure_overreach(worker) + (SPARE_M + 0.4 * abs(worker.wander_m))
 
 
 @kernel
-def _come_nearer(far: float, me: Worker) -> None:
-    """Move tool and targets towards the shoulders by what is out of reach, as `_short` says."""
-    p = me.p
-    pose, other = me.tool_pose, me.target[3 * (1 - me.side) :]
+def _move_nearer(far: float, worker: Worker) -> None:
+    """Move tool and targets towards the shoulders by a shortfall [m]."""
+    p = worker.p
+    pose, other = worker.tool_pose, worker.target[3 * (1 - worker.side) :]
     dx, dy, dz = (pose[0] - p[an.CHEST, 0], pose[1] - p[an.CHEST, 1], pose[2] - p[an.CHEST, 2])
     share = 1.15 * far / math.sqrt(dx * dx + dy * dy + dz * dz)
     for i, d in enumerate((dx, dy, dz)):
@@ -215,12 +286,12 @@ def _come_nearer(far: float, me: Worker) -> None:
 
 
 @kernel
-def _way(me: Worker) -> float:
-    """The longest way that a hand has from hanging, or from the belt, to its work [m]."""
-    at_work(me)
-    used, goal = (me.q[c.HAND_SHARE], me.q[c.HAND_SHARE + 1]), me.goals
+def _measure_hand_way(worker: Worker) -> float:
+    """Return the longest way of a hand from hanging, or from the belt, to its work [m]."""
+    pose_at_work(worker)
+    used, goal = Sides(worker.q[c.HAND_SHARE], worker.q[c.HAND_SHARE + 1]), worker.goals
     for i in range(6):
-        goal[i] = me.q[c.HAND_TARGET + i]
-    stand(me.start_x, me.start_y, me.start_yaw, 0.0, me)
-    extend(1.0, 0.0, me)
-    return max(0.15, farthest(an.HAND, goal, used, me) - 0.05)
+        goal[i] = worker.q[c.HAND_TARGET + i]
+    stand(worker.start_x, worker.start_y, worker.start_yaw, 0.0, worker)
+    extend(1.0, 0.0, worker)
+    return max(0.15, find_farthest(an.HAND, goal, used, worker) - 0.05)

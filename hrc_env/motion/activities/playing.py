@@ -1,6 +1,6 @@
-"""Playing a clip: two steps into its first pose, the recording, two steps out of its last.
+"""Playing a clip: two steps into its first pose, the recording, two steps out of its last pose.
 
-Frames hold `clip.RECORDED`, of pieces (`pieces.Clips`).
+A frame holds the columns `clip.RECORDED` of a piece (`pieces.Clips`).
 """
 
 import math
@@ -12,94 +12,127 @@ from hrc_env.core.typing import Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion.activities.pieces import Clips
 from hrc_env.motion.anatomy import ANKLE_Z
-from hrc_env.motion.clip import footprints
-from hrc_env.motion.curves import min_jerk, placed, ramp
-from hrc_env.motion.feet import foot, raise_heel
+from hrc_env.motion.clip import find_footprints
+from hrc_env.motion.curves import min_jerk, move_point, ramp
+from hrc_env.motion.feet import place_foot, raise_heel
+from hrc_env.motion.points import Point
 from hrc_env.motion.posture import STANCE_HALF_WIDTH_M, stand
-from hrc_env.motion.state import N_ROOTS, Pair, Worker
-from hrc_env.motion.walk import footprint
+from hrc_env.motion.state import N_ROOTS, Worker
+from hrc_env.motion.walk import write_footprint
 
-STEP_AT_S, PERIOD_S, SWING_S = 0.12, 0.50, 0.42
-"""First lift-off, from one to the next, in the air: steps into a clip and out of it [s]."""
-TILT_S, PACE_S = 0.25, 0.6
-"""In which standing feet take their pitch in the clip; the recording gathers and loses pace [s]."""
+STEP_AT_S = 0.12
+"""Time of the first lift-off of the steps into a clip [s]."""
+PERIOD_S = 0.50
+"""Period of the steps into a clip and out of it [s]."""
+SWING_S = 0.42
+"""Time that a foot is in the air in the steps into a clip and out of it [s]."""
+TILT_S = 0.25
+"""Time in which standing feet take their pitch in the clip [s]."""
+PACE_S = 0.6
+"""Time in which the recording gathers its pace, and again loses it [s]."""
 SETTLE_S = STEP_AT_S + PERIOD_S + SWING_S + 0.1 + TILT_S
-"""Steps and pitch together [s]."""
+"""Time of the steps and the change of pitch together [s]."""
 END, BEGIN, LAST = 0, 2, 4
-"""First of the two footprints where the activity ends, where the clip begins, where it ends."""
+"""First of two footprints where the activity ends, where the clip begins, and where it ends."""
 STRIDE_SHARE = 0.25
-"""Share of a full stride that the steps into a clip and out of it are."""
+"""Length of the steps into a clip and out of it as a share of a full stride."""
 
 
-def start_clip(piece: int, turn_rad: float, clips: Clips, me: Worker) -> float:
-    """Plan to play a piece where the worker stands, turned from their heading; how long [s]."""
-    prints, size = me["prints"], me["size"]
-    row = int(me["body"]) * clips.n_rows + int(clips.row[piece])
+def start_clip(piece: int, turn_rad: float, clips: Clips, worker: Worker) -> float:
+    """Plan to play a piece of a clip on the spot.
+
+    Args:
+        piece: index of the piece.
+        turn_rad: heading of the clip from the worker's own [rad].
+        clips: all pieces.
+        worker: record that the plan is written into.
+
+    Returns:
+        The duration [s].
+    """
+    prints, size = worker.footprints, worker.lengths
+    row = int(worker.body) * clips.n_rows + int(clips.row[piece])
     n, fps = int(clips.count[piece]), float(clips.fps[piece])
     q = clips.frames[row : row + n]
-    yaw = float(me["start_yaw"]) + turn_rad
-    lasts = (n - 1) / fps + PACE_S
-    me["clip_row"], me["clip_frames"], me["clip_fps"] = row, n, fps
-    me["clip_yaw"], me["clip_s"] = yaw, lasts
-    me["step_start"], me["step_period"], me["step_swing"] = STEP_AT_S, PERIOD_S, SWING_S
-    me["step_first"], me["step_count"], me["undo_at"] = 0, 2, 0.0
+    yaw = float(worker.start_yaw) + turn_rad
+    duration_s = (n - 1) / fps + PACE_S
+    worker.clip_row, worker.clip_frames, worker.clip_fps = row, n, fps
+    worker.clip_yaw, worker.clip_s = yaw, duration_s
+    worker.step_start, worker.step_period, worker.step_swing = STEP_AT_S, PERIOD_S, SWING_S
+    worker.step_first, worker.step_count, worker.undo_at = 0, 2, 0.0
     cos, sin = math.cos(yaw), math.sin(yaw)
-    turn, origin = np.array([[cos, -sin], [sin, cos]]), np.array([me["start_x"], me["start_y"]])
+    turn, origin = np.array([[cos, -sin], [sin, cos]]), np.array([worker.start_x, worker.start_y])
     way = q[:, [c.ROOT_X, c.ROOT_Y]] @ turn.T + origin
     x, y, heading = float(way[-1, 0]), float(way[-1, 1]), float(yaw + q[-1, c.HEADING])
-    me["end_x"], me["end_y"], me["end_yaw"] = x, y, heading
+    worker.end_x, worker.end_y, worker.end_yaw = x, y, heading
     prints[: LAST + 2, 3] = STRIDE_SHARE
     for side in range(2):
-        footprint(side, x, y, heading, STANCE_HALF_WIDTH_M, prints[END + side], me)
-        feet = footprints(q[[0, -1], c.N_BLENDED + 6 * side :], size)
+        write_footprint(side, x, y, heading, STANCE_HALF_WIDTH_M, prints[END + side], worker)
+        feet = find_footprints(q[[0, -1], c.N_BLENDED + 6 * side :], size)
         for at, foot_ in zip((BEGIN, LAST), feet, strict=True):
             prints[at + side, :2] = turn @ foot_[:2] + origin
             prints[at + side, 2] = foot_[3] + yaw
             prints[at + side, 4] = foot_[2] - size[ANKLE_Z]
-    whole = lasts + 2.0 * SETTLE_S
+    whole = duration_s + 2.0 * SETTLE_S
     for k, since in enumerate(np.linspace(0.0, whole, N_ROOTS) - SETTLE_S):
-        me["roots"][k] = way[min(round(_gone_s(since, me) * fps), n - 1)]
+        worker.roots[k] = way[min(round(_to_clip_time(since, worker) * fps), n - 1)]
     return whole
 
 
 @kernel
-def _gone_s(since: float, me: Worker) -> float:
-    """Time of the recording that is over: it gathers pace and loses it again."""
-    slow = me.clip_s - PACE_S
+def _to_clip_time(since: float, worker: Worker) -> float:
+    """Return the time in the recording `since` [s] after its slow beginning [s]."""
+    slow = worker.clip_s - PACE_S
     return PACE_S * (ramp(since / PACE_S) - ramp((since - slow) / PACE_S))
 
 
 @kernel
-def play(t: float, clock_s: float, frames: Floats, me: Worker) -> None:
-    """The control vector, feet included, of someone who plays a clip."""
+def play(t: float, clock_s: float, frames: Floats, worker: Worker) -> None:
+    """Write the control vector, feet included, of playing a clip.
+
+    Args:
+        t: time since the activity began [s].
+        clock_s: time since the episode began [s].
+        frames: frames of all clips.
+        worker: record with the plan; its `q` is written.
+    """
     since = t - SETTLE_S
-    left = me.clip_s - since
-    if since < 0.5 * me.clip_s:
-        stand(me.start_x, me.start_y, me.start_yaw, clock_s, me)
+    left = worker.clip_s - since
+    if since < 0.5 * worker.clip_s:
+        stand(worker.start_x, worker.start_y, worker.start_yaw, clock_s, worker)
     else:
-        stand(me.end_x, me.end_y, me.end_yaw, clock_s, me)
+        stand(worker.end_x, worker.end_y, worker.end_yaw, clock_s, worker)
     share = min_jerk(t / SETTLE_S) * min_jerk(1.0 + left / SETTLE_S)
-    first, n = me.clip_row, me.clip_frames
-    f = min(max(_gone_s(since, me) * me.clip_fps, 0.0), n - 1.0)
-    _body(f, share, frames, me)
+    first, n = worker.clip_row, worker.clip_frames
+    f = min(max(_to_clip_time(since, worker) * worker.clip_fps, 0.0), n - 1.0)
+    _play_body(f, share, frames, worker)
     for side in range(2):
         pitch = c.N_BLENDED + 6 * side + 4
         if since < 0.0:
-            foot(t, side, me.prints[BEGIN:], me.stance, me)
+            place_foot(t, side, worker.footprints[BEGIN:], worker.stance, worker)
             tilt = min_jerk(1.0 + since / TILT_S)
-            raise_heel(side, frames[first, pitch] * tilt, me)
+            raise_heel(side, frames[first, pitch] * tilt, worker)
         elif left < 0.0:
-            foot(-left - TILT_S, side, me.prints[END:], me.prints[LAST:], me)
+            place_foot(
+                -left - TILT_S, side, worker.footprints[END:], worker.footprints[LAST:], worker
+            )
             tilt = min_jerk(1.0 + left / TILT_S)
-            raise_heel(side, frames[first + n - 1, pitch] * tilt, me)
+            raise_heel(side, frames[first + n - 1, pitch] * tilt, worker)
         else:
-            _placed_foot(f, side, frames, me)
+            _play_foot(f, side, frames, worker)
 
 
 @kernel
-def _between(f: float, column: int, frames: Floats, me: Worker) -> float:
-    """A column of a clip between its frames: Catmull-Rom, its ends held."""
-    first, last = me.clip_row, me.clip_row + me.clip_frames - 1
+def _interpolate_frames(f: float, column: int, frames: Floats, worker: Worker) -> float:
+    """Return a column between frames by a Catmull-Rom spline, held at the ends.
+
+    Args:
+        f: time in frames of the clip.
+        column: column of the frames.
+        frames: frames of all clips.
+        worker: record that says which frames are the clip's.
+    """
+    first, last = worker.clip_row, worker.clip_row + worker.clip_frames - 1
     k = first + int(f)
     u = f - int(f)
     a, b = frames[max(k - 1, first), column], frames[min(k, last), column]
@@ -109,36 +142,56 @@ def _between(f: float, column: int, frames: Floats, me: Worker) -> float:
 
 
 @kernel
-def _body(f: float, share: float, frames: Floats, me: Worker) -> None:
-    """Let a share of a standing q become the clip's root, trunk, head and arms at frame f."""
-    q = me.q
-    ahead, left = _between(f, c.ROOT_X, frames, me), _between(f, c.ROOT_Y, frames, me)
-    x, y = placed(me.start_x, me.start_y, me.clip_yaw, ahead, left)
+def _play_body(f: float, share: float, frames: Floats, worker: Worker) -> None:
+    """Change root, trunk, head and arms of a standing worker by a share into those of the clip.
+
+    Args:
+        f: time in frames of the clip.
+        share: share of the clip.
+        frames: frames of all clips.
+        worker: record; its `q` is changed.
+    """
+    q = worker.q
+    ahead, left = (
+        _interpolate_frames(f, c.ROOT_X, frames, worker),
+        _interpolate_frames(f, c.ROOT_Y, frames, worker),
+    )
+    x, y = move_point(worker.start_x, worker.start_y, worker.clip_yaw, ahead, left)
     q[c.ROOT_X] += share * (x - q[c.ROOT_X])
     q[c.ROOT_Y] += share * (y - q[c.ROOT_Y])
-    yaw = me.clip_yaw + _between(f, c.HEADING, frames, me)
+    yaw = worker.clip_yaw + _interpolate_frames(f, c.HEADING, frames, worker)
     q[c.HEADING] += share * (yaw - q[c.HEADING])
     for i in range(c.PELVIS_Z, c.N_BLENDED):
-        q[i] += share * (_between(f, i, frames, me) - q[i])
+        q[i] += share * (_interpolate_frames(f, i, frames, worker) - q[i])
 
 
 @kernel
-def _placed_foot(f: float, side: int, frames: Floats, me: Worker) -> None:
-    """The clip's foot at frame f, where the clip is placed."""
-    q, at, of = me.q, c.ANKLE + 6 * side, c.N_BLENDED + 6 * side
-    ahead, left = _between(f, of, frames, me), _between(f, of + 1, frames, me)
-    q[at], q[at + 1] = placed(me.start_x, me.start_y, me.clip_yaw, ahead, left)
-    q[at + 3] = me.clip_yaw + _between(f, of + 3, frames, me)
+def _play_foot(f: float, side: int, frames: Floats, worker: Worker) -> None:
+    """Write the foot of the clip, where the clip is placed.
+
+    Args:
+        f: time in frames of the clip.
+        side: 0 left, 1 right.
+        frames: frames of all clips.
+        worker: record; its `q` is written.
+    """
+    q, at, column = worker.q, c.ANKLE + 6 * side, c.N_BLENDED + 6 * side
+    ahead, left = (
+        _interpolate_frames(f, column, frames, worker),
+        _interpolate_frames(f, column + 1, frames, worker),
+    )
+    q[at], q[at + 1] = move_point(worker.start_x, worker.start_y, worker.clip_yaw, ahead, left)
+    q[at + 3] = worker.clip_yaw + _interpolate_frames(f, column + 3, frames, worker)
     for i in (2, 4, 5):
-        q[at + i] = _between(f, of + i, frames, me)
+        q[at + i] = _interpolate_frames(f, column + i, frames, worker)
 
 
 @kernel
-def clip_root(t: float, me: Worker) -> Pair:
-    """About where the root of someone who plays a clip is on the floor at time t, and after."""
-    lasts = me.clip_s + 2.0 * SETTLE_S
-    u = min(max(t / lasts, 0.0), 1.0) * (N_ROOTS - 1)
+def predict_clip_root(t: float, worker: Worker) -> Point:
+    """Return the approximate root on the floor at time t of a clip, and after it."""
+    duration_s = worker.clip_s + 2.0 * SETTLE_S
+    u = min(max(t / duration_s, 0.0), 1.0) * (N_ROOTS - 1)
     k = min(int(u), N_ROOTS - 2)
-    share, roots = u - k, me.roots
+    share, roots = u - k, worker.roots
     x, y = roots[k, 0], roots[k, 1]
-    return x + share * (roots[k + 1, 0] - x), y + share * (roots[k + 1, 1] - y)
+    return Point(x + share * (roots[k + 1, 0] - x), y + share * (roots[k + 1, 1] - y))

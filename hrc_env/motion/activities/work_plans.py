@@ -1,190 +1,336 @@
 """Plans of work in place: with tools, pointing, a lunge, with both hands at floor height.
 
-`plan_...` returns how fast hands may go to the work [m/s], for `planning.finish`.
+`plan_...` returns the peak speed of the hands on their way to the work [m/s], which
+`planning.finish_plan` takes.
 """
 
 import math
 
 from hrc_env.core.kernels import kernel
-from hrc_env.core.typing import Floats
+from hrc_env.core.typing import Floats, Vector3
 from hrc_env.motion.activities import planning as to
 from hrc_env.motion.activities import strokes
-from hrc_env.motion.activities.planning import CALM_M_S, between, dominant
+from hrc_env.motion.activities.planning import CALM_M_S, choose_hand, scale_draw
 from hrc_env.motion.activities.work import LOW_M
 from hrc_env.motion.anatomy import ARM, STAND_Z
-from hrc_env.motion.curves import placed
+from hrc_env.motion.curves import move_point
 from hrc_env.motion.state import Worker
 from hrc_env.worker.props import PROP_NAMES
 
-HAMMER, DRILL, HAND_SAW, TAPE = map(PROP_NAMES.index, ("hammer", "drill", "saw", "tape_measure"))
-HEAD_M, FACE_M = 0.25, 0.05
-"""From the fist to the hammer's head along the handle, and to its face [m]; `props`."""
-LIGHT_HZ, LIGHT_M, LOW_SHARE = 5.6, 0.060, 0.7
-"""Light taps: to and fro by 6 cm, at most 1.1 m/s; size of blows at floor height; judgement."""
-WALL_M, OVERHEAD_M = 1.2, 1.7
-"""From these heights on nails go into a wall, not downwards; people work above their head [m]."""
-BIT_M, BIT_UP_M, THRUST_M = 0.22, 0.09, 0.04
-"""Tip of the bit: ahead of the fist and above it (`props`); how far it goes in: a screw [m]."""
-SCREWS, SCREW_PITCH_M, FIST_M, ASKEW_RAD = 4, 0.15, (0.467, 0.127), -0.25 * math.pi
-"""Of who screws beside what a robot holds: how many, how far below each other, where the fist is
-ahead and left of the feet [m], how far the drill is turned from where the worker looks."""
+HAMMER = PROP_NAMES.index("hammer")
+DRILL = PROP_NAMES.index("drill")
+HAND_SAW = PROP_NAMES.index("saw")
+TAPE = PROP_NAMES.index("tape_measure")
+LEVEL = Vector3(0.0, 0.0, 0.0)
+"""Turn of a tool that points straight ahead: yaw, pitch, roll [rad]."""
+HEAD_M = 0.25
+"""Distance from the fist to the hammer's head along the handle [m], see `props`."""
+FACE_M = 0.05
+"""Distance from the handle to the face of the hammer [m], see `props`."""
+LIGHT_HZ = 5.6
+"""Rate of light taps [Hz]; they move at most at 1.1 m/s; judgement."""
+LIGHT_M = 0.060
+"""Size of light taps, to and fro [m]; judgement."""
+LOW_SHARE = 0.7
+"""Size of blows at floor height relative to others; judgement."""
+WALL_M = 1.2
+"""Height from which nails go into a wall, not downwards [m]."""
+OVERHEAD_M = 1.7
+"""Height from which people work above their head [m]."""
+BIT_M = 0.22
+"""Distance of the tip of the bit ahead of the fist [m], see `props`."""
+BIT_UP_M = 0.09
+"""Height of the tip of the bit above the fist [m], see `props`."""
+THRUST_M = 0.04
+"""Depth of a hole, and length of a screw [m]."""
+SCREWS = 4
+"""Number of screws in the robot's workpiece."""
+SCREW_PITCH_M = 0.15
+"""Distance of a screw below the one before [m]."""
+FIST_AHEAD_M = 0.467
+"""Distance of the fist ahead of the feet in screwing the robot's workpiece [m]."""
+FIST_LEFT_M = 0.127
+"""Distance of the fist to the left of the feet in screwing the robot's workpiece [m]."""
+ASKEW_RAD = -0.25 * math.pi
+"""Yaw of the drill from the heading in screwing the robot's workpiece [rad]."""
 CUT_RAD = 0.6
-"""How steeply the blade goes into the board [rad]; 45 to 60 degrees to it is usual, judgement."""
-SHOULDER_SHARE, SHOULDER_M = 1.50, 0.19
-"""Height of the shoulder in heights of the pelvis, and its distance from the middle [m]."""
-POINT_M_S, AHEAD_ARMS = 1.5, (1.2, 1.5)
-"""Peak speed of a pointing hand [m/s]; where one lunges to, in lengths of the arm; judgement."""
+"""Pitch of the blade in the board [rad]; 45 to 60 degrees to it is usual, judgement."""
+SHOULDER_SHARE = 1.50
+"""Height of the shoulder, in heights of the pelvis."""
+SHOULDER_M = 0.19
+"""Distance of the shoulder from the middle [m]."""
+POINT_M_S = 1.5
+"""Peak speed of a pointing hand [m/s]; judgement."""
+NEAREST_ARMS = 1.2
+"""Least distance of the target of a lunge, in lengths of the arm; judgement."""
+FARTHEST_ARMS = 1.5
+"""Greatest distance of the target of a lunge, in lengths of the arm; judgement."""
 
 
 @kernel
-def plan_hammer(draws: Floats, height: float, me: Worker) -> float:
-    """Plan to drive nails at the height."""
-    side, sign = to.begin(draws[0], me)
-    z = height if height > 0.0 else between(draws[1], 0.85, 1.4)
-    aside = to.get_ready(z, side, 1 - side, 0.16, me)
+def plan_hammer(draws: Floats, height: float, worker: Worker) -> float:
+    """Plan to drive nails.
+
+    Args:
+        draws: uniform draws (N_START,) in [0, 1).
+        height: height of the work [m]; 0 to draw one.
+        worker: record that the plan is written into.
+
+    Returns:
+        The peak speed of the hands on their way to the work [m/s].
+    """
+    side = to.begin_plan(draws[0], worker)
+    sign = 1.0 - 2.0 * side
+    z = height if height > 0.0 else scale_draw(draws[1], 0.85, 1.4)
+    aside = to.plan_stance(z, side, 1 - side, 0.16, worker)
     if z < WALL_M:
-        ahead, turn = (0.62 if z < LOW_M else 0.72), (0.0, 0.5 * math.pi, 0.0)
-        at = (ahead - HEAD_M, aside + 0.06 * sign, z + FACE_M + 0.02)
+        ahead, turn = (0.62 if z < LOW_M else 0.72), Vector3(0.0, 0.5 * math.pi, 0.0)
+        at = Vector3(ahead - HEAD_M, aside + 0.06 * sign, z + FACE_M + 0.02)
     else:
-        ahead, turn = 0.68, (0.0, 0.0, 0.0)
-        at = (ahead - FACE_M, 0.06 * sign, z - HEAD_M)
-    to.put_tool(HAMMER, side, at, turn, me)
-    to.put_other((ahead - 0.02, aside - 0.09 * sign, z + 0.05 if z < WALL_M else z - 0.05), me)
-    to.look_to((ahead, aside, z), me)
+        ahead, turn = 0.68, LEVEL
+        at = Vector3(ahead - FACE_M, 0.06 * sign, z - HEAD_M)
+    to.plan_tool(HAMMER, side, at, turn, worker)
+    beside_z = z + 0.05 if z < WALL_M else z - 0.05
+    to.plan_other_hand(Vector3(ahead - 0.02, aside - 0.09 * sign, beside_z), worker)
+    to.plan_gaze(Vector3(ahead, aside, z), worker)
     light = draws[2] < 0.4
-    size = LIGHT_M if light else between(draws[3], 0.16, 0.22)
+    size = LIGHT_M if light else scale_draw(draws[3], 0.16, 0.22)
     if z < LOW_M:
         size *= LOW_SHARE
-    rate = LIGHT_HZ if light else between(draws[4], 1.9, 2.2)
-    to.strokes(strokes.STRIKE, size, rate, between(draws[5], 1.6, 3.2), 2 + int(3.0 * draws[6]), me)
-    me.wander_m = 0.08 * sign
+    rate = LIGHT_HZ if light else scale_draw(draws[4], 1.9, 2.2)
+    to.plan_strokes(
+        strokes.STRIKE, size, rate, scale_draw(draws[5], 1.6, 3.2), 2 + int(3.0 * draws[6]), worker
+    )
+    worker.wander_m = 0.08 * sign
     return CALM_M_S
 
 
 @kernel
-def plan_drill(draws: Floats, height: float, me: Worker) -> float:
-    """Plan to drill at the height."""
-    side, sign = to.begin(draws[0], me)
-    z = height if height > 0.0 else between(draws[1], 1.1, 1.4)
+def plan_drill(draws: Floats, height: float, worker: Worker) -> float:
+    """Plan to drill.
+
+    Args:
+        draws: uniform draws (N_START,) in [0, 1).
+        height: height of the work [m]; 0 to draw one.
+        worker: record that the plan is written into.
+
+    Returns:
+        The peak speed of the hands on their way to the work [m/s].
+    """
+    side = to.begin_plan(draws[0], worker)
+    sign = 1.0 - 2.0 * side
+    z = height if height > 0.0 else scale_draw(draws[1], 1.1, 1.4)
     overhead = z >= OVERHEAD_M
-    aside = to.get_ready(z, side, 1 - side, 0.10 if overhead else 0.18, me)
+    aside = to.plan_stance(z, side, 1 - side, 0.10 if overhead else 0.18, worker)
     if overhead:
-        ahead, turn = 0.34, (0.0, -0.5 * math.pi, 0.0)
-        at, beside = (ahead + BIT_UP_M, 0.10 * sign, z - BIT_M - THRUST_M), (ahead, z - 0.04)
+        ahead, turn = 0.34, Vector3(0.0, -0.5 * math.pi, 0.0)
+        at = Vector3(ahead + BIT_UP_M, 0.10 * sign, z - BIT_M - THRUST_M)
+        beside = Vector3(ahead, aside - 0.22 * sign, z - 0.04)
     else:
-        ahead, turn = 0.70, (0.0, 0.0, 0.0)
-        at = (ahead - BIT_M - THRUST_M, aside + 0.05 * sign, z - BIT_UP_M)
-        beside = (ahead - 0.04, z - 0.02)
-    to.put_tool(DRILL, side, at, turn, me)
-    to.put_other((beside[0], aside - (0.22 if overhead else 0.12) * sign, beside[1]), me)
-    to.look_to((ahead, aside, z), me)
-    kind, burst_s = strokes.PRESS if overhead else strokes.BORE, between(draws[2], 1.5, 1.8)
-    to.strokes(kind, THRUST_M, 0.0, burst_s, 2 + int(3.0 * draws[3]), me)
-    me.wander_m = 0.12 * sign
+        ahead, turn = 0.70, LEVEL
+        at = Vector3(ahead - BIT_M - THRUST_M, aside + 0.05 * sign, z - BIT_UP_M)
+        beside = Vector3(ahead - 0.04, aside - 0.12 * sign, z - 0.02)
+    to.plan_tool(DRILL, side, at, turn, worker)
+    to.plan_other_hand(beside, worker)
+    to.plan_gaze(Vector3(ahead, aside, z), worker)
+    kind, burst_s = strokes.PRESS if overhead else strokes.BORE, scale_draw(draws[2], 1.5, 1.8)
+    to.plan_strokes(kind, THRUST_M, 0.0, burst_s, 2 + int(3.0 * draws[3]), worker)
+    worker.wander_m = 0.12 * sign
     return CALM_M_S
 
 
 @kernel
-def plan_screw(draws: Floats, height: float, me: Worker) -> float:
-    """Plan to drive screws, each below the last, the first at the height."""
-    side, _ = to.begin(draws[0], me)
-    to.step_ahead(1 - side, 0.12, me)
-    ahead, left = FIST_M
-    to.put_tool(DRILL, side, (ahead, left, height - BIT_UP_M), (ASKEW_RAD, 0.0, 0.0), me)
-    to.look_to((ahead + 0.18, left - 0.18, height - 0.2), me)
-    to.strokes(strokes.PRESS, THRUST_M, 0.0, between(draws[2], 1.0, 1.3), SCREWS, me)
-    me.down_m = SCREW_PITCH_M
+def plan_screw(draws: Floats, height: float, worker: Worker) -> float:
+    """Plan to drive screws, each below the one before.
+
+    Args:
+        draws: uniform draws (N_START,) in [0, 1).
+        height: height of the first screw [m].
+        worker: record that the plan is written into.
+
+    Returns:
+        The peak speed of the hands on their way to the work [m/s].
+    """
+    side = to.begin_plan(draws[0], worker)
+    to.plan_step_ahead(1 - side, 0.12, worker)
+    to.plan_tool(
+        DRILL,
+        side,
+        Vector3(FIST_AHEAD_M, FIST_LEFT_M, height - BIT_UP_M),
+        Vector3(ASKEW_RAD, 0.0, 0.0),
+        worker,
+    )
+    to.plan_gaze(Vector3(FIST_AHEAD_M + 0.18, FIST_LEFT_M - 0.18, height - 0.2), worker)
+    to.plan_strokes(strokes.PRESS, THRUST_M, 0.0, scale_draw(draws[2], 1.0, 1.3), SCREWS, worker)
+    worker.down_m = SCREW_PITCH_M
     return CALM_M_S
 
 
 @kernel
-def plan_saw(draws: Floats, height: float, me: Worker) -> float:
-    """Plan to saw a board at the height."""
-    side, sign = to.begin(draws[0], me)
-    z = height if height > 0.0 else between(draws[1], 0.75, 0.95)
-    to.step_ahead(1 - side, 0.26, me)
-    to.put_tool(HAND_SAW, side, (0.52, 0.17 * sign, z + 0.17), (0.0, CUT_RAD, 0.0), me)
-    to.put_other((0.58, -0.12 * sign, z + 0.03), me)
-    to.look_to((0.74, 0.1 * sign, z), me)
-    to.strokes(strokes.SAW, between(draws[2], 0.13, 0.15), between(draws[3], 1.55, 1.75),
-            between(draws[4], 3.0, 5.0), 1 + int(3.0 * draws[5]), me)  # fmt: skip
+def plan_saw(draws: Floats, height: float, worker: Worker) -> float:
+    """Plan to saw a board.
+
+    Args:
+        draws: uniform draws (N_START,) in [0, 1).
+        height: height of the work [m]; 0 to draw one.
+        worker: record that the plan is written into.
+
+    Returns:
+        The peak speed of the hands on their way to the work [m/s].
+    """
+    side = to.begin_plan(draws[0], worker)
+    sign = 1.0 - 2.0 * side
+    z = height if height > 0.0 else scale_draw(draws[1], 0.75, 0.95)
+    to.plan_step_ahead(1 - side, 0.26, worker)
+    to.plan_tool(
+        HAND_SAW, side, Vector3(0.52, 0.17 * sign, z + 0.17), Vector3(0.0, CUT_RAD, 0.0), worker
+    )
+    to.plan_other_hand(Vector3(0.58, -0.12 * sign, z + 0.03), worker)
+    to.plan_gaze(Vector3(0.74, 0.1 * sign, z), worker)
+    size, rate = scale_draw(draws[2], 0.13, 0.15), scale_draw(draws[3], 1.55, 1.75)
+    burst_s = scale_draw(draws[4], 3.0, 5.0)
+    to.plan_strokes(strokes.SAW, size, rate, burst_s, 1 + int(3.0 * draws[5]), worker)
     return CALM_M_S
 
 
 @kernel
-def plan_measure(draws: Floats, height: float, me: Worker) -> float:
-    """Plan to measure at the height."""
-    to.blank(me)
-    z = height if height > 0.0 else between(draws[1], 0.85, 1.3)
-    aside = to.get_ready(z, 1, dominant(draws[0], me), 0.12, me)
-    to.put_tool(TAPE, 1, (0.48, aside, z + 0.04), (0.0, 0.0, 0.0), me)
-    to.look_to((0.46, 0.12, z), me)
-    to.strokes(strokes.SHIFT, 0.0, 0.0, between(draws[2], 0.8, 1.6), 2 + int(3.0 * draws[3]), me)
-    me.wander_m = between(draws[4], 0.10, 0.18)
+def plan_measure(draws: Floats, height: float, worker: Worker) -> float:
+    """Plan to measure with a tape.
+
+    Args:
+        draws: uniform draws (N_START,) in [0, 1).
+        height: height of the work [m]; 0 to draw one.
+        worker: record that the plan is written into.
+
+    Returns:
+        The peak speed of the hands on their way to the work [m/s].
+    """
+    to.clear_plan(worker)
+    z = height if height > 0.0 else scale_draw(draws[1], 0.85, 1.3)
+    aside = to.plan_stance(z, 1, choose_hand(draws[0], worker), 0.12, worker)
+    to.plan_tool(TAPE, 1, Vector3(0.48, aside, z + 0.04), LEVEL, worker)
+    to.plan_gaze(Vector3(0.46, 0.12, z), worker)
+    to.plan_strokes(
+        strokes.SHIFT, 0.0, 0.0, scale_draw(draws[2], 0.8, 1.6), 2 + int(3.0 * draws[3]), worker
+    )
+    worker.wander_m = scale_draw(draws[4], 0.10, 0.18)
     return CALM_M_S
 
 
 @kernel
-def plan_point(draws: Floats, height: float, me: Worker) -> float:
-    """Plan to point somewhere ahead, at its height if it has one."""
-    side, sign = to.begin(draws[0], me)
-    aside = sign * between(draws[1], -0.4, 0.7)
-    up = between(draws[2], -0.25, 0.25)
-    reach = 0.95 * me.size[ARM]
-    shoulder_z = SHOULDER_SHARE * me.size[STAND_Z]
-    x, y = placed(0.0, SHOULDER_M * sign, aside, reach * math.cos(up), 0.0)
-    to.put_tool(0, side, (x, y, shoulder_z + reach * math.sin(up)), (0.0, 0.0, 0.0), me)
-    x, y = placed(0.0, 0.0, aside, 10.0, 0.0)
-    to.look_to((x, y, shoulder_z + 10.0 * math.tan(up)), me)
-    to.strokes(strokes.JAB, 0.03, between(draws[3], 1.2, 1.8), between(draws[4], 0.8, 2.2), 1, me)
-    me.twist = 0.35 * aside
+def plan_point(draws: Floats, height: float, worker: Worker) -> float:
+    """Plan to point somewhere ahead; the height has no effect.
+
+    Args:
+        draws: uniform draws (N_START,) in [0, 1).
+        height: height of the work [m].
+        worker: record that the plan is written into.
+
+    Returns:
+        The peak speed of the hand [m/s].
+    """
+    side = to.begin_plan(draws[0], worker)
+    sign = 1.0 - 2.0 * side
+    aside = sign * scale_draw(draws[1], -0.4, 0.7)
+    up = scale_draw(draws[2], -0.25, 0.25)
+    reach = 0.95 * worker.lengths[ARM]
+    shoulder_z = SHOULDER_SHARE * worker.lengths[STAND_Z]
+    x, y = move_point(0.0, SHOULDER_M * sign, aside, reach * math.cos(up), 0.0)
+    at = Vector3(x, y, shoulder_z + reach * math.sin(up))
+    to.plan_tool(0, side, at, LEVEL, worker)
+    x, y = move_point(0.0, 0.0, aside, 10.0, 0.0)
+    to.plan_gaze(Vector3(x, y, shoulder_z + 10.0 * math.tan(up)), worker)
+    to.plan_strokes(
+        strokes.JAB, 0.03, scale_draw(draws[3], 1.2, 1.8), scale_draw(draws[4], 0.8, 2.2), 1, worker
+    )
+    worker.twist = 0.35 * aside
     return POINT_M_S
 
 
 @kernel
-def plan_lunge(draws: Floats, height: float, me: Worker) -> float:
-    """Plan to snatch at something ahead, at the height."""
-    side, sign = to.begin(draws[0], me)
-    z = height if height > 0.0 else between(draws[1], 0.9, 1.3)
-    to.step_ahead(side, between(draws[2], 0.32, 0.42), me)
-    ahead = me.size[ARM] * between(draws[3], *AHEAD_ARMS)
-    at = (ahead, sign * between(draws[4], -0.1, 0.25), z)
-    to.put_tool(0, side, at, (0.0, 0.0, 0.0), me)
-    to.look_to(at, me)
-    to.strokes(strokes.STILL, 0.0, 0.0, between(draws[5], 0.0, 0.3), 1, me)
-    me.settle_s, me.out_at = 0.7, 0.12
-    me.step_swing = 0.40
-    me.twist = -0.35 * sign
-    return between(draws[6], 1.9, 2.3)
+def plan_lunge(draws: Floats, height: float, worker: Worker) -> float:
+    """Plan to snatch at something ahead.
 
+    Args:
+        draws: uniform draws (N_START,) in [0, 1).
+        height: height of the work [m]; 0 to draw one.
+        worker: record that the plan is written into.
 
-@kernel
-def plan_kneel(draws: Floats, height: float, me: Worker) -> float:
-    """Plan to kneel and work low."""
-    side, _ = to.begin(draws[0], me)
-    to.kneel_down(side, me)
-    return _hands_low(0.42, draws, height, me)
-
-
-@kernel
-def plan_squat(draws: Floats, height: float, me: Worker) -> float:
-    """Plan to work low on the haunches."""
-    to.blank(me)
-    me.crouch, me.ahead, me.settle_s = 1.0, 0.02, to.CROUCH_S
-    return _hands_low(0.50, draws, height, me)
-
-
-@kernel
-def _hands_low(ahead: float, draws: Floats, height: float, me: Worker) -> float:
-    """Plan what both hands do at floor height."""
-    side = dominant(draws[0], me)
+    Returns:
+        The peak speed of the hands on their way to the work [m/s].
+    """
+    side = to.begin_plan(draws[0], worker)
     sign = 1.0 - 2.0 * side
-    z = height if height > 0.0 else between(draws[1], 0.12, 0.35)
-    aside = to.before_knee(me)
-    to.put_tool(0, side, (ahead, aside + 0.10 * sign, z), (0.0, 0.0, 0.0), me)
-    to.put_other((ahead + 0.03, aside - 0.12 * sign, z), me)
-    to.look_to((ahead + 0.03, aside, z), me)
-    size, rate = between(draws[2], 0.02, 0.05), between(draws[3], 0.8, 1.4)
-    to.strokes(strokes.BUSY, size, rate, between(draws[4], 1.5, 3.5), 1 + int(3.0 * draws[5]), me)
-    me.wander_m = 0.10
+    z = height if height > 0.0 else scale_draw(draws[1], 0.9, 1.3)
+    to.plan_step_ahead(side, scale_draw(draws[2], 0.32, 0.42), worker)
+    ahead = worker.lengths[ARM] * scale_draw(draws[3], NEAREST_ARMS, FARTHEST_ARMS)
+    at = Vector3(ahead, sign * scale_draw(draws[4], -0.1, 0.25), z)
+    to.plan_tool(0, side, at, LEVEL, worker)
+    to.plan_gaze(at, worker)
+    to.plan_strokes(strokes.STILL, 0.0, 0.0, scale_draw(draws[5], 0.0, 0.3), 1, worker)
+    worker.settle_s, worker.out_at = 0.7, 0.12
+    worker.step_swing = 0.40
+    worker.twist = -0.35 * sign
+    return scale_draw(draws[6], 1.9, 2.3)
+
+
+@kernel
+def plan_kneel(draws: Floats, height: float, worker: Worker) -> float:
+    """Plan to kneel and work near the floor.
+
+    Args:
+        draws: uniform draws (N_START,) in [0, 1).
+        height: height of the work [m]; 0 to draw one.
+        worker: record that the plan is written into.
+
+    Returns:
+        The peak speed of the hands on their way to the work [m/s].
+    """
+    side = to.begin_plan(draws[0], worker)
+    to.plan_kneeling(side, worker)
+    return _plan_hands_low(0.42, draws, height, worker)
+
+
+@kernel
+def plan_squat(draws: Floats, height: float, worker: Worker) -> float:
+    """Plan to work near the floor on the haunches.
+
+    Args:
+        draws: uniform draws (N_START,) in [0, 1).
+        height: height of the work [m]; 0 to draw one.
+        worker: record that the plan is written into.
+
+    Returns:
+        The peak speed of the hands on their way to the work [m/s].
+    """
+    to.clear_plan(worker)
+    worker.crouch, worker.ahead, worker.settle_s = 1.0, 0.02, to.CROUCH_S
+    return _plan_hands_low(0.50, draws, height, worker)
+
+
+@kernel
+def _plan_hands_low(ahead: float, draws: Floats, height: float, worker: Worker) -> float:
+    """Plan the work of both hands near the floor.
+
+    Args:
+        ahead: distance of the work ahead of the feet [m].
+        draws: uniform draws (N_START,) in [0, 1).
+        height: height of the work [m]; 0 to draw one.
+        worker: record that the plan is written into.
+
+    Returns:
+        The peak speed of the hands on their way to the work [m/s].
+    """
+    side = choose_hand(draws[0], worker)
+    sign = 1.0 - 2.0 * side
+    z = height if height > 0.0 else scale_draw(draws[1], 0.12, 0.35)
+    aside = to.offset_before_knee(worker)
+    to.plan_tool(0, side, Vector3(ahead, aside + 0.10 * sign, z), LEVEL, worker)
+    to.plan_other_hand(Vector3(ahead + 0.03, aside - 0.12 * sign, z), worker)
+    to.plan_gaze(Vector3(ahead + 0.03, aside, z), worker)
+    size, rate = scale_draw(draws[2], 0.02, 0.05), scale_draw(draws[3], 0.8, 1.4)
+    to.plan_strokes(
+        strokes.BUSY, size, rate, scale_draw(draws[4], 1.5, 3.5), 1 + int(3.0 * draws[5]), worker
+    )
+    worker.wander_m = 0.10
     return CALM_M_S

@@ -1,1 +1,1 @@
-"""Whose is which detection, where there are several workers."""
+"""Association of detections with workers, where there are several workers."""

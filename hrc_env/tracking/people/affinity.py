@@ -1,42 +1,80 @@
-"""How well a 2D pose fits a body whose joints are predicted, in one camera.
+"""The affinity of a 2D pose in one camera to a body with predicted joints.
 
-A joint counts with its log likelihood ratio, near where the body is expected or anywhere in the
-image; one gross error costs no more than the gate. Errors of a body's joints go together, so a pose
-counts with the mean over its joints. Left and right may be exchanged: the better reading counts.
+Each joint contributes the log likelihood ratio of a detection near its predicted pixel against one
+anywhere in the image; a gross error costs no more than the gate. The errors of a body's joints are
+correlated, so the affinity is the mean over joints, not the sum. A detector may exchange left and
+right, so the better of both readings counts.
 """
 
 import math
+from typing import Annotated, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from hrc_env.core.declared import dtype_of
 from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import MIRROR, N_JOINTS
+from hrc_env.core.typing import Bools, Covariances3, Floats, Points2, Points3
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
 from hrc_env.tracking.measurements import pixel_spread
 
 LEAST_JOINTS = 3
-"""A pose of fewer joints is nobody's."""
+"""Least number of joints of a pose that can belong to a worker."""
 FULL_JOINTS = 6
-"""Poses of fewer joints than this count for less."""
+"""Number of joints below which a pose has less affinity."""
 _ISOTROPIC = np.eye(3)
-POSE = np.dtype(
-    [
-        # pixels, standard deviations [px], and which of them are measurements
-        ("px", "f8", (N_JOINTS, 2)), ("sigma_px", "f8", (N_JOINTS,)), ("ok", "i1", (N_JOINTS,)),
-        # unit directions to the joints, from the camera; whether the pose is nobody's yet
-        ("sight", "f8", (N_JOINTS, 3)), ("free", "?"),
-    ],
-    align=True,
-)  # fmt: skip
-"""A 2D pose that a camera has found."""
+
+
+class Pose:
+    """A 2D pose that a camera has detected."""
+
+    px: Annotated[Points2, (N_JOINTS, 2)]
+    """Pixel of each joint."""
+    sigma_px: Annotated[Floats, (N_JOINTS,)]
+    """Standard deviation of each joint's pixel [px]."""
+    ok: Annotated[NDArray[np.int8], (N_JOINTS,)]
+    """Whether the joint is a measurement (1) or missing (0)."""
+    sight: Annotated[Floats, (N_JOINTS, 3)]
+    """Unit direction from the camera to each joint in the world frame."""
+    free: bool
+    """Whether the pose has not been assigned yet."""
+
+
+POSE = dtype_of(Pose)
+
+
+class AssociationSettings(NamedTuple):
+    """`AssociationConfig` as compiled functions take it."""
+
+    gate_sigma: float
+    """Gate of a joint around its predicted pixel, in standard deviations."""
+    slack_m: float
+    """Standard deviation of errors that predictions do not account for [m]."""
+    min_joints: int
+    """Number of joints on which two cameras must agree for a new person."""
+    apart_m: float
+    """Distance between two bodies below which they are one person [m]."""
+    rejoin_m: float
+    """Greatest distance of a new body from the hidden worker that it is taken for [m]."""
+    image_area_px: float
+    """Area of an image [px^2]."""
 
 
 @kernel(makes_arrays=True)
-def expect(camera, mean, cov, known, slack_m, image):
-    """Where a camera (3, 4) should see a body's joints: image (J, 3) of u, v and variance [px^2].
+def project_body(
+    camera: Floats, mean: Points3, cov: Covariances3, known: Bools, slack_m: float, image: Floats
+) -> None:
+    """Predict the pixels of a body's joints in one camera.
 
-    The variance is -1 where nothing is expected: what is not `known` (J,), or not before the lens.
-    `slack_m` is a standard deviation of what the body may have done besides [m].
+    Args:
+        camera: (3, 4) projection.
+        mean: (J, 3) positions [m].
+        cov: (J, 3, 3) covariances of the positions [m^2].
+        known: (J,) joints with a known position.
+        slack_m: standard deviation of errors that `cov` does not hold [m].
+        image: (J, 3) u, v [px] and mean variance of a coordinate [px^2], filled in. The variance is
+            -1 for joints that are not known or not in front of the camera.
     """
     for j in range(len(mean)):
         image[j, 2] = -1.0
@@ -51,17 +89,34 @@ def expect(camera, mean, cov, known, slack_m, image):
 
 
 @kernel(makes_arrays=True)
-def affinity(image, pose, s):
-    """Mean log likelihood ratio of a `POSE`; 0 where it does not fit. `s` as in `association`."""
-    return max(_one_reading(image, pose, False, s), _one_reading(image, pose, True, s))
+def compute_affinity(image: Floats, pose: Pose, settings: AssociationSettings) -> float:
+    """Return the mean log likelihood ratio of a pose; 0 where it does not fit.
+
+    Args:
+        image: (J, 3) predicted pixels and variances, of `project_body`.
+        pose: the detected pose.
+        settings: the gate and the area of the image.
+    """
+    as_detected = _score_reading(image, pose, False, settings)
+    return max(as_detected, _score_reading(image, pose, True, settings))
 
 
 @kernel(makes_arrays=True)
-def _one_reading(image, pose, swapped, s):
-    z, sigma, ok, gate_sigma = pose.px, pose.sigma_px, pose.ok, s.gate_sigma
+def _score_reading(
+    image: Floats, pose: Pose, swapped: bool, settings: AssociationSettings
+) -> float:
+    """Return the affinity of one reading of a pose; 0 where it does not fit.
+
+    Args:
+        image: (J, 3) predicted pixels and variances, of `project_body`.
+        pose: the detected pose.
+        swapped: whether left and right of the pose are exchanged.
+        settings: the gate and the area of the image.
+    """
+    z, sigma, ok, gate_sigma = pose.px, pose.sigma_px, pose.ok, settings.gate_sigma
     n, n_near, total, product, gate = 0, 0, 0.0, 1.0, gate_sigma * gate_sigma
     for j in range(len(image)):
-        k = MIRROR[j] if swapped else j
+        k: int = MIRROR[j] if swapped else j
         if not ok[k] or image[j, 2] < 0.0:
             continue
         variance = sigma[k] * sigma[k] + image[j, 2]
@@ -72,5 +127,5 @@ def _one_reading(image, pose, swapped, s):
         n_near += misfit < gate
     if n < LEAST_JOINTS or 2 * n_near < n:
         return 0.0
-    total += n * math.log(s.image_area_px / (2.0 * math.pi)) - math.log(product)
+    total += n * math.log(settings.image_area_px / (2.0 * math.pi)) - math.log(product)
     return max(total / max(n, FULL_JOINTS), 0.0)

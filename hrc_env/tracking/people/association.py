@@ -1,53 +1,69 @@
-"""Which detection belongs to whom: 2D poses of every camera to workers who are followed.
+"""Association of the 2D poses in every camera with the workers that are tracked.
 
-Poses that fit where a worker is predicted go to that worker, in each camera so that all together
-fit best, and no pose to two workers. What is left is compared across cameras: poses of at least two
-cameras that are one body go to a worker who was lost from sight nearby, else to a place that nobody
-has; poses that no other camera confirms go to nobody: views that do not fit their worker look like
-somebody new. Where there is no other camera, they go to vacant places while all who are followed
-are seen.
+Poses that fit where a worker is predicted are assigned to that worker, in each camera so that all
+of them together fit best, and no pose is assigned twice. The remaining poses are compared across
+cameras. Poses of at least two cameras that belong to one body are assigned to a tracked worker at
+that place or to one who was lost from sight nearby, else to a slot without a track. Poses that no
+other camera confirms are not assigned, because views that do not fit their worker look like a new
+person. If the rig has a single camera, they are assigned to slots without a track while all tracked
+workers are seen.
 """
 
-from collections import namedtuple
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
+from hrc_env.core.declared import Records1, Records2, make_records
 from hrc_env.core.errors import check_fields, check_shape
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
-from hrc_env.core.typing import Floats, Ints
+from hrc_env.core.typing import Bools, Covariances3, Floats, Ints, Points2, Points3
 from hrc_env.geometry.assignment import assign_rows
-from hrc_env.geometry.lines_of_sight import cameras_of
-from hrc_env.tracking.measurements import arrays_of, is_measurement
-from hrc_env.tracking.people.affinity import LEAST_JOINTS, POSE, affinity, expect
-from hrc_env.tracking.people.new_people import (
-    fit_cameras,
-    look_along,
-    meeting,
-    propose,
+from hrc_env.geometry.lines_of_sight import Camera, cameras_of
+from hrc_env.tracking.measurements import KeypointArrays, get_keypoint_arrays, is_measurement
+from hrc_env.tracking.people.affinity import (
+    LEAST_JOINTS,
+    AssociationSettings,
+    Pose,
+    compute_affinity,
+    project_body,
 )
+from hrc_env.tracking.people.new_people import (
+    Body,
+    Proposals,
+    fill_sight_lines,
+    fit_cameras,
+    intersect_poses,
+    make_body,
+    make_proposals,
+    propose_bodies,
+)
+from hrc_env.tracking.tracks import EstimateArrays, get_estimate_arrays
 
 
 @dataclass(frozen=True, slots=True)
 class AssociationConfig:
-    """When a 2D pose is believed to be of a worker."""
+    """When a 2D pose is assigned to a worker.
+
+    Raises:
+        ConfigError: a value is out of its range; the error names the field and the range.
+    """
 
     gate_sigma: float = 5.0
-    """A joint is near where it is expected within so many standard deviations; half of a
-    pose's joints must be."""
+    """Gate of a joint around its predicted pixel, in standard deviations. Half of a pose's joints
+    must be within it."""
     slack_m: float = 0.05
-    """Standard deviation of what predictions do not know of [m]: detectors err for half a
-    second in the same way, and people start and stop."""
+    """Standard deviation of errors that predictions do not account for [m]: errors of a detector
+    persist for half a second, and people start and stop."""
     min_joints: int = 8
-    """Two cameras must agree on so many joints (of 15) of somebody new."""
+    """Number of joints, of 15, on which two cameras must agree for a new person."""
     apart_m: float = 0.35
-    """Two people's bodies are never nearer than this [m]: nearer ones are one person."""
+    """Distance between two bodies below which they are one person [m]."""
     rejoin_m: float = 1.0
-    """Somebody new who appears so near [m] a worker whom no camera sees now is that worker."""
+    """Distance within which a new body is taken for a tracked worker that no camera sees [m]."""
     image_area_px: float = 1920.0 * 1080.0
-    """Area of an image [px^2]: the inverse is the density of poses that are nobody's."""
+    """Area of an image [px^2]. Its inverse is the density of poses that belong to no worker."""
 
     def __post_init__(self) -> None:
         check_fields(self, "be positive", "gate_sigma", "min_joints", "image_area_px")
@@ -56,75 +72,88 @@ class AssociationConfig:
 
 @dataclass(frozen=True, slots=True)
 class Association:
-    """Keypoints by worker, and where each of them came from."""
+    """Keypoints by worker, and the poses that they come from."""
 
     keypoints: Keypoints
-    """(B, C, W, J, ...): missing where a camera has no pose of a worker."""
+    """(B, C, W, J, ...) keypoints; missing where a camera has no pose of a worker."""
     pose: Ints
-    """(B, C, W) which of the camera's poses it is, -1 for none."""
-
-
-_Settings = namedtuple("_Settings", [each.name for each in fields(AssociationConfig)])
-"""`AssociationConfig` for the kernels, under the same names."""
+    """(B, C, W) index of the camera's pose; -1 for none."""
 
 
 def associate(
-    P: Floats, found: Keypoints, predicted: PoseEstimate, config: AssociationConfig | None = None
+    P: Floats, detected: Keypoints, predicted: PoseEstimate, config: AssociationConfig | None = None
 ) -> Association:
-    """Sort poses by worker.
+    """Assign poses to workers.
 
     Args:
-        P: (C, 3, 4) projections.
-        found: (B, C, D, J, ...) D poses a camera in any order; those that are not are NaN.
-        predicted: (B, W, ...) where the workers should be, before these frames were taken in.
+        P: (C, 3, 4) projections from the world [m] to pixels.
+        detected: (B, C, D, J, ...) D poses a camera in any order; missing ones are NaN.
+        predicted: (B, W, ...) prediction of the workers for the time of these frames.
+        config: when a pose is assigned; None for the defaults.
 
     Raises:
-        ConfigError: arrays of other shapes. Never because of what they hold.
+        ConfigError: arrays have other shapes. Their values raise nothing.
     """
-    P = np.ascontiguousarray(P, np.float64)
+    cameras = cameras_of(P)
     batch, n_workers = predicted.tracked.shape
-    n_poses = found.px.shape[2] if found.px.ndim == 5 else -1
-    measured = arrays_of(found, (batch, len(P), n_poses, N_JOINTS))
+    n_poses = detected.px.shape[2] if detected.px.ndim == 5 else -1
+    detections = get_keypoint_arrays(detected, (batch, len(cameras), n_poses, N_JOINTS))
     check_shape("mean_world", predicted.mean_world.shape, (batch, n_workers, N_JOINTS, 3), "B, W")
     config = config or AssociationConfig()
-    settings = _Settings(*(getattr(config, name) for name in _Settings._fields))
-    shape = (batch, len(P), n_workers, N_JOINTS)
+    settings = AssociationSettings(*(getattr(config, name) for name in AssociationSettings._fields))
+    shape = (batch, len(cameras), n_workers, N_JOINTS)
     pose = np.full(shape[:3], -1, np.int64)
-    keypoints = Keypoints(
-        np.full((*shape, 2), np.nan), np.zeros(shape), np.full(shape, np.inf), found.time_s
-    )
-    belief = (
-        np.ascontiguousarray(predicted.mean_world, np.float64),
-        np.ascontiguousarray(predicted.cov_world, np.float64),
-        np.ascontiguousarray(predicted.tracked),
-    )
-    cameras, poses = cameras_of(P), np.empty((len(P), n_poses), POSE)
-    sorted_into = (keypoints.px, keypoints.confidence, keypoints.sigma_px)
-    _associate_all(cameras, poses, measured, belief, settings, pose, sorted_into)
-    return Association(keypoints, pose)
+    out = KeypointArrays(np.full((*shape, 2), np.nan), np.zeros(shape), np.full(shape, np.inf))
+    poses, estimate = make_records(Pose, (len(cameras), n_poses)), get_estimate_arrays(predicted)
+    _associate_all(cameras, poses, detections, estimate, settings, pose, out)
+    return Association(Keypoints(*out, time_s=detected.time_s), pose)
 
 
 @kernel(makes_arrays=True)
-def _associate_all(cameras, poses, measured, belief, s, pose, sorted_into):
-    """Sort what was measured into arrays by worker, and fill in which pose it was."""
-    (found_px, found_confidence, found_sigma), (mean, cov, tracked) = measured, belief
-    px, confidence, sigma_px = sorted_into
+def _associate_all(
+    cameras: Records1[Camera],
+    poses: Records2[Pose],
+    detected: KeypointArrays,
+    predicted: EstimateArrays,
+    settings: AssociationSettings,
+    pose: Ints,
+    out: KeypointArrays,
+) -> None:
+    """Assign the poses of every environment.
+
+    Args:
+        cameras: (C,) cameras.
+        poses: (C, D) scratch for the poses of one environment.
+        detected: (B, C, D, J, ...) detections.
+        predicted: (B, W, ...) prediction of the workers.
+        settings: when a pose is assigned.
+        pose: (B, C, W) index of the assigned pose, filled in; must be -1.
+        out: (B, C, W, J, ...) detections of the assigned poses, filled in.
+    """
     for b in range(len(pose)):
-        _read(found_px[b], found_confidence[b], found_sigma[b], poses)
-        _follow(cameras, poses, (mean[b], cov[b], tracked[b]), s, pose[b])
-        _assign_new_people(cameras, poses, mean[b], tracked[b], s, pose[b])
+        mean, cov, tracked = predicted.mean_world[b], predicted.cov_world[b], predicted.tracked[b]
+        _read_poses(detected.px[b], detected.confidence[b], detected.sigma_px[b], poses)
+        _assign_to_tracked(cameras, poses, mean, cov, tracked, settings, pose[b])
+        _assign_new_people(cameras, poses, mean, tracked, settings, pose[b])
         for c in range(len(cameras)):
             for w in range(pose.shape[2]):
-                d = pose[b, c, w]
+                d: int = pose[b, c, w]
                 if d >= 0:
-                    px[b, c, w] = found_px[b, c, d]
-                    confidence[b, c, w] = found_confidence[b, c, d]
-                    sigma_px[b, c, w] = found_sigma[b, c, d]
+                    out.px[b, c, w] = detected.px[b, c, d]
+                    out.confidence[b, c, w] = detected.confidence[b, c, d]
+                    out.sigma_px[b, c, w] = detected.sigma_px[b, c, d]
 
 
 @kernel(makes_arrays=True)
-def _read(px, confidence, sigma_px, poses):
-    """Which joints are measurements, and which poses have enough of them to be somebody's."""
+def _read_poses(px: Points2, confidence: Floats, sigma_px: Floats, poses: Records2[Pose]) -> None:
+    """Fill in the poses (C, D) of one environment; those with too few joints are not free.
+
+    Args:
+        px: (C, D, J, 2) pixels.
+        confidence: (C, D, J) confidences.
+        sigma_px: (C, D, J) standard deviations [px].
+        poses: (C, D) poses, filled in except for their lines of sight.
+    """
     for c in range(poses.shape[0]):
         for d in range(poses.shape[1]):
             pose, n = poses[c, d], 0
@@ -137,10 +166,27 @@ def _read(px, confidence, sigma_px, poses):
 
 
 @kernel(makes_arrays=True)
-def _follow(cameras, poses, belief, s, chosen):
-    """Give tracked workers the poses that fit their predictions best, camera by camera."""
-    (mean, cov, tracked), n_poses = belief, poses.shape[1]
-    n_workers = len(tracked)
+def _assign_to_tracked(
+    cameras: Records1[Camera],
+    poses: Records2[Pose],
+    mean: Points3,
+    cov: Covariances3,
+    tracked: Bools,
+    settings: AssociationSettings,
+    chosen: Ints,
+) -> None:
+    """Assign to tracked workers the poses that fit their predictions best, camera by camera.
+
+    Args:
+        cameras: (C,) cameras.
+        poses: (C, D) their poses; assigned ones are no longer free.
+        mean: (W, J, 3) predicted joints [m].
+        cov: (W, J, 3, 3) their covariances [m^2].
+        tracked: (W,) whether the worker is tracked.
+        settings: when a pose is assigned.
+        chosen: (C, W) index of the assigned pose, filled in.
+    """
+    n_workers, n_poses = len(tracked), poses.shape[1]
     size = max(n_workers, n_poses)
     fit, column = np.empty((size, size)), np.empty(size, np.int64)
     image, known = np.empty((N_JOINTS, 3)), np.ones(N_JOINTS, np.bool_)
@@ -149,20 +195,37 @@ def _follow(cameras, poses, belief, s, chosen):
         for w in range(n_workers):
             if not tracked[w]:
                 continue
-            expect(cameras[c].P, mean[w], cov[w], known, s.slack_m, image)
+            project_body(cameras[c].P, mean[w], cov[w], known, settings.slack_m, image)
             for d in range(n_poses):
                 if poses[c, d].free:
-                    fit[w, d] = -affinity(image, poses[c, d], s)
+                    fit[w, d] = -compute_affinity(image, poses[c, d], settings)
         assign_rows(fit, column)
         for w in range(n_workers):
-            if fit[w, column[w]] < 0.0:  # 0: no pose fits, or it fits another better
-                chosen[c, w] = column[w]
-                poses[c, column[w]].free = False
+            d: int = column[w]
+            if fit[w, d] < 0.0:  # 0: no pose fits, or it fits another better
+                chosen[c, w] = d
+                poses[c, d].free = False
 
 
 @kernel(makes_arrays=True)
-def _assign_new_people(cameras, poses, mean, tracked, s, chosen):
-    """Give poses that several cameras have of one body to whom it can be."""
+def _assign_new_people(
+    cameras: Records1[Camera],
+    poses: Records2[Pose],
+    mean: Points3,
+    tracked: Bools,
+    settings: AssociationSettings,
+    chosen: Ints,
+) -> None:
+    """Assign the poses that several cameras have of one body to the worker that it can be.
+
+    Args:
+        cameras: (C,) cameras.
+        poses: (C, D) their poses; assigned ones are no longer free.
+        mean: (W, J, 3) predicted joints [m].
+        tracked: (W,) whether the worker is tracked.
+        settings: when a pose is assigned.
+        chosen: (C, W) index of the assigned pose, filled in.
+    """
     (n_cameras, n_poses), n_workers = poses.shape, len(tracked)
     vacant, unseen = np.empty(n_workers, np.bool_), np.empty(n_workers, np.bool_)
     wanted = False
@@ -179,22 +242,21 @@ def _assign_new_people(cameras, poses, mean, tracked, s, chosen):
                     chosen[0, w], poses[0, d].free = d, False
     if n_cameras == 1 or not wanted:
         return
-    most = n_cameras * (n_cameras - 1) // 2 * n_poses * n_poses
-    seeds = np.empty((most, 4), np.int64)
-    proposals = (seeds, np.empty((most, n_cameras), np.int64), np.empty((most, n_cameras)))
-    look_along(cameras, poses)
-    n = propose(cameras, poses, s, proposals)
-    mean, tracked = mean.copy(), tracked.copy()  # newcomers are followed from here on
+    proposals, body = make_proposals(n_cameras, n_poses), make_body()
+    fill_sight_lines(cameras, poses)
+    n = propose_bodies(cameras, poses, settings, proposals)
+    mean, tracked = mean.copy(), tracked.copy()  # new people are tracked from here on
     member, score = np.empty(n_cameras, np.int64), np.empty(n_cameras)
     while True:
-        best = _best(proposals, poses, n)
+        best = _find_best(proposals, poses, n)
         if best < 0:
             return
-        c1, d1, c2, d2 = seeds[best]
-        body = np.empty((N_JOINTS, 3)), np.empty(N_JOINTS, np.bool_)
-        meeting(cameras[c1], cameras[c2], poses[c1, d1], poses[c2, d2], s.gate_sigma, body)
-        fit_cameras(cameras, poses, body, s, member, score)
-        w = _whose(body, mean, tracked, vacant, unseen, s)
+        c1: int = proposals.seeds[best, 0]
+        c2: int = proposals.seeds[best, 2]
+        one, other = poses[c1, proposals.seeds[best, 1]], poses[c2, proposals.seeds[best, 3]]
+        intersect_poses(cameras[c1], cameras[c2], one, other, settings.gate_sigma, body)
+        fit_cameras(cameras, poses, body, settings, member, score)
+        w = _find_worker(body, mean, tracked, vacant, unseen, settings)
         for c in range(n_cameras):
             if member[c] < 0:
                 continue
@@ -203,21 +265,30 @@ def _assign_new_people(cameras, poses, mean, tracked, s, chosen):
                 chosen[c, w] = member[c]
         if w >= 0:
             if vacant[w]:
-                _place(body, mean[w])
+                mean[w] = np.nan
+                for j in range(N_JOINTS):
+                    if body.met[j]:
+                        mean[w, j] = body.points[j]
             tracked[w], vacant[w], unseen[w] = True, False, False
 
 
 @kernel(makes_arrays=True)
-def _best(proposals, poses, n):
-    """The proposal that the cameras fit best with poses that are still free, or -1."""
-    (seeds, members, scores), best, best_total = proposals, -1, 0.0
+def _find_best(proposals: Proposals, poses: Records2[Pose], n: int) -> int:
+    """Return the index of the proposal that the cameras fit best with unassigned poses, or -1.
+
+    Args:
+        proposals: bodies with the poses that fit them.
+        poses: (C, D) poses of the cameras.
+        n: number of proposals.
+    """
+    seeds, members, best, best_total = proposals.seeds, proposals.members, -1, 0.0
     for k in range(n):
         if not (poses[seeds[k, 0], seeds[k, 1]].free and poses[seeds[k, 2], seeds[k, 3]].free):
             continue
         total, n_views = 0.0, 0
         for c in range(poses.shape[0]):
             if members[k, c] >= 0 and poses[c, members[k, c]].free:
-                total += scores[k, c]
+                total += proposals.scores[k, c]
                 n_views += 1
         if n_views >= 2 and total > best_total:
             best, best_total = k, total
@@ -225,22 +296,46 @@ def _best(proposals, poses, n):
 
 
 @kernel(makes_arrays=True)
-def _whose(body, mean, tracked, vacant, unseen, s):
-    """The worker that a body is, or -1: one who is followed there, is missed near, or is nobody.
+def _find_worker(
+    body: Body,
+    mean: Points3,
+    tracked: Bools,
+    vacant: Bools,
+    unseen: Bools,
+    settings: AssociationSettings,
+) -> int:
+    """Return the index of the worker that a body belongs to, or -1 for none.
 
-    Of vacant places the one whose last belief is nearest: who comes back is known again.
+    This is a worker tracked at that place, else a tracked worker that no camera sees nearby, else
+    the slot without a track with the nearest last estimate, so that a person returns to the same
+    slot.
+
+    Args:
+        body: the body.
+        mean: (W, J, 3) joints of the workers [m].
+        tracked: (W,) workers with a track.
+        vacant: (W,) slots without a track.
+        unseen: (W,) workers with a track that no camera sees.
+        settings: the distances within which a body belongs to a worker.
     """
     distance = np.empty(len(tracked))
     for w in range(len(tracked)):
-        distance[w] = _apart(body, mean[w])
-    near = _nearest(distance, tracked, s.apart_m)
-    if near < 0:
-        near = _nearest(distance, unseen, s.rejoin_m)
-    return near if near >= 0 else _nearest(distance, vacant, np.inf)
+        distance[w] = _measure_distance(body, mean[w])
+    nearest = _find_nearest(distance, tracked, settings.apart_m)
+    if nearest < 0:
+        nearest = _find_nearest(distance, unseen, settings.rejoin_m)
+    return nearest if nearest >= 0 else _find_nearest(distance, vacant, np.inf)
 
 
 @kernel(makes_arrays=True)
-def _nearest(distance, among, limit):
+def _find_nearest(distance: Floats, among: Bools, limit: float) -> int:
+    """Return the index of the nearest of some workers, or -1 if none is near enough.
+
+    Args:
+        distance: (W,) distances [m].
+        among: (W,) the workers to choose from.
+        limit: greatest distance, excluded [m].
+    """
     best = -1
     for w in range(len(distance)):
         if among[w] and distance[w] < limit:
@@ -249,19 +344,12 @@ def _nearest(distance, among, limit):
 
 
 @kernel(makes_arrays=True)
-def _place(body, mean):
-    points, met = body
-    mean[:] = np.nan
-    for j in range(len(met)):
-        if met[j]:
-            for i in range(3):
-                mean[j, i] = points[j, i]
+def _measure_distance(body: Body, mean: Points3) -> float:
+    """Return the distance between a body and a worker (J, 3) [m]; infinite without common joints.
 
-
-@kernel(makes_arrays=True)
-def _apart(body, mean):
-    """Distance [m] between a body and a worker, on average over joints known of both."""
-    points, met = body
+    It is that of the means over the joints known of both.
+    """
+    points, met = body.points, body.met
     n, dx, dy, dz = 0, 0.0, 0.0, 0.0
     for j in range(len(met)):
         if met[j] and np.isfinite(mean[j, 0]):

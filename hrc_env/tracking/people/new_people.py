@@ -1,34 +1,84 @@
-"""People whom nobody follows yet: poses of several cameras that are one body.
+"""People without a track: poses of several cameras that belong to one body.
 
-Any two poses of two cameras are a proposal: where their joints' lines of sight meet is a body, if
-enough of them meet and its bones are as long as bones are. Every other camera then says which of
-its poses fits that body, and the proposal that the cameras fit best is a person. What one camera
-alone has seen is nobody (after RapidPoseTriangulation, arXiv 2503.21692).
+Any two poses of two cameras propose a body: the points where the lines of sight of their joints
+meet, provided that enough of them meet and that the bones have plausible lengths. Each other camera
+then contributes the pose that fits that body, and the proposal that the cameras fit best is a
+person. A pose that only one camera has seen is no person (after RapidPoseTriangulation, arXiv
+2503.21692).
 
-Kernels take one environment: cameras (C,) and poses (C, D) are records of `CAMERA` and `POSE`.
+All functions work on one environment, with cameras (C,) and their poses (C, D).
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
+from hrc_env.core.declared import Records1, Records2
 from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import BONE_LENGTH_M, BONES, N_JOINTS
-from hrc_env.geometry.lines_of_sight import look, nearest_places
+from hrc_env.core.typing import Bools, Floats, Ints, Points3
+from hrc_env.geometry.lines_of_sight import Camera, look, nearest_places
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
-from hrc_env.tracking.people.affinity import affinity, expect
+from hrc_env.tracking.people.affinity import (
+    AssociationSettings,
+    Pose,
+    compute_affinity,
+    project_body,
+)
 
 MEETING_M = 0.03
-"""Lines of sight may pass each other at this distance [m] for other reasons than noise."""
+"""Standard deviation of the gap between lines of sight for other reasons than noise [m]."""
 AGREEING_SHARE = 0.6
-"""Of two poses' common joints so many must meet."""
-SHORTEST, LONGEST, BONE_SLACK_M, GOOD_BONES = 0.5, 1.6, 0.08, 0.7
-"""Shares of the population's length, and this much [m], that a bone may be; share of good ones."""
+"""Least share of the common joints of two poses with lines of sight that meet."""
+SHORTEST = 0.5
+"""Least length of a bone, as a share of the population's mean."""
+LONGEST = 1.6
+"""Greatest length of a bone, as a share of the population's mean."""
+BONE_SLACK_M = 0.08
+"""Tolerance added to both limits of a bone's length [m]."""
+GOOD_BONES = 0.7
+"""Least share of a body's bones with lengths within the limits."""
 BODY_SLACK_M = 0.1
-"""How far the body of two lines of sight may be from what other cameras see [m]."""
+"""Standard deviation of a body made from two lines of sight, when other cameras see it [m]."""
+
+
+class Body(NamedTuple):
+    """A body made from two poses."""
+
+    points: Points3
+    """(J, 3) points where the lines of sight meet [m]."""
+    met: Bools
+    """(J,) whether the joint's lines of sight meet; other points have no meaning."""
+
+
+class Proposals(NamedTuple):
+    """Bodies that pairs of cameras propose: room for all of them, filled from the front."""
+
+    seeds: Ints
+    """(N, 4) first camera, its pose, second camera, its pose."""
+    members: Ints
+    """(N, C) the pose of each camera that fits the body best; -1 for none."""
+    scores: Floats
+    """(N, C) the affinities of these poses."""
 
 
 @kernel(makes_arrays=True)
-def look_along(cameras, poses):
-    """Fill in the lines of sight of free poses."""
+def make_body() -> Body:
+    """Return room for a body."""
+    return Body(np.empty((N_JOINTS, 3)), np.empty(N_JOINTS, np.bool_))
+
+
+@kernel(makes_arrays=True)
+def make_proposals(n_cameras: int, n_poses: int) -> Proposals:
+    """Return room for the proposals of all pairs of cameras with `n_poses` each."""
+    n = n_cameras * (n_cameras - 1) // 2 * n_poses * n_poses
+    members, scores = np.empty((n, n_cameras), np.int64), np.empty((n, n_cameras))
+    return Proposals(np.empty((n, 4), np.int64), members, scores)
+
+
+@kernel(makes_arrays=True)
+def fill_sight_lines(cameras: Records1[Camera], poses: Records2[Pose]) -> None:
+    """Fill in the lines of sight of the poses (C, D) that are not assigned yet."""
     for c in range(poses.shape[0]):
         back = cameras[c].back
         for d in range(poses.shape[1]):
@@ -39,12 +89,23 @@ def look_along(cameras, poses):
 
 
 @kernel(makes_arrays=True)
-def meeting(camera_1, camera_2, pose_1, pose_2, gate_sigma, body):
-    """Where the joints' lines of sight of two poses meet; how many do, 0 if too few.
+def intersect_poses(
+    camera_1: Camera, camera_2: Camera, pose_1: Pose, pose_2: Pose, gate_sigma: float, body: Body
+) -> int:
+    """Find the points where the lines of sight of two poses meet.
 
-    Lines meet within `gate_sigma` standard deviations. Fills body: points (J, 3), whether met (J,).
+    Args:
+        camera_1: the camera of the first pose.
+        camera_2: the camera of the second pose.
+        pose_1: the first pose, with its lines of sight.
+        pose_2: the second pose, with its lines of sight.
+        gate_sigma: gap within which lines meet, in standard deviations.
+        body: the points, filled in.
+
+    Returns:
+        The number of joints that meet; 0 if they are too few of the common ones.
     """
-    (points, met), ok_1, ok_2 = body, pose_1.ok, pose_2.ok
+    points, met, ok_1, ok_2 = body.points, body.met, pose_1.ok, pose_2.ok
     n_common, n_met = 0, 0
     for j in range(len(points)):
         met[j] = False
@@ -61,23 +122,26 @@ def meeting(camera_1, camera_2, pose_1, pose_2, gate_sigma, body):
         noise_1 = pose_1.sigma_px[j] * far_1 / camera_1.focal
         noise_2 = pose_2.sigma_px[j] * far_2 / camera_2.focal
         allowed = gate_sigma**2 * (noise_1**2 + noise_2**2 + MEETING_M**2)
-        if gap < allowed and _ahead(camera_1.P, points[j]) and _ahead(camera_2.P, points[j]):
+        if gap < allowed and _is_ahead(camera_1.P, points[j]) and _is_ahead(camera_2.P, points[j]):
             met[j] = True
             n_met += 1
     return n_met if n_met >= AGREEING_SHARE * n_common else 0
 
 
 @kernel(makes_arrays=True)
-def _ahead(camera, point):
+def _is_ahead(camera: Floats, point: Points3) -> bool:
+    """Return whether a point (3,) [m] is in front of a camera (3, 4)."""
     return pixel_of(camera, point[0], point[1], point[2])[2] > NEAREST_DEPTH_M
 
 
 @kernel(makes_arrays=True)
-def has_good_bones(body):
-    """Whether most bones between joints that met are as long as a person's."""
-    (points, met), n, good = body, 0, 0
+def has_good_bones(body: Body) -> bool:
+    """Return whether most bones between joints that met have plausible lengths."""
+    points, met, n, good = body.points, body.met, 0, 0
     for k in range(len(BONES)):
-        i, j, length_m = BONES[k, 0], BONES[k, 1], BONE_LENGTH_M[k]
+        i: int = BONES[k, 0]
+        j: int = BONES[k, 1]
+        length_m = BONE_LENGTH_M[k]
         if met[i] and met[j]:
             squared = ((points[i] - points[j]) ** 2).sum()
             least, most = SHORTEST * length_m - BONE_SLACK_M, LONGEST * length_m + BONE_SLACK_M
@@ -87,32 +151,54 @@ def has_good_bones(body):
 
 
 @kernel(makes_arrays=True)
-def fit_cameras(cameras, poses, body, s, member, score):
-    """Which free pose of each camera fits a body best, and how well.
+def fit_cameras(
+    cameras: Records1[Camera],
+    poses: Records2[Pose],
+    body: Body,
+    settings: AssociationSettings,
+    member: Ints,
+    score: Floats,
+) -> None:
+    """Find the pose of each camera that fits a body best, among those not assigned yet.
 
-    Fills member (C,), the pose or -1, and score (C,), its affinity; `s` as in `association`.
+    Args:
+        cameras: (C,) cameras.
+        poses: (C, D) their poses.
+        body: the body.
+        settings: the gate and the area of the image.
+        member: (C,) index of the pose, filled in; -1 for none.
+        score: (C,) affinity of the pose, filled in.
     """
-    points, met = body
-    image, nothing = np.empty((len(points), 3)), np.zeros((len(points), 3, 3))
+    points = body.points
+    image, no_cov = np.empty((len(points), 3)), np.zeros((len(points), 3, 3))
     for c in range(poses.shape[0]):
         member[c], score[c] = -1, 0.0
-        expect(cameras[c].P, points, nothing, met, BODY_SLACK_M, image)
+        project_body(cameras[c].P, points, no_cov, body.met, BODY_SLACK_M, image)
         for d in range(poses.shape[1]):
             if poses[c, d].free:
-                fit = affinity(image, poses[c, d], s)
+                fit = compute_affinity(image, poses[c, d], settings)
                 if fit > score[c]:
                     member[c], score[c] = d, fit
 
 
 @kernel(makes_arrays=True)
-def propose(cameras, poses, s, proposals):
-    """All bodies that two cameras propose; how many.
+def propose_bodies(
+    cameras: Records1[Camera],
+    poses: Records2[Pose],
+    settings: AssociationSettings,
+    proposals: Proposals,
+) -> int:
+    """Fill in the bodies that pairs of cameras propose, and return their number.
 
-    Fills proposals: seeds (n, 4), the two cameras each with its pose, members and scores (n, C).
+    Args:
+        cameras: (C,) cameras.
+        poses: (C, D) their poses, with lines of sight.
+        settings: the gates and the least number of joints.
+        proposals: room for all proposals.
     """
-    seeds, members, scores = proposals
+    seeds, members = proposals.seeds, proposals.members
     n_cameras, n_poses = poses.shape
-    body, n = (np.empty((N_JOINTS, 3)), np.empty(N_JOINTS, np.bool_)), 0
+    body, n = make_body(), 0
     for c1 in range(n_cameras):
         for c2 in range(c1 + 1, n_cameras):
             for d1 in range(n_poses):
@@ -120,10 +206,12 @@ def propose(cameras, poses, s, proposals):
                     one, other = poses[c1, d1], poses[c2, d2]
                     if not (one.free and other.free):
                         continue
-                    n_met = meeting(cameras[c1], cameras[c2], one, other, s.gate_sigma, body)
-                    if n_met < s.min_joints or not has_good_bones(body):
+                    n_met = intersect_poses(
+                        cameras[c1], cameras[c2], one, other, settings.gate_sigma, body
+                    )
+                    if n_met < settings.min_joints or not has_good_bones(body):
                         continue
-                    fit_cameras(cameras, poses, body, s, members[n], scores[n])
+                    fit_cameras(cameras, poses, body, settings, members[n], proposals.scores[n])
                     if members[n, c1] >= 0 and members[n, c2] >= 0:
                         seeds[n, 0], seeds[n, 1], seeds[n, 2], seeds[n, 3] = c1, d1, c2, d2
                         n += 1

@@ -1,62 +1,84 @@
 """Acquisition: a track begins, is repaired and is given up, where views agree.
 
 Two cameras that name sides alike triangulate limbs; two that do not meet nowhere, unless one's
-sides are exchanged. That splits the cameras in two camps before there is a body; which of them is
-right is decided by their numbers and by the body that they show: the nose and the toes are in
-front.
-
-`frame` is `measurements.Frame`, `s` are `settings.Settings`, `tree` is a record of `TREE`.
+sides are exchanged. That splits the cameras in two camps before there is a body; their numbers
+decide which of them is right, and the body that they show: the nose and the toes are in front.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import MIRROR
+from hrc_env.core.typing import Bools, Floats
 from hrc_env.geometry.triangulation import consensus_point, linear_point, misfit
-from hrc_env.tracking.measurements import mirror
-from hrc_env.tracking.tree.evidence import anatomy, find_heading
+from hrc_env.tracking.measurements import Frame, mirror
+from hrc_env.tracking.settings import Settings
+from hrc_env.tracking.tree.evidence import find_heading_from, score_pose
 from hrc_env.tracking.tree.gaussian import PARENT, is_positive_definite
 from hrc_env.tracking.tree.report import forget_pace
-from hrc_env.tracking.tree.state import STANDING_M
+from hrc_env.tracking.tree.state import STANDING_M, Tree, Work, WorkerHypotheses
 
 WIDEST_STD_M = 0.5
-"""A triangulated joint that is less certain than this is no find [m]."""
-_GUESS_STD_M, _GUESS_STD_WITHOUT_HEADING_M = 0.3, 0.6
+"""Standard deviation above which a triangulated joint is not used [m]."""
+_GUESS_STD_M = 0.3
+"""Standard deviation of a joint that is guessed from a body of known heading [m]."""
+_GUESS_STD_WITHOUT_HEADING_M = 0.6
+"""The same where the heading is unknown [m]."""
 _MIRROR = tuple(int(j) for j in MIRROR)
 _SWAP_COST = 4.0
-"""Negative log-probability that one camera exchanges left and right."""
-_MOST, _FITS = 5.0, 0.4
-"""No joint counts for more [nat]; where joints miss by more than this share of it, however they are
-called, two cameras tell nothing of each other: one may hang askew."""
+"""Negative log-probability that one camera exchanges left and right [nat]."""
+_MOST = 5.0
+"""Greatest misfit that one joint counts for [nat]."""
+_FITS = 0.4
+"""Share of the greatest misfit above which two cameras, left and right exchanged or not, are not
+compared: one may be turned against its calibration."""
 _FOUND_SPEED_STD_M_S = 1.0
+"""Standard deviation of the speed of a joint that has just been found [m/s]."""
 _FURTHEST_STD = 8.0
-"""A body further than this many prior deviations from the prior has been lost."""
+"""Distance from the prior's mean beyond which a body is lost, in the prior's deviations."""
+
+
+class Misfit(NamedTuple):
+    """How badly the lines of sight of two cameras meet."""
+
+    total: float
+    """Negative log-likelihood over the joints [nat]."""
+    n_joints: int
+    """Number of joints that both cameras measured."""
 
 
 @kernel(makes_arrays=True)
-def start_track(own, frame, s):
-    """Begin a track where two views agree on a worker; whether they did."""
-    tree = own.trees[0]
-    if not acquire(tree, frame, s):
+def start_track(worker: WorkerHypotheses, frame: Frame, settings: Settings) -> bool:
+    """Begin a track where two views agree on a worker; return whether they did.
+
+    Args:
+        worker: the hypotheses of one worker, of which one is left.
+        frame: the measurements.
+        settings: settings of the estimator.
+    """
+    tree = worker.trees[0]
+    if not acquire(tree, frame, settings):
         return False
-    tree.slope[:], tree.waited, tree.size_std, own.n_alive[0] = 0.0, 0, 0.0, 1
-    tree.log_weight, tree.pose_log_prior, tree.pair.waited = 0.0, 0.0, 0
-    forget_pace(own.pace[0])
+    tree.slope[:], tree.one_view_updates, tree.size_std, worker.n_alive[0] = 0.0, 0, 0.0, 1
+    tree.log_weight, tree.pose_log_prior, tree.pair.untracked_updates = 0.0, 0.0, 0
+    forget_pace(worker.pace[0])
     return True
 
 
 @kernel(makes_arrays=True)
-def acquire(tree, frame, s):
-    """Start a track when two views agree on enough joints; whether one was started."""
+def acquire(tree: Tree, frame: Frame, settings: Settings) -> bool:
+    """Put a tree where two views agree on enough joints; return whether they did."""
     n_joints = len(tree.body)
     points, spread = np.empty((n_joints, 3)), np.empty((n_joints, 3, 3))
     found = np.empty(n_joints, np.bool_)
-    if not find_body(frame, s, points, spread, found):
+    if not find_body(frame, settings, points, spread, found):
         return False
     for j in range(n_joints):
-        place(tree.body[j], tree.cov[j], points[j], spread[j])
+        _place_joint(tree.body[j], tree.cov[j], points[j], spread[j])
         if found[j]:
             tree.age_s[j] = 0.0
     tree.tracked = True
@@ -64,8 +86,15 @@ def acquire(tree, frame, s):
 
 
 @kernel(makes_arrays=True)
-def place(body, cov, point, spread):
-    """Put a joint at rest at a point."""
+def _place_joint(body: Floats, cov: Floats, point: Floats, spread: Floats) -> None:
+    """Put a joint at rest at a point.
+
+    Args:
+        body: (6,) receives position and velocity.
+        cov: (6, 6) receives their covariance.
+        point: (3,) the position [m].
+        spread: (3, 3) its covariance [m^2].
+    """
     body[:3], body[3:] = point, 0.0
     cov[:] = 0.0
     cov[:3, :3] = spread
@@ -74,57 +103,95 @@ def place(body, cov, point, spread):
 
 
 @kernel(makes_arrays=True)
-def find_body(frame, s, points, cov, found):
-    """Find joints on which two views agree, and guess the others; whether there are enough.
+def find_body(frame: Frame, settings: Settings, points: Floats, cov: Floats, found: Bools) -> bool:
+    """Triangulate the joints on which two views agree, and guess the others.
 
-    Fills points (J, 3), cov (J, 3, 3) and which joints were found (J,).
+    Args:
+        frame: the measurements.
+        settings: settings of the estimator.
+        points: (J, 3) receives the positions [m].
+        cov: (J, 3, 3) receives their covariances [m^2].
+        found: (J,) receives which joints were triangulated.
+
+    Returns:
+        Whether there are enough joints for a body.
     """
     use = np.empty(len(frame.P), np.bool_)
     for j in range(len(points)):
         cov[j] = 1.0
-        found[j] = _triangulate_agreed(frame, j, s, points[j], cov[j], use) >= 2
-    if keep_one_body(points, cov, found, s.body_radius_m) < s.acquire_min_joints:
+        found[j] = _triangulate(frame, j, settings, points[j], cov[j], use) >= 2
+    if keep_one_body(points, cov, found, settings.body_radius_m) < settings.acquire_min_joints:
         return False
     complete_body(points, cov, found)
     return True
 
 
 @kernel(makes_arrays=True)
-def find_again(frame, j, s, middle, point, cov):
-    """Fill `point` (3,) and `cov` (3, 3) of joint j, if two views agree near the body's middle."""
+def find_again(
+    frame: Frame, j: int, settings: Settings, middle: Floats, point: Floats, cov: Floats
+) -> bool:
+    """Triangulate one joint, if two views agree on it near the body's middle.
+
+    Args:
+        frame: the measurements.
+        j: the joint.
+        settings: settings of the estimator.
+        middle: (3,) middle of the body [m].
+        point: (3,) receives the position [m].
+        cov: (3, 3) receives its covariance [m^2].
+
+    Returns:
+        Whether they agree.
+    """
     use = np.empty(len(frame.P), np.bool_)
-    if _triangulate_agreed(frame, j, s, point, cov, use) < 2:
+    if _triangulate(frame, j, settings, point, cov, use) < 2:
         return False
     widest = max(cov[0, 0], cov[1, 1], cov[2, 2])
-    return widest < WIDEST_STD_M**2 and distance(point, middle) < s.body_radius_m
+    return widest < WIDEST_STD_M**2 and distance(point, middle) < settings.body_radius_m
 
 
 @kernel(makes_arrays=True)
-def _triangulate_agreed(frame, j, s, point, cov, use):
+def _triangulate(
+    frame: Frame, j: int, settings: Settings, point: Floats, cov: Floats, use: Bools
+) -> int:
+    """Triangulate one joint; return the number of views that agree, and which in `use` (C,)."""
     z, sigma, ok = frame.z[j], frame.sigma[j], frame.ok[j]
-    return consensus_point(frame.P, z, sigma, ok, s.gate_sigma, point, cov, use)
+    return consensus_point(frame.P, z, sigma, ok, settings.gate_sigma, point, cov, use)
 
 
 @kernel(makes_arrays=True)
-def keep_one_body(points, cov, found, radius):
-    """Drop points that are too uncertain, or not near the others as a body's are; how many stay."""
+def keep_one_body(points: Floats, cov: Floats, found: Bools, radius_m: float) -> int:
+    """Drop joints that are too uncertain or too far from the others; return how many stay.
+
+    Args:
+        points: (J, 3) positions [m].
+        cov: (J, 3, 3) their covariances [m^2].
+        found: (J,) which joints count, changed in place.
+        radius_m: greatest distance of a joint from the body's middle [m].
+    """
     middle, n_found = np.empty(3), 0
     for j in range(len(points)):
         widest = max(cov[j, 0, 0], cov[j, 1, 1], cov[j, 2, 2])
         found[j] = found[j] and widest < WIDEST_STD_M**2
         n_found += found[j]
-    if n_found == 0 or not middle_of(points, found, middle):
+    if n_found == 0 or not find_middle(points, found, middle):
         return 0
     for j in range(len(points)):
-        if found[j] and not distance(points[j], middle) < radius:
+        if found[j] and not distance(points[j], middle) < radius_m:
             found[j] = False
             n_found -= 1
     return n_found
 
 
 @kernel(makes_arrays=True)
-def middle_of(points, among, out):
-    """Median of the points `among`, axis by axis; False if there is none."""
+def find_middle(points: Floats, among: Bools, out: Floats) -> bool:
+    """Write the median of some points, axis by axis; return False if there is none.
+
+    Args:
+        points: (J, 3+) positions [m].
+        among: (J,) which points count.
+        out: (3,) receives the median [m].
+    """
     values = np.empty(len(points))
     for i in range(3):
         n = 0
@@ -139,15 +206,22 @@ def middle_of(points, among, out):
 
 
 @kernel
-def distance(a, b):
-    """Euclidean distance of two points."""
+def distance(a: Floats, b: Floats | tuple[float, float, float]) -> float:
+    """Return the Euclidean distance of two points (3+,)."""
     return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
 
 
 @kernel(makes_arrays=True)
-def complete_body(points, cov, found):
-    """Guess the joints that were not found, from a standing body turned as the torso is."""
-    cos, sin, known = find_heading(points, found[1] and found[2], found[7] and found[8])
+def complete_body(points: Floats, cov: Floats, found: Bools) -> None:
+    """Guess missing joints from a standing body that is turned like the torso.
+
+    Args:
+        points: (J, 3) positions [m], filled in place.
+        cov: (J, 3, 3) their covariances [m^2], filled in place.
+        found: (J,) which joints are given.
+    """
+    heading = find_heading_from(points, found[1] and found[2], found[7] and found[8])
+    cos, sin = heading.cos, heading.sin
     root, n_found = np.zeros(3), 0
     for j in range(len(points)):
         if found[j]:
@@ -157,7 +231,7 @@ def complete_body(points, cov, found):
             root[2] += points[j, 2] - up
             n_found += 1
     root /= n_found
-    std = _GUESS_STD_M if known else _GUESS_STD_WITHOUT_HEADING_M
+    std = _GUESS_STD_M if heading.is_known else _GUESS_STD_WITHOUT_HEADING_M
     for j in range(len(points)):
         if not found[j]:
             forward, left, up = STANDING_M[j]
@@ -168,14 +242,14 @@ def complete_body(points, cov, found):
 
 
 @kernel(makes_arrays=True)
-def agree_on_sides(frame, s):
-    """Mirror, in place, what was seen by cameras that exchange left and right."""
+def agree_on_sides(frame: Frame, settings: Settings) -> None:
+    """Mirror the measurements of cameras that exchange left and right, in place."""
     n_cameras, n_joints = len(frame.P), len(_MIRROR)
     gain = np.zeros((n_cameras, n_cameras))
     for a in range(n_cameras):
         for b in range(a):
-            gain[a, b] = gain[b, a] = _gain(frame, a, b)
-    other = _camps(gain)
+            gain[a, b] = gain[b, a] = _mirroring_gain(frame, a, b)
+    other = _find_camp(gain)
     n_other = other.sum()
     if n_other == 0:
         return
@@ -183,7 +257,7 @@ def agree_on_sides(frame, s):
         if other[c]:
             mirror(c, frame.z, frame.sigma, frame.ok)
     points, found = np.empty((n_joints, 3)), np.empty(n_joints, np.bool_)
-    if not find_body(frame, s, points, np.empty((n_joints, 3, 3)), found):
+    if not find_body(frame, settings, points, np.empty((n_joints, 3, 3)), found):
         return
     turned, n_seeing = np.empty((n_joints, 3)), 0
     for j in range(n_joints):
@@ -191,15 +265,17 @@ def agree_on_sides(frame, s):
     for c in range(n_cameras):
         n_seeing += frame.ok[:, c].any()
     fewer = _SWAP_COST * (n_seeing - 2 * n_other)
-    if anatomy(turned) > anatomy(points) + fewer:
+    if score_pose(turned) > score_pose(points) + fewer:
         for c in range(n_cameras):
             mirror(c, frame.z, frame.sigma, frame.ok)
 
 
 @kernel(makes_arrays=True)
-def _camps(gain):
-    """(C,) which cameras name sides otherwise than the rest, the fewer: gain (C, C) is what two
-    cameras' misfit falls by if one of them is mirrored."""
+def _find_camp(gain: Floats) -> Bools:
+    """Return (C,) the smaller set of cameras that name sides otherwise than the rest.
+
+    `gain` (C, C) is the decrease of two cameras' misfit [nat] if one of them is mirrored.
+    """
     other = gain[0] > _SWAP_COST
     for _ in range(len(gain)):
         best, most = -1, 0.0
@@ -219,22 +295,28 @@ def _camps(gain):
 
 
 @kernel(makes_arrays=True)
-def _gain(frame, a, b):
-    """By how much [nat] limbs fit better in two cameras if one of them is mirrored."""
-    as_they_are, n_joints = _misfit(frame, a, b, False)
-    exchanged, _ = _misfit(frame, a, b, True)
-    fits = min(as_they_are, exchanged) < _FITS * _MOST * n_joints
-    return as_they_are - exchanged if fits else 0.0
+def _mirroring_gain(frame: Frame, a: int, b: int) -> float:
+    """Return the decrease [nat] of the misfit of cameras a and b if one of them is mirrored."""
+    direct, exchanged = _measure_misfit(frame, a, b, False), _measure_misfit(frame, a, b, True)
+    is_fitting = min(direct.total, exchanged.total) < _FITS * _MOST * direct.n_joints
+    return direct.total - exchanged.total if is_fitting else 0.0
 
 
 @kernel(makes_arrays=True)
-def _misfit(frame, a, b, mirrored):
-    """Negative log-likelihood [nat] of limbs' joints in two cameras, and how many there are."""
+def _measure_misfit(frame: Frame, a: int, b: int, is_mirrored: bool) -> Misfit:
+    """Return the misfit of the limbs' joints in two cameras.
+
+    Args:
+        frame: the measurements.
+        a: index of the first camera.
+        b: index of the second camera.
+        is_mirrored: whether the second camera's left and right are exchanged.
+    """
     total, n_joints = 0.0, 0
     use, z, point = np.zeros(len(frame.P), np.bool_), np.empty((len(frame.P), 2)), np.empty(3)
     use[a] = use[b] = True
     for j in range(len(_MIRROR)):
-        i = _MIRROR[j] if mirrored else j
+        i = _MIRROR[j] if is_mirrored else j
         if _MIRROR[j] == j or not (frame.ok[j, a] and frame.ok[i, b]):
             continue
         z[a], z[b] = frame.z[j, a], frame.z[i, b]
@@ -244,79 +326,93 @@ def _misfit(frame, a, b, mirrored):
             miss += 0.5 * misfit(frame.P[b], z[b, 0], z[b, 1], frame.sigma[i, b], point)
         total += min(miss, _MOST)
         n_joints += 1
-    return total, n_joints
+    return Misfit(total, n_joints)
 
 
 @kernel
-def recover(tree, frame, s, work):
-    """Find joints or the whole body again where the views say so; notice a body that is lost."""
-    placed = work.placed
-    placed[:] = acquire_anew(tree, frame, s)
-    find_joints_again(tree, frame, s, placed)
-    for j in range(len(placed)):
-        if placed[j] or (PARENT[j] >= 0 and placed[PARENT[j]]):
+def recover(tree: Tree, frame: Frame, settings: Settings, work: Work) -> None:
+    """Find joints or the whole body again where the views say so; give up a lost body.
+
+    Args:
+        tree: the updated hypothesis, changed in place.
+        frame: the measurements.
+        settings: settings of the estimator.
+        work: scratch.
+    """
+    is_placed = work.is_placed
+    is_placed[:] = _acquire_anew(tree, frame, settings)
+    _find_joints_again(tree, frame, settings, is_placed)
+    for j in range(len(is_placed)):
+        if is_placed[j] or (PARENT[j] >= 0 and is_placed[PARENT[j]]):
             tree.slope[j] = 0.0
-    if not check(tree, s):
+    if not _repair(tree, settings):
         tree.slope[:] = 0.0
 
 
 @kernel(makes_arrays=True)
-def find_joints_again(tree, frame, s, placed):
-    """Put joints where two views have seen them for a while; `placed` (J,) says which."""
-    everyone, middle = np.ones(len(placed), np.bool_), np.empty(3)
+def _find_joints_again(
+    tree: Tree, frame: Frame, settings: Settings, is_placed: NDArray[np.int8]
+) -> None:
+    """Put joints where two views have seen them for a while.
+
+    Args:
+        tree: the updated hypothesis, changed in place.
+        frame: the measurements.
+        settings: settings of the estimator.
+        is_placed: (J,) is set to 1 for these joints.
+    """
+    everything, middle = np.ones(len(is_placed), np.bool_), np.empty(3)
     point, spread = np.empty(3), np.empty((3, 3))
-    for j in range(len(placed)):
-        if tree.conflict[j] < s.conflict_frames:
+    for j in range(len(is_placed)):
+        if tree.conflict[j] < settings.conflict_frames:
             continue
-        middle_of(tree.body, everyone, middle)
-        if find_again(frame, j, s, middle, point, spread):
-            place(tree.body[j], tree.cov[j], point, spread)
-            tree.age_s[j], tree.conflict[j], placed[j] = 0.0, 0, True
+        find_middle(tree.body, everything, middle)
+        if find_again(frame, j, settings, middle, point, spread):
+            _place_joint(tree.body[j], tree.cov[j], point, spread)
+            tree.age_s[j], tree.conflict[j], is_placed[j] = 0.0, 0, True
 
 
 @kernel
-def acquire_anew(tree, frame, s):
-    """Start over when the views have long agreed on another body; whether that happened."""
+def _acquire_anew(tree: Tree, frame: Frame, settings: Settings) -> bool:
+    """Start over when the views have long agreed on another body; return whether they have."""
     n_wrong = 0
     for j in range(len(tree.conflict)):
-        n_wrong += tree.conflict[j] >= s.conflict_frames
-    if n_wrong < s.acquire_min_joints or not acquire(tree, frame, s):
+        n_wrong += tree.conflict[j] >= settings.conflict_frames
+    if n_wrong < settings.acquire_min_joints or not acquire(tree, frame, settings):
         return False
     tree.conflict[:] = 0
     return True
 
 
 @kernel
-def check(tree, s):
-    """Keep covariances positive definite, lose a body that has left the world; was all well?"""
-    body, cov, inside, well = tree.body, tree.cov, True, True
+def _repair(tree: Tree, settings: Settings) -> bool:
+    """Keep covariances positive definite; put a body that has left the world back to the prior.
+
+    Returns:
+        Whether nothing had to be changed.
+    """
+    body, cov, is_inside, is_proper = tree.body, tree.cov, True, True
     for j in range(len(body)):
         if not is_positive_definite(cov[j]):
-            well = False
+            is_proper = False
             for i in range(6):
                 variance = cov[j, i, i]
                 cov[j, i, :], cov[j, :, i] = 0.0, 0.0
                 cov[j, i, i] = max(variance, 1e-4)
-        away = distance(body[j], s.prior_mean_world)
+        away = distance(body[j], settings.prior_mean_world)
         variances, numbers = 0.0, 0.0
         for i in range(6):
-            variances += cov[j, i, i]  # where these are finite, what lies between them is
+            variances += cov[j, i, i]  # where these are finite, the covariances between them are
             numbers += body[j, i]
-        inside &= away < _FURTHEST_STD * s.prior_std_m and math.isfinite(variances + numbers)
-    if inside:
-        return well
-    _lose(tree, s)
-    return False
-
-
-@kernel
-def _lose(tree, s):
-    """Put a worker who has left the world back to the prior."""
-    body, cov = tree.body, tree.cov
+        is_near = away < _FURTHEST_STD * settings.prior_std_m
+        is_inside &= is_near and math.isfinite(variances + numbers)
+    if is_inside:
+        return is_proper
     tree.tracked = False
     for j in range(len(body)):
-        tree.age_s[j] = s.max_age_s
+        tree.age_s[j] = settings.max_age_s
         for i in range(6):
-            body[j, i] = s.prior_mean_world[i] if i < 3 else 0.0
+            body[j, i] = settings.prior_mean_world[i] if i < 3 else 0.0
             for k in range(6):
-                cov[j, i, k] = s.prior_std_m**2 if i == k else 0.0
+                cov[j, i, k] = settings.prior_std_m**2 if i == k else 0.0
+    return False

@@ -2,165 +2,230 @@
 
 `update_all` reads a worker's measurements as each hypothesis takes them (`measurements`),
 conditions the hypothesis on them (`update`, which searches the mode first: `search`), weighs it
-(`evidence`), learns from it (`learning`), looks for other hypotheses (`branching`), repairs what
-has gone astray (`acquisition`), and prunes and merges.
-
-`own` are a worker's `Hypotheses`, `s` are `settings.Settings`, `frame` is `measurements.Frame`,
-`work` is a record of `WORK`, `scratch` that and room for a prediction.
+(`evidence`), learns from it (`learning`), searches for other hypotheses (`branching`), repairs
+contradicted joints (`acquisition`), and prunes and merges.
 """
 
+from hrc_env.core.declared import Records1
 from hrc_env.core.kernels import kernel
-from hrc_env.tracking.measurements import make_frame, read_for_hypothesis, read_worker, scale_sigma
+from hrc_env.core.typing import Floats
+from hrc_env.geometry.lines_of_sight import Camera
+from hrc_env.tracking.measurements import (
+    Frame,
+    KeypointArrays,
+    make_frame,
+    read_for_hypothesis,
+    read_worker,
+    scale_sigma,
+)
 from hrc_env.tracking.settings import Settings
 from hrc_env.tracking.tracks import age_worker, count_up
 from hrc_env.tracking.tree.acquisition import acquire, agree_on_sides, recover, start_track
-from hrc_env.tracking.tree.askew import aim_cameras, check_pair_calibration
 from hrc_env.tracking.tree.branching import branch, is_ambiguous
-from hrc_env.tracking.tree.evidence import heading, normalise, prune_and_merge, weigh_pose
+from hrc_env.tracking.tree.evidence import (
+    find_heading,
+    normalise_weights,
+    prune_and_merge,
+    weigh_pose,
+)
 from hrc_env.tracking.tree.learning import NoiseModel, learn_from_frame
 from hrc_env.tracking.tree.one_view import start_from_one_view
-from hrc_env.tracking.tree.predict import predict_tree
+from hrc_env.tracking.tree.pair_calibration import check_pair_calibration, write_projections
+from hrc_env.tracking.tree.predict import MotionModel, predict_tree
 from hrc_env.tracking.tree.report import measure_pace
-from hrc_env.tracking.tree.state import Hypotheses
+from hrc_env.tracking.tree.state import Hypotheses, Tree, Work, WorkerHypotheses
 from hrc_env.tracking.tree.update import condition_on_frame
 
 _TORSO = (1, 2, 7, 8)
+_WALKING_M_S = 0.5
+"""Speed along the heading from which a body surely walks forwards [m/s]."""
 
 
 @kernel(makes_arrays=True)
-def update_all(state, cameras, measured, s, noise, works, prior):
+def update_all(
+    state: Hypotheses,
+    cameras: Records1[Camera],
+    measured: KeypointArrays,
+    settings: Settings,
+    noise_model: NoiseModel,
+    works: Records1[Work],
+    prior: Records1[Tree],
+) -> None:
     """Update every worker's hypotheses by one set of frames.
 
     Args:
-        state: plain tuple of `Hypotheses`, which are changed in place.
-        cameras: (C,) records of `lines_of_sight.CAMERA`, as the rig has them.
-        measured: pixels, confidence and sigma of all workers, as `arrays_of` makes them.
-        s, noise: plain tuples of `Settings` and of `learning.NoiseModel`.
-        works: (1,) scratch, records of `WORK`.
-        prior: (1,) records of `TREE`: room for a hypothesis before its update.
+        state: the hypotheses, changed in place.
+        cameras: (C,) cameras of the rig.
+        measured: pixels, confidences and standard deviations of all workers.
+        settings: settings of the estimator.
+        noise_model: constants for learning the measurement noise.
+        works: (1,) scratch.
+        prior: (1,) scratch for a hypothesis before its update.
     """
-    state, s, noise = Hypotheses(*state), Settings(*s), NoiseModel(*noise)
-    frame, scratch = make_frame(cameras), (works[0], prior)
+    frame, work = make_frame(cameras), works[0]
     for b in range(state.n_alive.shape[0]):
         for w in range(state.n_alive.shape[1]):
-            own, at = worker_slots(state, b, w), (b, w)
-            _hang_as_rigged(frame)
-            if own.trees[0].pair.askew:
-                aim_cameras(own.trees[0].pair, frame)
-            if own.trees[0].tracked:
-                _update_worker(own, measured, at, frame, s, noise, scratch)
+            worker = select_worker(state, b, w)
+            tree = worker.trees[0]
+            write_projections(tree.pair, frame)
+            if tree.tracked:
+                _update_worker(worker, measured, b, w, frame, settings, noise_model, work, prior)
                 continue
-            read_worker(measured, b, w, s.sigma_scale, frame)
-            scale_sigma(own.noise[0], frame.sigma)
-            agree_on_sides(frame, s)
-            start_track(own, frame, s)
-            check_pair_calibration(own, frame, s)
-            if not own.trees[0].tracked:
-                start_from_one_view(own, frame, s, scratch)
+            read_worker(measured, b, w, settings.sigma_scale, frame)
+            scale_sigma(worker.noise[0], frame.sigma)
+            agree_on_sides(frame, settings)
+            start_track(worker, frame, settings)
+            check_pair_calibration(worker, frame, settings)
+            if not tree.tracked:
+                start_from_one_view(worker, frame, settings, work, prior)
 
 
 @kernel
-def _hang_as_rigged(frame):
-    """Write the projections frame.P of the cameras as the rig has them."""
-    for c in range(len(frame.P)):
-        for i in range(3):
-            for k in range(4):
-                frame.P[c, i, k] = frame.cameras[c].P[i, k]
+def _update_worker(
+    worker: WorkerHypotheses,
+    measured: KeypointArrays,
+    b: int,
+    w: int,
+    frame: Frame,
+    settings: Settings,
+    noise_model: NoiseModel,
+    work: Work,
+    prior: Records1[Tree],
+) -> None:
+    """Update the hypotheses about a tracked worker, and search for others if it is time.
 
-
-@kernel
-def _update_worker(own, measured, at, frame, s, noise, scratch):
-    """Update the hypotheses about a worker who is tracked, and look for others if it is time."""
-    work, prior = scratch
-    if own.trees[0].size_std > 0.0:
-        read_worker(measured, at[0], at[1], s.sigma_scale, frame)
-        if start_track(own, frame, s):
-            return
-    searches_now = len(own.trees) > 1 and own.waited_s[0] >= s.look_every_s
-    if searches_now:
-        read_worker(measured, at[0], at[1], s.sigma_scale, frame)
-        searches_now = is_ambiguous(own.trees[0], frame, s)
-    for h in range(own.n_alive[0]):
-        tree, learnt, several = own.trees[h], own.noise[h], own.n_alive[0] > 1
-        branches = searches_now and h == 0
-        mirrored = read_for_hypothesis(tree, own.views[h], learnt, measured, at, s, frame)
-        if mirrored and acquire(tree, frame, s):
-            tree.slope[:] = 0.0
-        evidence = condition_on_frame(tree, prior, several or branches, frame, s, work)
-        if several or branches:
-            weigh_pose(tree, several, s.evidence_trust * evidence, s)
-        learn_from_frame(frame, tree, learnt, noise, work)
-        if branches:
-            own.waited_s[0] = 0.0
-            branch(own, prior, evidence, frame, s, work)
-        recover(tree, frame, s, work)
-    if own.n_alive[0] > 1:
-        prune_and_merge(own, s, work)
-    measure_pace(own)
-    check_pair_calibration(own, frame, s)
-
-
-@kernel(makes_arrays=True)
-def worker_slots(state, b, w):
-    """Return worker w of environment b alone: (H, ...); `n_alive`, `waited_s`, `pace` are (1,)."""
-    trees, views, noise = state.trees[b, w], state.views[b, w], state.noise[b, w]
-    n_alive, waited_s = state.n_alive[b, w : w + 1], state.waited_s[b, w : w + 1]
-    return Hypotheses(trees, views, noise, n_alive, waited_s, state.pace[b, w : w + 1])
-
-
-@kernel(makes_arrays=True)
-def predict_all(state, model, dt, s, works):
-    """Move and age every worker's hypotheses by dt [s].
-
-    `model` is as in `predict_tree`, the rest as in `update_all`.
+    Args:
+        worker: the worker's hypotheses, changed in place.
+        measured: pixels, confidences and standard deviations of all workers.
+        b: index of the environment.
+        w: index of the worker.
+        frame: room for the worker's measurements.
+        settings: settings of the estimator.
+        noise_model: constants for learning the measurement noise.
+        work: scratch.
+        prior: (1,) scratch for a hypothesis before its update.
     """
-    state, s = Hypotheses(*state), Settings(*s)
+    if worker.trees[0].size_std > 0.0:
+        read_worker(measured, b, w, settings.sigma_scale, frame)
+        if start_track(worker, frame, settings):
+            return
+    is_due = worker.since_search_s[0] >= settings.look_every_s
+    searches_now = len(worker.trees) > 1 and is_due
+    if searches_now:
+        read_worker(measured, b, w, settings.sigma_scale, frame)
+        searches_now = is_ambiguous(worker.trees[0], frame, settings)
+    for h in range(worker.n_alive[0]):
+        tree, noise, has_rivals = worker.trees[h], worker.noise[h], worker.n_alive[0] > 1
+        branches = searches_now and h == 0
+        is_weighed = has_rivals or branches
+        is_mirrored = read_for_hypothesis(
+            tree, worker.views[h], noise, measured, b, w, settings, frame
+        )
+        if is_mirrored and acquire(tree, frame, settings):
+            tree.slope[:] = 0.0
+        evidence = condition_on_frame(tree, prior, is_weighed, frame, settings, work)
+        if is_weighed:
+            weigh_pose(tree, has_rivals, settings.evidence_trust * evidence, settings)
+        learn_from_frame(frame, tree, noise, noise_model, work)
+        if branches:
+            worker.since_search_s[0] = 0.0
+            branch(worker, prior, evidence, frame, settings, work)
+        recover(tree, frame, settings, work)
+    if worker.n_alive[0] > 1:
+        prune_and_merge(worker, settings, work)
+    measure_pace(worker)
+    check_pair_calibration(worker, frame, settings)
+
+
+@kernel(makes_arrays=True)
+def select_worker(state: Hypotheses, b: int, w: int) -> WorkerHypotheses:
+    """Return views of the hypotheses about worker w of environment b."""
+    return WorkerHypotheses(
+        state.trees[b, w],
+        state.views[b, w],
+        state.noise[b, w],
+        state.n_alive[b, w : w + 1],
+        state.since_search_s[b, w : w + 1],
+        state.pace[b][w : w + 1],
+    )
+
+
+@kernel(makes_arrays=True)
+def predict_all(
+    state: Hypotheses, model: MotionModel, dt: float, settings: Settings, works: Records1[Work]
+) -> None:
+    """Move and age every worker's hypotheses by a time step.
+
+    Args:
+        state: the hypotheses, changed in place.
+        model: motion over the time step.
+        dt: the time step [s].
+        settings: settings of the estimator.
+        works: (1,) scratch.
+    """
     for b in range(state.n_alive.shape[0]):
         for w in range(state.n_alive.shape[1]):
-            own = worker_slots(state, b, w)
-            if own.trees[0].tracked:
-                own.waited_s[0] += dt
-                own.pace[0].since_s += dt
-                _move(own, model, dt, s, works[0])
-            _grow_older(own, dt, s)
+            worker = select_worker(state, b, w)
+            if worker.trees[0].tracked:
+                worker.since_search_s[0] += dt
+                worker.pace[0].since_s += dt
+                _move_worker(worker, model, dt, settings, works[0])
+            _age_worker(worker, dt, settings)
 
 
 @kernel(makes_arrays=True)
-def _move(own, model, dt, s, work):
-    """Move a worker's hypotheses; several at once learn no places on the body."""
-    several = own.n_alive[0] > 1
-    for h in range(own.n_alive[0]):
-        tree = own.trees[h]
-        if several:
+def _move_worker(
+    worker: WorkerHypotheses, model: MotionModel, dt: float, settings: Settings, work: Work
+) -> None:
+    """Move a worker's hypotheses; several at once learn no places on the body.
+
+    Args:
+        worker: the worker's hypotheses, changed in place.
+        model: motion over the time step.
+        dt: the time step [s].
+        settings: settings of the estimator.
+        work: scratch.
+    """
+    has_rivals = worker.n_alive[0] > 1
+    for h in range(worker.n_alive[0]):
+        tree = worker.trees[h]
+        if has_rivals:
             work.offset[:], work.offset_count[:] = tree.offset, tree.offset_count
         predict_tree(tree, model, dt, work)
-        if several:
+        if has_rivals:
             tree.offset[:], tree.offset_count[:] = work.offset, work.offset_count
-            tree.log_weight += s.walking_odds * dt * forwards(tree.body)
-    if several:
-        normalise(own, s.log_least_weight)
+            tree.log_weight += settings.walking_odds * dt * _score_walk(tree.body)
+    if has_rivals:
+        normalise_weights(worker, settings.log_least_weight)
 
 
 @kernel
-def _grow_older(own, dt, s):
-    """Count ages up by dt [s]; give up a track that nothing supports, let a lost one relax."""
-    tree = own.trees[0]
-    body, ages = tree.body, (tree.age_s, tree.conflict)
-    gaussian = (body[:, :3], tree.cov[:, :3, :3], body[:, 3:])
-    tree.tracked = age_worker(*gaussian, *ages, tree.tracked, dt, s)
-    if not tree.tracked:  # a worker who is lost has one hypothesis
-        own.n_alive[0], tree.log_weight, tree.pose_log_prior = 1, 0.0, 0.0
-    for h in range(1, own.n_alive[0]):
-        count_up(own.trees[h].age_s, dt, s.max_age_s)
+def _age_worker(worker: WorkerHypotheses, dt: float, settings: Settings) -> None:
+    """Count ages up by `dt` [s]; give up a track without support and let a lost one relax."""
+    tree = worker.trees[0]
+    tree.tracked = age_worker(
+        tree.body[:, :3],
+        tree.cov[:, :3, :3],
+        tree.body[:, 3:],
+        tree.age_s,
+        tree.conflict,
+        tree.tracked,
+        dt,
+        settings,
+    )
+    if not tree.tracked:  # a lost worker has one hypothesis
+        worker.n_alive[0], tree.log_weight, tree.pose_log_prior = 1, 0.0, 0.0
+    for h in range(1, worker.n_alive[0]):
+        count_up(worker.trees[h].age_s, dt, settings.max_age_s)
 
 
 @kernel
-def forwards(body):
+def _score_walk(body: Floats) -> float:
     """Return how clearly a body (J, 6) walks forwards, from -1 (backwards) to 1."""
-    cos, sin, known = heading(body)
-    if not known:
+    heading = find_heading(body)
+    if not heading.is_known:
         return 0.0
     speed = 0.0
     for j in _TORSO:
-        speed += 0.25 * (cos * body[j, 3] + sin * body[j, 4])
-    return min(max(speed / 0.5, -1.0), 1.0)
+        speed += 0.25 * (heading.cos * body[j, 3] + heading.sin * body[j, 4])
+    return min(max(speed / _WALKING_M_S, -1.0), 1.0)

@@ -1,4 +1,4 @@
-"""Branching: other bodies that one view can hardly tell from the one that is tracked.
+"""Branching: other bodies that one view can hardly distinguish from the one that is tracked.
 
 A camera sees a limb in front of its joint as it sees it behind (the bas-relief ambiguity). A limb
 is reflected: its joints keep their rays, and their depths are reflected in the depth of a pivot.
@@ -6,152 +6,243 @@ From there the posterior's mode is searched for, under the same prediction and f
 several posterior deviations from the known ones, with evidence that is not negligible, becomes a
 hypothesis.
 
-A whole body is turned instead: a line from shoulder to shoulder that recedes looks as one that
+A whole body is turned instead: a line from shoulder to shoulder that recedes looks like one that
 comes nearer. The other body has its shoulders and hips reflected across the ray to its middle, but
 is no mirror image: it is the same body, turned, with nose and toes in front again. Its uncertainty
 is the reflected one, because it lies along the same ray.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
+from hrc_env.core.declared import Records1
 from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import N_JOINTS, TORSO
-from hrc_env.core.typing import Bools
+from hrc_env.core.typing import Bools, Floats
+from hrc_env.tracking.measurements import Frame
+from hrc_env.tracking.settings import Settings
 from hrc_env.tracking.tree.evidence import (
-    anatomy,
     copy_slot,
     distance_between,
-    heading,
+    find_heading,
     log_evidence,
+    score_pose,
 )
 from hrc_env.tracking.tree.gaussian import multiply
 from hrc_env.tracking.tree.learning import learn_lengths
-from hrc_env.tracking.tree.search import find_pose_near, stiff_lengths
+from hrc_env.tracking.tree.search import find_pose_near, set_bone_variances
+from hrc_env.tracking.tree.state import Tree, Work, WorkerHypotheses
 from hrc_env.tracking.tree.update import condition_on_frame, correct_mean, update_tree
 
 _LOG_LEAST_EVIDENCE = math.log(0.01)
-"""A limb's other mode with less evidence than this beside the known one's is none."""
+"""Log-evidence, relative to the known mode's, below which a limb's other mode is left out."""
 _MOST_PENALTY = 10.0
-"""A turned body that is less likely than this is not tried [nat]."""
+"""Negative log-probability above which a turned body is not tried [nat]."""
 _DISTINCT = 3.0
-"""A mode beyond so many posterior deviations is new."""
+"""Distance from the known hypotheses above which a mode is new, in posterior deviations."""
 _SEARCH_STEPS = 4
 """Gauss-Newton steps from a mirror image."""
 _NEARER_M = 0.05
-"""A search that ends with every joint nearer than this has found nothing new [m]."""
-_PARTS: tuple[tuple[tuple[int, ...], tuple[int, ...]], ...] = (
-    (tuple(int(j) for j in TORSO), tuple(range(N_JOINTS))),  # the whole body
-    ((1,), (3, 5)), ((2,), (4, 6)),  # arms
-    ((3,), (5,)), ((4,), (6,)),  # forearms
-    ((7,), (9, 11, 13)), ((8,), (10, 12, 14)),  # legs
-    ((9,), (11, 13)), ((10,), (12, 14)),  # shanks
-    ((1, 2), (0,)),  # head
-)  # fmt: skip
-"""Joints whose mean is the pivot, and joints that are reflected."""
+"""A search that ends with every joint nearer to the known mode than this has found no other [m]."""
+
+
+class Part(NamedTuple):
+    """A part of the body that is reflected."""
+
+    pivot: tuple[int, ...]
+    """Joints of which the mean is the pivot."""
+    moved: tuple[int, ...]
+    """Joints that are reflected."""
+
+
+_PARTS = (
+    Part(tuple(int(j) for j in TORSO), tuple(range(N_JOINTS))),  # the whole body
+    Part((1,), (3, 5)),  # arms
+    Part((2,), (4, 6)),
+    Part((3,), (5,)),  # forearms
+    Part((4,), (6,)),
+    Part((7,), (9, 11, 13)),  # legs
+    Part((8,), (10, 12, 14)),
+    Part((9,), (11, 13)),  # shanks
+    Part((10,), (12, 14)),
+    Part((1, 2), (0,)),  # head
+)
+N_PARTS = len(_PARTS)
+"""Number of parts that are reflected."""
 WHOLE_BODY = 0
-"""The row that reflects the whole body; the others reflect limbs."""
+"""The part that is the whole body; the others are limbs and the head."""
 _MOST_SEEN_TWICE = 2
-"""So many joints of a whole body may be seen twice, and it may still be mirrored."""
+"""Most joints that two cameras may see of a whole body that counts as seen by one alone."""
 _TORSO = (1, 2, 7, 8)
-_LEAST_TURN = 0.35
-"""Bodies that are turned by less [rad] are one hypothesis."""
+_LEAST_TURN_RAD = 0.35
+"""Angle between two headings below which bodies are one hypothesis [rad]."""
+
+
+def _mark_joints(joints: list[tuple[int, ...]]) -> Bools:
+    """Return (n, J) which joints belong to each of n groups."""
+    table = np.zeros((len(joints), N_JOINTS), bool)
+    for row, group in enumerate(joints):
+        table[row, list(group)] = True
+    return table
+
+
+_PIVOT = _mark_joints([part.pivot for part in _PARTS])
+_MOVED = _mark_joints([part.moved for part in _PARTS])
 
 
 @kernel
-def is_ambiguous(tree, frame, s):
-    """Whether one view alone carries a part of the body whose depth is open in a prediction."""
+def is_ambiguous(tree: Tree, frame: Frame, settings: Settings) -> bool:
+    """Return whether one camera leaves open the depth of any part of a predicted body."""
     ambiguous = False
-    for part in range(N_MIRRORS):
-        ambiguous = ambiguous or _find_lone_camera(part, tree, frame, s) >= 0
+    for part in range(N_PARTS):
+        ambiguous = ambiguous or _find_ambiguous_view(part, tree, frame, settings) >= 0
     return ambiguous
 
 
 @kernel
-def _find_lone_camera(part, tree, frame, s):
-    """The camera that leaves the depth of a part open that may be mirrored, or -1.
+def _find_ambiguous_view(part: int, tree: Tree, frame: Frame, settings: Settings) -> int:
+    """Return the only camera that sees a part, if the prediction leaves its depth open, or -1.
 
-    One view in this update is not enough: what other views said a moment ago is still known.
+    That one camera alone sees it in this frame is not enough: measurements of other cameras a
+    moment ago still count in the prediction.
+
+    Args:
+        part: index of the part.
+        tree: the predicted hypothesis.
+        frame: the measurements.
+        settings: settings of the estimator, with the parts that may be reflected.
     """
-    if not (s.mirrors_body if part == WHOLE_BODY else s.mirrors_limbs):
+    if not (settings.mirrors_body if part == WHOLE_BODY else settings.mirrors_limbs):
         return -1
-    c = lone_camera(part, frame.ok)
-    if c < 0 or not open_depth(part, frame.cameras[c].eye, tree.body, tree.cov) > s.open_depth_m:
+    c = find_lone_camera(part, frame.ok)
+    if c < 0:
         return -1
-    return c
+    depth_std = measure_depth_std(part, frame.cameras[c].eye, tree.body, tree.cov)
+    return c if depth_std > settings.open_depth_m else -1
 
 
 @kernel(makes_arrays=True)
-def branch(own, prior, evidence, frame, s, work):
-    """Look for other bodies beside the heaviest hypothesis, and keep them as hypotheses.
+def branch(
+    worker: WorkerHypotheses,
+    prior: Records1[Tree],
+    evidence: float,
+    frame: Frame,
+    settings: Settings,
+    work: Work,
+) -> None:
+    """Search for other bodies beside the heaviest hypothesis, and add them as hypotheses.
 
-    `own` are a worker's `Hypotheses`, of which the first has been updated: `prior` (1,) is what
-    it was before, `evidence` the update's log-evidence.
+    Args:
+        worker: the hypotheses of one worker, of which the first has been updated.
+        prior: (1,) the first hypothesis before its update.
+        evidence: log-evidence of that update.
+        frame: the measurements.
+        settings: settings of the estimator.
+        work: scratch.
     """
-    trees = own.trees
-    for part in range(N_MIRRORS):
-        n = own.n_alive[0]
-        camera = _find_lone_camera(part, prior[0], frame, s) if n < len(trees) else -1
+    trees = worker.trees
+    for part in range(N_PARTS):
+        n: int = worker.n_alive[0]
+        camera = _find_ambiguous_view(part, prior[0], frame, settings) if n < len(trees) else -1
         if camera < 0:
             continue
-        copy_slot(own, 0, n)
+        copy_slot(worker, 0, n)
         penalty = np.inf
         if part == WHOLE_BODY:
-            penalty = _try_turned_body(trees, n, camera, prior, frame, s, work)
+            penalty = _try_turned_body(trees, n, camera, prior, frame, settings, work)
         elif reflect(part, frame.cameras[camera].eye, trees[0].body, work.point):
-            penalty = _search_mode(trees, n, prior[0], evidence, frame, s, work)
+            penalty = _search_mode(trees, n, prior[0], evidence, frame, settings, work)
         if penalty < np.inf:
             tree = trees[n]
-            before, tree.pose_log_prior = tree.pose_log_prior, s.anatomy_trust * anatomy(tree.body)
+            before = tree.pose_log_prior
+            tree.pose_log_prior = settings.anatomy_trust * score_pose(tree.body)
             tree.log_weight += tree.pose_log_prior - before - penalty
-            own.n_alive[0] = n + 1
+            worker.n_alive[0] = n + 1
 
 
 @kernel(makes_arrays=True)
-def _try_turned_body(trees, n, camera, prior, frame, s, work):
-    """Make tree n the body that is turned the other way; its penalty [nat], infinite if it is
-    known."""
-    new = trees[n]
-    eye = frame.cameras[camera].eye
-    turn = turn_of(eye, prior[0].body)
-    penalty = 0.5 * (turn / s.turn_std_rad) ** 2
+def _try_turned_body(
+    trees: Records1[Tree],
+    n: int,
+    camera: int,
+    prior: Records1[Tree],
+    frame: Frame,
+    settings: Settings,
+    work: Work,
+) -> float:
+    """Make tree n the body that is turned the other way.
+
+    Args:
+        trees: (H,) the worker's hypotheses; tree n is a copy of the first.
+        n: slot of the new hypothesis.
+        camera: index of the camera that alone sees the body.
+        prior: (1,) the first hypothesis before its update.
+        frame: the measurements.
+        settings: settings of the estimator.
+        work: scratch.
+
+    Returns:
+        Negative log-probability of the turn [nat]; infinite if such a body is known already.
+    """
+    new, eye = trees[n], frame.cameras[camera].eye
+    turn = find_other_turn(eye, prior[0].body)
+    penalty = 0.5 * (turn / settings.turn_std_rad) ** 2
     if penalty > _MOST_PENALTY:
         return np.inf
     _restore_prediction(new, prior[0])
     turn_body(eye, turn, new.body, new.cov, new.slope)
-    if _is_turned_alike(trees, n):
+    if _has_known_heading(trees, n):
         return np.inf
-    condition_on_frame(new, prior, False, frame, s, work)
+    condition_on_frame(new, prior, False, frame, settings, work)
     learn_lengths(new, work.n_views)
-    return np.inf if _is_turned_alike(trees, n) else penalty
+    return np.inf if _has_known_heading(trees, n) else penalty
 
 
 @kernel(makes_arrays=True)
-def _restore_prediction(tree, prior):
-    """Give a tree that was updated the Gaussian from before, but not what was learnt before."""
+def _restore_prediction(tree: Tree, prior: Tree) -> None:
+    """Give an updated tree the Gaussian before the update; lengths and offsets stay."""
     tree.body[:], tree.cov[:], tree.slope[:] = prior.body, prior.cov, prior.slope
 
 
 @kernel
-def _is_turned_alike(trees, n):
-    """Whether tree n is turned as one of those before it."""
+def _has_known_heading(trees: Records1[Tree], n: int) -> bool:
+    """Return whether tree n faces the same way as one of those before it."""
     alike = False
     for k in range(n):
-        alike |= heads_like(trees[n].body, trees[k].body)
+        alike |= has_same_heading(trees[n].body, trees[k].body)
     return alike
 
 
 @kernel(makes_arrays=True)
-def _search_mode(trees, n, prior, evidence, frame, s, work):
-    """Condition tree n at the mode next to a reflected limb (work.point); 0, or infinity for none.
+def _search_mode(
+    trees: Records1[Tree],
+    n: int,
+    prior: Tree,
+    evidence: float,
+    frame: Frame,
+    settings: Settings,
+    work: Work,
+) -> float:
+    """Condition tree n at the mode next to a reflected limb.
 
-    There is none where the search ends at a known hypothesis, or with negligible evidence.
+    Args:
+        trees: (H,) the worker's hypotheses; tree n is a copy of the first.
+        n: slot of the new hypothesis.
+        prior: the first hypothesis before its update.
+        evidence: log-evidence of that update.
+        frame: the measurements.
+        settings: settings of the estimator.
+        work: scratch; `point` is where the search begins.
+
+    Returns:
+        0, or infinity where the search ends at a known hypothesis or with negligible evidence.
     """
     new, known = trees[n], trees[0].body
     _restore_prediction(new, prior)
-    stiff_lengths(new.bone_variance, s.bone_give, work.bone_variance)
-    find_pose_near(new, frame, s, _SEARCH_STEPS, 0.0, work)
+    set_bone_variances(new.bone_variance, settings.bone_give, work.bone_variance)
+    find_pose_near(new, frame, settings, _SEARCH_STEPS, 0.0, work)
     moved = 0.0
     for j in range(len(known)):
         for i in range(3):
@@ -159,9 +250,9 @@ def _search_mode(trees, n, prior, evidence, frame, s, work):
     if not moved > _NEARER_M:
         return np.inf
     update_tree(new, work)
-    if not log_evidence(prior, new, frame, s, work) - evidence > _LOG_LEAST_EVIDENCE:
+    if not log_evidence(prior, new, frame, settings, work) - evidence > _LOG_LEAST_EVIDENCE:
         return np.inf
-    correct_mean(new, frame, s, work)
+    correct_mean(new, frame, settings, work)
     learn_lengths(new, work.n_views)
     for k in range(n):
         if not distance_between(trees[k], new, work) > _DISTINCT**2:
@@ -169,20 +260,14 @@ def _search_mode(trees, n, prior, evidence, frame, s, work):
     return 0.0
 
 
-def _table(which: int) -> Bools:
-    table = np.zeros((len(_PARTS), N_JOINTS), bool)
-    for row, part in enumerate(_PARTS):
-        table[row, list(part[which])] = True
-    return table
-
-
-_PIVOT, _MOVED = _table(0), _table(1)
-N_MIRRORS = len(_PARTS)
-
-
 @kernel
-def lone_camera(part, ok):
-    """The camera that alone sees a part of the body, of which `ok` (J, C) is seen, or -1."""
+def find_lone_camera(part: int, ok: Bools) -> int:
+    """Return the camera that alone sees a part of the body, or -1.
+
+    Args:
+        part: index of the part.
+        ok: (J, C) which joints each camera measured.
+    """
     n_cameras, seen_twice, best, most = ok.shape[1], 0, -1, 0
     for c in range(n_cameras):
         n = 0
@@ -199,10 +284,14 @@ def lone_camera(part, ok):
 
 
 @kernel(makes_arrays=True)
-def open_depth(part, eye, body, cov):
-    """Return the least standard deviation of a part's joints along their rays from `eye` (3,) [m].
+def measure_depth_std(part: int, eye: Floats, body: Floats, cov: Floats) -> float:
+    """Return the least standard deviation of a part's joints along their rays [m].
 
-    `body` is (J, 6), `cov` (J, 6, 6).
+    Args:
+        part: index of the part.
+        eye: (3,) optical centre of the camera [m].
+        body: (J, 6) positions and velocities.
+        cov: (J, 6, 6) their covariances.
     """
     ray, least = np.empty(3), np.inf
     for j in range(len(body)):
@@ -220,10 +309,17 @@ def open_depth(part, eye, body, cov):
 
 
 @kernel(makes_arrays=True)
-def reflect(part, eye, body, out):
-    """Write positions (J, 3) of a body (J, 6) whose `part` is reflected along the rays from `eye`.
+def reflect(part: int, eye: Floats, body: Floats, out: Floats) -> bool:
+    """Write the positions of a body of which a part is reflected along a camera's rays.
 
-    Returns False where that would bring a joint to the camera or behind it.
+    Args:
+        part: index of the part.
+        eye: (3,) optical centre of the camera [m].
+        body: (J, 6) positions and velocities.
+        out: (J, 3) receives the positions [m].
+
+    Returns:
+        False if that brings a joint to the camera or behind it; `out` has no meaning then.
     """
     middle, n = np.zeros(3), 0
     for j in range(len(body)):
@@ -248,10 +344,13 @@ def reflect(part, eye, body, out):
 
 
 @kernel
-def turn_of(eye, body):
-    """Return the angle [rad] between a body (J, 6) and the other one from `eye`; 0 if unknown."""
-    cos, sin, known = heading(body)
-    if not known:
+def find_other_turn(eye: Floats, body: Floats) -> float:
+    """Return the angle by which the other body is turned from a body (J, 6), seen from `eye` (3,).
+
+    It is in [-pi, pi] [rad], and 0 if the heading is unknown.
+    """
+    heading = find_heading(body)
+    if not heading.is_known:
         return 0.0
     x, y = 0.0, 0.0
     for j in _TORSO:
@@ -259,20 +358,29 @@ def turn_of(eye, body):
         y += 0.25 * body[j, 1]
     # forwards is across the shoulders, so that reflecting the shoulders across the ray
     # turns it to the mirror image of its opposite
-    turn = 2.0 * math.atan2(y - eye[1], x - eye[0]) - 2.0 * math.atan2(sin, cos)
+    ray = math.atan2(y - eye[1], x - eye[0])
+    turn = 2.0 * ray - 2.0 * math.atan2(heading.sin, heading.cos)
     return math.atan2(math.sin(turn), math.cos(turn))
 
 
 @kernel
-def heads_like(one, other):
-    """Whether two bodies (J, 6) are turned alike."""
-    a, b = heading(one), heading(other)
-    return a[0] * b[0] + a[1] * b[1] > math.cos(_LEAST_TURN)
+def has_same_heading(one: Floats, other: Floats) -> bool:
+    """Return whether two bodies (J, 6) face the same way."""
+    a, b = find_heading(one), find_heading(other)
+    return a.cos * b.cos + a.sin * b.sin > math.cos(_LEAST_TURN_RAD)
 
 
 @kernel(makes_arrays=True)
-def turn_body(eye, turn, body, cov, slope):
-    """Make a Gaussian (J, 6), (J, 6, 6), (J, 6, 6) the other body's, in place."""
+def turn_body(eye: Floats, turn: float, body: Floats, cov: Floats, slope: Floats) -> None:
+    """Make a Gaussian that of the body turned the other way.
+
+    Args:
+        eye: (3,) optical centre of the camera that alone sees the body [m].
+        turn: angle about the vertical, as `find_other_turn` returns it [rad].
+        body: (J, 6) means, changed in place.
+        cov: (J, 6, 6) covariances, reflected in place along the ray to the body's middle.
+        slope: (J, 6, 6) slopes, likewise.
+    """
     middle, across, speed = np.zeros(6), np.zeros(2), np.zeros(2)
     for j in _TORSO:
         for i in range(6):

@@ -11,59 +11,115 @@ C_j - B_j C_q B_j' that joint j does not share with its parent q, det C is the p
 Terms that all hypotheses share are left out.
 
 Bodies have the nose, the toes and the knees in front, and a body that is tracked mirrored in depth
-has them behind. That weighs hypotheses as a potential of the pose that is believed now, not anew
-with every frame: it does not add up.
+has them behind. That weighs hypotheses as a potential of the present pose, not anew with every
+frame: it does not add up.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
+from hrc_env.core.declared import Records1
 from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import JOINT
+from hrc_env.core.typing import Floats
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, pixel_of
+from hrc_env.tracking.measurements import Frame
+from hrc_env.tracking.settings import Settings
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT, multiply, multiply_transposed
+from hrc_env.tracking.tree.state import Tree, Work, WorkerHypotheses
 
 _NOSE, _RIGHT_SHOULDER = JOINT["nose"], JOINT["right_shoulder"]
+
+
+class Feature(NamedTuple):
+    """A joint that people have before or behind the middle of two others."""
+
+    joint: int
+    """The joint."""
+    first: int
+    """The first of the two others."""
+    second: int
+    """The second of them."""
+    ahead_m: float
+    """Mean distance of the joint before their middle, along the heading [m]."""
+    std_m: float
+    """Standard deviation of that distance [m]."""
+
+
 _FEATURES = (
-    (0, 1, 2, 0.12, 0.10),  # the nose before the middle of the shoulders
-    (13, 11, 11, 0.12, 0.10), (14, 12, 12, 0.12, 0.10),  # toes before the ankles
-    (9, 7, 11, 0.06, 0.12), (10, 8, 12, 0.06, 0.12),  # knees before the middle of the leg
-    (3, 1, 5, -0.05, 0.12), (4, 2, 6, -0.05, 0.12),  # elbows behind the middle of the arm
-)  # fmt: skip
-"""A joint, two others, how far it is before their middle [m], and its deviation [m]: judgements
-from common proportions, wide enough for turned heads and feet."""
+    Feature(0, 1, 2, 0.12, 0.10),  # the nose before the middle of the shoulders
+    Feature(13, 11, 11, 0.12, 0.10),  # toes before the ankles
+    Feature(14, 12, 12, 0.12, 0.10),
+    Feature(9, 7, 11, 0.06, 0.12),  # knees before the middle of the leg
+    Feature(10, 8, 12, 0.06, 0.12),
+    Feature(3, 1, 5, -0.05, 0.12),  # elbows behind the middle of the arm
+    Feature(4, 2, 6, -0.05, 0.12),
+)
+"""Judgements from common proportions, wide enough for turned heads and feet."""
 _MOST = 4.5
-"""No feature counts for more than three deviations."""
+"""Greatest penalty of one feature [nat]: that of three standard deviations."""
 _CLOSE = 2.0
-"""Hypotheses within so many posterior deviations are one."""
+"""Distance below which two hypotheses are merged, in posterior standard deviations."""
+
+
+class TreeMeasure(NamedTuple):
+    """A change of the body as a Gaussian on the tree measures it."""
+
+    squared: float
+    """Squared Mahalanobis length of the change."""
+    log_det: float
+    """Logarithm of the determinant of the covariance of all joints."""
+
+
+class Heading(NamedTuple):
+    """The direction in which a body faces, on the floor."""
+
+    cos: float
+    """Cosine of the angle from the world's x axis; 0 if unknown."""
+    sin: float
+    """Sine of that angle; 0 if unknown."""
+    is_known: bool
+    """Whether shoulders and hips are far enough apart, seen from above."""
 
 
 @kernel
-def log_evidence(prior, tree, frame, s, w):
-    """Log of the evidence of one update, up to what all hypotheses share.
+def log_evidence(prior: Tree, tree: Tree, frame: Frame, settings: Settings, work: Work) -> float:
+    """Return the log-evidence of one update, up to terms that all hypotheses share.
 
-    `prior` is the tree before the update, `tree` what `tree.update.update_tree` made of it, before
-    the mean correction; `w` has the variances of the bones as measurements, its a, b, c, d and step
-    are used.
+    Args:
+        prior: the hypothesis before the update.
+        tree: the hypothesis as `update.update_tree` leaves it, before the correction of the mean.
+        frame: the measurements.
+        settings: settings of the estimator.
+        work: scratch with the variances of the bones as measurements; a, b, c, d and step are
+            overwritten.
     """
     body = tree.body
     for j in range(len(body)):
         for i in range(6):
-            w.step[j, i] = body[j, i] - prior.body[j, i]
-    square, log_det = tree_measure(prior, w.step, w)
+            work.step[j, i] = body[j, i] - prior.body[j, i]
+    before = measure_change(prior, work.step, work)
     for j in range(len(body)):
         for i in range(6):
-            w.step[j, i] = 0.0
-    _, log_det_after = tree_measure(tree, w.step, w)
-    likelihood = log_likelihood(body, frame, s.inlier_odds)
-    likelihood += _bones(body, tree.bone_length, w.bone_variance) + _floor(body, s.floor_std_m)
-    return likelihood - 0.5 * square + 0.5 * (log_det_after - log_det)
+            work.step[j, i] = 0.0
+    after = measure_change(tree, work.step, work)
+    likelihood = _log_likelihood_of_pixels(body, frame, settings.inlier_odds)
+    bones = _log_likelihood_of_bones(body, tree.bone_length, work.bone_variance)
+    likelihood += bones + _log_likelihood_of_floor(body, settings.floor_std_m)
+    return likelihood - 0.5 * before.squared + 0.5 * (after.log_det - before.log_det)
 
 
 @kernel
-def log_likelihood(body, frame, inlier_odds):
-    """Log-likelihood of all pixels at positions (J, 6), relative to all being outliers."""
+def _log_likelihood_of_pixels(body: Floats, frame: Frame, inlier_odds: float) -> float:
+    """Return the log-likelihood of all pixels, relative to all being outliers.
+
+    Args:
+        body: (J, 6) positions and velocities.
+        frame: the measurements.
+        inlier_odds: odds of a perfect inlier, times the variance of its pixel [px^2].
+    """
     P, z, sigma, ok = frame.P, frame.z, frame.sigma, frame.ok
     total = 0.0
     for j in range(len(ok)):
@@ -79,36 +135,42 @@ def log_likelihood(body, frame, inlier_odds):
 
 
 @kernel(makes_arrays=True)
-def tree_measure(tree, change, w):
-    """Squared Mahalanobis length of `change` (J, 6) under a tree, and log det of the tree.
+def measure_change(tree: Tree, change: Floats, work: Work) -> TreeMeasure:
+    """Return the length of a change (J, 6) under a tree, and the tree's determinant.
 
-    A conditional covariance that is not positive definite counts by its diagonal.
+    A conditional covariance that is not positive definite counts by its diagonal. The matrices a,
+    b, c and d of `work` are overwritten.
     """
-    cov, slope, square, log_det = tree.cov, tree.slope, 0.0, 0.0
-    for m in range(len(ORDER)):
-        j = ORDER[m]
-        q = PARENT[j]
-        rest, own, factor = w.a, w.b, w.c
+    cov, slope, squared, log_det = tree.cov, tree.slope, 0.0, 0.0
+    for j in ORDER:
+        q: int = PARENT[j]
+        rest, own, factor = work.a, work.b, work.c
         rest[:] = cov[j]
         for i in range(6):
             own[0, i] = change[j, i]
         if q >= 0:
-            multiply(slope[j], cov[q], w.d)
-            multiply_transposed(w.d, slope[j], factor)
+            multiply(slope[j], cov[q], work.d)
+            multiply_transposed(work.d, slope[j], factor)
             for i in range(6):
                 for k in range(6):
                     rest[i, k] -= factor[i, k]
                     own[0, i] -= slope[j, i, k] * change[q, k]
-        s, d = _measure(rest, own[0], factor)
-        square += s
-        log_det += d
-    return square, log_det
+        joint = _measure_joint(rest, own[0], factor)
+        squared += joint.squared
+        log_det += joint.log_det
+    return TreeMeasure(squared, log_det)
 
 
 @kernel
-def _measure(a, x, factor):
-    """x' a^-1 x and log det a for a symmetric 6x6 matrix; x (6,) is used up."""
-    square, product = 0.0, 1.0
+def _measure_joint(a: Floats, x: Floats, factor: Floats) -> TreeMeasure:
+    """Return x' a^-1 x and log det a by Cholesky's factors.
+
+    Args:
+        a: (6, 6) symmetric matrix.
+        x: (6,) vector, overwritten.
+        factor: (6, 6) scratch.
+    """
+    squared, product = 0.0, 1.0
     for i in range(6):
         for k in range(i):
             rest = a[i, k]
@@ -123,34 +185,47 @@ def _measure(a, x, factor):
             return _measure_diagonal(a, x)
         factor[i, i] = 1.0 / math.sqrt(rest)
         x[i] *= factor[i, i]
-        square += x[i] * x[i]
+        squared += x[i] * x[i]
         product *= rest
-    return square, math.log(product)
+    return TreeMeasure(squared, math.log(product))
 
 
 @kernel
-def _measure_diagonal(a, x):
-    square, log_det = 0.0, 0.0
+def _measure_diagonal(a: Floats, x: Floats) -> TreeMeasure:
+    """Return the same for the diagonal of a (6, 6) alone."""
+    squared, log_det = 0.0, 0.0
     for i in range(6):
         variance = max(a[i, i], 1e-12)
-        square += x[i] * x[i] / variance
+        squared += x[i] * x[i] / variance
         log_det += math.log(variance)
-    return square, log_det
+    return TreeMeasure(squared, log_det)
 
 
 @kernel
-def _bones(body, length, variance):
-    """Log-likelihood of the bones' lengths, those of the tree's edges and the nose's second."""
-    total = _bone(body, _NOSE, _RIGHT_SHOULDER, length[_NOSE], variance[_NOSE])
-    for m in range(1, len(ORDER)):
-        j = ORDER[m]
-        total += _bone(body, j, PARENT[j], length[j], variance[j])
+def _log_likelihood_of_bones(body: Floats, length: Floats, variance: Floats) -> float:
+    """Return the log-likelihood of the tree's edges, and of the nose's second bone.
+
+    Args:
+        body: (J, 6) positions and velocities.
+        length: (J,) lengths of the edges [m].
+        variance: (J,) their variances [m^2].
+    """
+    total = _log_likelihood_of_bone(body, _NOSE, _RIGHT_SHOULDER, length[_NOSE], variance[_NOSE])
+    for j in ORDER[1:]:
+        total += _log_likelihood_of_bone(body, j, PARENT[j], length[j], variance[j])
     return total
 
 
 @kernel
-def _floor(body, std_m):
-    """Log-likelihood of the floor: of what is below it."""
+def _log_likelihood_of_bone(body: Floats, j: int, q: int, length: float, variance: float) -> float:
+    """Return the log-likelihood of the distance between joints j and q."""
+    x, y, z = body[j, 0] - body[q, 0], body[j, 1] - body[q, 1], body[j, 2] - body[q, 2]
+    return -0.5 * (math.sqrt(x * x + y * y + z * z) - length) ** 2 / variance
+
+
+@kernel
+def _log_likelihood_of_floor(body: Floats, std_m: float) -> float:
+    """Return the log-likelihood of joints that are below the floor."""
     total = 0.0
     for j in range(len(body)):
         total -= 0.5 * (min(body[j, 2], 0.0) / std_m) ** 2
@@ -158,123 +233,131 @@ def _floor(body, std_m):
 
 
 @kernel
-def _bone(body, j, q, length, variance):
-    x, y, z = body[j, 0] - body[q, 0], body[j, 1] - body[q, 1], body[j, 2] - body[q, 2]
-    return -0.5 * (math.sqrt(x * x + y * y + z * z) - length) ** 2 / variance
-
-
-@kernel
-def distance_between(one, other, w):
-    """Squared Mahalanobis distance of two trees under the wider of them."""
+def distance_between(one: Tree, other: Tree, work: Work) -> float:
+    """Return the squared Mahalanobis distance of two trees under the wider of them."""
     least = np.inf
     for tree in (one, other):
         for j in range(len(one.body)):
             for i in range(6):
-                w.step[j, i] = one.body[j, i] - other.body[j, i]
-        square, _ = tree_measure(tree, w.step, w)
-        least = min(least, square)
+                work.step[j, i] = one.body[j, i] - other.body[j, i]
+        least = min(least, measure_change(tree, work.step, work).squared)
     return least
 
 
 @kernel
-def anatomy(body):
-    """Log-potential of a pose (J, 6): 0 at best; 0 if the heading is unknown."""
-    cos, sin, known = heading(body)
+def score_pose(body: Floats) -> float:
+    """Return the log-potential of a pose (J, 3+): 0 at best, and where the heading is unknown."""
+    heading = find_heading(body)
     total = 0.0
-    if known:
-        for joint, one, other, ahead, std in _FEATURES:
-            x = body[joint, 0] - 0.5 * (body[one, 0] + body[other, 0])
-            y = body[joint, 1] - 0.5 * (body[one, 1] + body[other, 1])
-            total -= min(0.5 * ((cos * x + sin * y - ahead) / std) ** 2, _MOST)
+    if heading.is_known:
+        for feature in _FEATURES:
+            j, one, other = feature.joint, feature.first, feature.second
+            x = body[j, 0] - 0.5 * (body[one, 0] + body[other, 0])
+            y = body[j, 1] - 0.5 * (body[one, 1] + body[other, 1])
+            ahead = heading.cos * x + heading.sin * y
+            total -= min(0.5 * ((ahead - feature.ahead_m) / feature.std_m) ** 2, _MOST)
     return total
 
 
 @kernel
-def heading(points):
-    """(cos, sin, known) of the body's heading, from shoulders and hips; (0, 0, False) unknown."""
-    return find_heading(points, True, True)
+def find_heading(points: Floats) -> Heading:
+    """Return the heading of a body (J, 3+), from shoulders and hips."""
+    return find_heading_from(points, True, True)
 
 
 @kernel
-def find_heading(points, shoulders, hips):
-    """The heading, from the shoulders or hips that are known."""
+def find_heading_from(points: Floats, has_shoulders: bool, has_hips: bool) -> Heading:
+    """Return the heading of a body from the shoulders or the hips.
+
+    Args:
+        points: (J, 3+) positions [m].
+        has_shoulders: whether the shoulders are used.
+        has_hips: whether the hips are used.
+    """
     x, y = 0.0, 0.0
-    for left, known in ((1, shoulders), (7, hips)):
-        if known:
+    for left, is_used in ((1, has_shoulders), (7, has_hips)):
+        if is_used:
             x += points[left, 0] - points[left + 1, 0]
             y += points[left, 1] - points[left + 1, 1]
     length = math.sqrt(x * x + y * y)
     if length < 0.05:
-        return 0.0, 0.0, False
-    return y / length, -x / length, True
+        return Heading(0.0, 0.0, False)
+    return Heading(y / length, -x / length, True)
 
 
 @kernel
-def weigh_pose(tree, several, gain, s):
-    """Weigh a hypothesis by its evidence, and by its pose in the place of the last one."""
-    pose_log_prior = s.anatomy_trust * anatomy(tree.body)
-    if several:
+def weigh_pose(tree: Tree, has_rivals: bool, gain: float, settings: Settings) -> None:
+    """Weigh a hypothesis by its evidence, and by its pose in the place of the last one.
+
+    Args:
+        tree: the updated hypothesis, changed in place.
+        has_rivals: whether there are other hypotheses; the only one keeps its weight.
+        gain: log-evidence of the frame, times the trust in it.
+        settings: settings of the estimator.
+    """
+    pose_log_prior = settings.anatomy_trust * score_pose(tree.body)
+    if has_rivals:
         tree.log_weight += gain + pose_log_prior - tree.pose_log_prior
     tree.pose_log_prior = pose_log_prior
 
 
 @kernel(makes_arrays=True)
-def prune_and_merge(own, s, work):
+def prune_and_merge(worker: WorkerHypotheses, settings: Settings, work: Work) -> None:
     """Drop hypotheses that are lost or too light, and merge those that have come close."""
-    for h in range(own.n_alive[0] - 1, -1, -1):
-        if own.n_alive[0] > 1 and not own.trees[h].tracked:
-            drop(own, h)
-    normalise(own, s.log_least_weight)
-    merge(own, _CLOSE**2, work)
-    normalise(own, s.log_least_weight)
+    for h in range(worker.n_alive[0] - 1, -1, -1):
+        if worker.n_alive[0] > 1 and not worker.trees[h].tracked:
+            drop_hypothesis(worker, h)
+    normalise_weights(worker, settings.log_least_weight)
+    merge_close(worker, _CLOSE**2, work)
+    normalise_weights(worker, settings.log_least_weight)
 
 
 @kernel(makes_arrays=True)
-def copy_slot(own, source, target):
+def copy_slot(worker: WorkerHypotheses, source: int, target: int) -> None:
     """Make slot `target` of a worker a copy of `source`."""
-    own.trees[target] = own.trees[source]
-    own.views[target] = own.views[source]
-    own.noise[target] = own.noise[source]
+    worker.trees[target] = worker.trees[source]
+    worker.views[target] = worker.views[source]
+    worker.noise[target] = worker.noise[source]
 
 
 @kernel(makes_arrays=True)
-def exchange_slots(own, one, other):
+def exchange_slots(worker: WorkerHypotheses, one: int, other: int) -> None:
     """Exchange two slots of a worker."""
-    tree = own.trees[one : one + 1].copy()
-    views, noise = own.views[one].copy(), own.noise[one].copy()
-    copy_slot(own, other, one)
-    own.trees[other] = tree[0]
-    own.views[other], own.noise[other] = views, noise
+    tree = worker.trees[one : one + 1].copy()
+    views, noise = worker.views[one].copy(), worker.noise[one].copy()
+    copy_slot(worker, other, one)
+    worker.trees[other] = tree[0]
+    worker.views[other], worker.noise[other] = views, noise
 
 
 @kernel(makes_arrays=True)
-def drop(own, h):
-    """Drop hypothesis h of a worker who has others; the last one takes its place."""
-    last = own.n_alive[0] - 1
+def drop_hypothesis(worker: WorkerHypotheses, h: int) -> None:
+    """Drop hypothesis h of a worker that has others; the last one takes its slot."""
+    last = worker.n_alive[0] - 1
     if h != last:
-        copy_slot(own, last, h)
-    own.n_alive[0] = last
+        copy_slot(worker, last, h)
+    worker.n_alive[0] = last
 
 
 @kernel(makes_arrays=True)
-def normalise(own, log_least):
-    """Drop what is lighter than `log_least`; the weights of the others sum to one, best first."""
-    trees = own.trees
-    _share_out(trees, own.n_alive[0])
-    for h in range(own.n_alive[0] - 1, -1, -1):
-        if trees[h].log_weight < log_least and own.n_alive[0] > 1:
-            drop(own, h)
-    _share_out(trees, own.n_alive[0])
+def normalise_weights(worker: WorkerHypotheses, log_least: float) -> None:
+    """Drop hypotheses lighter than `log_least`; scale the weights to sum 1, heaviest first."""
+    trees = worker.trees
+    _scale_weights(trees, worker.n_alive[0])
+    for h in range(worker.n_alive[0] - 1, -1, -1):
+        if trees[h].log_weight < log_least and worker.n_alive[0] > 1:
+            drop_hypothesis(worker, h)
+    _scale_weights(trees, worker.n_alive[0])
     best = 0
-    for h in range(own.n_alive[0]):
+    for h in range(worker.n_alive[0]):
         best = h if trees[h].log_weight > trees[best].log_weight else best
     if best > 0:
-        exchange_slots(own, 0, best)
+        exchange_slots(worker, 0, best)
 
 
 @kernel
-def _share_out(trees, n):
-    """Make the weights of the first n sum to one."""
+def _scale_weights(trees: Records1[Tree], n: int) -> None:
+    """Make the weights of the first n trees sum to 1."""
     most, total = -np.inf, 0.0
     for h in range(n):
         most = max(most, trees[h].log_weight)
@@ -285,18 +368,21 @@ def _share_out(trees, n):
 
 
 @kernel(makes_arrays=True)
-def merge(own, least_distance, work):
-    """Hypotheses that have come close are one: the heavier stays, with the weight of both.
+def merge_close(worker: WorkerHypotheses, least_distance: float, work: Work) -> None:
+    """Merge hypotheses that have come close: the heavier stays, with the weight of both.
 
-    `least_distance` is squared, in posterior deviations.
+    Args:
+        worker: the hypotheses of one worker, changed in place.
+        least_distance: squared Mahalanobis distance from which two are kept apart.
+        work: scratch.
     """
-    trees, h = own.trees, 0
-    while h < own.n_alive[0]:
-        for k in range(own.n_alive[0] - 1, h, -1):
+    trees, h = worker.trees, 0
+    while h < worker.n_alive[0]:
+        for k in range(worker.n_alive[0] - 1, h, -1):
             if distance_between(trees[h], trees[k], work) < least_distance:
                 both = np.logaddexp(trees[h].log_weight, trees[k].log_weight)
                 if trees[k].log_weight > trees[h].log_weight:
-                    exchange_slots(own, h, k)
+                    exchange_slots(worker, h, k)
                 trees[h].log_weight = both
-                drop(own, k)
+                drop_hypothesis(worker, k)
         h += 1

@@ -6,18 +6,24 @@ the root, the slope B_j (6, 6) with which it follows its parent q:
 
     x_j - E x_j = B_j (x_q - E x_q) + independent noise,   Cov(x_j, x_q) = B_j C_q.
 
-Everything that these say is exact; a joint depends on all others through its parent only.
+This is exact; a joint depends on all others through its parent only.
 """
+
+from typing import NamedTuple
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import BONES, N_JOINTS
+from hrc_env.core.typing import Floats, Vector3
 
 PARENT = (1, -1, 1, 1, 2, 3, 4, 1, 2, 7, 8, 9, 10, 11, 12)
-"""Parents: the nose, the right shoulder and the left half hang on the left shoulder."""
+"""Parent of each joint; -1 for the root. The nose, the right shoulder and the left half hang on
+the left shoulder."""
 ORDER = (1, 0, 2, 7, 8, 3, 4, 5, 6, 9, 10, 11, 12, 13, 14)
 """Joints with every parent before its children."""
 LEAVES_FIRST = ORDER[::-1]
+"""Joints with every parent after its children."""
 ROOT = ORDER[0]
+"""The joint without a parent, the left shoulder."""
 _ends = [tuple(sorted(int(end) for end in ends)) for ends in BONES]
 EDGE_BONE = tuple(
     _ends.index((min(j, PARENT[j]), max(j, PARENT[j]))) if j != ROOT else -1
@@ -25,13 +31,67 @@ EDGE_BONE = tuple(
 )
 """Row of `skeleton.BONES` that joins a joint to its parent; -1 for the root."""
 _LEAST_PIVOT = 1e-13
+"""Pivot below which a matrix counts as singular."""
 _REORDER = {"reassoc", "contract", "nsz"}  # lets sums vectorise; NaN and infinity keep meaning
 
 
+class Row6(NamedTuple):
+    """One row of a 6x6 matrix."""
+
+    c0: float
+    """Column 0."""
+    c1: float
+    """Column 1."""
+    c2: float
+    """Column 2."""
+    c3: float
+    """Column 3."""
+    c4: float
+    """Column 4."""
+    c5: float
+    """Column 5."""
+
+
+class Inverse3(NamedTuple):
+    """The inverse of a symmetric 3x3 matrix: its lower triangle, and whether it can be used."""
+
+    a00: float
+    """Entry 00."""
+    a10: float
+    """Entry 10."""
+    a11: float
+    """Entry 11."""
+    a20: float
+    """Entry 20."""
+    a21: float
+    """Entry 21."""
+    a22: float
+    """Entry 22."""
+    is_positive: bool
+    """Whether the matrix is positive definite."""
+
+
+class Blocks(NamedTuple):
+    """Factors of a symmetric 6x6 matrix [[U, L'], [L, D]] of 3x3 blocks."""
+
+    upper: Inverse3
+    """Inverse of the upper block, U^-1."""
+    x: Vector3
+    """U^-1 times row 0 of L: slope of coordinate 3 on the upper half."""
+    y: Vector3
+    """U^-1 times row 1 of L: slope of coordinate 4 on the upper half."""
+    z: Vector3
+    """U^-1 times row 2 of L: slope of coordinate 5 on the upper half."""
+    lower: Inverse3
+    """Inverse of the lower block given the upper, (D - L U^-1 L')^-1."""
+
+
 @kernel(fastmath=_REORDER, forceinline=True)
-def _combine(a0, a1, a2, a3, a4, a5, b):
-    """Sum of the rows of a 6x6 matrix, each times a number."""
-    return (
+def _combine_rows(
+    a0: float, a1: float, a2: float, a3: float, a4: float, a5: float, b: Floats
+) -> Row6:
+    """Return the sum of the rows of b (6, 6), row i times ai."""
+    return Row6(
         a0 * b[0, 0] + a1 * b[1, 0] + a2 * b[2, 0] + a3 * b[3, 0] + a4 * b[4, 0] + a5 * b[5, 0],
         a0 * b[0, 1] + a1 * b[1, 1] + a2 * b[2, 1] + a3 * b[3, 1] + a4 * b[4, 1] + a5 * b[5, 1],
         a0 * b[0, 2] + a1 * b[1, 2] + a2 * b[2, 2] + a3 * b[3, 2] + a4 * b[4, 2] + a5 * b[5, 2],
@@ -42,24 +102,24 @@ def _combine(a0, a1, a2, a3, a4, a5, b):
 
 
 @kernel(fastmath=_REORDER, forceinline=True)
-def multiply(a, b, out):
-    """out = a b for 6x6 matrices; nothing is written before a row is complete."""
+def multiply(a: Floats, b: Floats, out: Floats) -> None:
+    """Write the product a b of 6x6 matrices; `out` may be `a`, since rows are written whole."""
     for i in range(6):
-        row = _combine(a[i, 0], a[i, 1], a[i, 2], a[i, 3], a[i, 4], a[i, 5], b)
+        row = _combine_rows(a[i, 0], a[i, 1], a[i, 2], a[i, 3], a[i, 4], a[i, 5], b)
         out[i, 0], out[i, 1], out[i, 2], out[i, 3], out[i, 4], out[i, 5] = row
 
 
 @kernel(fastmath=_REORDER, forceinline=True)
-def transposed_multiply(a, b, out):
-    """out = a' b for 6x6 matrices."""
+def transposed_multiply(a: Floats, b: Floats, out: Floats) -> None:
+    """Write the product a' b of 6x6 matrices."""
     for i in range(6):
-        row = _combine(a[0, i], a[1, i], a[2, i], a[3, i], a[4, i], a[5, i], b)
+        row = _combine_rows(a[0, i], a[1, i], a[2, i], a[3, i], a[4, i], a[5, i], b)
         out[i, 0], out[i, 1], out[i, 2], out[i, 3], out[i, 4], out[i, 5] = row
 
 
 @kernel(fastmath=_REORDER)
-def multiply_transposed(a, b, out):
-    """out = a b' for 6x6 matrices."""
+def multiply_transposed(a: Floats, b: Floats, out: Floats) -> None:
+    """Write the product a b' of 6x6 matrices."""
     for k in range(6):
         b0, b1, b2, b3, b4, b5 = b[k, 0], b[k, 1], b[k, 2], b[k, 3], b[k, 4], b[k, 5]
         for i in range(6):
@@ -68,11 +128,13 @@ def multiply_transposed(a, b, out):
 
 
 @kernel(fastmath=_REORDER, forceinline=True)
-def inverse_of(a00, a10, a11, a20, a21, a22):
-    """Inverse of a symmetric 3x3 matrix by its L D L' factors; whether it is positive definite.
+def inverse_of(a00: float, a10: float, a11: float, a20: float, a21: float, a22: float) -> Inverse3:
+    """Return the inverse of a symmetric 3x3 matrix by its L D L' factors.
 
-    Six numbers in, six and the answer out: 00, 10, 11, 20, 21, 22. Unlike cofactors it loses no
-    digits where a matrix is nearly singular.
+    Unlike cofactors it loses no digits where a matrix is nearly singular.
+
+    Args:
+        a00, a10, a11, a20, a21, a22: the lower triangle of the matrix.
     """
     d0 = 1.0 / a00
     l10, l20 = a10 * d0, a20 * d0
@@ -85,77 +147,74 @@ def inverse_of(a00, a10, a11, a20, a21, a22):
     i20, i21 = back * i22, -l21 * i22
     i11, i10 = d1 - l21 * i21, -l10 * d1 - l21 * i20
     i00 = d0 + l10 * l10 * d1 + back * i20
-    proper = a00 > _LEAST_PIVOT and p1 > _LEAST_PIVOT and p2 > _LEAST_PIVOT
-    return i00, i10, i11, i20, i21, i22, proper
+    is_positive = a00 > _LEAST_PIVOT and p1 > _LEAST_PIVOT and p2 > _LEAST_PIVOT
+    return Inverse3(i00, i10, i11, i20, i21, i22, is_positive)
 
 
 @kernel(fastmath=_REORDER, forceinline=True)
-def invert3(a, out):
-    """Inverse of a symmetric 3x3 matrix, of which only the lower half is looked at."""
+def invert3(a: Floats, out: Floats) -> None:
+    """Write the inverse of a symmetric 3x3 matrix, of which the lower triangle is read."""
     half = inverse_of(a[0, 0], a[1, 0], a[1, 1], a[2, 0], a[2, 1], a[2, 2])
-    out[0, 0], out[1, 1], out[2, 2] = half[0], half[2], half[5]
-    out[1, 0] = out[0, 1] = half[1]
-    out[2, 0] = out[0, 2] = half[3]
-    out[2, 1] = out[1, 2] = half[4]
+    out[0, 0], out[1, 1], out[2, 2] = half.a00, half.a11, half.a22
+    out[1, 0] = out[0, 1] = half.a10
+    out[2, 0] = out[0, 2] = half.a20
+    out[2, 1] = out[1, 2] = half.a21
 
 
 @kernel(fastmath=_REORDER, forceinline=True)
-def _times(half, x, y, z):
-    """A symmetric 3x3 matrix, as `inverse_of` gives it, times (x, y, z)."""
-    return (
-        half[0] * x + half[1] * y + half[3] * z,
-        half[1] * x + half[2] * y + half[4] * z,
-        half[3] * x + half[4] * y + half[5] * z,
+def _times(half: Inverse3, x: float, y: float, z: float) -> Vector3:
+    """Return the product of an inverse with the vector (x, y, z)."""
+    return Vector3(
+        half.a00 * x + half.a10 * y + half.a20 * z,
+        half.a10 * x + half.a11 * y + half.a21 * z,
+        half.a20 * x + half.a21 * y + half.a22 * z,
     )
 
 
 @kernel(fastmath=_REORDER, forceinline=True)
-def _blocks(a):
-    """Inverses, as `inverse_of` gives them, of blocks of a symmetric 6x6 matrix.
-
-    The first of its upper block, the last of what is left of the lower one when the upper is given;
-    between them the slope of the lower half on the upper. Only the lower half of `a` is looked at.
-    """
-    p = inverse_of(a[0, 0], a[1, 0], a[1, 1], a[2, 0], a[2, 1], a[2, 2])
-    x = _times(p, a[3, 0], a[3, 1], a[3, 2])
-    y = _times(p, a[4, 0], a[4, 1], a[4, 2])
-    z = _times(p, a[5, 0], a[5, 1], a[5, 2])
-    v = inverse_of(
-        a[3, 3] - (x[0] * a[3, 0] + x[1] * a[3, 1] + x[2] * a[3, 2]),
-        a[4, 3] - (y[0] * a[3, 0] + y[1] * a[3, 1] + y[2] * a[3, 2]),
-        a[4, 4] - (y[0] * a[4, 0] + y[1] * a[4, 1] + y[2] * a[4, 2]),
-        a[5, 3] - (z[0] * a[3, 0] + z[1] * a[3, 1] + z[2] * a[3, 2]),
-        a[5, 4] - (z[0] * a[4, 0] + z[1] * a[4, 1] + z[2] * a[4, 2]),
-        a[5, 5] - (z[0] * a[5, 0] + z[1] * a[5, 1] + z[2] * a[5, 2]),
+def _factor(a: Floats) -> Blocks:
+    """Return the factors of a symmetric 6x6 matrix, of which the lower triangle is read."""
+    upper = inverse_of(a[0, 0], a[1, 0], a[1, 1], a[2, 0], a[2, 1], a[2, 2])
+    x = _times(upper, a[3, 0], a[3, 1], a[3, 2])
+    y = _times(upper, a[4, 0], a[4, 1], a[4, 2])
+    z = _times(upper, a[5, 0], a[5, 1], a[5, 2])
+    lower = inverse_of(
+        a[3, 3] - (x.x * a[3, 0] + x.y * a[3, 1] + x.z * a[3, 2]),
+        a[4, 3] - (y.x * a[3, 0] + y.y * a[3, 1] + y.z * a[3, 2]),
+        a[4, 4] - (y.x * a[4, 0] + y.y * a[4, 1] + y.z * a[4, 2]),
+        a[5, 3] - (z.x * a[3, 0] + z.y * a[3, 1] + z.z * a[3, 2]),
+        a[5, 4] - (z.x * a[4, 0] + z.y * a[4, 1] + z.z * a[4, 2]),
+        a[5, 5] - (z.x * a[5, 0] + z.y * a[5, 1] + z.z * a[5, 2]),
     )
-    return p, x, y, z, v
+    return Blocks(upper, x, y, z, lower)
 
 
 @kernel(fastmath=_REORDER)
-def is_positive_definite(a):
-    """Whether a symmetric 6x6 matrix, of which the lower half is looked at, has an inverse."""
-    p, _, _, _, v = _blocks(a)
-    return p[6] and v[6]
+def is_positive_definite(a: Floats) -> bool:
+    """Return whether a symmetric 6x6 matrix, of which the lower triangle is read, is positive."""
+    blocks = _factor(a)
+    return blocks.upper.is_positive and blocks.lower.is_positive
 
 
 @kernel(fastmath=_REORDER)
-def invert(a, out):
-    """Inverse of a symmetric 6x6 matrix by its blocks; whether it is positive definite."""
-    p, x, y, z, v = _blocks(a)
+def invert(a: Floats, out: Floats) -> bool:
+    """Write the inverse of a symmetric 6x6 matrix; return whether it is positive definite."""
+    blocks = _factor(a)
+    p, x, y, z, v = blocks.upper, blocks.x, blocks.y, blocks.z, blocks.lower
     for k in range(3):
         f, g, h = _times(v, x[k], y[k], z[k])
         out[3, k], out[4, k], out[5, k] = -f, -g, -h
         out[k, 3], out[k, 4], out[k, 5] = -f, -g, -h
         for i in range(3):
             out[i, k] = x[i] * f + y[i] * g + z[i] * h
-    out[0, 0] += p[0]
-    out[1, 1] += p[2]
-    out[2, 2] += p[5]
-    out[1, 0] = out[0, 1] = out[1, 0] + p[1]
-    out[2, 0] = out[0, 2] = out[2, 0] + p[3]
-    out[2, 1] = out[1, 2] = out[2, 1] + p[4]
-    out[3, 3], out[4, 4], out[5, 5] = v[0], v[2], v[5]
-    out[4, 3] = out[3, 4] = v[1]
-    out[5, 3] = out[3, 5] = v[3]
-    out[5, 4] = out[4, 5] = v[4]
-    return p[6] and v[6]
+    out[0, 0] += p.a00
+    out[1, 1] += p.a11
+    out[2, 2] += p.a22
+    out[1, 0] = out[0, 1] = out[1, 0] + p.a10
+    out[2, 0] = out[0, 2] = out[2, 0] + p.a20
+    out[2, 1] = out[1, 2] = out[2, 1] + p.a21
+    out[3, 3], out[4, 4], out[5, 5] = v.a00, v.a11, v.a22
+    out[4, 3] = out[3, 4] = v.a10
+    out[5, 3] = out[3, 5] = v.a20
+    out[5, 4] = out[4, 5] = v.a21
+    return p.is_positive and v.is_positive

@@ -1,4 +1,4 @@
-"""Learning: what a hypothesis keeps of a frame for later ones, true noise and lengths of bones.
+"""Learning: true noise and lengths of bones, which a hypothesis keeps from frame to frame.
 
 True errors of a detector may be larger or smaller than it reports, and they may persist for about
 half a second. Per worker and camera a factor on the reported variance is learnt with which a
@@ -22,98 +22,125 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hrc_env.core.declared import Records1, Records2
 from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats, Ints
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M, inverse3
 from hrc_env.tracking.config import ParticleConfig
+from hrc_env.tracking.measurements import Frame
 from hrc_env.tracking.tree.gaussian import PARENT
-from hrc_env.tracking.tree.state import EDGE_STIFFNESS_M
+from hrc_env.tracking.tree.state import (
+    EDGE_STIFFNESS_M,
+    LAST_SQUARES,
+    PRODUCTS,
+    REDUNDANCY,
+    SQUARES,
+    TURN,
+    Noise,
+    Tree,
+    Work,
+)
 
 _TURNS = 2
-"""Every update looks at every so-manieth joint, which costs less and tells as much: neighbouring
-frames are alike."""
+"""Turns in which the joints are learnt from, one each update: neighbouring frames are alike, so
+that this costs less and teaches as much."""
 _CAMERA_WEIGHT = 50.0
-"""The reported noise counts as so much redundancy, so that the first frames decide little."""
+"""Redundancy that the reported noise counts as, so that the first frames decide little."""
 _JOINT_WEIGHT = 100.0
-"""A camera's noise counts as so much redundancy of each joint's."""
+"""Redundancy of each joint that its camera's noise counts as."""
 _SHARE_WEIGHT = 600.0
-"""The share that persists, as told, counts as so many squared residuals: two views alone show
-it late."""
+"""Squared residuals that the assumed share of persistent variance counts as: with two views alone
+the true one shows late."""
 _CHANCE = 0.07
-"""Twice the standard deviation of the share that persists where nothing does."""
-_CORRELATED_UPDATES, _GATE_SIGMA, _LEAST_VARIANCE = 10.0, 3.0, 1e-5
-"""Of the lengths of bones: updates for which errors last, gate, least variance [m^2]."""
+"""Twice the standard deviation of the estimated share where no error persists."""
+_CORRELATED_UPDATES = 10.0
+"""Updates for which errors of a bone's length last."""
+_GATE_SIGMA = 3.0
+"""Standard deviations beyond which a measurement of a bone's length is ignored."""
+_LEAST_VARIANCE = 1e-5
+"""Least variance of a bone's length [m^2]."""
 _OPEN_M = 0.5
-"""Two views triangulate no joint along a ray that they share: it stays within this [m]."""
+"""Standard deviation of a joint about its mean in the triangulation [m]: two views leave the
+place along a ray that they share open."""
 _LEAST_BELIEF = 0.5
+"""Weight below which a measurement is not learnt from."""
 _REORDER = {"reassoc", "contract", "arcp", "nsz"}  # NaN and infinity keep their meaning
 
 
 class NoiseModel(NamedTuple):
-    """What the kernels need to learn the factors."""
+    """The constants for learning the factors on the reported variances."""
 
     keep: float
-    """Share of what was learnt of a joint that its next turn leaves."""
-    persists: float
+    """Share of a joint's statistics that its next turn leaves."""
+    correlation: float
     """Correlation r over one update of errors that persist."""
     share: float
-    """L before anything was learnt."""
-    least: float
-    most: float
-    """Bounds of the factor on the variance; equal: nothing is learnt."""
+    """Assumed share L of the variance that persists."""
+    min_factor: float
+    """Lower bound of the factors."""
+    max_factor: float
+    """Upper bound of the factors; equal to the lower one if nothing is learnt."""
 
 
-def noise_model(config: ParticleConfig, ctrl_dt: float) -> NoiseModel:
-    """The constants for updates that are `ctrl_dt` [s] apart."""
-    least, most = config.noise_bounds
-    keep, persists = (
+def make_noise_model(config: ParticleConfig, ctrl_dt: float) -> NoiseModel:
+    """Return the constants for updates that are `ctrl_dt` [s] apart."""
+    min_factor, max_factor = config.noise_bounds
+    keep, correlation = (
         math.exp(-ctrl_dt / tau) for tau in (config.noise_tau_s, config.noise_persists_s)
     )
-    return NoiseModel(keep**_TURNS, persists, config.noise_share, least, most)
+    return NoiseModel(keep**_TURNS, correlation, config.noise_share, min_factor, max_factor)
 
 
 @kernel
-def learn_from_frame(frame, tree, learnt, model, w):
-    """Learn lengths of bones and factors on the noise from a tree that was updated, in place."""
-    learn_lengths(tree, w.n_views)
-    learn_noise(frame, tree, learnt, model, w)
+def learn_from_frame(
+    frame: Frame, tree: Tree, noise: Records2[Noise], model: NoiseModel, work: Work
+) -> None:
+    """Learn lengths of bones and factors on the noise from an updated hypothesis.
 
-
-@kernel
-def learn_noise(frame, tree, learnt, model, w):
-    """Learn the factors of `learnt` (J, C), records of `tree.state.NOISE`, from one update, in
-    place.
-
-    `frame` has sigma as scaled by `scale_sigma`, w.predicted (J, 3, 3) the covariances before the
-    update.
+    Args:
+        frame: the measurements, with `sigma` as `measurements.scale_sigma` leaves it.
+        tree: the hypothesis; its lengths are changed in place.
+        noise: (J, C) its measurement noise, changed in place.
+        model: constants for learning the factors.
+        work: scratch with `n_views` and with `predicted`, the covariances before the update.
     """
-    if model.least == model.most:
+    learn_lengths(tree, work.n_views)
+    if model.min_factor == model.max_factor:
         return
-    mean, cov, predicted = tree.body, tree.cov, w.predicted
-    view, spread, grows = frame.looks, w.spread, w.grows
-    turn = learnt[0, 0].sums[4]
-    learnt[0, 0].sums[4] = (turn + 1.0) % _TURNS
-    for j in range(len(mean)):
-        n_views, grows[j] = 0, -1.0
+    view, spread, persistence = frame.joint_views, work.spread, work.persistence
+    turn = noise[0, 0].sums[TURN]
+    noise[0, 0].sums[TURN] = (turn + 1.0) % _TURNS
+    for j in range(len(tree.body)):
+        n_views, persistence[j] = 0, -1.0
         if j % _TURNS == turn:
-            n_views = _look(frame, mean[j], j, view, spread)
+            n_views = _triangulate(frame, tree.body[j], j, view, spread)
         if n_views < 2:
-            for c in range(learnt.shape[1]):
-                learnt[j, c].last[0] *= model.persists
-                learnt[j, c].last[1] *= model.persists
+            for c in range(noise.shape[1]):
+                noise[j, c].last_residual[0] *= model.correlation
+                noise[j, c].last_residual[1] *= model.correlation
         else:
-            _compare(view, spread, learnt[j], model)
+            _add_residuals(view, spread, noise[j], model)
         if n_views > 0:
-            follows = min(_remembered(cov[j], predicted[j], spread), 1.0) * model.persists
-            grows[j] = (1.0 + follows) / (1.0 - follows)
-    _set_factors(learnt, grows, model)
+            weight = min(_prediction_weight(tree.cov[j], work.predicted[j], spread), 1.0)
+            lasting = weight * model.correlation
+            persistence[j] = (1.0 + lasting) / (1.0 - lasting)
+    _set_factors(noise, persistence, model)
 
 
 @kernel(fastmath=_REORDER)
-def _look(frame, body, j, view, spread):
-    """Triangulate joint j linearly about `body`, from the cameras that are believed; how many.
+def _triangulate(frame: Frame, body: Floats, j: int, view: Floats, spread: Floats) -> int:
+    """Triangulate a joint from this frame alone, linearly about its mean.
 
-    Fills view (C, 8) by `_linearise` (a residual of infinity: the camera does not count) and spread
-    (3, 4): covariance of the point, and in the last column where it is from `body`.
+    Args:
+        frame: the measurements, of which those with enough weight count.
+        body: (6,) mean of the joint.
+        j: the joint.
+        view: (C, 8) receives the rows of `_linearise`; infinity as the first residual of a camera
+            that does not count.
+        spread: (3, 4) receives the point's covariance [m^2] and its offset from the mean [m].
+
+    Returns:
+        The number of cameras that count.
     """
     h00 = h11 = h22 = 1.0 / _OPEN_M**2
     h01 = h02 = h12 = g0 = g1 = g2 = 0.0
@@ -147,9 +174,19 @@ def _look(frame, body, j, view, spread):
 
 
 @kernel(fastmath=_REORDER)
-def _linearise(p, body, pixel, sigma, out):
-    """Jacobians of u and of v and the residuals of both, all over sigma, into out (8,), if it
-    sees."""
+def _linearise(p: Floats, body: Floats, pixel: Floats, sigma: float, out: Floats) -> bool:
+    """Write the Jacobians and the residuals of a joint's pixel, over its standard deviation.
+
+    Args:
+        p: (3, 4) projection.
+        body: (3+,) position of the joint [m].
+        pixel: (2,) measurement [px].
+        sigma: its standard deviation [px].
+        out: (8,) receives the Jacobian of u (3) and of v (3) [1/m] and the two residuals.
+
+    Returns:
+        Whether the joint is in front of the camera.
+    """
     x, y, z = body[0], body[1], body[2]
     depth = p[2, 0] * x + p[2, 1] * y + p[2, 2] * z + p[2, 3]
     if not depth > NEAREST_DEPTH_M:
@@ -165,40 +202,51 @@ def _linearise(p, body, pixel, sigma, out):
 
 
 @kernel(fastmath=_REORDER)
-def _compare(view, spread, learnt, model):
-    """Add one joint's residuals about its triangulated point to its sums (C, 5), which fade.
+def _add_residuals(view: Floats, spread: Floats, noise: Records1[Noise], model: NoiseModel) -> None:
+    """Add one joint's residuals about its triangulated point to the statistics of its noise.
 
-    What is left of the last residuals are those, faded as errors that persist would: products
-    with them over their squares tell the same however long ago they were.
+    Of the last residuals a part is left, faded as errors that persist fade: products with them
+    over their squares estimate the same share after any time.
+
+    Args:
+        view: (C, 8) as `_triangulate` writes it.
+        spread: (3, 4) likewise.
+        noise: (C,) the joint's noise in each camera, changed in place.
+        model: constants for learning the factors.
     """
-    keep, persists = model.keep, model.persists
     s00, s11, s22 = spread[0, 0], spread[1, 1], spread[2, 2]
     s01, s02, s12 = 2.0 * spread[0, 1], 2.0 * spread[0, 2], 2.0 * spread[1, 2]
     x, y, z = spread[0, 3], spread[1, 3], spread[2, 3]
     for c in range(len(view)):
         if not view[c, 6] < np.inf:
-            learnt[c].last[0] *= persists
-            learnt[c].last[1] *= persists
+            noise[c].last_residual[0] *= model.correlation
+            noise[c].last_residual[1] *= model.correlation
             continue
         a0, a1, a2 = view[c, 0], view[c, 1], view[c, 2]
         b0, b1, b2 = view[c, 3], view[c, 4], view[c, 5]
-        scale = math.sqrt(learnt[c].factor)  # to reported standard deviations
+        scale = math.sqrt(noise[c].factor)  # to reported standard deviations
         du = scale * (view[c, 6] - a0 * x - a1 * y - a2 * z)
         dv = scale * (view[c, 7] - b0 * x - b1 * y - b2 * z)
         absorbed = s00 * (a0 * a0 + b0 * b0) + s11 * (a1 * a1 + b1 * b1)
         absorbed += s22 * (a2 * a2 + b2 * b2) + s01 * (a0 * a1 + b0 * b1)
         absorbed += s02 * (a0 * a2 + b0 * b2) + s12 * (a1 * a2 + b1 * b2)
-        u, v = learnt[c].last[0], learnt[c].last[1]
-        learnt[c].sums[0] = keep * learnt[c].sums[0] + du * du + dv * dv
-        learnt[c].sums[1] = keep * learnt[c].sums[1] + 2.0 - absorbed
-        learnt[c].sums[2] = keep * learnt[c].sums[2] + du * u + dv * v
-        learnt[c].sums[3] = keep * learnt[c].sums[3] + u * u + v * v
-        learnt[c].last[0], learnt[c].last[1] = du, dv
+        u, v = noise[c].last_residual[0], noise[c].last_residual[1]
+        noise[c].sums[SQUARES] = model.keep * noise[c].sums[SQUARES] + du * du + dv * dv
+        noise[c].sums[REDUNDANCY] = model.keep * noise[c].sums[REDUNDANCY] + 2.0 - absorbed
+        noise[c].sums[PRODUCTS] = model.keep * noise[c].sums[PRODUCTS] + du * u + dv * v
+        noise[c].sums[LAST_SQUARES] = model.keep * noise[c].sums[LAST_SQUARES] + u * u + v * v
+        noise[c].last_residual[0], noise[c].last_residual[1] = du, dv
 
 
 @kernel(fastmath=_REORDER)
-def _remembered(cov, predicted, work):
-    """tr(cov predicted^-1) / 3: how much of a position is the prediction's; `work` (3, 3+)."""
+def _prediction_weight(cov: Floats, predicted: Floats, work: Floats) -> float:
+    """Return the weight of the prediction in a position, tr(cov predicted^-1) / 3.
+
+    Args:
+        cov: (3+, 3+) covariance after the update [m^2].
+        predicted: (3, 3) covariance before it [m^2].
+        work: (3, 3+) scratch.
+    """
     inverse3(predicted, work)
     own = cov[0, 0] * work[0, 0] + cov[1, 1] * work[1, 1] + cov[2, 2] * work[2, 2]
     cross = cov[0, 1] * work[0, 1] + cov[0, 2] * work[0, 2] + cov[1, 2] * work[1, 2]
@@ -206,41 +254,54 @@ def _remembered(cov, predicted, work):
 
 
 @kernel(fastmath=_REORDER)
-def _set_factors(learnt, grows, model):
-    """The factors (J, C) that the sums ask for.
+def _set_factors(noise: Records2[Noise], persistence: Floats, model: NoiseModel) -> None:
+    """Write the factors that follow from the statistics.
 
-    `grows` (J,) is the last bracket of the module's formula; less than 0: the factor stays.
+    Args:
+        noise: (J, C) the noise, changed in place.
+        persistence: (J,) last bracket of the module's formula; the factors of a joint stay where
+            it is negative.
+        model: constants for learning the factors.
     """
-    for c in range(learnt.shape[1]):
+    for c in range(noise.shape[1]):
         squares = redundancy = _CAMERA_WEIGHT
-        products, unchanged = model.persists * model.share * _SHARE_WEIGHT, _SHARE_WEIGHT
-        for j in range(len(learnt)):
-            squares += learnt[j, c].sums[0]
-            redundancy += learnt[j, c].sums[1]
-            products += learnt[j, c].sums[2]
-            unchanged += learnt[j, c].sums[3]
+        products, unchanged = model.correlation * model.share * _SHARE_WEIGHT, _SHARE_WEIGHT
+        for j in range(len(noise)):
+            squares += noise[j, c].sums[SQUARES]
+            redundancy += noise[j, c].sums[REDUNDANCY]
+            products += noise[j, c].sums[PRODUCTS]
+            unchanged += noise[j, c].sums[LAST_SQUARES]
         of_camera = squares / redundancy
-        share = products / (unchanged * model.persists)
+        share = products / (unchanged * model.correlation)
         share = min(max((share - _CHANCE) / (1.0 - _CHANCE), 0.0), 1.0)
-        for j in range(len(learnt)):
-            if grows[j] > 0.0:
-                own = learnt[j, c].sums[0] + _JOINT_WEIGHT * of_camera
-                variance = own / (learnt[j, c].sums[1] + _JOINT_WEIGHT)
-                wanted = variance * (1.0 - share + share * grows[j])
-                learnt[j, c].factor = min(max(wanted, model.least), model.most)
+        for j in range(len(noise)):
+            if persistence[j] > 0.0:
+                own = noise[j, c].sums[SQUARES] + _JOINT_WEIGHT * of_camera
+                variance = own / (noise[j, c].sums[REDUNDANCY] + _JOINT_WEIGHT)
+                factor = variance * (1.0 - share + share * persistence[j])
+                noise[j, c].factor = min(max(factor, model.min_factor), model.max_factor)
 
 
 @kernel
-def learn_lengths(tree, n_views):
-    """Learn a tree's bone lengths, in place, from the joints that two views see (J,)."""
+def learn_lengths(tree: Tree, n_views: Ints) -> None:
+    """Learn a hypothesis's bone lengths where two cameras measured both ends.
+
+    Each length has a Kalman filter with a measurement noise that is larger by the number of updates
+    for which errors last.
+
+    Args:
+        tree: the updated hypothesis, changed in place.
+        n_views: (J,) number of cameras that measured each joint.
+    """
     body, cov, slope = tree.body, tree.cov, tree.slope
+    length, variance = tree.bone_length, tree.bone_variance
     for j in range(len(body)):
-        q = PARENT[j]
+        q: int = PARENT[j]
         if q < 0 or n_views[j] < 2 or n_views[q] < 2:
             continue
         x, y, z = body[j, 0] - body[q, 0], body[j, 1] - body[q, 1], body[j, 2] - body[q, 2]
-        now = math.sqrt(x * x + y * y + z * z) + 1e-6
-        along = (x / now, y / now, z / now)
+        apart = math.sqrt(x * x + y * y + z * z) + 1e-6
+        along = (x / apart, y / apart, z / apart)
         spread, total = 0.0, 0.0
         for i in range(3):
             for k in range(3):
@@ -250,18 +311,11 @@ def learn_lengths(tree, n_views):
                 difference = cov[j, i, k] + cov[q, i, k] - 2.0 * edge
                 spread += along[i] * along[k] * difference
                 total += difference if i == k else 0.0
-        measured = now - 0.5 * (total - spread) / now  # errors across a bone lengthen it
-        _learn_length(tree, j, measured, max(spread, EDGE_STIFFNESS_M[j] ** 2))
-
-
-@kernel
-def _learn_length(tree, j, measured, spread):
-    """Kalman update of one length by a measurement whose errors last for several updates."""
-    length, variance = tree.bone_length, tree.bone_variance
-    noise = _CORRELATED_UPDATES * spread
-    miss = measured - length[j]
-    if miss * miss > _GATE_SIGMA**2 * (noise + variance[j]):
-        return
-    gain = variance[j] / (variance[j] + noise)
-    length[j] += gain * miss
-    variance[j] = max((1.0 - gain) * variance[j], _LEAST_VARIANCE)
+        measured = apart - 0.5 * (total - spread) / apart  # errors across a bone lengthen it
+        noise = _CORRELATED_UPDATES * max(spread, EDGE_STIFFNESS_M[j] ** 2)
+        miss = measured - length[j]
+        if miss * miss > _GATE_SIGMA**2 * (noise + variance[j]):
+            continue
+        gain = variance[j] / (variance[j] + noise)
+        length[j] += gain * miss
+        variance[j] = max((1.0 - gain) * variance[j], _LEAST_VARIANCE)

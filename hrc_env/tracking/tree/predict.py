@@ -11,159 +11,252 @@ Cov(x_j, r), which the tree gives by a recursion. Keeping these and forgetting a
 covariances is the nearest Gaussian on the tree (least Kullback-Leibler divergence).
 
 A trunk that leans little counts as upright, as people's are: where one view leaves open how far it
-leans, that tells the depth. One that lies takes head and arms with it; the legs go with it, or
-hang below it as those of a person who bends down, whichever they are nearer to.
+leans, that fixes the depth. One that lies takes head and arms with it; the legs go with it, or
+stay below it as in a person bending down, whichever is nearer.
 """
 
 import functools
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import JOINT
-from hrc_env.core.typing import Floats
+from hrc_env.core.typing import Floats, Vector3
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT, invert, multiply, multiply_transposed
+from hrc_env.tracking.tree.state import Tree, Work
 
 _LEFT, _RIGHT, _LEFT_HIP, _RIGHT_HIP = 1, 2, 7, 8  # shoulders: _RIGHT, _LEFT_HIP hang on _LEFT
 _REORDER = {"reassoc", "contract", "nsz"}
-_LEANS, _LIES = math.cos(math.radians(25.0)), math.cos(math.radians(50.0))
-"""Up to the first angle a trunk is upright, from the second on it lies; judgement."""
+_UPRIGHT_COSINE = math.cos(math.radians(25.0))
+"""Cosine of the angle from the vertical up to which a trunk counts as upright; judgement."""
+_LYING_COSINE = math.cos(math.radians(50.0))
+"""Cosine of the angle from the vertical from which a trunk counts as lying; judgement."""
 _SHORT_M = 0.05
+"""Shortest line from right to left that gives a heading [m]."""
 _KNEE, _FOOT = JOINT["left_knee"], JOINT["left_foot"]
 SPREAD_M: Floats = np.array(
-    [.06, .04, .04, .12, .12, .20, .20, .04, .04, .12, .12, .20, .20, .22, .22]
-)  # fmt: skip
-"""Standard deviation of a joint about its mean place on the body [m]; a judgement."""
+    [0.06, 0.04, 0.04, 0.12, 0.12, 0.20, 0.20, 0.04, 0.04, 0.12, 0.12, 0.20, 0.20, 0.22, 0.22]
+)
+"""(J,) standard deviation of a joint about its mean place on the body [m]; a judgement."""
 SPEED_M_S: Floats = np.array(
-    [.2, .2, .2, .5, .5, .95, .95, .2, .2, .5, .5, .9, .9, .95, .95]
-)  # fmt: skip
-"""Standard deviation of its speed relative to the body [m/s]; a judgement: those of people at
+    [0.2, 0.2, 0.2, 0.5, 0.5, 0.95, 0.95, 0.2, 0.2, 0.5, 0.5, 0.9, 0.9, 0.95, 0.95]
+)
+"""(J,) standard deviation of its speed relative to the body [m/s]; a judgement: those of people at
 work are near it, and twice as much makes every prediction twice as uncertain as it is wrong."""
-_OFFSET_TAU_S, _OFFSET_STD_M = 2.0, 0.06
+_OFFSET_TAU_S = 2.0
+"""Time constant with which places on the body are forgotten [s]."""
+_OFFSET_STD_M = 0.06
+"""Standard deviation of a joint's position above which nothing is learnt from it [m]."""
+
+
+class JointMotion(NamedTuple):
+    """The motion of every joint relative to its anchor over a time step."""
+
+    F: Floats
+    """(J, 2, 2) transition of position and velocity, the same on each axis."""
+    Q: Floats
+    """(J, 2, 2) process noise of position and velocity."""
+
+
+class MotionModel(NamedTuple):
+    """The motion of the whole tree over a time step."""
+
+    F: Floats
+    """(J, 2, 2) transition of each joint's position and velocity relative to its anchor."""
+    travel: Floats
+    """(J, 2, 2) transition of the anchor's position and velocity to the joint's."""
+    Q: Floats
+    """(J, 2, 2) process noise of each joint."""
+    shared: Floats
+    """(2, 2) part of the process noise that is the whole body's."""
+
+
+class TorsoState(NamedTuple):
+    """Mean position and velocity of the four torso joints in the world frame."""
+
+    x: float
+    """First coordinate [m]."""
+    y: float
+    """Second coordinate [m]."""
+    z: float
+    """Height [m]."""
+    vx: float
+    """Velocity along the first axis [m/s]."""
+    vy: float
+    """Velocity along the second axis [m/s]."""
+    vz: float
+    """Upward velocity [m/s]."""
+
+
+class Lean(NamedTuple):
+    """The attitude of a trunk."""
+
+    share: float
+    """0 for an upright trunk, 1 for a lying one."""
+    direction: Vector3
+    """Unit vector from the hips to the shoulders in the world frame."""
 
 
 @kernel
-def predict_tree(tree, model, dt, w):
-    """Move one worker by dt [s], in place, and learn their joints' places on the body.
+def predict_tree(tree: Tree, model: MotionModel, dt: float, work: Work) -> None:
+    """Move a hypothesis by one time step and learn its joints' places on the body.
 
-    `model` is F (J, 2, 2), travel (J, 2, 2), Q (J, 2, 2) noise of a joint, shared (2, 2) part of it
-    that is the whole body's; `w` is scratch.
+    Args:
+        tree: the hypothesis, changed in place.
+        model: motion over the time step.
+        dt: the time step [s].
+        work: scratch.
     """
-    F, travel, Q, shared = model
     cov, slope = tree.cov, tree.slope
-    _move_means(tree, F, travel, dt, w)
-    torso = w.a
-    _relate_torso(cov, slope, w)
+    _move_means(tree, model, dt, work)
+    torso = work.a
+    _relate_torso(cov, slope, work)
     for j in ORDER:
-        q = PARENT[j]
-        _move(cov[j], w.root[j], w.root[j], torso, F, travel, (j, j), w.moved[j])
-        _add_noise(Q[j], w.moved[j])
+        q: int = PARENT[j]
+        _move_covariance(work.root[j], work.root[j], torso, model, j, j, cov[j], work.moved[j])
+        _add_noise(model.Q[j], work.moved[j])
         if q >= 0:
-            _move(w.edge[j], w.root[j], w.root[q], torso, F, travel, (j, q), w.moved_edge[j])
-            _add_noise(shared, w.moved_edge[j])
+            moved_edge = work.moved_edge[j]
+            _move_covariance(
+                work.root[j], work.root[q], torso, model, j, q, work.edge[j], moved_edge
+            )
+            _add_noise(model.shared, moved_edge)
     for j in ORDER:
         for i in range(6):
             for k in range(i + 1):
-                cov[j, i, k] = cov[j, k, i] = w.moved[j, i, k]
-        if not invert(cov[j], w.inverse[j]):
-            w.inverse[j] = 0.0
+                cov[j, i, k] = cov[j, k, i] = work.moved[j, i, k]
+        if not invert(cov[j], work.inverse[j]):
+            work.inverse[j] = 0.0
         if PARENT[j] >= 0:
-            multiply(w.moved_edge[j], w.inverse[PARENT[j]], slope[j])
+            multiply(work.moved_edge[j], work.inverse[PARENT[j]], slope[j])
 
 
 @kernel
-def _torso_of(body, i):
-    """Mean of the torso's four joints, component i."""
+def torso_mean(body: Floats, i: int) -> float:
+    """Return component i of the mean of the torso's four joints, of a body (J, 3+)."""
     return 0.25 * (body[_LEFT, i] + body[_RIGHT, i] + body[_LEFT_HIP, i] + body[_RIGHT_HIP, i])
 
 
 @kernel
-def _move_means(tree, F, travel, dt, w):
-    body, offset, axes, place = tree.body, tree.offset, w.axes, w.place
-    root = (
-        _torso_of(body, 0), _torso_of(body, 1), _torso_of(body, 2),
-        _torso_of(body, 3), _torso_of(body, 4), _torso_of(body, 5),
-    )  # fmt: skip
-    known = set_axes(body, root, offset, axes)
-    if known:
-        learn_offsets(tree, root, axes, dt)
+def trunk_vector(body: Floats, i: int) -> float:
+    """Return component i of twice the vector from the middle of the hips to the shoulders'."""
+    return body[_LEFT, i] + body[_RIGHT, i] - body[_LEFT_HIP, i] - body[_RIGHT_HIP, i]
+
+
+@kernel
+def _move_means(tree: Tree, model: MotionModel, dt: float, work: Work) -> None:
+    """Move the means of all joints with the torso and towards their places on the body."""
+    body, offset, axes, place = tree.body, tree.offset, work.axes, work.place
+    root = TorsoState(
+        torso_mean(body, 0),
+        torso_mean(body, 1),
+        torso_mean(body, 2),
+        torso_mean(body, 3),
+        torso_mean(body, 4),
+        torso_mean(body, 5),
+    )
+    is_known = set_axes(body, root, offset, axes)
+    if is_known:
+        _learn_offsets(tree, root, axes, dt)
     for j in range(len(body)):
-        own = axes[part_of(j)]
+        joint, F, travel, joint_axes = body[j], model.F[j], model.travel[j], axes[axes_of(j)]
         for i in range(3):
             place[i] = 0.0
             for k in range(3):
-                place[i] += own[i, k] * offset[j, k] if known or i == k == 2 else 0.0
-        _move_mean(body[j], root, F[j], travel[j], place)
+                place[i] += joint_axes[i, k] * offset[j, k] if is_known or i == k == 2 else 0.0
+        for i in range(3):
+            p, v = joint[i], joint[3 + i]
+            at, speed = root[i], root[3 + i]
+            p_new = F[0, 0] * p + F[0, 1] * v + travel[0, 0] * at + travel[0, 1] * speed
+            v_new = F[1, 0] * p + F[1, 1] * v + travel[1, 0] * at + travel[1, 1] * speed
+            joint[i] = p_new + travel[0, 0] * place[i]
+            joint[3 + i] = v_new + travel[1, 0] * place[i]
 
 
 @kernel
-def _move_mean(joint, root, F, travel, place):
-    for i in range(3):
-        p, v = joint[i], joint[3 + i]
-        at, speed = root[i], root[3 + i]
-        p_new = F[0, 0] * p + F[0, 1] * v + travel[0, 0] * at + travel[0, 1] * speed
-        v_new = F[1, 0] * p + F[1, 1] * v + travel[1, 0] * at + travel[1, 1] * speed
-        joint[i] = p_new + travel[0, 0] * place[i]
-        joint[3 + i] = v_new + travel[1, 0] * place[i]
+def _relate_torso(cov: Floats, slope: Floats, work: Work) -> None:
+    """Write `work.edge`, `work.root` = Cov(x_j, r) and `work.a` = Cov(r, r).
 
-
-@kernel
-def _relate_torso(cov, slope, w):
-    """Fill w.edge, w.root = Cov(x_j, r) and w.a = Cov(r, r)."""
+    Args:
+        cov: (J, 6, 6) marginal covariances.
+        slope: (J, 6, 6) slopes on the parents.
+        work: scratch that receives the results.
+    """
     for j in ORDER:
         if PARENT[j] >= 0:
-            multiply(slope[j], cov[PARENT[j]], w.edge[j])
-    right, root = w.edge[_RIGHT], w.root  # right shoulder with left
-    hip = w.edge[_LEFT_HIP]  # left hip with left shoulder
-    multiply(slope[_RIGHT_HIP], right, w.b)  # right hip with left shoulder
-    multiply_transposed(slope[_LEFT_HIP], right, w.c)  # left hip with right shoulder
-    multiply_transposed(slope[_RIGHT_HIP], w.c, w.d)  # right hip with left hip
-    other = w.edge[_RIGHT_HIP]  # right hip with right shoulder
+            multiply(slope[j], cov[PARENT[j]], work.edge[j])
+    right, root = work.edge[_RIGHT], work.root  # right shoulder with left
+    hip = work.edge[_LEFT_HIP]  # left hip with left shoulder
+    multiply(slope[_RIGHT_HIP], right, work.b)  # right hip with left shoulder
+    multiply_transposed(slope[_LEFT_HIP], right, work.c)  # left hip with right shoulder
+    multiply_transposed(slope[_RIGHT_HIP], work.c, work.d)  # right hip with left hip
+    other = work.edge[_RIGHT_HIP]  # right hip with right shoulder
     for i in range(6):
         for k in range(6):
-            own = cov[_LEFT, i, k] + right[k, i] + w.b[k, i]
+            own = cov[_LEFT, i, k] + right[k, i] + work.b[k, i]
             root[_LEFT, i, k] = 0.25 * (own + hip[k, i])
-            own = cov[_RIGHT, i, k] + right[i, k] + w.c[k, i]
+            own = cov[_RIGHT, i, k] + right[i, k] + work.c[k, i]
             root[_RIGHT, i, k] = 0.25 * (own + other[k, i])
-            own = cov[_LEFT_HIP, i, k] + w.c[i, k] + w.d[k, i]
+            own = cov[_LEFT_HIP, i, k] + work.c[i, k] + work.d[k, i]
             root[_LEFT_HIP, i, k] = 0.25 * (own + hip[i, k])
-            own = cov[_RIGHT_HIP, i, k] + w.b[i, k] + w.d[i, k]
+            own = cov[_RIGHT_HIP, i, k] + work.b[i, k] + work.d[i, k]
             root[_RIGHT_HIP, i, k] = 0.25 * (own + other[i, k])
     for i in range(6):
         for k in range(6):
             shoulders = root[_LEFT, i, k] + root[_RIGHT, i, k]
-            w.a[i, k] = 0.25 * (shoulders + root[_LEFT_HIP, i, k] + root[_RIGHT_HIP, i, k])
+            work.a[i, k] = 0.25 * (shoulders + root[_LEFT_HIP, i, k] + root[_RIGHT_HIP, i, k])
     for j in ORDER:
         if j not in (_LEFT, _RIGHT, _LEFT_HIP, _RIGHT_HIP):
             multiply(slope[j], root[PARENT[j]], root[j])
 
 
 @kernel(fastmath=_REORDER)
-def _move(edge, own, other, torso, F, travel, joints, out):
-    """f edge g' + f own e' + d other' g' + d S e' for 6x6 matrices, axes of space left alone.
+def _move_covariance(
+    own: Floats,
+    other: Floats,
+    torso: Floats,
+    model: MotionModel,
+    j: int,
+    m: int,
+    cov: Floats,
+    out: Floats,
+) -> None:
+    """Write the covariance of joints j and m after a time step, without noise.
 
-    f, d are F and travel of the first of `joints`, g, e those of the second.
+    With f, d the transitions of joint j and of its anchor, g, e those of joint m, and the axes of
+    space left alone, it is f cov g' + f own e' + d other' g' + d torso e'.
+
+    Args:
+        own: (6, 6) covariance of joint j with the torso's mean.
+        other: (6, 6) covariance of joint m with it.
+        torso: (6, 6) covariance of the torso's mean.
+        model: motion over the time step.
+        j: first joint.
+        m: second joint.
+        cov: (6, 6) covariance of the two joints before.
+        out: (6, 6) receives the covariance after.
     """
-    f, g, d, e = F[joints[0]], F[joints[1]], travel[joints[0]], travel[joints[1]]
+    f, g, d, e = model.F[j], model.F[m], model.travel[j], model.travel[m]
     for i in range(3):
-        for q in range(2):
-            g0, g1, e0, e1 = g[q, 0], g[q, 1], e[q, 0], e[q, 1]
+        for column in range(2):
+            g0, g1, e0, e1 = g[column, 0], g[column, 1], e[column, 0], e[column, 1]
             for k in range(3):
-                m, v = 3 + i, 3 + k
-                near_p = edge[i, k] * g0 + edge[i, v] * g1 + own[i, k] * e0 + own[i, v] * e1
-                near_v = edge[m, k] * g0 + edge[m, v] * g1 + own[m, k] * e0 + own[m, v] * e1
-                far_p = other[k, i] * g0 + other[v, i] * g1 + torso[i, k] * e0 + torso[i, v] * e1
-                far_v = other[k, m] * g0 + other[v, m] * g1 + torso[m, k] * e0 + torso[m, v] * e1
-                to = 3 * q + k
+                a, b = 3 + i, 3 + k
+                near_p = cov[i, k] * g0 + cov[i, b] * g1 + own[i, k] * e0 + own[i, b] * e1
+                near_v = cov[a, k] * g0 + cov[a, b] * g1 + own[a, k] * e0 + own[a, b] * e1
+                far_p = other[k, i] * g0 + other[b, i] * g1 + torso[i, k] * e0 + torso[i, b] * e1
+                far_v = other[k, a] * g0 + other[b, a] * g1 + torso[a, k] * e0 + torso[a, b] * e1
+                to = 3 * column + k
                 p = f[0, 0] * near_p + f[0, 1] * near_v + d[0, 0] * far_p + d[0, 1] * far_v
                 out[i, to] = p
-                out[m, to] = f[1, 0] * near_p + f[1, 1] * near_v + d[1, 0] * far_p + d[1, 1] * far_v
+                out[a, to] = f[1, 0] * near_p + f[1, 1] * near_v + d[1, 0] * far_p + d[1, 1] * far_v
 
 
 @kernel
-def _add_noise(noise, out):
-    """Add noise (2, 2) x I3."""
+def _add_noise(noise: Floats, out: Floats) -> None:
+    """Add noise (2, 2) of position and velocity to every axis of a covariance (6, 6)."""
     for i in range(3):
         out[i, i] += noise[0, 0]
         out[i, 3 + i] += noise[0, 1]
@@ -172,48 +265,47 @@ def _add_noise(noise, out):
 
 
 @kernel
-def leaning(body):
-    """How far a trunk lies, 0 to 1, and the direction from its hips to its shoulders."""
-    x, y, z = _trunk(body, 0), _trunk(body, 1), _trunk(body, 2)
+def measure_lean(body: Floats) -> Lean:
+    """Return how far the trunk of a body (J, 3+) lies."""
+    x, y, z = trunk_vector(body, 0), trunk_vector(body, 1), trunk_vector(body, 2)
     length = math.sqrt(x * x + y * y + z * z) + 1e-9
-    lies = min(max((z / length - _LEANS) / (_LIES - _LEANS), 0.0), 1.0)
-    return lies, (x / length, y / length, z / length)
+    cosine = z / length
+    share = (cosine - _UPRIGHT_COSINE) / (_LYING_COSINE - _UPRIGHT_COSINE)
+    return Lean(min(max(share, 0.0), 1.0), Vector3(x / length, y / length, cosine))
 
 
 @kernel
-def _trunk(body, i):
-    return body[1, i] + body[2, i] - body[7, i] - body[8, i]
-
-
-@kernel
-def part_of(j):
-    """Which axes joint j goes by: 0 the trunk's, 1 the legs'."""
+def axes_of(j: int) -> int:
+    """Return the index of the axes that joint j follows: 0 for the trunk's, 1 for the legs'."""
     return 1 if j >= _KNEE else 0
 
 
 @kernel
-def set_axes(body, root, offset, axes):
-    """Fill axes (2, 3, 3), columns forward, left, up of trunk and legs; whether they are known.
+def set_axes(body: Floats, root: TorsoState, offset: Floats, axes: Floats) -> bool:
+    """Write the axes of trunk and legs; return whether the trunk's are known.
 
-    `body` is (J, 3+), `root` begins with the middle of its torso, `offset` are the joints' mean
-    places (J, 3).
+    Args:
+        body: (J, 3+) positions [m].
+        root: mean of the torso's joints.
+        offset: (J, 3) places on the body [m].
+        axes: (2, 3, 3) receives the axes; columns forward, left and up.
     """
     trunk, legs = axes[0], axes[1]
-    lies, along = leaning(body)
+    lean = measure_lean(body)
     for i in range(3):
         legs[i, 2] = 1.0 if i == 2 else 0.0
-        trunk[i, 2] = lies * along[i] + (1.0 - lies) * legs[i, 2]
-    known = _turn(body, trunk)
-    if not _turn(body, legs) or _legs_follow(body, root, offset, axes):
+        trunk[i, 2] = lean.share * lean.direction[i] + (1.0 - lean.share) * legs[i, 2]
+    is_known = _complete_axes(body, trunk)
+    if not _complete_axes(body, legs) or _are_legs_along_trunk(body, root, offset, axes):
         for i in range(3):
             for k in range(3):
                 legs[i, k] = trunk[i, k]
-    return known
+    return is_known
 
 
 @kernel
-def _turn(body, axes):
-    """Make axes (3, 3) of a body that has up in the last column; whether its left is known."""
+def _complete_axes(body: Floats, axes: Floats) -> bool:
+    """Complete axes (3, 3) from their last column, up; return whether the body's left is known."""
     length = along = across = 0.0
     for i in range(3):
         axes[i, 1] = body[1, i] - body[2, i] + body[7, i] - body[8, i]
@@ -234,8 +326,15 @@ def _turn(body, axes):
 
 
 @kernel
-def _legs_follow(body, root, offset, axes):
-    """Whether knees and ankles are nearer to where the trunk's axes put them than below it."""
+def _are_legs_along_trunk(body: Floats, root: TorsoState, offset: Floats, axes: Floats) -> bool:
+    """Return whether knees and ankles are nearer to the trunk's axes than to upright ones.
+
+    Args:
+        body: (J, 3+) positions [m].
+        root: mean of the torso's joints.
+        offset: (J, 3) places on the body [m].
+        axes: (2, 3, 3) the trunk's axes and upright ones.
+    """
     difference = 0.0
     for j in range(_KNEE, _FOOT):
         for i in range(3):
@@ -248,11 +347,17 @@ def _legs_follow(body, root, offset, axes):
 
 
 @functools.lru_cache(maxsize=16)
-def damped_joints(dt_s: float, damping: float, root_acceleration: float) -> tuple[Floats, Floats]:
-    """Exact discretisation over `dt_s` [s] of damped joints, `damping` in (0, 1).
+def discretise_joints(dt_s: float, damping: float, root_acceleration: float) -> JointMotion:
+    """Return the exact discretisation of damped joints over a time step.
 
-    F (J, 2, 2) moves (position, velocity) relative to the anchor; the process noise Q (J, 2, 2)
-    keeps the stationary spreads and adds the whole body's acceleration [m^2/s^3].
+    Args:
+        dt_s: the time step [s].
+        damping: damping ratio, in (0, 1).
+        root_acceleration: spectral density of the whole body's acceleration [m^2/s^3].
+
+    Returns:
+        The transition relative to the anchor, and process noise that keeps the stationary spreads
+        and adds the whole body's acceleration.
     """
     frequency = SPEED_M_S / SPREAD_M
     damped = frequency * np.sqrt(1 - damping**2)
@@ -267,21 +372,25 @@ def damped_joints(dt_s: float, damping: float, root_acceleration: float) -> tupl
     F[:, 1, 0], F[:, 1, 1] = -decay * frequency**2 / damped * sin, decay * (cos - slope)
     stationary = np.zeros_like(F)
     stationary[:, 0, 0], stationary[:, 1, 1] = SPREAD_M**2, SPEED_M_S**2
-    Q = stationary - F @ stationary @ F.swapaxes(1, 2)
-    Q += whole_body_noise(dt_s, root_acceleration)
-    return F, Q
+    noise = stationary - F @ stationary @ F.swapaxes(1, 2)
+    noise += make_shared_noise(dt_s, root_acceleration)
+    return JointMotion(F, noise)
 
 
-def whole_body_noise(dt_s: float, root_acceleration: float) -> Floats:
-    """(2, 2) noise of position and velocity that all joints share over `dt_s` [s]."""
+def make_shared_noise(dt_s: float, root_acceleration: float) -> Floats:
+    """Return the (2, 2) noise of position and velocity that all joints share over `dt_s` [s]."""
     return root_acceleration * np.array([[dt_s**3 / 3, dt_s**2 / 2], [dt_s**2 / 2, dt_s]])
 
 
 @kernel
-def learn_offsets(tree, root, axes, dt):
-    """Joints that are known well teach their mean places (J, 3) on the body, in place.
+def _learn_offsets(tree: Tree, root: TorsoState, axes: Floats, dt: float) -> None:
+    """Learn the places on the body of joints with certain positions.
 
-    `axes` are as `axes.set_axes` fills them, `root` begins with the middle of the torso.
+    Args:
+        tree: the hypothesis; its offsets are changed in place.
+        root: mean of the torso's joints.
+        axes: (2, 3, 3) as `set_axes` writes them.
+        dt: time since the last prediction [s].
     """
     body, cov, offset, offset_count = tree.body, tree.cov, tree.offset, tree.offset_count
     for j in range(len(body)):
@@ -289,17 +398,23 @@ def learn_offsets(tree, root, axes, dt):
             continue
         offset_count[j] += 1.0
         trust = max(1.0 / offset_count[j], dt / _OFFSET_TAU_S)
-        own = axes[part_of(j)]
+        joint_axes = axes[axes_of(j)]
         for k in range(3):
             there = 0.0
             for i in range(3):
-                there += own[i, k] * (body[j, i] - root[i])
+                there += joint_axes[i, k] * (body[j, i] - root[i])
             offset[j, k] += trust * (there - offset[j, k])
 
 
 @functools.lru_cache(maxsize=16)
-def motion(dt_s: float, damping: float, acceleration: float) -> tuple[Floats, ...]:
-    """F, travel, Q (J, 2, 2) and shared noise (2, 2), as `tree.predict.predict_tree` takes them."""
-    F, Q = damped_joints(dt_s, damping, acceleration)
+def make_motion_model(dt_s: float, damping: float, acceleration: float) -> MotionModel:
+    """Return the motion of the tree over a time step.
+
+    Args:
+        dt_s: the time step [s].
+        damping: damping ratio of the joints, in (0, 1).
+        acceleration: spectral density of the whole body's acceleration [m^2/s^3].
+    """
+    F, Q = discretise_joints(dt_s, damping, acceleration)
     travel = np.array([[1.0, dt_s], [0.0, 1.0]]) - F
-    return F, travel, Q, whole_body_noise(dt_s, acceleration)
+    return MotionModel(F, travel, Q, make_shared_noise(dt_s, acceleration))

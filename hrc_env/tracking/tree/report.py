@@ -1,148 +1,164 @@
 """Report: the mixture of a worker's hypotheses, as wide as one view needs it.
 
-The motion model is that of people who walk and work. With one view, a person who spins, falls or
-runs is farther from the estimate than the Gaussian has it: the depth of joints follows from how
-the body is turned, and that is found late. `widening` is the factor on the covariance for it.
+The motion model is that of walking and working people. With one view, a person that spins, falls
+or runs is farther from the estimate than the Gaussian's deviations: the depth of joints follows
+from how the body is turned, and that is found late. `find_pace_factor` returns the factor on the
+covariance for it.
 """
 
 import math
+from typing import NamedTuple
 
+from hrc_env.core.declared import Records1
 from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Floats
 from hrc_env.tracking.settings import Settings
-from hrc_env.tracking.tracks import bound
-from hrc_env.tracking.tree.predict import leaning
-from hrc_env.tracking.tree.state import Hypotheses
+from hrc_env.tracking.tracks import EstimateArrays, bound
+from hrc_env.tracking.tree.predict import measure_lean, torso_mean, trunk_vector
+from hrc_env.tracking.tree.state import Hypotheses, Pace, Tree, WorkerHypotheses
 
 _FORGOTTEN_UPDATES = 8
-"""A camera that has not seen the worker for longer no longer counts as a view of them."""
-LASTS_S = 0.7
-"""Time constant of these means [s]."""
-MOST_RAD_S = 15.0
-"""No person turns faster."""
-TURNS, TIPS, TRAVELS = (2.3, 1.1), (0.52, 5.0), (1.63, 1.1)
-"""Rates up to which the model is right, and the logarithm of the factor on the covariance for every
-unit above them [1/(rad/s)], [1/(m/s)]; fitted to people who walk, spin, fall, tumble and run."""
-MOST_MOVING, MOST = 10.5, 25.0
-"""Greatest factor for the movement, and together with that for a body that lies."""
+"""Updates without the worker after which a camera no longer counts as a view."""
+_TAU_S = 0.7
+"""Time constant of the means in `Pace` [s]."""
+_MOST_RATE = 15.0
+"""Bound on every rate [rad/s] or [m/s]: no person moves faster."""
+
+
+class Excess(NamedTuple):
+    """The factor on the covariance for a movement that the motion model does not expect."""
+
+    limit: float
+    """Rate up to which the motion model is right [rad/s] or [m/s]."""
+    log_factor: float
+    """Logarithm of the factor for every unit above the limit [s/rad] or [s/m]."""
+
+
+_TURN = Excess(2.3, 1.1)
+"""For turning about the vertical; all three were fitted to people walking, spinning, falling,
+tumbling and running."""
+_TIP = Excess(0.52, 5.0)
+"""For tipping."""
+_SPEED = Excess(1.63, 1.1)
+"""For the speed of the trunk."""
+MOST_MOVING = 10.5
+"""Greatest factor for movement."""
+_MOST = 25.0
+"""Greatest factor for movement and a lying body together."""
 
 
 @kernel(makes_arrays=True)
-def estimate_all(state, s, out):
-    """Fill the arrays of a `PoseEstimate` in; `state` and `s` as in `body_filter`."""
-    state, s = Hypotheses(*state), Settings(*s)
-    mean, cov, velocity, age, tracked = out
+def estimate_all(state: Hypotheses, settings: Settings, out: EstimateArrays) -> None:
+    """Write the estimates of all workers.
+
+    Args:
+        state: the hypotheses.
+        settings: settings of the estimator.
+        out: receives positions, covariances, velocities, ages and tracked workers.
+    """
     for b in range(state.n_alive.shape[0]):
         for w in range(state.n_alive.shape[1]):
             trees, best = state.trees[b, w], state.trees[b, w, 0]
-            _mix(trees, state.n_alive[b, w], mean[b, w], cov[b, w], velocity[b, w])
+            mean, cov = out.mean_world[b, w], out.cov_world[b, w]
+            _mix(trees, state.n_alive[b, w], mean, cov, out.velocity_world[b, w])
             n_views = 0
             for c in range(state.views.shape[3]):
-                n_views += state.views[b, w, 0, c].blind <= _FORGOTTEN_UPDATES
+                n_views += state.views[b, w, 0, c].unseen_updates <= _FORGOTTEN_UPDATES
             if best.tracked and n_views == 1:  # the errors have heavier tails than a Gaussian's
-                lies, _ = leaning(mean[b, w])
-                moves = min(s.lying_inflation**lies * widening(state.pace[b, w]), MOST)
-                _widen(cov[b, w], s.one_view_inflation * moves)
-            bound(cov[b, w], s.min_std_m, s.prior_std_m)
-            for j in range(age.shape[2]):
-                age[b, w, j] = best.age_s[j]
-            tracked[b, w] = best.tracked
+                lying_factor = settings.lying_inflation ** measure_lean(mean).share
+                factor = min(lying_factor * find_pace_factor(state.pace[b, w]), _MOST)
+                factor *= settings.one_view_inflation
+                for j in range(len(cov)):
+                    for i in range(3):
+                        for k in range(3):
+                            cov[j, i, k] *= factor
+            bound(cov, settings.min_std_m, settings.prior_std_m)
+            for j in range(out.age_s.shape[2]):
+                out.age_s[b, w, j] = best.age_s[j]
+            out.tracked[b, w] = best.tracked
 
 
 @kernel
-def _mix(trees, n, mean, cov, velocity):
-    """Moments of the first n trees: mean, velocity (J, 3) and cov (J, 3, 3) of the positions."""
+def _mix(trees: Records1[Tree], n: int, mean: Floats, cov: Floats, velocity: Floats) -> None:
+    """Write the moments of a mixture.
+
+    Args:
+        trees: (H,) hypotheses of one worker.
+        n: number of those in use.
+        mean: (J, 3) receives the mean positions [m].
+        cov: (J, 3, 3) receives their covariances [m^2].
+        velocity: (J, 3) receives the mean velocities [m/s].
+    """
     mean[:], cov[:], velocity[:] = 0.0, 0.0, 0.0
-    for k in range(n):
-        body, share = trees[k].body, math.exp(trees[k].log_weight)
+    for h in range(n):
+        body, share = trees[h].body, math.exp(trees[h].log_weight)
         for j in range(len(mean)):
             for i in range(3):
                 mean[j, i] += share * body[j, i]
                 velocity[j, i] += share * body[j, 3 + i]
-    for k in range(n):
-        _add_moments(math.exp(trees[k].log_weight), trees[k].body, trees[k].cov, mean, cov)
+    for h in range(n):
+        body, share = trees[h].body, math.exp(trees[h].log_weight)
+        for j in range(len(mean)):
+            for i in range(3):
+                for k in range(3):
+                    between = (body[j, i] - mean[j, i]) * (body[j, k] - mean[j, k])
+                    cov[j, i, k] += share * (trees[h].cov[j, i, k] + between)
 
 
 @kernel
-def _add_moments(share, body, cov, mean, out):
-    for j in range(len(body)):
-        for i in range(3):
-            for k in range(3):
-                apart = (body[j, i] - mean[j, i]) * (body[j, k] - mean[j, k])
-                out[j, i, k] += share * (cov[j, i, k] + apart)
-
-
-@kernel
-def _widen(cov, factor):
-    for j in range(len(cov)):
-        for i in range(3):
-            for k in range(3):
-                cov[j, i, k] *= factor
-
-
-@kernel
-def measure_pace(own):
-    """Note how the heaviest hypothesis has moved since the last update."""
-    pace = own.pace[0]
-    update_pace(pace, own.trees[0].body, pace.since_s)
+def measure_pace(worker: WorkerHypotheses) -> None:
+    """Update a worker's pace by the motion of the heaviest hypothesis since the last update."""
+    pace = worker.pace[0]
+    update_pace(pace, worker.trees[0].body, pace.since_s)
     pace.since_s = 0.0
 
 
 @kernel
-def update_pace(pace, body, dt):
-    """Take the present body (J, 6), `dt` after the last one, into the means."""
+def update_pace(pace: Pace, body: Floats, dt: float) -> None:
+    """Take the present body (J, 6), `dt` [s] after the last one, into the means."""
     ax, ay = _across(body, 0), _across(body, 1)
-    ux, uy, uz = _trunk(body, 0), _trunk(body, 1), _trunk(body, 2)
+    ux, uy, uz = trunk_vector(body, 0), trunk_vector(body, 1), trunk_vector(body, 2)
     flat, length = math.hypot(ax, ay) + 1e-9, math.sqrt(ux * ux + uy * uy + uz * uz) + 1e-9
     ax, ay, ux, uy, uz = ax / flat, ay / flat, ux / length, uy / length, uz / length
-    if pace.known and dt > 0.0:
-        turned = abs(
-            math.atan2(
-                pace.across[0] * ay - pace.across[1] * ax, pace.across[0] * ax + pace.across[1] * ay
-            )
-        )
+    if pace.is_known and dt > 0.0:
+        sine = pace.across[0] * ay - pace.across[1] * ax
+        turn = abs(math.atan2(sine, pace.across[0] * ax + pace.across[1] * ay))
         cosine = pace.up[0] * ux + pace.up[1] * uy + pace.up[2] * uz
-        tipped = math.acos(min(max(cosine, -1.0), 1.0))
-        keep = math.exp(-dt / LASTS_S)
-        pace.turns = _mean(pace.turns, turned / dt, keep)
-        pace.tips = _mean(pace.tips, tipped / dt, keep)
-        speed = math.sqrt(_speed(body, 3) ** 2 + _speed(body, 4) ** 2 + _speed(body, 5) ** 2)
-        pace.travels = _mean(pace.travels, speed, keep)
+        tip = math.acos(min(max(cosine, -1.0), 1.0))
+        vx, vy, vz = torso_mean(body, 3), torso_mean(body, 4), torso_mean(body, 5)
+        keep = math.exp(-dt / _TAU_S)
+        pace.turn_rad_s = _fade(pace.turn_rad_s, turn / dt, keep)
+        pace.tip_rad_s = _fade(pace.tip_rad_s, tip / dt, keep)
+        speed = math.sqrt(vx**2 + vy**2 + vz**2)
+        pace.speed_m_s = _fade(pace.speed_m_s, speed, keep)
     pace.across[0], pace.across[1] = ax, ay
     pace.up[0], pace.up[1], pace.up[2] = ux, uy, uz
-    pace.known = True
+    pace.is_known = True
 
 
 @kernel
-def forget_pace(pace):
-    """Begin with a worker anew."""
-    pace.known, pace.since_s = False, 0.0
-    pace.turns = pace.tips = pace.travels = 0.0
+def forget_pace(pace: Pace) -> None:
+    """Put a pace back to that at the beginning of a track."""
+    pace.is_known, pace.since_s = False, 0.0
+    pace.turn_rad_s = pace.tip_rad_s = pace.speed_m_s = 0.0
 
 
 @kernel
-def widening(pace):
-    """The factor on the covariance of a worker whom one camera alone sees."""
-    log = TURNS[1] * max(pace.turns - TURNS[0], 0.0)
-    log += TIPS[1] * max(pace.tips - TIPS[0], 0.0)
-    log += TRAVELS[1] * max(pace.travels - TRAVELS[0], 0.0)
-    return min(math.exp(log), MOST_MOVING)
+def find_pace_factor(pace: Pace) -> float:
+    """Return the factor on the covariance, with one view, for the movement of a worker."""
+    log_factor = _TURN.log_factor * max(pace.turn_rad_s - _TURN.limit, 0.0)
+    log_factor += _TIP.log_factor * max(pace.tip_rad_s - _TIP.limit, 0.0)
+    log_factor += _SPEED.log_factor * max(pace.speed_m_s - _SPEED.limit, 0.0)
+    return min(math.exp(log_factor), MOST_MOVING)
 
 
 @kernel
-def _mean(before, rate, keep):
-    return keep * before + (1.0 - keep) * min(rate, MOST_RAD_S)
+def _fade(mean: float, rate: float, keep: float) -> float:
+    """Return a fading mean after another rate, of which 1 - `keep` is taken in."""
+    return keep * mean + (1.0 - keep) * min(rate, _MOST_RATE)
 
 
 @kernel
-def _across(body, i):
+def _across(body: Floats, i: int) -> float:
+    """Return component i of twice the vector from right to left, across shoulders and hips."""
     return body[1, i] + body[7, i] - body[2, i] - body[8, i]
-
-
-@kernel
-def _trunk(body, i):
-    return body[1, i] + body[2, i] - body[7, i] - body[8, i]
-
-
-@kernel
-def _speed(body, i):
-    return 0.25 * (body[1, i] + body[2, i] + body[7, i] + body[8, i])

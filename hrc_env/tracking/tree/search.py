@@ -16,66 +16,91 @@ import math
 
 from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import JOINT
+from hrc_env.core.typing import Floats
 from hrc_env.geometry.triangulation import NEAREST_DEPTH_M
+from hrc_env.tracking.measurements import Frame
+from hrc_env.tracking.settings import Settings
 from hrc_env.tracking.tree.gaussian import LEAVES_FIRST, ORDER, PARENT, invert3, multiply
-from hrc_env.tracking.tree.state import EDGE_STIFFNESS_M, LANES, N_IMAGE
+from hrc_env.tracking.tree.state import EDGE_STIFFNESS_M, LANES, N_IMAGE, Tree, Work
 
 _NOSE, _RIGHT_SHOULDER = JOINT["nose"], JOINT["right_shoulder"]
 BELIEF, LOG_ODDS, FACTOR, A0, A1, A2, B0, B1, B2, DU, DV, NEARNESS = range(N_IMAGE)
+"""Rows of `Work.image`; see `state.N_IMAGE`."""
 _REORDER = {"reassoc", "contract", "nsz"}  # NaN and infinity keep their meaning
 
 
 @kernel
-def find_pose(tree, frame, s, w):
-    """Search the most probable positions of a predicted tree and leave everything linearised there.
+def find_pose(tree: Tree, frame: Frame, settings: Settings, work: Work) -> None:
+    """Find the most probable positions of a predicted tree and linearise the likelihood there.
 
-    In `w` stay the point, the variances of the bones as measurements, and the information and
-    gradient of cameras and bones there: those of the log-likelihood as a function of the positions
-    (of joints, and of joints less their parents') minus their predicted means, at 0. Fills
-    frame.belief and frame.images.
+    Args:
+        tree: the predicted hypothesis.
+        frame: the measurements; `belief` and `images` are written.
+        settings: settings of the estimator.
+        work: scratch. It receives the positions (`point`), the variances of the bones as
+            measurements, and information and gradient of cameras and bones: those of the
+            log-likelihood as a function of the positions (of joints, and of joints less their
+            parents') minus their predicted means, at 0.
     """
-    stiff_lengths(tree.bone_variance, s.bone_give, w.bone_variance)
+    set_bone_variances(tree.bone_variance, settings.bone_give, work.bone_variance)
     for j in range(len(tree.body)):
         for i in range(3):
-            w.point[j, i] = tree.body[j, i]
-    find_pose_near(tree, frame, s, s.gauss_newton_steps, 1.0, w)
+            work.point[j, i] = tree.body[j, i]
+    find_pose_near(tree, frame, settings, settings.gauss_newton_steps, 1.0, work)
 
 
 @kernel
-def find_pose_near(tree, frame, s, n_steps, widen, w):
-    """As `find_pose`, but the search begins at w.point (J, 3) instead of the predicted means.
+def find_pose_near(
+    tree: Tree, frame: Frame, settings: Settings, n_steps: int, widen: float, work: Work
+) -> None:
+    """Do as `find_pose`, but begin at `work.point` instead of the predicted means.
 
-    `widen` times the prior's own image variance is added to the detector's in the first step.
+    Args:
+        tree: the predicted hypothesis.
+        frame: the measurements; `belief` and `images` are written.
+        settings: settings of the estimator.
+        n_steps: number of Gauss-Newton steps.
+        widen: factor on the prior's own image variance that is added to the detector's in the
+            first step; it is halved from step to step.
+        work: scratch with the start and the bones' variances; it receives the same as there.
     """
     body, cov, slope = tree.body, tree.cov, tree.slope
     for j in ORDER:
         if PARENT[j] >= 0:
-            multiply(slope[j], cov[PARENT[j]], w.edge[j])
-        _position_prior(j, cov, w)
+            multiply(slope[j], cov[PARENT[j]], work.edge[j])
+        _set_position_prior(j, cov, work)
         for i in range(3):
-            w.shift[j, i] = w.point[j, i] - body[j, i]
-    set_covariances(cov, w.points)
-    set_views(frame)
+            work.shift[j, i] = work.point[j, i] - body[j, i]
+    _set_covariances(cov, work.points)
+    _set_views(frame)
     for step in range(n_steps + 1):
         widening = widen if step < n_steps - 1 else 0.0
-        _linearise_cameras(frame, s.inlier_odds, widening, step == n_steps, w)
-        _stand_on_the_floor(body, 1.0 / s.floor_std_m**2, w)
-        _linearise_bones(tree.bone_length, w)
-        _add_second_bone(cov, tree.bone_length, w)
+        _linearise_cameras(frame, settings.inlier_odds, widening, step == n_steps, work)
+        _add_floor(body, 1.0 / settings.floor_std_m**2, work)
+        _linearise_bones(tree.bone_length, work)
+        _add_second_bone(cov, tree.bone_length, work)
         if step < n_steps:
-            _solve_positions(body, w)
+            _solve_positions(body, work)
         widen *= 0.5
 
 
 @kernel(fastmath=_REORDER)
-def _position_prior(j, cov, w):
-    """Precision of a position given its parent's, and how it follows that."""
-    q, precision = PARENT[j], w.precision[j]
+def _set_position_prior(j: int, cov: Floats, work: Work) -> None:
+    """Write the precision of a joint's position given its parent's, and its slope on that.
+
+    Args:
+        j: the joint.
+        cov: (J, 6, 6) predicted covariances.
+        work: scratch with `edge`; the fields of the joint that begin with `position` are written.
+    """
+    q: int = PARENT[j]
+    precision = work.position_precision[j]
     if q < 0:
         invert3(cov[j], precision)
         return
-    edge, follow, pull, back = w.edge[j], w.follow[j], w.pull_position[j], w.back_position[j]
-    above, rest = w.a, w.b
+    edge, follow = work.edge[j], work.position_slope[j]
+    pull, back = work.position_coupling[j], work.position_back[j]
+    above, rest = work.a, work.b
     invert3(cov[q], above)
     for i in range(3):
         for k in range(3):
@@ -99,148 +124,172 @@ def _position_prior(j, cov, w):
 
 
 @kernel
-def _linearise_cameras(frame, inlier_odds, widening, keep, w):
-    """Write the cameras' information and gradient at the points; `keep` their images."""
-    points, sums, belief = w.points, w.sums, frame.belief
+def _linearise_cameras(
+    frame: Frame, inlier_odds: float, widening: float, is_last: bool, work: Work
+) -> None:
+    """Write the cameras' information and gradient at `work.point`.
+
+    Args:
+        frame: the measurements; `belief` is written.
+        inlier_odds: odds of a perfect inlier, times the variance of its pixel [px^2].
+        widening: factor on the prior's image variance that is added to the detector's.
+        is_last: whether the Jacobians and residuals are kept in `frame.images`.
+        work: scratch.
+    """
+    points, sums, belief = work.points, work.sums, frame.belief
     for j in range(len(belief)):
         for i in range(3):
-            points[i, j] = w.point[j, i]
+            points[i, j] = work.point[j, i]
     sums[:] = 0.0
     for c in range(len(frame.P)):
-        add_view(frame.P[c], points, frame.views[c], widening, inlier_odds, w.image, sums)
+        _add_view(frame.P[c], points, frame.views[c], widening, inlier_odds, work.image, sums)
         for j in range(len(belief)):
-            belief[j, c] = w.image[BELIEF, j]
-        if keep:
-            _keep_image(w.image, frame.images[c])
+            belief[j, c] = work.image[BELIEF, j]
+        if is_last:
+            for row in range(A0, N_IMAGE):
+                for j in range(LANES):
+                    frame.images[c, row, j] = work.image[row, j]
     for j in range(len(belief)):
-        h, shift = w.camera_information[j], w.shift[j]
+        h, shift = work.camera_information[j], work.shift[j]
         h[0, 0], h[1, 1], h[2, 2] = sums[0, j], sums[1, j], sums[2, j]
         h[0, 1] = h[1, 0] = sums[3, j]
         h[0, 2] = h[2, 0] = sums[4, j]
         h[1, 2] = h[2, 1] = sums[5, j]
         for i in range(3):
             back = h[i, 0] * shift[0] + h[i, 1] * shift[1] + h[i, 2] * shift[2]
-            w.camera_gradient[j, i] = sums[6 + i, j] + back
+            work.camera_gradient[j, i] = sums[6 + i, j] + back
 
 
 @kernel
-def _keep_image(image, out):
-    """Copy Jacobians, residuals and depths of a camera out of the scratch."""
-    for row in range(A0, N_IMAGE):
-        for j in range(LANES):
-            out[row, j] = image[row, j]
+def _add_floor(body: Floats, information: float, work: Work) -> None:
+    """Add a measurement of height 0 to joints below the floor.
 
+    One view leaves the distance of a body open; that no joint is below the floor bounds it.
 
-@kernel
-def _stand_on_the_floor(body, information, w):
-    """Joints below the floor are measured to be on it: one view leaves open how far a body is."""
+    Args:
+        body: (J, 6) predicted means.
+        information: information of the measurement [1/m^2].
+        work: scratch; the camera information and gradient are changed.
+    """
     for j in range(len(body)):
-        if w.point[j, 2] < 0.0:
-            w.camera_information[j, 2, 2] += information
-            w.camera_gradient[j, 2] -= information * body[j, 2]
+        if work.point[j, 2] < 0.0:
+            work.camera_information[j, 2, 2] += information
+            work.camera_gradient[j, 2] -= information * body[j, 2]
 
 
 @kernel(fastmath=_REORDER)
-def _linearise_bones(length, w):
-    """What the bones from joints to their parents say, at the points."""
+def _linearise_bones(bone_length: Floats, work: Work) -> None:
+    """Write information and gradient of the bones (J,) from joints to their parents."""
     for j in ORDER:
-        q, a, b = PARENT[j], w.point[j], w.point[PARENT[j]]
+        q: int = PARENT[j]
+        a, b = work.point[j], work.point[q]
         if q < 0:
             continue
         x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
-        now = math.sqrt(x * x + y * y + z * z) + 1e-9
-        along = (x / now, y / now, z / now)
-        miss = length[j] - now
+        length = math.sqrt(x * x + y * y + z * z) + 1e-9
+        along = (x / length, y / length, z / length)
+        miss = bone_length[j] - length
         for i in range(3):
-            miss += along[i] * (w.shift[j, i] - w.shift[q, i])
+            miss += along[i] * (work.shift[j, i] - work.shift[q, i])
         for i in range(3):
-            known = along[i] / w.bone_variance[j]
-            w.edge_gradient[j, i] = known * miss
+            known = along[i] / work.bone_variance[j]
+            work.edge_gradient[j, i] = known * miss
             for k in range(3):
-                w.edge_information[j, i, k] = known * along[k]
+                work.edge_information[j, i, k] = known * along[k]
 
 
 @kernel(fastmath=_REORDER)
-def _add_second_bone(cov, length, w):
-    """The bone from the nose to the right shoulder: one alone would hold the nose's mirror image.
+def _add_second_bone(cov: Floats, bone_length: Floats, work: Work) -> None:
+    """Add the bone from the nose to the right shoulder to the nose's edge.
 
-    It is no edge of the tree: the right shoulder counts as a point that the left one carries, and
-    what is not known of where it carries it counts as noise.
+    One bone alone would leave the nose's mirror image open. The second is no edge of the tree: the
+    right shoulder counts as a point that the left one carries, and the uncertainty of where it is
+    carried counts as noise.
+
+    Args:
+        cov: (J, 6, 6) predicted covariances.
+        bone_length: (J,) lengths of the bones [m].
+        work: scratch; information and gradient of the nose's edge are changed.
     """
-    nose, right, left = _NOSE, _RIGHT_SHOULDER, PARENT[_RIGHT_SHOULDER]
-    a, b = w.point[nose], w.point[right]
+    nose, right = _NOSE, _RIGHT_SHOULDER
+    left: int = PARENT[_RIGHT_SHOULDER]
+    a, b = work.point[nose], work.point[right]
     x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
-    now = math.sqrt(x * x + y * y + z * z) + 1e-9
-    along = (x / now, y / now, z / now)
-    miss, spread = length[nose] - now, w.bone_variance[nose]
+    length = math.sqrt(x * x + y * y + z * z) + 1e-9
+    along = (x / length, y / length, z / length)
+    miss, spread = bone_length[nose] - length, work.bone_variance[nose]
     for i in range(3):
-        miss += along[i] * (w.shift[nose, i] - w.shift[PARENT[nose], i])
+        miss += along[i] * (work.shift[nose, i] - work.shift[PARENT[nose], i])
         for k in range(3):
-            across = cov[right, i, k] + cov[left, i, k] - 2.0 * w.edge[right, i, k]
+            across = cov[right, i, k] + cov[left, i, k] - 2.0 * work.edge[right, i, k]
             spread += along[i] * across * along[k]
     known = 1.0 / spread
     for i in range(3):
-        w.edge_gradient[nose, i] += along[i] * known * miss
+        work.edge_gradient[nose, i] += along[i] * known * miss
         for k in range(3):
-            w.edge_information[nose, i, k] += along[i] * known * along[k]
+            work.edge_information[nose, i, k] += along[i] * known * along[k]
 
 
 @kernel
-def _solve_positions(body, w):
-    """Shifts = the minimum of the quadratic that prior, cameras and bones make."""
+def _solve_positions(body: Floats, work: Work) -> None:
+    """Write the shifts that minimise the quadratic of prior, cameras and bones.
+
+    Args:
+        body: (J, 6) predicted means.
+        work: scratch with the linearised likelihood; `shift` and `point` are written.
+    """
     for j in ORDER:
         for i in range(3):
-            w.node_gradient[j, i] = w.camera_gradient[j, i]
+            work.node_gradient[j, i] = work.camera_gradient[j, i]
             for k in range(3):
-                w.node[j, i, k] = w.camera_information[j, i, k]
+                work.node[j, i, k] = work.camera_information[j, i, k]
     for j in LEAVES_FIRST:
-        _eliminate(j, w)
+        _eliminate(j, work)
     for j in ORDER:
-        q = PARENT[j]
+        q: int = PARENT[j]
         for i in range(3):
             total = 0.0
             for k in range(3):
-                total += w.inverse_position[j, i, k] * w.node_gradient[j, k]
+                total += work.position_inverse[j, i, k] * work.node_gradient[j, k]
                 if q >= 0:
-                    total += w.follow[j, i, k] * w.shift[q, k]
-            w.shift[j, i] = total
-            w.point[j, i] = body[j, i] + total
+                    total += work.position_slope[j, i, k] * work.shift[q, k]
+            work.shift[j, i] = total
+            work.point[j, i] = body[j, i] + total
 
 
 @kernel(fastmath=_REORDER)
-def _eliminate(j, w):
-    """Slope and inverse Hessian of a joint's shift, and what it tells the parent's."""
-    q, bone, node, gradient = PARENT[j], w.edge_information[j], w.node[j], w.node_gradient[j]
-    inverse, total, together = w.inverse_position[j], w.a, w.b
+def _eliminate(j: int, work: Work) -> None:
+    """Write slope and inverse Hessian of a joint's shift; pass its information to the parent."""
+    q: int = PARENT[j]
+    bone, node, gradient = work.edge_information[j], work.node[j], work.node_gradient[j]
+    inverse, total, together = work.position_inverse[j], work.a, work.b
     for i in range(3):
         for k in range(3):
-            total[i, k] = node[i, k] + w.precision[j, i, k]
+            total[i, k] = node[i, k] + work.position_precision[j, i, k]
             if q >= 0:
                 total[i, k] += bone[i, k]
-                together[i, k] = w.pull_position[j, i, k] + bone[i, k]
+                together[i, k] = work.position_coupling[j, i, k] + bone[i, k]
     invert3(total, inverse)
     if q < 0:
         return
-    follow = w.follow[j]
+    slope = work.position_slope[j]
     for i in range(3):
-        gradient[i] += w.edge_gradient[j, i]
+        gradient[i] += work.edge_gradient[j, i]
         for k in range(3):
-            follow[i, k] = inverse[i, 0] * together[0, k] + inverse[i, 1] * together[1, k]
-            follow[i, k] += inverse[i, 2] * together[2, k]
+            slope[i, k] = inverse[i, 0] * together[0, k] + inverse[i, 1] * together[1, k]
+            slope[i, k] += inverse[i, 2] * together[2, k]
     for i in range(3):
-        passed = (
-            follow[0, i] * gradient[0] + follow[1, i] * gradient[1] + follow[2, i] * gradient[2]
-        )
-        w.node_gradient[q, i] += passed - w.edge_gradient[j, i]
+        passed = slope[0, i] * gradient[0] + slope[1, i] * gradient[1] + slope[2, i] * gradient[2]
+        work.node_gradient[q, i] += passed - work.edge_gradient[j, i]
         for k in range(3):
-            taken = together[0, i] * follow[0, k] + together[1, i] * follow[1, k]
-            taken += together[2, i] * follow[2, k]
-            w.node[q, i, k] += w.back_position[j, i, k] + bone[i, k] - taken
+            taken = together[0, i] * slope[0, k] + together[1, i] * slope[1, k]
+            taken += together[2, i] * slope[2, k]
+            work.node[q, i, k] += work.position_back[j, i, k] + bone[i, k] - taken
 
 
 @kernel
-def set_views(frame):
-    """Put pixels and precisions into frame.views (C, N_VIEW, LANES)."""
+def _set_views(frame: Frame) -> None:
+    """Write pixels and precisions into `frame.views`."""
     z, sigma, ok, views = frame.z, frame.sigma, frame.ok, frame.views
     for c in range(len(views)):
         for j in range(len(ok)):
@@ -251,20 +300,34 @@ def set_views(frame):
 
 
 @kernel
-def set_covariances(cov, points):
-    """Put position covariances (J, 3+, 3+) into their rows."""
+def _set_covariances(cov: Floats, points: Floats) -> None:
+    """Write position covariances (J, 3+, 3+) into their rows of points (N_POINT, LANES)."""
     for j in range(len(cov)):
         points[3, j], points[4, j], points[5, j] = cov[j, 0, 0], cov[j, 1, 1], cov[j, 2, 2]
         points[6, j], points[7, j], points[8, j] = cov[j, 0, 1], cov[j, 0, 2], cov[j, 1, 2]
 
 
 @kernel(fastmath=_REORDER)
-def add_view(p, points, view, widen, inlier_odds, image, sums):
-    """Add one camera's information and gradient, of all joints, to `sums` (N_SUM, LANES).
+def _add_view(
+    p: Floats,
+    points: Floats,
+    view: Floats,
+    widen: float,
+    inlier_odds: float,
+    image: Floats,
+    sums: Floats,
+) -> None:
+    """Add one camera's information and gradient of all joints.
 
-    `p` is (3, 4), `points` (N_POINT, LANES), `view` (N_VIEW, LANES); `widen` times the prior's
-    variance in the image is added to the detector's in the decision how far each measurement is
-    believed, which is left in `image` (N_IMAGE, LANES).
+    Args:
+        p: (3, 4) projection.
+        points: (N_POINT, LANES) positions and predicted covariances.
+        view: (N_VIEW, LANES) pixels and precisions.
+        widen: factor on the prior's image variance that is added to the detector's in the
+            weights of the measurements.
+        inlier_odds: odds of a perfect inlier, times the variance of its pixel [px^2].
+        image: (N_IMAGE, LANES) receives weights, Jacobians and residuals.
+        sums: (N_SUM, LANES) to which information and gradient are added.
     """
     _project(p, points, view, widen, inlier_odds, image)
     for j in range(LANES):
@@ -287,8 +350,15 @@ def add_view(p, points, view, widen, inlier_odds, image, sums):
 
 
 @kernel(fastmath=_REORDER)
-def _project(p, points, view, widen, inlier_odds, image):
-    """Where the camera sees the joints, and how odd that the pixels lie where they do."""
+def _project(
+    p: Floats,
+    points: Floats,
+    view: Floats,
+    widen: float,
+    inlier_odds: float,
+    image: Floats,
+) -> None:
+    """Write Jacobians, residuals and odds of all joints in one camera; arguments of `_add_view`."""
     p00, p01, p02, p03 = p[0, 0], p[0, 1], p[0, 2], p[0, 3]
     p10, p11, p12, p13 = p[1, 0], p[1, 1], p[1, 2], p[1, 3]
     p20, p21, p22, p23 = p[2, 0], p[2, 1], p[2, 2], p[2, 3]
@@ -317,7 +387,13 @@ def _project(p, points, view, widen, inlier_odds, image):
 
 
 @kernel
-def stiff_lengths(variance, give, out):
-    """Variances (J,) of the lengths as measurements: what is not known of them, and the give."""
+def set_bone_variances(variance: Floats, give: float, out: Floats) -> None:
+    """Write the variances of the bones' lengths as measurements.
+
+    Args:
+        variance: (J,) variances of the learnt lengths [m^2].
+        give: factor on the standard deviation of a length within one person.
+        out: (J,) receives the sums of both variances [m^2].
+    """
     for j in range(len(variance)):
         out[j] = variance[j] + (give * EDGE_STIFFNESS_M[j]) ** 2

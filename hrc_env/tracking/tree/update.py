@@ -13,8 +13,12 @@ is multiplied by 1 + (|d|^4 - d'C d) / d'R d: the variance along d is then |d|^2
 
 import numpy as np
 
+from hrc_env.core.declared import Records1
 from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Bools, Floats
 from hrc_env.geometry.triangulation import consensus_point
+from hrc_env.tracking.measurements import Frame
+from hrc_env.tracking.settings import Settings
 from hrc_env.tracking.tree.evidence import log_evidence
 from hrc_env.tracking.tree.gaussian import (
     LEAVES_FIRST,
@@ -27,114 +31,137 @@ from hrc_env.tracking.tree.gaussian import (
     transposed_multiply,
 )
 from hrc_env.tracking.tree.search import A0, A1, A2, B0, B1, B2, NEARNESS, find_pose
+from hrc_env.tracking.tree.state import Tree, Work
 
 _FAR = 16.0
 """Squared Mahalanobis distance of a jump: by chance a joint is as far once in 900 updates."""
-_SURE_VIEWS, _AGREEING_VIEWS = 1.5, 3
-"""Where more views than this are believed, the pose that was found counts; where not, it takes so
-many that agree: two may err alike."""
+_SURE_VIEWS = 1.5
+"""Sum of the views' weights above which the pose that was found counts as a joint's place."""
+_AGREEING_VIEWS = 3
+"""Views that must agree on a joint's place otherwise: two may err alike."""
 _NEAREST_M = 0.3
-"""The mean correction knows no joint nearer to a lens than this."""
+"""Least depth of a joint in the correction of the mean [m]."""
 _REORDER = {"reassoc", "contract", "nsz"}
 
 
 @kernel
-def condition_on_frame(tree, prior, weigh, frame, s, work):
-    """Condition a predicted tree on a frame; return its log-evidence, 0 if not to `weigh` it.
+def condition_on_frame(
+    tree: Tree,
+    prior: Records1[Tree],
+    is_weighed: bool,
+    frame: Frame,
+    settings: Settings,
+    work: Work,
+) -> float:
+    """Condition a predicted tree on a frame and return the frame's log-evidence.
 
-    `prior` (1,) then holds the prediction. frame.belief says which pixels are believed; the
-    predicted covariances of the positions stay in work.predicted.
+    Args:
+        tree: the predicted hypothesis, changed in place.
+        prior: (1,) receives the prediction, if the frame is weighed.
+        is_weighed: whether the evidence is wanted; 0 is returned otherwise.
+        frame: the measurements; its weights and images are written.
+        settings: settings of the estimator.
+        work: scratch; `predicted`, the position covariances before the update, and `n_views` are
+            for `learning`.
     """
     evidence = 0.0
-    if weigh:
+    if is_weighed:
         prior[0] = tree
     for j in range(len(tree.cov)):
         for i in range(3):
             for k in range(3):
                 work.predicted[j, i, k] = tree.cov[j, i, k]
-    find_pose(tree, frame, s, work)
-    if widen_jumped(tree, frame, s, work):
-        find_pose(tree, frame, s, work)
+    find_pose(tree, frame, settings, work)
+    if widen_jumped_joints(tree, frame, settings, work):
+        find_pose(tree, frame, settings, work)
     update_tree(tree, work)
-    if weigh:  # the mean correction needs the factors that the evidence leaves alone
-        evidence = log_evidence(prior[0], tree, frame, s, work)
-    correct_mean(tree, frame, s, work)
+    if is_weighed:  # the mean correction needs the factors that the evidence leaves alone
+        evidence = log_evidence(prior[0], tree, frame, settings, work)
+    correct_mean(tree, frame, settings, work)
     return evidence
 
 
 @kernel(makes_arrays=True)
-def widen_jumped(tree, frame, s, w):
-    """Widen the predicted covariances of joints that have jumped, in place; whether any has."""
-    cov, grown, jumped = tree.cov, w.moved, False
+def widen_jumped_joints(tree: Tree, frame: Frame, settings: Settings, work: Work) -> bool:
+    """Widen the predicted covariances of joints that have jumped; return whether any has.
+
+    Args:
+        tree: the predicted hypothesis, changed in place.
+        frame: the measurements, with weights as `find_pose` leaves them.
+        settings: settings of the estimator.
+        work: scratch, as `find_pose` leaves it.
+    """
+    cov, growth, has_jumped = tree.cov, work.moved, False
     use, point, spread = np.empty(len(frame.P), np.bool_), np.empty(3), np.empty((3, 3))
     for j in ORDER:
-        grown[j] = 0.0
-        if jumped and PARENT[j] >= 0:  # joints beyond one that jumped go with it
-            multiply(tree.slope[j], grown[PARENT[j]], w.a)
-            multiply_transposed(w.a, tree.slope[j], grown[j])
-        if _has_jumped(j, tree, frame, s, (point, spread, use, w)):
-            jumped |= _grow(j, tree, point, w)
+        growth[j] = 0.0
+        if has_jumped and PARENT[j] >= 0:  # joints beyond one that jumped go with it
+            multiply(tree.slope[j], growth[PARENT[j]], work.a)
+            multiply_transposed(work.a, tree.slope[j], growth[j])
+        if _find_jump(j, tree, frame, settings, work, point, spread, use):
+            has_jumped |= _widen_joint(j, tree, point, work)
     for j in ORDER:
-        if not jumped:
+        if not has_jumped:
             break
         for i in range(6):
             for k in range(6):
-                cov[j, i, k] += grown[j, i, k]
-    return jumped
-
-
-@kernel
-def _grow(j, tree, point, w):
-    """Add to w.moved[j] what makes the predicted variance as large as the jump to `point`."""
-    q, body, cov, inherited = PARENT[j], tree.body[j], tree.cov[j], w.b
-    for i in range(6):
-        for k in range(6):
-            inherited[i, k] = 0.0
-    if q >= 0:
-        multiply(tree.slope[j], tree.cov[q], w.a)
-        multiply_transposed(w.a, tree.slope[j], inherited)
-    squared = known = own = 0.0
-    for i in range(3):
-        d = point[i] - body[i]
-        squared += d * d
-        for k in range(3):
-            product = d * (point[k] - body[k])
-            known += product * (cov[i, k] + w.moved[j, i, k])
-            own += product * (cov[i, k] - inherited[i, k])
-    if not (own > 0.0 and squared * squared > known):
-        return False
-    more = (squared * squared - known) / own
-    for i in range(6):
-        for k in range(6):
-            w.moved[j, i, k] += more * (cov[i, k] - inherited[i, k])
-    return True
+                cov[j, i, k] += growth[j, i, k]
+    return has_jumped
 
 
 @kernel(makes_arrays=True)
-def _has_jumped(j, tree, frame, s, scratch):
-    """Whether views agree on another place of a joint than the expected one: `point`."""
-    point, spread, use, w = scratch
+def _find_jump(
+    j: int,
+    tree: Tree,
+    frame: Frame,
+    settings: Settings,
+    work: Work,
+    point: Floats,
+    spread: Floats,
+    use: Bools,
+) -> bool:
+    """Return whether views agree on another place of a joint than the predicted one.
+
+    Args:
+        j: the joint.
+        tree: the predicted hypothesis.
+        frame: the measurements, with weights.
+        settings: settings of the estimator.
+        work: scratch with the pose that was found.
+        point: (3,) receives the place [m].
+        spread: (3, 3) scratch.
+        use: (C,) scratch.
+    """
     ok, body, cov = frame.ok[j], tree.body[j], tree.cov[j]
     n_believed = 0.0
     for c in range(len(ok)):
         n_believed += frame.belief[j, c] if ok[c] else 0.0
     if n_believed > _SURE_VIEWS:
         for i in range(3):
-            point[i] = w.point[j, i]
-        return _is_far(point, body, cov, w.c)
-    views = (frame.P, frame.z[j], frame.sigma[j], ok)
+            point[i] = work.point[j, i]
+        return _is_far(point, body, cov, work.c)
     if ok.sum() < _AGREEING_VIEWS:
         return False
-    if consensus_point(*views, s.gate_sigma, point, spread, use) < _AGREEING_VIEWS:
+    gate = settings.gate_sigma
+    z, sigma = frame.z[j], frame.sigma[j]
+    if consensus_point(frame.P, z, sigma, ok, gate, point, spread, use) < _AGREEING_VIEWS:
         return False
     for i in range(3):
         for k in range(3):
             spread[i, k] += cov[i, k]
-    return _is_far(point, body, spread, w.c)
+    return _is_far(point, body, spread, work.c)
 
 
 @kernel
-def _is_far(point, body, cov, inverse):
+def _is_far(point: Floats, body: Floats, cov: Floats, inverse: Floats) -> bool:
+    """Return whether a place counts as a jump.
+
+    Args:
+        point: (3,) the place [m].
+        body: (3+,) predicted position [m].
+        cov: (3+, 3+) covariance of the difference [m^2].
+        inverse: (3+, 3+) scratch.
+    """
     invert3(cov, inverse)
     squared = 0.0
     for i in range(3):
@@ -144,37 +171,78 @@ def _is_far(point, body, cov, inverse):
 
 
 @kernel
-def update_tree(tree, w):
-    """Condition a tree on cameras and bones, in place.
+def _widen_joint(j: int, tree: Tree, point: Floats, work: Work) -> bool:
+    """Make the predicted variance of a joint as large as its jump; return whether it grew.
 
-    `w` is as `find_pose` leaves it; the factors stay in it for `shift_to_mean`.
+    Args:
+        j: the joint.
+        tree: the predicted hypothesis.
+        point: (3,) the place to which the joint has jumped [m].
+        work: scratch; `moved` receives the growth.
     """
-    body, cov, slope = tree.body, tree.cov, tree.slope
-    for j in LEAVES_FIRST:
-        _split(j, cov, slope, w)
-        _add_measurements(j, w)
-    for j in LEAVES_FIRST:
-        _eliminate(j, slope, w)
-    for j in ORDER:
-        _marginalise(j, cov, slope, w)
-    for j in range(len(body)):
-        for i in range(3):
-            w.gradient[j, i], w.gradient[j, 3 + i] = w.camera_gradient[j, i], 0.0
-    for j in range(len(body)):
-        q = PARENT[j]
-        if q >= 0:
-            for i in range(3):
-                w.gradient[j, i] += w.edge_gradient[j, i]
-                w.gradient[q, i] -= w.edge_gradient[j, i]
-    _substitute(body, slope, w)
+    q: int = PARENT[j]
+    body, cov, inherited = tree.body[j], tree.cov[j], work.b
+    for i in range(6):
+        for k in range(6):
+            inherited[i, k] = 0.0
+    if q >= 0:
+        multiply(tree.slope[j], tree.cov[q], work.a)
+        multiply_transposed(work.a, tree.slope[j], inherited)
+    squared = known = own = 0.0
+    for i in range(3):
+        d = point[i] - body[i]
+        squared += d * d
+        for k in range(3):
+            product = d * (point[k] - body[k])
+            known += product * (cov[i, k] + work.moved[j, i, k])
+            own += product * (cov[i, k] - inherited[i, k])
+    if not (own > 0.0 and squared * squared > known):
+        return False
+    more = (squared * squared - known) / own
+    for i in range(6):
+        for k in range(6):
+            work.moved[j, i, k] += more * (cov[i, k] - inherited[i, k])
+    return True
 
 
 @kernel
-def _split(j, cov, slope, w):
-    """Write the precision of a joint given its parent, and how it follows that."""
-    own, rest, shared = w.own[j], w.a, w.b
+def update_tree(tree: Tree, work: Work) -> None:
+    """Condition a tree on cameras and bones, in place.
+
+    `work` is as `find_pose` leaves it; the factors stay in it for `shift_to_mean`.
+    """
+    body, cov, slope = tree.body, tree.cov, tree.slope
+    for j in LEAVES_FIRST:
+        _add_information(j, cov, slope, work)
+    for j in LEAVES_FIRST:
+        _eliminate(j, slope, work)
+    for j in ORDER:
+        _marginalise(j, cov, slope, work)
+    for j in range(len(body)):
+        for i in range(3):
+            work.gradient[j, i], work.gradient[j, 3 + i] = work.camera_gradient[j, i], 0.0
+    for j in range(len(body)):
+        q: int = PARENT[j]
+        if q >= 0:
+            for i in range(3):
+                work.gradient[j, i] += work.edge_gradient[j, i]
+                work.gradient[q, i] -= work.edge_gradient[j, i]
+    _substitute(body, slope, work)
+
+
+@kernel
+def _add_information(j: int, cov: Floats, slope: Floats, work: Work) -> None:
+    """Write the information of the prediction, the cameras and the bone about a joint.
+
+    Args:
+        j: the joint.
+        cov: (J, 6, 6) predicted covariances.
+        slope: (J, 6, 6) predicted slopes; 0 is written where an edge has to be cut.
+        work: scratch; the joint's `precision`, `coupling`, `back` and `known` are written.
+    """
+    own, rest, shared = work.precision[j], work.a, work.b
     if PARENT[j] >= 0:
-        multiply_transposed(w.edge[j], slope[j], shared)
+        multiply_transposed(work.edge[j], slope[j], shared)
     for i in range(6):
         for k in range(6):
             rest[i, k] = cov[j, i, k] - (shared[i, k] if PARENT[j] >= 0 else 0.0)
@@ -184,88 +252,103 @@ def _split(j, cov, slope, w):
         for i in range(6):
             own[i, i] = 1.0 / cov[j, i, i]
     if PARENT[j] >= 0:
-        multiply(own, slope[j], w.pull[j])
-        transposed_multiply(slope[j], w.pull[j], w.back[j])
-
-
-@kernel
-def _add_measurements(j, w):
-    """Add the information of cameras on a joint, and of its bone on it and its parent."""
-    w.known[j] = 0.0
+        multiply(own, slope[j], work.coupling[j])
+        transposed_multiply(slope[j], work.coupling[j], work.back[j])
+    work.known[j] = 0.0
     for i in range(3):
         for k in range(3):
-            w.known[j, i, k] = w.camera_information[j, i, k]
+            work.known[j, i, k] = work.camera_information[j, i, k]
             if PARENT[j] >= 0:
-                bone = w.edge_information[j, i, k]
-                w.own[j, i, k] += bone
-                w.pull[j, i, k] += bone
-                w.back[j, i, k] += bone
+                bone = work.edge_information[j, i, k]
+                own[i, k] += bone
+                work.coupling[j, i, k] += bone
+                work.back[j, i, k] += bone
 
 
 @kernel
-def _eliminate(j, slope, w):
-    """Write a joint's posterior slope and inverse Hessian; pass on its information."""
-    hessian, message, q = w.a, w.b, PARENT[j]
+def _eliminate(j: int, slope: Floats, work: Work) -> None:
+    """Write a joint's posterior slope and inverse Hessian; pass its information to the parent."""
+    hessian, message = work.a, work.b
+    q: int = PARENT[j]
     for i in range(6):
         for k in range(6):
-            hessian[i, k] = w.own[j, i, k] + w.known[j, i, k]
-    invert(hessian, w.inverse[j])
+            hessian[i, k] = work.precision[j, i, k] + work.known[j, i, k]
+    invert(hessian, work.inverse[j])
     if q >= 0:
-        multiply(w.inverse[j], w.pull[j], slope[j])
-        transposed_multiply(w.pull[j], slope[j], message)
+        multiply(work.inverse[j], work.coupling[j], slope[j])
+        transposed_multiply(work.coupling[j], slope[j], message)
         for i in range(6):
             for k in range(6):
-                w.known[q, i, k] += w.back[j, i, k] - message[i, k]
+                work.known[q, i, k] += work.back[j, i, k] - message[i, k]
 
 
 @kernel
-def _marginalise(j, cov, slope, w):
-    """C_j = inverse Hessian + B_j C_parent B_j'."""
-    q = PARENT[j]
+def _marginalise(j: int, cov: Floats, slope: Floats, work: Work) -> None:
+    """Write a joint's marginal covariance, C_j = inverse Hessian + B_j C_q B_j'.
+
+    Args:
+        j: the joint; its parent q is done.
+        cov: (J, 6, 6) covariances, written for the joint.
+        slope: (J, 6, 6) posterior slopes.
+        work: scratch with the inverse Hessians.
+    """
+    q: int = PARENT[j]
     if q >= 0:
-        multiply(slope[j], cov[q], w.a)
-        multiply_transposed(w.a, slope[j], w.b)
+        multiply(slope[j], cov[q], work.a)
+        multiply_transposed(work.a, slope[j], work.b)
     for i in range(6):
         for k in range(i + 1):
-            shared = w.b[i, k] if q >= 0 else 0.0
-            cov[j, i, k] = cov[j, k, i] = shared + w.inverse[j, i, k]
+            shared = work.b[i, k] if q >= 0 else 0.0
+            cov[j, i, k] = cov[j, k, i] = shared + work.inverse[j, i, k]
 
 
 @kernel
-def _substitute(body, slope, w):
-    """Add to the means what w.gradient asks for, by the factors of the elimination."""
+def _substitute(body: Floats, slope: Floats, work: Work) -> None:
+    """Move the means by the inverse Hessian of all joints times `work.gradient`.
+
+    Args:
+        body: (J, 6) means, changed in place.
+        slope: (J, 6, 6) posterior slopes.
+        work: scratch with the factors of the elimination; the gradient is used up.
+    """
     for j in LEAVES_FIRST:
-        q = PARENT[j]
+        q: int = PARENT[j]
         if q >= 0:
             for i in range(6):
                 for k in range(6):
-                    w.gradient[q, k] += slope[j, i, k] * w.gradient[j, i]
+                    work.gradient[q, k] += slope[j, i, k] * work.gradient[j, i]
     for j in ORDER:
-        q = PARENT[j]
+        q: int = PARENT[j]
         for i in range(6):
             total = 0.0
             for k in range(6):
-                total += w.inverse[j, i, k] * w.gradient[j, k]
+                total += work.inverse[j, i, k] * work.gradient[j, k]
                 if q >= 0:
-                    total += slope[j, i, k] * w.step[q, k]
-            w.step[j, i] = total
+                    total += slope[j, i, k] * work.step[q, k]
+            work.step[j, i] = total
             body[j, i] += total
 
 
 @kernel
-def shift_to_mean(tree, frame, share, w):
+def shift_to_mean(tree: Tree, frame: Frame, share: float, work: Work) -> None:
     """Move the means from the mode towards the mean of the posterior (Laplace's next term).
 
     A camera's information falls with the square of the depth: there is more room behind the mode
     than before it. With J the Jacobian of joint j's pixel, n the camera's optical axis (both in the
     world), d the depth and S_j the posterior covariance, mean - mode = H^-1 g with g_j = sum over
-    cameras of n tr(S_j J'J / sigma^2) / d, H being the Hessian of all joints, whose factors
-    `update_tree` left. `share` of it is applied.
+    cameras of n tr(S_j J'J / sigma^2) / d, H being the Hessian of all joints in the factors that
+    `update_tree` left.
+
+    Args:
+        tree: the updated hypothesis, changed in place.
+        frame: the measurements, with weights and images.
+        share: share of the shift that is applied, 0 to 1.
+        work: scratch, as `update_tree` leaves it.
     """
     sigma, ok, belief = frame.sigma, frame.ok, frame.belief
     for j in range(len(ok)):
         for i in range(6):
-            w.gradient[j, i] = 0.0
+            work.gradient[j, i] = 0.0
         for c in range(len(frame.P)):
             if not (ok[j, c] and belief[j, c] > 0.0):
                 continue
@@ -273,13 +356,19 @@ def shift_to_mean(tree, frame, share, w):
             pull = share * belief[j, c] * _pixel_variance(image, j, tree.cov[j]) / sigma[j, c] ** 2
             pull *= min(image[NEARNESS, j], 1.0 / _NEAREST_M)
             for i in range(3):
-                w.gradient[j, i] += pull * frame.P[c, 2, i]
-    _substitute(tree.body, tree.slope, w)
+                work.gradient[j, i] += pull * frame.P[c, 2, i]
+    _substitute(tree.body, tree.slope, work)
 
 
 @kernel(fastmath=_REORDER)
-def _pixel_variance(image, j, cov):
-    """Return the variance of both coordinates of joint j's pixel together [px^2]."""
+def _pixel_variance(image: Floats, j: int, cov: Floats) -> float:
+    """Return the sum of the variances of both coordinates of a joint's pixel [px^2].
+
+    Args:
+        image: (N_IMAGE, LANES) the joints in one camera.
+        j: the joint.
+        cov: (3+, 3+) covariance of its position [m^2].
+    """
     a0, a1, a2 = image[A0, j], image[A1, j], image[A2, j]
     b0, b1, b2 = image[B0, j], image[B1, j], image[B2, j]
     own = cov[0, 0] * (a0 * a0 + b0 * b0) + cov[1, 1] * (a1 * a1 + b1 * b1)
@@ -289,17 +378,18 @@ def _pixel_variance(image, j, cov):
 
 
 @kernel
-def correct_mean(tree, frame, s, work):
-    """Move from the mode to the mean; update ages, and in work.n_views the views of joints."""
-    if s.mean_correction > 0.0:
-        shift_to_mean(tree, frame, s.mean_correction, work)
-    _update_ages(tree, frame, work.n_views)
+def correct_mean(tree: Tree, frame: Frame, settings: Settings, work: Work) -> None:
+    """Move from the mode to the mean; update ages, conflicts and the numbers of views.
 
-
-@kernel
-def _update_ages(tree, frame, n_views):
-    """Update ages and conflicts of a worker's joints; count the cameras that saw each."""
-    ok, belief = frame.ok, frame.belief
+    Args:
+        tree: the updated hypothesis, changed in place.
+        frame: the measurements, with weights and images.
+        settings: settings of the estimator.
+        work: scratch, as `update_tree` leaves it; `n_views` is written.
+    """
+    if settings.mean_correction > 0.0:
+        shift_to_mean(tree, frame, settings.mean_correction, work)
+    ok, belief, n_views = frame.ok, frame.belief, work.n_views
     for j in range(len(ok)):
         n_views[j], n_supporting = 0, 0
         for c in range(ok.shape[1]):
@@ -310,8 +400,15 @@ def _update_ages(tree, frame, n_views):
 
 
 @kernel
-def count_conflict(n_ok, n_supporting, conflict):
-    """Count updates in a row with two views of a joint of which fewer than two support it."""
+def count_conflict(n_ok: int, n_supporting: int, conflict: int) -> int:
+    """Return the number of updates in a row in which a joint's views contradict its estimate.
+
+    Args:
+        n_ok: number of cameras that measured the joint.
+        n_supporting: number of those that support the estimate; two or more end the row, and so
+            does a joint that no camera measured.
+        conflict: the number before this update; it stays with one view that does not support.
+    """
     if n_ok < 2 or n_supporting >= 2:
         return 0 if n_supporting >= 2 or n_ok == 0 else conflict
     return conflict + 1

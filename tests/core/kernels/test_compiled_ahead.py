@@ -30,7 +30,7 @@ print(json.dumps([[name, [encode(each) for each in args]] for name, kernel in KE
 def two_kernels(tmp_path, monkeypatch):
     """A folder in which nothing is compiled, and two small kernels that are to be."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    names = ("hrc_env.observations:_scale", "hrc_env.tracking.metrics:_tracking_error")
+    names = ("hrc_env.observations:_scale", "hrc_env.tracking.metrics:_measure_errors")
     some = [each for each in signatures.recorded("truth") if each.kernel in names]
     monkeypatch.setattr(signatures, "PATH", tmp_path / "signatures.json")
     signatures.write(some)
@@ -71,5 +71,5 @@ def test_a_process_that_dies_is_named_and_its_kernel_left_for_later(
     monkeypatch.setattr(sys, "executable", "/bin/false")
     with caplog.at_level(logging.WARNING):
         ahead.compile_missing(None, lambda share, what: None)
-    assert "_scale" in caplog.text or "_tracking_error" in caplog.text
+    assert "_scale" in caplog.text or "_measure_errors" in caplog.text
     assert ahead.missing() == two_kernels

@@ -11,7 +11,16 @@ from hrc_env.core.vacancy import EMPTY, POSSIBLE, STATURE_M
 from hrc_env.geometry import chains
 from hrc_env.geometry.distances import closest_parameters, segments
 from hrc_env.safety.config import ShieldConfig
-from hrc_env.safety.rows import MOST_ROWS, RANKING_HZ, floor_rows, tightest_rows
+from hrc_env.safety.constraints import (
+    MAX_CONSTRAINTS,
+    RANKING_HZ,
+    Bodies,
+    Constraints,
+    Robots,
+    UnseenFloors,
+    add_floor_constraints,
+    add_worker_constraints,
+)
 from hrc_env.scene.build import build
 from hrc_env.scene.limits import slew_rad_s2
 
@@ -39,21 +48,32 @@ def before(scene, away_m):
     return chains.tool_frame(scene.chain, scene.home_q)[:2, 3] + np.array([away_m, 0.0])
 
 
-def rows_of(chain, q, estimate, box, config=CONFIG, touches=(0.0, 0.0), gone_m=0.0):
-    q, (low, high, slew) = q[None], box
-    touch_m_s, most_m_s = touches
-    found = np.empty((1, MOST_ROWS, chain.n_joints)), np.empty((1, MOST_ROWS))
-    count, least_m = np.empty(1, np.int64), np.empty(1)
-    tightest_rows(
-        (chains.link_frames(chain, q), chain.slides, chain.capsule_link, chains.capsules(chain, q),
-         chain.capsule_radius_m, low[None], high[None], slew),
-        (segments(estimate.mean_world), estimate.mean_world, estimate.velocity_world,
-         estimate.cov_world, estimate.age_s, estimate.tracked, np.full((1, 1), gone_m),
-         touch_m_s + np.zeros((1, 1, 16)), most_m_s + np.zeros(len(chain.capsule_link))),
-        config.record(), (*found, count, least_m),
+def robots_of(chain, q, box):
+    """One robot as the constraints need it."""
+    low, high, slew = box
+    return Robots(
+        chains.link_frames(chain, q[None]), chain.slides, chain.capsule_link,
+        chains.capsules(chain, q[None]), chain.capsule_radius_m, low[None], high[None], slew,
     )  # fmt: skip
-    n = int(count[0])
-    return found[0][0, :n], found[1][0, :n], least_m[0]
+
+
+def no_constraints(chain, box):
+    """Room for the constraints of one robot, of which there are none so far."""
+    J, b = np.empty((1, MAX_CONSTRAINTS, chain.n_joints)), np.empty((1, MAX_CONSTRAINTS))
+    return Constraints(J, b, np.zeros(1, np.int64), box[0][None], box[1][None], np.full(1, np.inf))
+
+
+def rows_of(chain, q, estimate, box, config=CONFIG, touches=(0.0, 0.0), gone_m=0.0):
+    touch_m_s, most_m_s = touches
+    bodies = Bodies(
+        segments(estimate.mean_world), estimate.mean_world, estimate.velocity_world,
+        estimate.cov_world, estimate.age_s, estimate.tracked, np.full((1, 1), gone_m),
+        touch_m_s + np.zeros((1, 1, 16)), most_m_s + np.zeros(len(chain.capsule_link)),
+    )  # fmt: skip
+    found = no_constraints(chain, box)
+    add_worker_constraints(robots_of(chain, q, box), bodies, config.make_params(), found)
+    n = int(found.n_rows[0])
+    return found.J[0, :n], found.b[0, :n], found.clearance_m[0]
 
 
 def defined(chain, q, estimate, box, p, touches):
@@ -81,16 +101,22 @@ def defined(chain, q, estimate, box, p, touches):
             gap = math.sqrt(squared) - chain.capsule_radius_m[c] - SEGMENT_RADIUS_M[s]
             margin = p.hand_margin_m if s in (6, 7, 14, 15) else p.margin_m
             sigma = math.sqrt(n @ Sigma @ n)
-            predicted = min(sigma, p.predicted_m_s * estimate.age_s[0, 0, [*one, *other]].min())
+            predicted = min(
+                sigma, p.prediction_growth_m_s * estimate.age_s[0, 0, [*one, *other]].min()
+            )
             seen = math.sqrt(sigma**2 - predicted**2)
-            z_d = predicted + p.sigmas * seen + p.doubtful_sigmas * max(seen - p.doubtful_m, 0)
-            z_d = max(z_d, p.least_sigmas_m)
-            travel = (max(v_h, 0) + p.human_margin_m_s) * (p.human_s + p.latency_s)
+            z_d = (
+                predicted
+                + p.n_sigmas * seen
+                + p.single_view_sigmas * max(seen - p.single_view_std_m, 0)
+            )
+            z_d = max(z_d, p.min_uncertainty_m)
+            travel = (max(v_h, 0) + p.worker_speed_margin_m_s) * (p.worker_time_s + p.latency_s)
             clear = gap - margin - z_d - travel
             least_m = min(least_m, clear)
             row = n @ moved(chain, q, c, u)
             a = min(p.deceleration_m_s2, max(np.abs(row) @ slew, 1e-9))
-            bound = max(-p.retreat_m_s, p.gain_hz * clear)
+            bound = max(-p.max_retreat_m_s, p.retreat_gain_hz * clear)
             if clear >= 0:
                 bound = a * (math.sqrt(p.reaction_s**2 + 2 * clear / a) - p.reaction_s)
             left_m_s = touch_m_s[s] - max(v_h, 0)
@@ -98,7 +124,7 @@ def defined(chain, q, estimate, box, p, touches):
                 share_m_s = min(left_m_s, most_m_s[c])
                 brakes = math.sqrt(share_m_s**2 + 2 * a * max(gap - margin - z_d, 0))
                 allowed = max(share_m_s, brakes - a * p.reaction_s)
-                bound = max(bound, allowed if share_m_s else p.still_m_s)
+                bound = max(bound, allowed if share_m_s else p.creep_m_s)
             if bound < np.maximum(row * low, row * high).sum():
                 found.append((bound, *row))
     return np.array(sorted(found)).reshape(-1, 1 + len(q)), least_m
@@ -134,8 +160,8 @@ def test_rows_are_as_they_are_defined_and_none_that_matters_is_left_out(robot, t
         given = chain, q, estimate, (low, high, slew), CONFIG, (touch_m_s, most_m_s)
         J, b, least_m = rows_of(*given)
         expected, all_m = defined(*given)
-        np.testing.assert_allclose(np.sort(b), expected[:MOST_ROWS, 0], atol=1e-6)
-        if len(expected) <= MOST_ROWS:
+        np.testing.assert_allclose(np.sort(b), expected[:MAX_CONSTRAINTS, 0], atol=1e-6)
+        if len(expected) <= MAX_CONSTRAINTS:
             rows = sorted(np.column_stack([b, J]).round(4).tolist())
             np.testing.assert_allclose(rows, sorted(expected.round(4).tolist()), atol=2e-4)
         several += len(b) > 3
@@ -146,16 +172,11 @@ def test_rows_are_as_they_are_defined_and_none_that_matters_is_left_out(robot, t
 
 def floor_rows_of(chain, q, places, level, reach_m, box, config=CONFIG):
     """The rows b, n.J of pieces of floor, the tightest first, and the least D."""
-    q, (low, high, slew) = q[None], box
-    found = np.empty((1, MOST_ROWS, chain.n_joints)), np.empty((1, MOST_ROWS))
-    count, least_m = np.zeros(1, np.int64), np.full(1, np.inf)
-    floor_rows(
-        (chains.link_frames(chain, q), chain.slides, chain.capsule_link, chains.capsules(chain, q),
-         chain.capsule_radius_m, low[None], high[None], slew),
-        (places, np.array([level]), np.array([reach_m])), config.record(), (*found, count, least_m),
-    )  # fmt: skip
-    rows = np.column_stack([found[1][0], found[0][0]])[: count[0]]
-    return rows[rows[:, 0].argsort()], least_m[0]
+    floor = UnseenFloors(places, np.array([level]), np.array([reach_m]))
+    found = no_constraints(chain, box)
+    add_floor_constraints(robots_of(chain, q, box), floor, config.make_params(), found)
+    rows = np.column_stack([found.b[0], found.J[0]])[: found.n_rows[0]]
+    return rows[rows[:, 0].argsort()], found.clearance_m[0]
 
 
 @pytest.mark.parametrize("robot", ["ur10e_like", "mobile_base"])
@@ -209,7 +230,7 @@ def test_who_may_have_gone_anywhere_is_come_no_nearer_to_and_the_nearest_pairs_a
     _, seen, least_m = rows_of(scene.chain, scene.home_q, estimate, box)
     _, b, gone_least_m = rows_of(scene.chain, scene.home_q, estimate, box, gone_m=3.0)
     assert gone_least_m == pytest.approx(least_m - 3.0)
-    assert len(b) == MOST_ROWS > len(seen)
+    assert len(b) == MAX_CONSTRAINTS > len(seen)
     assert (b < 0.0).all()
     assert b.min() > -1e-3
     assert b.min() == pytest.approx(RANKING_HZ * gone_least_m)
@@ -221,7 +242,7 @@ def test_touches_are_allowed_as_fast_as_the_region_bears_less_the_workers_speed(
     box = -np.ones(6), np.ones(6), slew_rad_s2(scene)
     _, strict, _ = rows_of(scene.chain, scene.home_q, estimate, box)
     assert strict.min() < 0.0
-    for most_m_s, bound in ((np.inf, 0.4), (0.25, 0.25), (0.0, CONFIG.still_m_s)):
+    for most_m_s, bound in ((np.inf, 0.4), (0.25, 0.25), (0.0, CONFIG.creep_m_s)):
         given = scene.chain, scene.home_q, estimate, box, CONFIG, (0.4, most_m_s)
         _, b, _ = rows_of(*given)
         assert b.min() == pytest.approx(bound)

@@ -1,5 +1,5 @@
-"""Two cameras of which one hangs askew: they are turned until they agree, and it is said how far
-off the body may be."""
+"""Two cameras of which one is turned against its calibration: the turns are found, and the body's
+uncertain displacement is reported."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,13 @@ from hrc_env.geometry.lines_of_sight import cameras_of
 from hrc_env.tracking.estimators import make_estimator
 from hrc_env.tracking.measurements import make_frame
 from hrc_env.tracking.smoother import smooth
-from hrc_env.tracking.tree.askew import TURN_STD_RAD, _gaps, aim_cameras, displacement, turn_camera
+from hrc_env.tracking.tree.pair_calibration import (
+    TURN_STD_RAD,
+    measure_displacement,
+    measure_gaps,
+    turn_camera,
+    write_projections,
+)
 from hrc_env.tracking.tree.state import PAIR, TREE
 
 TWO = LAB[:2]
@@ -97,7 +103,7 @@ def test_a_disagreement_too_small_to_end_a_track_is_noticed_and_the_body_put_rig
     state, estimates = followed(px)
     assert estimates[0].tracked.all()
     plain = np.mean([off_m(e, j) for e, j in zip(estimates[:3], joints[:3], strict=True)])
-    assert pairs(state)["askew"].all()
+    assert pairs(state)["is_misaligned"].all()
     assert np.median(off_m(estimates[-1], joints[-1])) < plain
     assert (off_m(estimates[-1], joints[-1]) < 2.5 * said_m(estimates[-1])).all()
 
@@ -105,7 +111,7 @@ def test_a_disagreement_too_small_to_end_a_track_is_noticed_and_the_body_put_rig
 @pytest.mark.parametrize("damage", [Damage(), HARD])
 def test_cameras_that_hang_as_is_said_are_not_turned(damage):
     state, estimates = followed(seen_by(TWO, walkers(100), damage))
-    assert not pairs(state)["askew"].any()
+    assert not pairs(state)["is_misaligned"].any()
     assert not state.trees["displaced_m2"].any()
     assert estimates[-1].tracked.all()
 
@@ -117,7 +123,7 @@ def test_three_cameras_that_agree_begin_anew_without_any_turn():
     px[:40, :, 2] = np.nan
     state, estimates = followed(px, LAB[:3])
     assert off_m(estimates[39], joints[39]).min() > 0.05
-    assert not pairs(state)["askew"].any()
+    assert not pairs(state)["is_misaligned"].any()
     assert (off_m(estimates[-1], joints[-1]) < 0.05).all()
     assert (said_m(estimates[-1]) < 0.05).all()
 
@@ -129,10 +135,10 @@ def test_where_a_third_camera_sees_them_too_two_are_not_doubted_for_what_the_det
     px = seen_by(rig, joints)
     alone = px.copy()
     alone[:, :, 2] = np.nan
-    assert pairs(followed(alone, LAB[:3])[0])["askew"].all()
+    assert pairs(followed(alone, LAB[:3])[0])["is_misaligned"].all()
     px[np.arange(90) % 15 > 0, :, 2] = np.nan
     state, estimates = followed(px, LAB[:3])
-    assert not pairs(state)["askew"].any()
+    assert not pairs(state)["is_misaligned"].any()
     assert (off_m(estimates[-1], joints[-1]) < 0.05).all()
 
 
@@ -152,7 +158,7 @@ def test_two_cameras_that_see_two_people_are_not_taken_for_askew():
     shares = []
     for t in range(40, 101, 20):
         state, _ = followed(px[:t])
-        shares.append(pairs(state)["askew"].mean())
+        shares.append(pairs(state)["is_misaligned"].mean())
     assert np.mean(shares) < 0.25
 
 
@@ -187,7 +193,7 @@ def test_slopes_of_the_gaps_are_their_derivatives():
     def gaps(turn):
         tree["pair"]["turn"] = turn
         rows, gap, variance = np.empty((15, 6)), np.empty(15), np.empty(15)
-        assert _gaps(tree[0], frame, rows, gap, variance) == 15
+        assert measure_gaps(tree[0], frame, rows, gap, variance) == 15
         return rows, gap
 
     rows, gap = gaps(np.zeros(6))
@@ -200,7 +206,7 @@ def test_slopes_of_the_gaps_are_their_derivatives():
 def test_displacement_is_the_spread_of_bodies_triangulated_with_turned_cameras():
     joints, pair, out = walk(1, 1)[0], np.zeros(1, PAIR), np.empty((3, 3))
     pair["cameras"], pair["turn_cov"] = (0, 1), (0.1 * TURN_STD_RAD) ** 2 * np.eye(6)
-    displacement(pair[0], cameras_of(TWO), np.column_stack([joints, 0 * joints]), out)
+    measure_displacement(pair[0], cameras_of(TWO), np.column_stack([joints, 0 * joints]), out)
     middle, rng, places = joints.mean(0), np.random.default_rng(0), []
     eyes = [-np.linalg.solve(p[:, :3], p[:, 3]) for p in TWO]
     for turn in rng.normal(0.0, 0.1 * TURN_STD_RAD, (4000, 2, 3)):
@@ -216,10 +222,10 @@ def test_displacement_is_the_spread_of_bodies_triangulated_with_turned_cameras()
 def test_nothing_is_turned_that_does_not_hang_askew():
     pair, frame = np.zeros(1, PAIR), make_frame(cameras_of(LAB))
     pair["cameras"], pair["turn"] = (0, 1), 0.05
-    aim_cameras(pair[0], frame)
+    write_projections(pair[0], frame)
     np.testing.assert_array_equal(frame.P, LAB)
-    pair["askew"] = True
-    aim_cameras(pair[0], frame)
+    pair["is_misaligned"] = True
+    write_projections(pair[0], frame)
     np.testing.assert_allclose(frame.P[1], turned(LAB[1], np.full(3, 0.05)), atol=1e-6)
     np.testing.assert_array_equal(frame.P[2:], LAB[2:])
 

@@ -1,0 +1,337 @@
+"""The built-in shields: joint velocities that keep every constraint of `safety.constraints`.
+
+"ssm" scales all joint velocities by one factor, which keeps the path. "qp" and "pfl" take the
+nearest velocities that the arm can reach in a step. A constraint that demands a retreat counts as
+two: one not to approach, with a weight that outweighs nearly everything, and one to retreat: with
+a single constraint, an arm that flees from a hand pushes its wrist into the other hand.
+
+A task may let parts of estimated bodies come to the robot's hand (`Task.allowed_contact`): forearms
+and hands of a worker who takes a tool, or who works at what the robot holds. As long as these come
+no faster than their region of the body bears in a touch of this arm with its load
+(`contact.permitted_contact_speed`), no link has to retreat from them, which would take away what is
+held for them; and the last link and its load may touch them, at `contact_speed_m_s` at most, both
+speeds together no faster than the region bears. For other people, for other parts of their bodies
+and for the approach of other links (but for `creep_m_s`) nothing changes.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from hrc_env.belief import Belief
+from hrc_env.core.errors import needed
+from hrc_env.core.kernels import kernel
+from hrc_env.core.typing import Bools, Floats, Ints, JointVelocities, Transforms
+from hrc_env.core.vacancy import WALKING_M_S
+from hrc_env.geometry import chains
+from hrc_env.geometry.chains import lever
+from hrc_env.geometry.distances import segments
+from hrc_env.geometry.robot_model import RobotModel
+from hrc_env.safety.config import ShieldConfig
+from hrc_env.safety.constraints import (
+    ABSENT_M,
+    MAX_CONSTRAINTS,
+    Bodies,
+    Constraints,
+    Robots,
+    UnseenFloors,
+    add_floor_constraints,
+    add_worker_constraints,
+)
+from hrc_env.safety.contact import SEGMENT_REGIONS, permitted_contact_speed
+from hrc_env.safety.solver import Problem, constraint_violation, solve
+from hrc_env.safety.unseen import HAND_M, find_undetected
+
+NO_APPROACH_WEIGHT, RETREAT_WEIGHT = 1e4, 30.0
+"""Weights of a constraint's violation [m/s], against changes of joint velocities [rad/s]."""
+TOLERANCE_M_S = 1e-6
+"""Violation below which a constraint counts as kept [m/s]."""
+
+
+class ShieldOutput(NamedTuple):
+    """The result of a shield."""
+
+    velocities: JointVelocities
+    """(B, N) the joint velocities that the arm receives [rad/s]."""
+    values: Mapping[str, Floats]
+    """(B,) by name; each becomes "shield/NAME" in info."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ArmPose:
+    """Where the links and capsules are of the robots that a shield commands."""
+
+    model: RobotModel
+    """The robot's constants."""
+    frames: Transforms
+    """(B, N, 4, 4) world_from_link of every joint's link."""
+    links: Ints
+    """(K,) index of the link that carries each capsule."""
+
+
+def limit_command(
+    belief: Belief, velocities: JointVelocities, dt_s: float, config: ShieldConfig
+) -> ShieldOutput:
+    """Return the nearest safe joint velocities, as a `shield.Shield` with these settings.
+
+    Its values by name are
+
+    - "clearance_m" (B,): the least clearance D of the pairs that matter [m], NaN without any;
+    - "slack" (B,): the greatest violation of a constraint, retreats included [m/s];
+    - "unknown" (B,): 1 while it is not known where a worker is, or the last detection is stale.
+
+    Args:
+        belief: the robot's knowledge of itself and of the workers.
+        velocities: (B, N) joint velocities of the agent [rad/s].
+        dt_s: time until the next command [s].
+        config: kind, margins and limits.
+
+    Raises:
+        ConfigError: the belief has no `RobotModel` or no command in force.
+    """
+    pose, undetected = describe_pose(belief), find_undetected(belief, config)
+    found = build_constraints(belief, pose, undetected.is_lost, velocities, dt_s, config)
+    allowed, slack = np.empty_like(velocities), np.empty(len(velocities))
+    choose = scale_velocities if config.kind == "ssm" else find_nearest_velocities
+    choose(found, velocities, allowed)
+    limit_speed(pose.frames, pose.model.chain.slides, pose.links, belief.robot.capsules_world,
+                undetected.speed_limit_m_s, allowed)  # fmt: skip
+    find_slack(found, allowed, slack)
+    unknown = belief.estimate.unknown | undetected.is_lost
+    values = {
+        "clearance_m": np.where(np.isinf(found.clearance_m), np.nan, found.clearance_m),
+        "slack": slack,
+        "unknown": unknown.any(1).astype(float),
+    }
+    return ShieldOutput(allowed, values)
+
+
+def describe_pose(belief: Belief) -> ArmPose:
+    """Return where links and capsules are; the last link carries the loads."""
+    model = needed(belief.model, "A robot's model (RobotModel), which a built-in shield needs,")
+    n_loads = len(belief.robot.capsule_radius_m) - len(model.chain.capsule_link)
+    carried = np.full(n_loads, model.chain.n_joints - 1)
+    links = np.append(model.chain.capsule_link, carried)
+    return ArmPose(model, chains.link_frames(model.chain, belief.robot.q), links)
+
+
+def build_constraints(
+    belief: Belief,
+    pose: ArmPose,
+    is_lost: Bools,
+    wanted: JointVelocities,
+    dt_s: float,
+    config: ShieldConfig,
+) -> Constraints:
+    """Return the tightest constraints of every robot.
+
+    For "ssm" only velocities between rest and `wanted` are within reach, for other kinds those that
+    the slew reaches until the next command.
+
+    Args:
+        belief: the robot's knowledge of itself and of the workers.
+        pose: its links.
+        is_lost: (B, W) the workers that were detected once, but not lately.
+        wanted: (B, N) joint velocities of the agent [rad/s].
+        dt_s: time until the next command [s].
+        config: kind, margins and limits.
+    """
+    model, batch = pose.model, len(wanted)
+    low, high = np.minimum(wanted, 0.0), np.maximum(wanted, 0.0)
+    if config.kind != "ssm":
+        in_force = needed(belief.command, "The command in force, which a built-in shield needs,")
+        most, change = model.fastest_rad_s, model.slew_rad_s2 * dt_s
+        low = np.minimum(np.maximum(-most, in_force - change), most)
+        high = np.maximum(np.minimum(most, in_force + change), -most)
+    found = Constraints(
+        J=np.empty((batch, MAX_CONSTRAINTS, model.chain.n_joints)),
+        b=np.empty((batch, MAX_CONSTRAINTS)),
+        n_rows=np.empty(batch, np.int64),
+        low=low,
+        high=high,
+        clearance_m=np.empty(batch),
+    )
+    robots = Robots(
+        frames=pose.frames,
+        slides=model.chain.slides,
+        links=pose.links,
+        capsules=belief.robot.capsules_world,
+        radii_m=belief.robot.capsule_radius_m,
+        low=low,
+        high=high,
+        slew=model.slew_rad_s2,
+    )
+    params, floor = config.make_params(), belief.unseen
+    add_worker_constraints(robots, _describe_bodies(belief, pose, is_lost, config), params, found)
+    if floor is not None and np.isfinite(floor.possible_m).any():
+        walked_m = WALKING_M_S * (floor.age_s + config.reaction_s + config.latency_s)
+        unseen = UnseenFloors(floor.floor_world, floor.level, floor.piece_m + HAND_M + walked_m)
+        add_floor_constraints(robots, unseen, params, found)
+    return found
+
+
+def _describe_bodies(belief: Belief, pose: ArmPose, is_lost: Bools, config: ShieldConfig) -> Bodies:
+    """Return the estimated bodies, those of lost workers (B, W) at rest where they were seen
+    last."""
+    estimate = belief.estimate
+    mean, velocity, cov = estimate.mean_world, estimate.velocity_world, estimate.cov_world
+    touches = _find_allowed_touches(belief, pose, config)
+    contact_m_s = touches.segment_m_s
+    if is_lost.any():
+        lost = is_lost[..., None, None]
+        mean, velocity = np.where(lost, estimate.seen_world, mean), np.where(lost, 0.0, velocity)
+        cov = np.where(lost[..., None], 0.0, cov)
+        contact_m_s = np.where(lost[..., 0], 0.0, contact_m_s)
+    walking_m_s = WALKING_M_S if config.worker_speed_m_s is None else config.worker_speed_m_s
+    return Bodies(
+        segments=segments(mean),
+        mean=mean,
+        velocity=velocity,
+        cov=cov,
+        age_s=estimate.age_s,
+        is_located=estimate.tracked | is_lost,
+        moved_m=np.where(is_lost, walking_m_s * estimate.blind_s, 0.0),
+        contact_m_s=contact_m_s,
+        robot_share_m_s=touches.capsule_m_s,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class AllowedTouches:
+    """How fast touches of estimated bodies may be."""
+
+    segment_m_s: Floats
+    """(B, W, S) greatest relative speed of an allowed touch of each segment [m/s]; 0: none is."""
+    capsule_m_s: Floats
+    """(K,) greatest speed of each of the robot's capsules in an allowed touch [m/s]."""
+
+
+def _find_allowed_touches(belief: Belief, pose: ArmPose, config: ShieldConfig) -> AllowedTouches:
+    """Return the touches that "pfl" allows everywhere, and other kinds where the task allows
+    them."""
+    model, links = pose.model, pose.links
+    shape = (*belief.estimate.tracked.shape, len(SEGMENT_REGIONS))
+    if config.kind == "pfl":
+        allowed, capsule_m_s = np.ones(shape, bool), np.full(len(links), np.inf)
+    elif belief.allowed_contact is None:
+        return AllowedTouches(np.zeros(shape), np.zeros(len(links)))
+    else:
+        is_last = links == model.chain.n_joints - 1
+        allowed = belief.allowed_contact
+        capsule_m_s = np.where(is_last, config.contact_speed_m_s, 0.0)
+    carried = 0.0 if belief.objects is None else belief.objects.held @ model.load_kg
+    mass_kg = np.broadcast_to(model.mass_kg + carried, len(belief.action))
+    speeds = {name: permitted_contact_speed(name, mass_kg) for name in set(SEGMENT_REGIONS)}
+    bears_m_s = np.stack([speeds[name] for name in SEGMENT_REGIONS], axis=1)[:, None]
+    return AllowedTouches(np.where(allowed, bears_m_s, 0.0), capsule_m_s)
+
+
+@kernel
+def scale_velocities(
+    constraints: Constraints, wanted: JointVelocities, allowed: JointVelocities
+) -> None:
+    """Scale the velocities of all joints by one factor until every constraint holds.
+
+    Args:
+        constraints: of every robot.
+        wanted: (B, N) joint velocities of the agent [rad/s].
+        allowed: (B, N) written: those that are allowed [rad/s].
+    """
+    J, b = constraints.J, constraints.b
+    for e in range(len(wanted)):
+        share = 1.0
+        for r in range(constraints.n_rows[e]):
+            speed = constraint_violation(J[e, r], 0.0, wanted[e])
+            if speed > 0.0:
+                share = min(share, max(b[e, r], 0.0) / speed)
+        for i in range(wanted.shape[1]):
+            allowed[e, i] = share * wanted[e, i]
+
+
+@kernel(makes_arrays=True)
+def find_nearest_velocities(
+    constraints: Constraints, wanted: JointVelocities, allowed: JointVelocities
+) -> None:
+    """Find the nearest joint velocities within reach that keep the constraints.
+
+    Where the wanted ones keep all constraints, these are allowed, within reach or not.
+
+    Args:
+        constraints: of every robot.
+        wanted: (B, N) joint velocities of the agent [rad/s].
+        allowed: (B, N) written: those that are allowed [rad/s].
+    """
+    J, b, count = constraints.J, constraints.b, constraints.n_rows
+    low, high = constraints.low, constraints.high
+    n = wanted.shape[1]
+    rows, bound = np.empty((2 * MAX_CONSTRAINTS, n)), np.empty(2 * MAX_CONSTRAINTS)
+    weight, scratch = np.empty(2 * MAX_CONSTRAINTS), np.empty((n + 3, n))
+    for e in range(len(wanted)):
+        holds, x = True, allowed[e]
+        for i in range(n):
+            x[i] = min(high[e, i], max(low[e, i], wanted[e, i]))
+        for r in range(count[e]):
+            holds &= constraint_violation(J[e, r], b[e, r], x) <= TOLERANCE_M_S
+        if holds:
+            for i in range(n):
+                x[i] = wanted[e, i]
+            continue
+        m = 0
+        for r in range(count[e]):
+            for away in range(2 if b[e, r] < 0.0 else 1):
+                for i in range(n):
+                    rows[m, i] = J[e, r, i]
+                bound[m] = b[e, r] if away else max(b[e, r], 0.0)
+                weight[m] = RETREAT_WEIGHT if away else NO_APPROACH_WEIGHT
+                m += 1
+        problem = Problem(rows[:m], bound[:m], weight[:m], low[e], high[e], wanted[e])
+        solve(problem, x, scratch)
+
+
+@kernel
+def limit_speed(
+    frames: Transforms,
+    slides: Bools,
+    links: Ints,
+    capsules: Floats,
+    limit_m_s: Floats,
+    allowed: JointVelocities,
+) -> None:
+    """Scale joint velocities until no end of a capsule exceeds a speed limit.
+
+    Args:
+        frames: (B, N, 4, 4) world_from_link.
+        slides: (N,) which joints are slides.
+        links: (K,) index of the link that carries each capsule.
+        capsules: (B, K, 2, 3) end points in the world [m].
+        limit_m_s: (B,) speed limit of every point [m/s]; infinite: none.
+        allowed: (B, N) joint velocities, changed in place [rad/s].
+    """
+    for e in range(len(allowed)):
+        if limit_m_s[e] == np.inf:
+            continue
+        fastest = 0.0
+        for c in range(len(links)):
+            for end in range(2):
+                point, vx, vy, vz = capsules[e, c, end], 0.0, 0.0, 0.0
+                for i in range(links[c] + 1 if abs(point[0]) <= ABSENT_M else 0):
+                    x, y, z = lever(frames[e, i], slides[i], point)
+                    qd = allowed[e, i]
+                    vx, vy, vz = vx + qd * x, vy + qd * y, vz + qd * z
+                fastest = max(fastest, math.sqrt(vx * vx + vy * vy + vz * vz))
+        if fastest > limit_m_s[e]:
+            for i in range(allowed.shape[1]):
+                allowed[e, i] *= limit_m_s[e] / fastest
+
+
+@kernel
+def find_slack(constraints: Constraints, allowed: JointVelocities, slack: Floats) -> None:
+    """Write the greatest violation of a constraint, (B,) [m/s], of velocities (B, N) [rad/s]."""
+    for e in range(len(allowed)):
+        slack[e] = 0.0
+        for r in range(constraints.n_rows[e]):
+            violation = constraint_violation(constraints.J[e, r], constraints.b[e, r], allowed[e])
+            slack[e] = max(slack[e], violation)

@@ -1,0 +1,536 @@
+"""Constraints n.J qd <= b on how fast a robot's capsules may approach estimated bodies.
+
+For every pair of a robot's capsule and a segment of an estimated body, n is the unit vector from
+the robot's nearest point to the body's, and the clearance is
+
+    D = gap - margin - Z_d - v_h T_h,   Z_d = max(z, predicted + k seen + k' max(seen - s', 0))
+
+with v_h the estimated speed of the body's point along -n, and sigma_n = sqrt(n' Sigma n) the root
+of predicted^2 + seen^2. From `ShieldConfig` come k `n_sigmas`, k' `single_view_sigmas`, s'
+`single_view_std_m`, z `min_uncertainty_m`, T_h `worker_time_s`; the margin is `margin_m` or
+`hand_margin_m`. Where a body was not detected for a while, as in late images, much of the deviation
+comes from prediction, which is wide; a deviation that is large all the same belongs to a part that
+a single camera locates, whose errors exceed the reported ones. Where D >= 0 the robot may approach
+as fast as it can brake within D (the robot's share of `separation.protective_distance`); where
+D < 0 it has to retreat. Constraints that no command within reach violates are left out.
+
+A segment that may be touched causes no retreat while it comes no faster than its region of the body
+bears in a touch: capsules that may touch it brake within gap - margin - Z_d to a speed that both
+together keep below that limit; points of other capsules may approach at `creep_m_s` where D allows
+less.
+
+A worker without a recent detection may be anywhere within a walk of the last detected place. That
+distance is subtracted from D, too, and within D the robot neither approaches nor flees. The same
+holds for people on floor that no camera has seen empty.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from hrc_env.core.kernels import kernel
+from hrc_env.core.skeleton import HAND_SEGMENTS, SEGMENT_ENDS, SEGMENT_RADIUS_M
+from hrc_env.core.typing import (
+    Bools,
+    Capsules,
+    Covariances3,
+    Floats,
+    Ints,
+    JointVelocities,
+    Points3,
+    Transforms,
+    Vector3,
+    Velocities3,
+)
+from hrc_env.core.vacancy import POSSIBLE, STATURE_M
+from hrc_env.geometry.chains import lever
+from hrc_env.geometry.distances import closest_parameters
+from hrc_env.safety.config import ShieldParams
+
+MAX_CONSTRAINTS = 32
+"""Number of constraints of one robot; of more, the tightest are kept."""
+ABSENT_M = 1e3
+"""Coordinate beyond which a capsule belongs to a load that is not carried [m]."""
+RANKING_HZ = 1e-4
+"""Gain on D of the retreat from places where a lost worker may be [1/s]: hardly any motion, but it
+makes the nearest pairs the tightest constraints."""
+MIN_FOREARM_M = 0.1
+"""Lower bound on an estimated forearm's length, on which the speed of its fingertips depends
+[m]."""
+_N_LIMBS = len(SEGMENT_ENDS)
+_JOINTS: Ints = np.array(
+    [[(e[0], e[-1]) for e in ends[:2]] for ends in SEGMENT_ENDS]
+    + [[(wrist, wrist)] * 2 for _, wrist, *_ in HAND_SEGMENTS]
+)
+"""(S, 2, 2) the two joints whose mean is each end of a segment; both ends of a hand: its wrist."""
+
+
+class Robots(NamedTuple):
+    """The robots that a shield commands, one row an environment."""
+
+    frames: Transforms
+    """(B, N, 4, 4) world_from_link of every joint's link."""
+    slides: Bools
+    """(N,) which joints are slides."""
+    links: Ints
+    """(K,) index of the link that carries each capsule."""
+    capsules: Capsules
+    """(B, K, 2, 3) end points in the world [m]."""
+    radii_m: Floats
+    """(K,) radius of each capsule [m]."""
+    low: JointVelocities
+    """(B, N) least joint velocities within reach [rad/s]."""
+    high: JointVelocities
+    """(B, N) greatest joint velocities within reach [rad/s]."""
+    slew: Floats
+    """(N,) greatest change of each joint velocity [rad/s^2]."""
+
+
+class Bodies(NamedTuple):
+    """The estimated bodies of the workers, one row an environment and a worker."""
+
+    segments: Capsules
+    """(B, W, S, 2, 3) end points of the segments in the world [m]."""
+    mean: Points3
+    """(B, W, J, 3) estimated joints [m]."""
+    velocity: Velocities3
+    """(B, W, J, 3) their estimated velocities [m/s]."""
+    cov: Covariances3
+    """(B, W, J, 3, 3) covariance of each joint's position [m^2]."""
+    age_s: Floats
+    """(B, W, J) time since a measurement last supported each joint [s]."""
+    is_located: Bools
+    """(B, W) whether the worker has a track, or is lost at a known place."""
+    moved_m: Floats
+    """(B, W) how far a lost worker may have walked since the last detection [m]; else 0."""
+    contact_m_s: Floats
+    """(B, W, S) greatest relative speed of an allowed touch of each segment [m/s]; 0: none is."""
+    robot_share_m_s: Floats
+    """(K,) greatest speed of each capsule in an allowed touch [m/s]."""
+
+
+class UnseenFloors(NamedTuple):
+    """The floor on which people may be that no camera has detected."""
+
+    centres_world: Points3
+    """(N, 3) centres of the pieces of floor [m]."""
+    level: Ints
+    """(B, N) the state of each piece: `POSSIBLE`, `PROBABLY_EMPTY` or `EMPTY`."""
+    reach_m: Floats
+    """(B,) distance from a centre within which hands may be [m]."""
+
+
+class Constraints(NamedTuple):
+    """The constraints J qd <= b on joint velocities, and the box low <= qd <= high."""
+
+    J: Floats
+    """(B, M, N) rows n.J, of which the first `n_rows` count [m/rad, of slides 1]."""
+    b: Floats
+    """(B, M) greatest speed of approach [m/s]; negative: the least speed of retreat."""
+    n_rows: Ints
+    """(B,) number of constraints."""
+    low: JointVelocities
+    """(B, N) least joint velocities within reach [rad/s]."""
+    high: JointVelocities
+    """(B, N) greatest joint velocities within reach [rad/s]."""
+    clearance_m: Floats
+    """(B,) least clearance D over the pairs that may matter [m]; infinite without any."""
+
+
+class Arm(NamedTuple):
+    """One robot of `Robots`; the fields are those of a row."""
+
+    frames: Transforms
+    """(N, 4, 4) world_from_link."""
+    slides: Bools
+    """(N,) which joints are slides."""
+    low: JointVelocities
+    """(N,) least joint velocities within reach [rad/s]."""
+    high: JointVelocities
+    """(N,) greatest joint velocities within reach [rad/s]."""
+    slew: Floats
+    """(N,) greatest change of each joint velocity [rad/s^2]."""
+
+
+class Body(NamedTuple):
+    """One estimated body of `Bodies`."""
+
+    mean: Points3
+    """(J, 3) estimated joints [m]."""
+    velocity: Velocities3
+    """(J, 3) their estimated velocities [m/s]."""
+    cov: Covariances3
+    """(J, 3, 3) covariance of each joint's position [m^2]."""
+
+
+class Nearest(NamedTuple):
+    """The nearest points of a robot's capsule and a body's segment."""
+
+    distance_m: float
+    """Distance of the two axes [m]."""
+    along: float
+    """Place of the point on the segment, from 0 at its first end to 1 at its second."""
+
+
+class Approach(NamedTuple):
+    """How a point of a body moves towards a robot, and how well it is known."""
+
+    speed_m_s: float
+    """Speed along -n [m/s]."""
+    std_m: float
+    """Standard deviation of the position along n [m]."""
+
+
+class Reach(NamedTuple):
+    """The velocities of a point of a robot along n that commands can cause."""
+
+    max_speed_m_s: float
+    """Greatest speed of approach within reach [m/s]."""
+    deceleration_m_s2: float
+    """How fast the joints can reduce it [m/s^2]."""
+
+
+@kernel(makes_arrays=True)
+def add_worker_constraints(
+    robots: Robots, bodies: Bodies, params: ShieldParams, out: Constraints
+) -> None:
+    """Write the tightest constraints of every robot against every located worker.
+
+    Args:
+        robots: link frames, capsules and the velocities within reach.
+        bodies: estimated segments with velocities, covariances and ages.
+        params: margins, limits and gains of the shield.
+        out: written: `J`, `b`, `n_rows` and `clearance_m`; the box is left as it was.
+    """
+    n_caps, n_segments = robots.capsules.shape[1], bodies.segments.shape[2]
+    rods, limbs = np.empty((n_caps, 5)), np.empty((n_segments, 5))
+    normal, point, row = np.empty(3), np.empty(3), np.empty(len(robots.slides))
+    for e in range(len(robots.capsules)):
+        out.n_rows[e], out.clearance_m[e] = 0, np.inf
+        arm = Arm(robots.frames[e], robots.slides, robots.low[e], robots.high[e], robots.slew)
+        for c in range(n_caps):
+            bound_capsule(robots.capsules[e, c], robots.radii_m[c], rods[c])
+            rods[c, 4] = find_stopping_distance(arm, robots.links[c], robots.capsules[e, c], params)
+        for w in range(bodies.segments.shape[1]):
+            if not bodies.is_located[e, w]:
+                continue
+            body = Body(bodies.mean[e, w], bodies.velocity[e, w], bodies.cov[e, w])
+            moved = bodies.moved_m[e, w]
+            for s in range(n_segments):
+                bound_capsule(bodies.segments[e, w, s], SEGMENT_RADIUS_M[s], limbs[s])
+                limbs[s, 4] = bound_deduction(body, s, params) + moved
+            for c, s in np.ndindex(n_caps, n_segments):
+                if sphere_gap(rods[c], limbs[s]) > rods[c, 4] + limbs[s, 4]:
+                    continue
+                nearest = find_nearest(
+                    robots.capsules[e, c], bodies.segments[e, w, s], point, normal
+                )
+                towards = project_motion(body, s, nearest.along, normal)
+                age_s = find_segment_age(bodies.age_s[e, w], s)
+                z_d = find_uncertainty(towards.std_m, age_s, params) + moved
+                gap = nearest.distance_m - robots.radii_m[c] - SEGMENT_RADIUS_M[s]
+                near = gap - params.margins_m[s] - z_d
+                clear = near - find_travel(towards.speed_m_s, params)
+                out.clearance_m[e] = min(out.clearance_m[e], clear)
+                reach = write_row(arm, robots.links[c], point, normal, row)
+                braking = min(reach.deceleration_m_s2, params.deceleration_m_s2)
+                bound = bound_approach(clear, braking, moved > 0.0, params)
+                left_m_s = bodies.contact_m_s[e, w, s] - max(towards.speed_m_s, 0.0)
+                if left_m_s > 0.0:
+                    touch_m_s = min(left_m_s, bodies.robot_share_m_s[c])
+                    bound = max(bound, bound_touch(near, touch_m_s, braking, params))
+                if bound < reach.max_speed_m_s:
+                    keep_tightest(row, bound, e, out)
+
+
+@kernel(makes_arrays=True)
+def add_floor_constraints(
+    robots: Robots, floor: UnseenFloors, params: ShieldParams, out: Constraints
+) -> None:
+    """Add constraints by which robots can brake before people on floor that was not seen empty.
+
+    Args:
+        robots: link frames, capsules and the velocities within reach.
+        floor: the pieces of floor and their states.
+        params: margins, limits and gains of the shield.
+        out: the constraints so far, to which these are added.
+    """
+    body, rod, limb = np.empty((2, 3)), np.empty(5), np.empty(5)
+    normal, point, row = np.empty(3), np.empty(3), np.empty(len(robots.slides))
+    for e in range(len(robots.capsules)):
+        arm = Arm(robots.frames[e], robots.slides, robots.low[e], robots.high[e], robots.slew)
+        reach_m = floor.reach_m[e]
+        for c in range(robots.capsules.shape[1]):
+            bound_capsule(robots.capsules[e, c], robots.radii_m[c], rod)
+            stop_m = find_stopping_distance(arm, robots.links[c], robots.capsules[e, c], params)
+            for n in range(len(floor.centres_world)):
+                if floor.level[e, n] != POSSIBLE:
+                    continue
+                body[0], body[1] = floor.centres_world[n], floor.centres_world[n]
+                body[1, 2] += STATURE_M
+                bound_capsule(body, reach_m, limb)
+                if sphere_gap(rod, limb) > stop_m:
+                    continue
+                nearest = find_nearest(robots.capsules[e, c], body, point, normal)
+                clear = nearest.distance_m - robots.radii_m[c] - reach_m
+                out.clearance_m[e] = min(out.clearance_m[e], clear)
+                reach = write_row(arm, robots.links[c], point, normal, row)
+                braking = min(reach.deceleration_m_s2, params.deceleration_m_s2)
+                bound = bound_approach(clear, braking, True, params)
+                if bound < reach.max_speed_m_s:
+                    keep_tightest(row, bound, e, out)
+
+
+@kernel
+def bound_capsule(ends: Floats, radius_m: float, sphere: Floats) -> None:
+    """Write the sphere around a capsule.
+
+    Args:
+        ends: (2, 3) its end points [m].
+        radius_m: its radius [m].
+        sphere: (5,) written: the centre and the radius [m]; the last value is left as it was.
+    """
+    squared = 0.0
+    for i in range(3):
+        sphere[i] = 0.5 * (ends[0, i] + ends[1, i])
+        squared += (ends[1, i] - ends[0, i]) ** 2
+    sphere[3] = 0.5 * math.sqrt(squared) + radius_m
+
+
+@kernel
+def sphere_gap(one: Floats, other: Floats) -> float:
+    """Return the distance between the surfaces of two spheres, as `bound_capsule` writes them."""
+    dx, dy, dz = one[0] - other[0], one[1] - other[1], one[2] - other[2]
+    return math.sqrt(dx * dx + dy * dy + dz * dz) - one[3] - other[3]
+
+
+@kernel
+def find_stopping_distance(arm: Arm, link: int, ends: Floats, params: ShieldParams) -> float:
+    """Return an upper bound on the distance in which a capsule can be brought to rest [m].
+
+    A pair with a greater clearance cannot matter. No point of a capsule is faster than its faster
+    end. The bound of an absent load is -inf.
+
+    Args:
+        arm: the robot.
+        link: index of the link that carries the capsule.
+        ends: (2, 3) the capsule's end points [m].
+        params: the reaction time and the deceleration.
+    """
+    fastest, longest_s = 0.0, 0.0
+    for end in range(2):
+        if abs(ends[end, 0]) > ABSENT_M:
+            return -np.inf
+        vx, vy, vz, either = 0.0, 0.0, 0.0, 0.0
+        for i in range(link + 1):
+            x, y, z = lever(arm.frames[i], arm.slides[i], ends[end])
+            low, high = arm.low[i], arm.high[i]
+            middle, half = 0.5 * (low + high), 0.5 * (high - low)
+            vx, vy, vz = vx + middle * x, vy + middle * y, vz + middle * z
+            either += half * math.sqrt(x * x + y * y + z * z)
+            longest_s = max(longest_s, max(abs(low), abs(high)) / arm.slew[i])
+        fastest = max(fastest, math.sqrt(vx * vx + vy * vy + vz * vz) + either)
+    braking_s = max(fastest / params.deceleration_m_s2, longest_s)
+    return fastest * (params.reaction_s + 0.5 * braking_s)
+
+
+@kernel
+def bound_deduction(body: Body, s: int, params: ShieldParams) -> float:
+    """Return an upper bound on the difference of gap and clearance of segment `s` [m].
+
+    It holds for every direction of n.
+    """
+    squared, variance = 0.0, 0.0
+    for end in range(2):
+        x, y, z = find_end_velocity(body, s, end)
+        squared = max(squared, x * x + y * y + z * z)
+        for k in range(2):
+            S = body.cov[_JOINTS[s, end, k]]
+            variance = max(variance, S[0, 0] + S[1, 1] + S[2, 2])
+    std_m = math.sqrt(variance)
+    margin = params.margins_m[s] + std_m
+    return margin + find_uncertainty(std_m, 0.0, params) + find_travel(math.sqrt(squared), params)
+
+
+@kernel
+def find_uncertainty(std_m: float, age_s: float, params: ShieldParams) -> float:
+    """Return the uncertainty margin Z_d [m].
+
+    Args:
+        std_m: standard deviation of the position along n [m].
+        age_s: time since the part of the body was last detected [s].
+        params: the factors on both shares of the deviation.
+    """
+    predicted = min(std_m, params.prediction_growth_m_s * age_s)
+    seen = math.sqrt(std_m * std_m - predicted * predicted)
+    doubt = params.single_view_sigmas * max(0.0, seen - params.single_view_std_m)
+    return max(params.min_uncertainty_m, predicted + params.n_sigmas * seen + doubt)
+
+
+@kernel
+def find_travel(speed_m_s: float, params: ShieldParams) -> float:
+    """Return how far a worker may come before the robot has stopped [m].
+
+    Args:
+        speed_m_s: estimated speed towards the robot [m/s].
+        params: the worker's time, and the speed that replaces or enlarges the estimated one.
+    """
+    if params.follows_estimate:
+        speed_m_s = max(speed_m_s, 0.0) + params.worker_m_s
+    else:
+        speed_m_s = params.worker_m_s
+    return speed_m_s * params.travel_s
+
+
+@kernel
+def find_end_velocity(body: Body, s: int, end: int) -> Vector3:
+    """Return the velocity of an end of segment `s` [m/s]; the tip of a hand turns with its
+    forearm."""
+    one, two = body.velocity[_JOINTS[s, end, 0]], body.velocity[_JOINTS[s, end, 1]]
+    x, y, z = 0.5 * (one[0] + two[0]), 0.5 * (one[1] + two[1]), 0.5 * (one[2] + two[2])
+    if s >= _N_LIMBS and end == 1:
+        elbow, wrist, reach, _ = HAND_SEGMENTS[s - _N_LIMBS]
+        squared = 0.0
+        for i in range(3):
+            squared += (body.mean[wrist, i] - body.mean[elbow, i]) ** 2
+        share, v = reach / max(math.sqrt(squared), MIN_FOREARM_M), body.velocity[elbow]
+        x, y, z = x + share * (x - v[0]), y + share * (y - v[1]), z + share * (z - v[2])
+    return Vector3(x, y, z)
+
+
+@kernel
+def find_segment_age(age_s: Floats, s: int) -> float:
+    """Return the time since any joint of segment `s` was detected [s], of ages (J,)."""
+    least = np.inf
+    for end in range(2):
+        for k in range(2):
+            least = min(least, age_s[_JOINTS[s, end, k]])
+    return least
+
+
+@kernel
+def find_nearest(capsule: Floats, segment: Floats, point: Floats, normal: Floats) -> Nearest:
+    """Find the nearest points of the axes of a robot's capsule and a body's segment.
+
+    Args:
+        capsule: (2, 3) end points [m].
+        segment: (2, 3) end points [m].
+        point: (3,) written: the point on the robot's axis [m].
+        normal: (3,) written: n, the unit vector from there to the body.
+    """
+    squared, u, t = closest_parameters(capsule[0], capsule[1], segment[0], segment[1])
+    distance = math.sqrt(squared)
+    for i in range(3):
+        point[i] = capsule[0, i] + u * (capsule[1, i] - capsule[0, i])
+        to = segment[0, i] + t * (segment[1, i] - segment[0, i])
+        normal[i] = (to - point[i]) / max(distance, 1e-6)
+    return Nearest(distance, t)
+
+
+@kernel
+def project_motion(body: Body, s: int, along: float, normal: Floats) -> Approach:
+    """Project the velocity and the covariance of a point of a segment onto n.
+
+    Args:
+        body: the estimated body.
+        s: index of the segment.
+        along: place of the point, from 0 at the segment's first end to 1 at its second.
+        normal: (3,) n.
+    """
+    nx, ny, nz = normal[0], normal[1], normal[2]
+    speed, variance = 0.0, 0.0
+    for end in range(2):
+        share = along if end else 1.0 - along
+        x, y, z = find_end_velocity(body, s, end)
+        speed -= share * (nx * x + ny * y + nz * z)
+        for k in range(2):
+            S = body.cov[_JOINTS[s, end, k]]
+            across = nx * (ny * S[0, 1] + nz * S[0, 2]) + ny * nz * S[1, 2]
+            squares = nx * nx * S[0, 0] + ny * ny * S[1, 1] + nz * nz * S[2, 2]
+            variance += 0.5 * share * (squares + 2.0 * across)
+    return Approach(speed, math.sqrt(max(variance, 0.0)))
+
+
+@kernel
+def write_row(arm: Arm, link: int, point: Floats, normal: Floats, row: Floats) -> Reach:
+    """Write n.J of a point of a robot, and return the velocities along n within reach.
+
+    Args:
+        arm: the robot.
+        link: index of the link that carries the point.
+        point: (3,) the point in the world [m].
+        normal: (3,) n.
+        row: (N,) written: n.J.
+    """
+    fastest, slowing = 0.0, 0.0
+    for i in range(len(row)):
+        row[i] = 0.0
+        if i <= link:
+            x, y, z = lever(arm.frames[i], arm.slides[i], point)
+            row[i] = x * normal[0] + y * normal[1] + z * normal[2]
+            fastest += max(row[i] * arm.low[i], row[i] * arm.high[i])
+            slowing += abs(row[i]) * arm.slew[i]
+    return Reach(fastest, slowing)
+
+
+@kernel
+def bound_approach(
+    clearance_m: float, braking_m_s2: float, is_lost: bool, params: ShieldParams
+) -> float:
+    """Return the greatest speed of approach [m/s]; negative: the least speed of retreat.
+
+    Args:
+        clearance_m: D [m].
+        braking_m_s2: how fast the point can be slowed down [m/s^2].
+        is_lost: whether the worker's place is only known from an earlier detection; there is no
+            retreat from these.
+        params: the reaction time and the gain and limit of a retreat.
+    """
+    if clearance_m < 0.0:
+        if is_lost:
+            return RANKING_HZ * clearance_m
+        return max(-params.retreat_m_s, params.gain_hz * clearance_m)
+    reaction_s = params.reaction_s
+    root = math.sqrt(reaction_s**2 + 2.0 * clearance_m / max(braking_m_s2, 1e-9))
+    return braking_m_s2 * (root - reaction_s)
+
+
+@kernel
+def bound_touch(
+    near_m: float, touch_m_s: float, braking_m_s2: float, params: ShieldParams
+) -> float:
+    """Return the greatest speed of approach to a segment that may be touched [m/s].
+
+    Args:
+        near_m: gap - margin - Z_d [m].
+        touch_m_s: speed of the robot that is allowed in the touch [m/s]; 0: it only keeps its
+        place. braking_m_s2: how fast the point can be slowed down [m/s^2]. params: the reaction
+        time, and the speed of corrections.
+    """
+    if touch_m_s == 0.0:
+        return params.creep_m_s
+    root = math.sqrt(touch_m_s**2 + 2.0 * braking_m_s2 * max(near_m, 0.0))
+    return max(touch_m_s, root - braking_m_s2 * params.reaction_s)
+
+
+@kernel
+def keep_tightest(row: Floats, bound: float, e: int, out: Constraints) -> None:
+    """Add a constraint to environment `e`; where all places are taken, instead of a looser one.
+
+    Args:
+        row: (N,) n.J.
+        bound: greatest speed of approach [m/s].
+        e: index of the environment.
+        out: the constraints so far.
+    """
+    at = out.n_rows[e]
+    if at == MAX_CONSTRAINTS:
+        at = np.argmax(out.b[e])
+        if out.b[e, at] <= bound:
+            return
+    else:
+        out.n_rows[e] = at + 1
+    for i in range(len(row)):
+        out.J[e, at, i] = row[i]
+    out.b[e, at] = bound
