@@ -208,7 +208,7 @@ ROBOT_TERMS: tuple[ObservationTerm, ...] = (
         frame="tool",
         bound=300.0,
         scale=100.0,
-        doc="Force with which the fingers press together, negative: apart; or the load on the cups.",
+        doc="Force that presses the fingers together, negative: apart; or the load on the cups.",
         function=lambda belief: _hand(belief).force_n,
     ),
     ObservationTerm(
