@@ -32,13 +32,13 @@ ORGANS: Mapping[str, Sequence[Place]] = {
     "emulator": ((emulator, "emulate"),),
     "tracking": ((PoseTracking, "perceive"),),
     "distances": (
-        (chains, "robot_along"),
+        (chains, "robot_path"),
         (simulation, "estimated_separation"),
         (incidents, "measured"),
         (incidents.IncidentMonitor, "step"),
     ),
     "observation": ((observations, "observe"),),
-    "reward": ((rewards, "evaluated"), (rewards, "total")),
+    "reward": ((rewards, "evaluate_terms"), (rewards, "sum_terms")),
     "info": (
         (step_infos, "tracking_info"),
         (step_infos, "cost_info"),

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.belief import Belief, lent_belief
+from hrc_env.belief import Belief, lend_belief
 from hrc_env.core.brought import check_arguments, described, numbers_of
 from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.core.lending import called, is_of_user
@@ -95,7 +95,7 @@ def apply_shield(
     if shield is None:
         return ShieldOutput(command, {})
     if is_of_user(shield):
-        output = called("A shield", shield, lent_belief(belief), command.copy(), dt_s)
+        output = called("A shield", shield, lend_belief(belief), command.copy(), dt_s)
     else:
         output = shield(belief, command.copy(), dt_s)
     if not (isinstance(output, tuple) and len(output) == 2 and isinstance(output[1], Mapping)):

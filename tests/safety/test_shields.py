@@ -11,7 +11,7 @@ import hrc_env
 from hrc_env import simulation
 from hrc_env.agents.env_info import env_info
 from hrc_env.agents.registry import make_agent
-from hrc_env.belief import estimated_separation, of_concern, unseen_floor
+from hrc_env.belief import drop_distant_unknown, estimated_separation, find_unseen_floor
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import WorkerPath
 from hrc_env.core.skeleton import JOINT
@@ -222,8 +222,8 @@ def never_seen(now, *places, level=POSSIBLE):
     coverage = Coverage(where, 0.0, np.zeros(len(where), int), np.ones((1, 4), bool))
     levels = np.full((1, estimate.tracked.shape[1], 1), level)
     vacancy = Vacancy(coverage, levels, np.zeros((1, 1)), no_others(1))
-    floor = unseen_floor(now.robot, estimate, vacancy)
-    return replace(now, estimate=of_concern(estimate, floor), unseen=floor)
+    floor = find_unseen_floor(now.robot, estimate, vacancy)
+    return replace(now, estimate=drop_distant_unknown(estimate, floor), unseen=floor)
 
 
 @pytest.mark.parametrize("task", ["HRCReach-v0", "HRCDelivery-v0"])
