@@ -488,7 +488,11 @@ def settings() -> dict[str, str]:
     }
 
 
-SETTING_NAMES: dict[str, str] = {}
+SETTING_NAMES: dict[str, str] = {
+    f"shield_{shield}/{present}": f"shield_{shield}/{former}"
+    for shield in PRESETS
+    for former, present in ShieldConfig.RENAMED.items()
+}
 """Today's names of settings that the probes know by another."""
 
 
