@@ -233,7 +233,7 @@ def add_worker_constraints(
                 near = gap - params.margins_m[s] - z_d
                 clear = near - find_travel(towards.speed_m_s, params)
                 out.clearance_m[e] = min(out.clearance_m[e], clear)
-                link: int = robots.links[c]
+                link = int(robots.links[c])
                 reach = write_row(arm, link, point, normal, row)
                 braking = min(reach.deceleration_m_s2, params.deceleration_m_s2)
                 bound = bound_approach(clear, braking, moved > 0.0, params)
