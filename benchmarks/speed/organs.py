@@ -34,7 +34,7 @@ ORGANS: Mapping[str, Sequence[Place]] = {
     "distances": (
         (chains, "robot_path"),
         (simulation, "estimated_separation"),
-        (incidents, "measured"),
+        (incidents, "measure_paths"),
         (incidents.IncidentMonitor, "step"),
     ),
     "observation": ((observations, "observe"),),
@@ -44,7 +44,7 @@ ORGANS: Mapping[str, Sequence[Place]] = {
         (step_infos, "cost_info"),
         (simulation.Simulation, "_episode_info"),
         (simulation.StepResult, "info_of"),
-        (env, "table"),
+        (env, "make_table"),
         (infos.InfoTable, "arrays"),
     ),
     RESET: ((simulation.Simulation, "reset"),),
