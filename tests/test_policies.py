@@ -222,7 +222,7 @@ def test_files_that_are_no_policies_say_so(own, tmp_path):
         (b"junk of no form", "is not a policy"),
         (save({"other": np.zeros(3, "f4")}), "is not a policy: 'actor.0.weight'"),
         (save({k: v[..., :-1].copy() if k == "actor.0.weight" else v
-               for k, v in load(whole).items()}), "its card says"),
+               for k, v in load(whole).items()}), "its card describes"),
     ):  # fmt: skip
         own.write_bytes(content)
         spoil(own, sha256=hashlib.sha256(content).hexdigest())
