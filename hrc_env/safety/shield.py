@@ -3,7 +3,7 @@
 import warnings
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.core.lending import called, is_of_user
 from hrc_env.core.mapping import from_mapping
 from hrc_env.core.registry import Registry
-from hrc_env.core.typing import Floats, JointVelocities, is_mapping
+from hrc_env.core.typing import Floats, JointVelocities, is_list_or_tuple, is_mapping
 from hrc_env.safety.built_in import ShieldOutput, limit_command
 from hrc_env.safety.config import PRESETS, ShieldConfig
 
@@ -94,15 +94,16 @@ def apply_shield(
     """
     if shield is None:
         return ShieldOutput(command, {})
+    output: Any
     if is_of_user(shield):
         output = called("A shield", shield, lend_belief(belief), command.copy(), dt_s)
     else:
         output = shield(belief, command.copy(), dt_s)
-    pair: tuple[Any, ...] = output if isinstance(output, tuple) else ()
-    if len(pair) != 2 or not is_mapping(pair[1]):
+    pair = output if is_list_or_tuple(output) else ()
+    if not isinstance(output, tuple) or len(pair) != 2 or not is_mapping(pair[1]):
         raise ConfigError(
             "A shield must return two things, the velocities that it allows (B, joints) and a "
-            f"mapping of values (B,) by name, {{}} for none; got {described(output)}."
+            f"mapping of values (B,) by name, {{}} for none; got {described(cast(object, output))}."
         )
     allowed = numbers_of("A shield's velocities", pair[0], command.shape, "B, joints")
     values = _check_values(pair[1], len(command))
