@@ -119,7 +119,7 @@ def format_command(arguments: TrainingRequest) -> str:
     words = ["python", "-m", "hrc_env", "train"]
     for field in fields(TrainingRequest):
         value = getattr(arguments, field.name)
-        if value == field.default or (field.name in ONLY_OF_A_RUN and field.name != "timesteps"):
+        if value == field.default or field.name in LEFT_OUT:
             continue
         several = isinstance(value, tuple | list)
         option = f"--{field.name.replace('_', '-')}"

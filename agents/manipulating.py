@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.control import resolved_twist
+from hrc_env.control import resolve_twist
 
 from .env_info import EnvInfo
 
@@ -71,6 +71,6 @@ def make_arm_action(
         scale = np.repeat([config.tool_speed_mps, config.tool_turn_rad_s], 3)
         return np.clip(twist / scale, -1.0, 1.0)
     q = np.arctan2(terms["joint_angle_sin"], terms["joint_angle_cos"])
-    qd = resolved_twist(env_info.chain, q, twist, config)
+    qd = resolve_twist(env_info.chain, q, twist, config)
     action = qd / (config.joint_speed_share * env_info.chain.velocity_limit_rad_s)
     return action / np.maximum(np.abs(action).max(1, keepdims=True), 1.0)

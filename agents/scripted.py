@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.control import resolved_rate
+from hrc_env.control import resolve_rate
 from hrc_env.observations import split
 
 from .env_info import EnvInfo, Observation
@@ -99,6 +99,6 @@ class Reacher:
 
     def _make_joint_action(self, q: Array, velocity: Array) -> Array:
         info, config = self.env_info, self.env_info.control_config
-        qd = resolved_rate(info.chain, q, velocity, info.home_q, config)
+        qd = resolve_rate(info.chain, q, velocity, info.home_q, config)
         action = qd / (config.joint_speed_share * info.chain.velocity_limit_rad_s)
         return action / np.maximum(np.abs(action).max(-1, keepdims=True), 1.0)

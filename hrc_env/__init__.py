@@ -106,10 +106,10 @@ if TYPE_CHECKING:  # what `PUBLIC` says, for type checkers and editors
     from hrc_env.tasks.task import find_task as find_task
     from hrc_env.tasks.task import with_rewards as with_rewards
     from hrc_env.tracking.config import TrackerConfig as TrackerConfig
-    from hrc_env.tracking.estimators import Estimator as Estimator
     from hrc_env.tracking.estimators import EstimatorSpec as EstimatorSpec
     from hrc_env.tracking.estimators import make_estimator as make_estimator
     from hrc_env.tracking.forecast import forecast as forecast
+    from hrc_env.tracking.interface import Estimator as Estimator
     from hrc_env.tracking.smoother import smooth as smooth
     from hrc_env.vector.env import HRCVectorEnv as HRCVectorEnv
     from hrc_env.vector.make import make_vector as make_vector
@@ -186,7 +186,7 @@ PUBLIC = {
     "register_detector": "hrc_env.registration",
     # belief and estimators
     "Belief": "hrc_env.belief",
-    "Estimator": "hrc_env.tracking.estimators",
+    "Estimator": "hrc_env.tracking.interface",
     "EstimatorSpec": "hrc_env.tracking.estimators",
     "PoseEstimate": "hrc_env.core.records",
     "PoseTracker": "hrc_env.pipeline.pose_tracker",

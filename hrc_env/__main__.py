@@ -90,7 +90,7 @@ def main(words: Sequence[str] | None = None) -> int:
 
 
 def overview() -> str:
-    """What there is to call."""
+    """Return the help of the program: its commands by name."""
     commands = "\n".join(
         textwrap.fill(f"  {name:21s}{says}", 80, subsequent_indent=" " * 23)
         for name, (_, _, says) in COMMANDS.items()
@@ -106,7 +106,7 @@ A robot, a worker, and the cameras between them.
 
 
 def versions() -> str:
-    """Which versions of what matters are installed."""
+    """Return the installed versions of the package and its main libraries."""
     named = {"hrc_env": __version__, "Python": platform.python_version()}
     named |= {package: version(package) for package in ("mujoco", "gymnasium")}
     return ", ".join(f"{name} {number}" for name, number in named.items())

@@ -1,9 +1,10 @@
-"""From actions to arm commands: joint velocities directly, or velocities of the tool resolved.
+"""Actions to commands of an arm: joint velocities directly, or by resolved-rate control of the
+tool.
 
-Resolved-rate control: the damped least-squares solution of J qd = v (Wampler 1986,
-DOI 10.1109/TSMC.1986.289285; Nakamura and Hanafusa 1986, DOI 10.1115/1.3143764), with what
-is left of the joints' freedom pulled towards a rest posture. The damping keeps speeds finite
-near singular postures, where the tool then lags behind the command.
+Resolved-rate control is the damped least-squares solution of J qd = v (Wampler 1986,
+DOI 10.1109/TSMC.1986.289285; Nakamura and Hanafusa 1986, DOI 10.1115/1.3143764). The remaining
+freedom of the joints is used to approach a rest posture. The damping keeps speeds finite near
+singular postures, where the tool then lags behind the command.
 """
 
 import math
@@ -25,24 +26,26 @@ MEANINGS = {
 }
 """Meaning of an action, without the entry of a hand, by `control`."""
 CONTROLS = tuple(MEANINGS)
+"""Values of `control`."""
 SINGULAR_M3 = 0.05
 """Manipulability below which the damping of `twist` fades in."""
 
 
 @dataclass(frozen=True, slots=True)
 class ControlConfig:
-    """What an action of magnitude one means."""
+    """Scales of actions, by `control`."""
 
     joint_speed_share: float = 0.5
-    """`joint`: the share of each joint's velocity limit."""
+    """Velocity of a joint for an action of 1, as a share of its limit (`joint`)."""
     tool_speed_mps: float = 0.6
-    """`tool`, `twist`: the tool point's velocity along each world axis [m/s]."""
+    """Velocity of the tool point along a world axis for an action of 1 (`tool`, `twist`) [m/s]."""
     tool_turn_rad_s: float = 1.2
-    """`twist`: the tool's turn rate about each world axis [rad/s]."""
+    """Turn rate of the tool about a world axis for an action of 1 (`twist`) [rad/s]."""
     damping: float = 0.07
-    """`tool`, `twist`: damping of the least-squares solution [m]."""
+    """Damping of the least-squares solution (`tool`, `twist`) [m]."""
     posture_gain_hz: float = 0.8
-    """`tool`: how fast the joints return to the rest posture where the tool allows [1/s]."""
+    """Gain with which joints return to the rest posture, as far as the tool allows (`tool`)
+    [1/s]."""
 
     def __post_init__(self) -> None:
         check_fields(self, "be in (0, 1]", "joint_speed_share")
@@ -51,8 +54,16 @@ class ControlConfig:
 
 
 def n_actions(control: str, chain: SerialChain, grips: bool = False) -> int:
-    """Length of an action: one entry per joint, or three for a tool velocity, six for a twist; and
-    one for the hand of an arm that has one."""
+    """Return the length of an action.
+
+    Args:
+        control: "joint" (an entry for each joint), "tool" (three) or "twist" (six).
+        chain: geometry of the robot.
+        grips: whether it has a hand, which takes another entry.
+
+    Raises:
+        ConfigError: an unknown control, or one that needs a robot without slides.
+    """
     if control not in CONTROLS:
         raise unknown("control", control, CONTROLS)
     if control != "joint" and chain.slides.any():
@@ -63,14 +74,23 @@ def n_actions(control: str, chain: SerialChain, grips: bool = False) -> int:
     return {"joint": chain.n_joints, "tool": 3, "twist": 6}[control] + grips
 
 
-def fastest(control: str, chain: SerialChain, config: ControlConfig) -> JointVelocities:
-    """(N,) the greatest velocity that an action can ask of each joint [rad/s]."""
+def max_command(control: str, chain: SerialChain, config: ControlConfig) -> JointVelocities:
+    """Return the greatest velocity (N,) that an action can command for each joint [rad/s]."""
     share = config.joint_speed_share if control == "joint" else 1.0
     return share * chain.velocity_limit_rad_s
 
 
-def checked_action(action: ArrayLike, shape: tuple[int, ...], control: str) -> Floats:
-    """Actions as float64, clipped to [-1, 1]; `ConfigError` for other shapes or no numbers."""
+def check_action(action: ArrayLike, shape: tuple[int, ...], control: str) -> Floats:
+    """Return actions as float64, clipped to [-1, 1].
+
+    Args:
+        action: actions of an agent.
+        shape: shape that they must have.
+        control: the environment's `control`, for messages.
+
+    Raises:
+        ConfigError: another shape, or no finite numbers.
+    """
     try:
         values = np.asarray(action, np.float64)
     except (TypeError, ValueError) as error:
@@ -95,59 +115,96 @@ def joint_command(
     q_rest: JointAngles,
     config: ControlConfig,
 ) -> JointVelocities:
-    """(B, N) joint velocities [rad/s] that an action (B, A) in [-1, 1] asks for, of which an entry
-    for the hand is no part."""
+    """Return the joint velocities that actions command.
+
+    Args:
+        control: "joint", "tool" or "twist".
+        action: (B, A) in [-1, 1], without the entry of a hand.
+        q: (B, N) joint angles [rad].
+        chain: geometry of the robot.
+        q_rest: (N,) rest posture [rad].
+        config: scales of actions.
+
+    Returns:
+        (B, N) [rad/s].
+    """
     if control == "joint":
-        return action * fastest(control, chain, config)
+        return action * max_command(control, chain, config)
     if control == "tool":
-        return resolved_rate(chain, q, action * config.tool_speed_mps, q_rest, config)
+        return resolve_rate(chain, q, action * config.tool_speed_mps, q_rest, config)
     scale = np.repeat([config.tool_speed_mps, config.tool_turn_rad_s], 3)
-    return resolved_twist(chain, q, action * scale, config)
+    return resolve_twist(chain, q, action * scale, config)
 
 
-def resolved_rate(
+def resolve_rate(
     chain: SerialChain,
     q: JointAngles,
     tool_velocity_world: Velocities3,
     q_rest: JointAngles,
     config: ControlConfig,
 ) -> JointVelocities:
-    """Joint velocities (..., N) for a tool velocity (..., 3), scaled together to their limits."""
+    """Return the joint velocities that give the tool point a velocity, scaled to their limits.
+
+    Args:
+        chain: geometry of the robot.
+        q: (..., N) joint angles [rad].
+        tool_velocity_world: (..., 3) [m/s].
+        q_rest: (N,) rest posture [rad].
+        config: damping and gain.
+
+    Returns:
+        (..., N) [rad/s].
+    """
     pull = np.asarray(config.posture_gain_hz * (q_rest - q), float)
     pull[..., 0] = 0.0  # the first joint points the arm at its goal: leave it free
     J, qd = flat(jacobian(chain, q), 2), flat(pull, 1)
-    _resolve(
-        J, flat(np.asarray(tool_velocity_world, float), 1), np.full(len(J), config.damping**2), qd
-    )
-    return _within(qd.reshape(pull.shape), chain)
+    velocity = flat(np.asarray(tool_velocity_world, float), 1)
+    _solve_damped(J, velocity, np.full(len(J), config.damping**2), qd)
+    return _scale_to_limits(qd.reshape(pull.shape), chain)
 
 
-def resolved_twist(
+def resolve_twist(
     chain: SerialChain, q: JointAngles, twist_world: Floats, config: ControlConfig
 ) -> JointVelocities:
-    """Joint velocities (..., N) for a velocity and a turn rate of the tool, (..., 6), scaled
-    together to their limits; damped only near singular postures, where the tool lags behind."""
+    """Return the joint velocities that give the tool a twist, scaled to their limits.
+
+    The solution is damped near singular postures only, where the tool lags behind.
+
+    Args:
+        chain: geometry of the robot.
+        q: (..., N) joint angles [rad].
+        twist_world: (..., 6) velocity [m/s] and turn rate [rad/s].
+        config: damping.
+
+    Returns:
+        (..., N) [rad/s].
+    """
     J = flat(np.concatenate([jacobian(chain, q), angular_jacobian(chain, q)], axis=-2), 2)
     manipulability, qd = np.empty(len(J)), np.zeros((len(J), chain.n_joints))
     _measure_manipulability(J, manipulability)
     near = np.clip(1.0 - manipulability / SINGULAR_M3, 0.0, 1.0)
-    _resolve(
-        J, flat(np.asarray(twist_world, float), 1), np.square(config.damping * near) + 1e-9, qd
-    )
-    return _within(qd.reshape(np.shape(q)), chain)
+    twist = flat(np.asarray(twist_world, float), 1)
+    _solve_damped(J, twist, np.square(config.damping * near) + 1e-9, qd)
+    return _scale_to_limits(qd.reshape(np.shape(q)), chain)
 
 
 @kernel(makes_arrays=True)
-def _resolve(J, wanted, squared_damping, qd):
-    """Add to `qd` (B, N) the change that brings J qd (B, M) to `wanted`, by damped least squares.
+def _solve_damped(J: Floats, wanted: Floats, squared_damping: Floats, qd: JointVelocities) -> None:
+    """Change joint velocities so that J qd is as wanted, by damped least squares.
 
-    Sums are of a fixed order, as those of a linear algebra library are not: stiff contacts enlarge
-    the last bit.
+    Sums have a fixed order, unlike those of a linear algebra library, as stiff contacts enlarge the
+    last bit.
+
+    Args:
+        J: (B, M, N) Jacobians.
+        wanted: (B, M) velocities of the tool.
+        squared_damping: (B,) [m^2].
+        qd: (B, N) is changed [rad/s].
     """
     n_rows, n_joints = J.shape[1:]
     gram, missing = np.empty((n_rows, n_rows)), np.empty(n_rows)
     for b in range(len(J)):
-        _square(J[b], squared_damping[b], gram)
+        _write_gram(J[b], squared_damping[b], gram)
         for i in range(n_rows):
             missing[i] = wanted[b, i]
             for k in range(n_joints):
@@ -166,11 +223,11 @@ def _resolve(J, wanted, squared_damping, qd):
 
 
 @kernel(makes_arrays=True)
-def _measure_manipulability(J, out):
-    """Write the square root of the determinant of J J^T (B,), 0 of singular postures."""
+def _measure_manipulability(J: Floats, out: Floats) -> None:
+    """Write the manipulability (B,), sqrt(det(J J^T)), of Jacobians (B, M, N)."""
     gram = np.empty((J.shape[1], J.shape[1]))
     for b in range(len(J)):
-        _square(J[b], 0.0, gram)
+        _write_gram(J[b], 0.0, gram)
         _factorise(gram)
         determinant = 1.0
         for i in range(len(gram)):
@@ -179,8 +236,8 @@ def _measure_manipulability(J, out):
 
 
 @kernel
-def _square(J, squared_damping, gram):
-    """Write J J^T + squared_damping I."""
+def _write_gram(J: Floats, squared_damping: float, gram: Floats) -> None:
+    """Write the matrix J J^T + squared_damping I (M, M) of a Jacobian (M, N)."""
     for i in range(len(gram)):
         for j in range(i + 1):
             total = squared_damping if i == j else 0.0
@@ -190,9 +247,12 @@ def _square(J, squared_damping, gram):
 
 
 @kernel
-def _factorise(gram):
-    """Write L (below the diagonal, of ones) and D (on it) of gram = L D L^T; a pivot that is not
-    positive ends its column."""
+def _factorise(gram: Floats) -> None:
+    """Replace a matrix (M, M) by its factors in L D L^T.
+
+    D is on the diagonal, L below it, with ones on its own diagonal. A column with a pivot that is
+    not positive is 0 below it.
+    """
     for j in range(len(gram)):
         pivot = gram[j, j]
         for k in range(j):
@@ -205,7 +265,7 @@ def _factorise(gram):
             gram[i, j] = total / pivot if pivot > 0.0 else 0.0
 
 
-def _within(qd: JointVelocities, chain: SerialChain) -> JointVelocities:
-    """Scaled together to the joints' limits."""
+def _scale_to_limits(qd: JointVelocities, chain: SerialChain) -> JointVelocities:
+    """Return joint velocities (..., N) scaled by one factor so that all are within their limits."""
     excess = np.max(np.abs(qd) / chain.velocity_limit_rad_s, axis=-1, keepdims=True)
     return qd / np.maximum(excess, 1.0)

@@ -16,7 +16,7 @@ from gymnasium.spaces import Box, Dict
 from numpy.typing import NDArray
 
 from hrc_env import observations, rewards
-from hrc_env.control import checked_action
+from hrc_env.control import check_action
 from hrc_env.core.batching import Stateful, one
 from hrc_env.core.errors import ConfigError, NoAttributeError, unknown, whole
 from hrc_env.core.infos import Words, worded
@@ -215,7 +215,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         self.refuse_closed()
         if not self._begun:
             raise ConfigError("Call reset() before step().")
-        values = checked_action(action, (self.simulation.n_actions,), self.simulation.control)
+        values = check_action(action, (self.simulation.n_actions,), self.simulation.control)
         result = self.simulation.step(values[None])
         self._steps_left -= 1
         return (

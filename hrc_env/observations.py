@@ -1,7 +1,7 @@
-"""What the robot sees: one declaration per observation term.
+"""Observations: one declaration for each term.
 
-The space, the environment's page, `split` and the tests all derive from the terms, so that
-they cannot drift apart. Terms read the *estimate* of the worker, never the truth.
+The space, the environment's page, `split` and the tests derive from the terms, so that they agree.
+Terms read the *estimate* of the worker, never the truth.
 """
 
 import math
@@ -15,7 +15,7 @@ from hrc_env.belief import (
     Belief,
     covariance_factor_m,
     deviation_towards_robot_m,
-    lent_belief,
+    lend_belief,
     standard_deviation_m,
 )
 from hrc_env.core.brought import check_arguments
@@ -29,35 +29,37 @@ from hrc_env.core.typing import Floats, Tensor
 from hrc_env.geometry.rotations import matrix
 
 TOWARDS_ROBOT, FACTOR = UNCERTAINTY = ("towards_robot", "factor")
-"""What else can be asked for of each joint's covariance."""
+"""Values of `HRCConfig.uncertainty`: other measures of each joint's covariance."""
 FLAT = "observation"
-"""Name of the flat observation where goals or images stand beside it."""
+"""Key of the flat observation in a dict with goals or images."""
 IMAGE = "image_"
-"""How the names of images begin that stand beside it; the camera's name follows."""
+"""Prefix of the keys of images, before the camera's name."""
 FAR_SEPARATION_M = 1.0
-"""Larger separations are reported as this: nothing near, or nobody known of."""
+"""Greatest separation that is reported, also for workers without a track [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sizes:
-    """What the lengths of terms depend on."""
+    """The numbers on which the lengths of terms depend."""
 
     arm_joints: int
-    """Hinges."""
+    """Number of hinges of the robot."""
     actions: int
+    """Length of an action."""
     workers: int
+    """Number of workers."""
     horizons: int = 0
-    """How many times ahead were asked for."""
+    """Number of times ahead for which there is a forecast."""
     uncertainty: tuple[str, ...] = ()
-    """Which of `UNCERTAINTY` were asked for."""
+    """Chosen values of `UNCERTAINTY`."""
     hands: int = 0
-    """1 of an arm that can hold something,"""
+    """Number of hands: 1 for an arm that can hold something."""
     fingers: int = 0
-    """and 1 if with fingers."""
+    """Number of hands with fingers: 1 or 0."""
     objects: int = 0
-    """How many are loose."""
+    """Number of loose objects of the task."""
     slides: int = 0
-    """Of the robot's joints."""
+    """Number of slides of the robot."""
 
 
 @answer_unknown_fields
@@ -66,288 +68,448 @@ class ObservationTerm:
     """One block of the flat observation: clip(function, -bound, bound) / scale."""
 
     name: str
-    """By which `split_observation` and the environment's page know it."""
+    """Name of the term in `split_observation` and on the environment's page."""
     size: int | Callable[[Sizes], int]
-    """Number of entries, or a function of what it depends on."""
+    """Number of entries, or a function of the sizes on which it depends."""
     unit: str
-    """Of what the function returns: "m", "rad", ..., or "-"."""
+    """Unit of the function's result: "m", "rad", ..., or "-"."""
     frame: str
-    """In which vectors are given: "world", "base", ..., or "-"."""
+    """Frame of vectors: "world", "base", ..., or "-"."""
     bound: float
-    """Largest magnitude, in `unit`; larger values are clipped."""
+    """Greatest magnitude, in `unit`; larger values are clipped."""
     scale: float
-    """What one unit of the observation stands for, in `unit`."""
+    """Magnitude of an observed 1, in `unit`."""
     doc: str
-    """A sentence for the environment's page."""
+    """Sentence for the environment's page."""
     function: Callable[[Belief], Floats]
-    """Belief -> (B, ...), flattened per environment; not asked where it has no entries."""
+    """Function from a belief to (B, ...), which is flattened for each environment; it is not called
+    for a term without entries."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for a function that does not take one argument."""
         check_arguments(f"The observation term {self.name!r}", self.function, "belief")
 
 
-def _nearest_direction(now: Belief) -> Floats:
-    to_worker = now.separation.point_b_world - now.separation.point_a_world
-    near = now.separation.distance_m < FAR_SEPARATION_M
+def _nearest_direction(belief: Belief) -> Floats:
+    """Return unit vectors (B, W, 3) from the robot to near bodies, 0 for others."""
+    to_worker = belief.separation.point_b_world - belief.separation.point_a_world
+    near = belief.separation.distance_m < FAR_SEPARATION_M
     return np.where(near[..., None], directions(to_worker, 1e-3), 0.0)
 
 
 def directions(vectors: Floats, softening: float) -> Floats:
-    """Vectors (..., 3) divided by their length plus a little: unit vectors, but 0 stays 0."""
+    """Return vectors (..., 3) divided by their length plus a softening, so that 0 stays 0."""
     shortened = np.array(vectors)
     _shorten(shortened.reshape(-1, 3), softening)
     return shortened
 
 
 @kernel
-def _shorten(vectors, softening):
+def _shorten(vectors: Floats, softening: float) -> None:
+    """Divide vectors (n, 3) by their length plus a softening, in place."""
     for k in range(len(vectors)):
-        x, y, z = vectors[k]
+        x, y, z = vectors[k, 0], vectors[k, 1], vectors[k, 2]
         divisor = math.sqrt(x * x + y * y + z * z) + softening
         for i in range(3):
             vectors[k, i] /= divisor
 
 
-def _hinges(now: Belief, values: Floats) -> Floats:
-    """Those of values (B, N) of the robot's joints that are of hinges."""
-    return values if now.robot.slides is None else values[:, ~now.robot.slides]
+def _hinges(belief: Belief, values: Floats) -> Floats:
+    """Return the values of hinges among those of all joints (B, N)."""
+    return values if belief.robot.slides is None else values[:, ~belief.robot.slides]
 
 
-def _slides(now: Belief, values: Floats) -> Floats:
-    """Those that are of slides."""
-    return values[:, needed(now.robot.slides, "A slide")]
+def _slides(belief: Belief, values: Floats) -> Floats:
+    """Return the values of slides among those of all joints (B, N)."""
+    return values[:, needed(belief.robot.slides, "A slide")]
 
 
-def _hand(now: Belief) -> HandState:
-    return needed(now.hand, "A hand")
+def _hand(belief: Belief) -> HandState:
+    """Return the state of the hand, which must be there."""
+    return needed(belief.hand, "A hand")
 
 
-def _objects(now: Belief) -> ObjectState:
-    return needed(now.objects, "A loose object")
+def _objects(belief: Belief) -> ObjectState:
+    """Return the state of the loose objects, which must be there."""
+    return needed(belief.objects, "A loose object")
 
 
-def _joints_forecast(now: Belief) -> Floats:
-    """(B, W, H, J, 3) from the tool point now."""
-    joints = np.stack([later.mean_world for later in now.forecast], axis=2)
-    return joints - now.robot.tool_world[:, None, None, None]
+def _joints_forecast(belief: Belief) -> Floats:
+    """Return the joints (B, W, H, J, 3) at H times ahead, from the present tool point [m]."""
+    joints = np.stack([later.mean_world for later in belief.forecast], axis=2)
+    return joints - belief.robot.tool_world[:, None, None, None]
 
 
 ROBOT_TERMS: tuple[ObservationTerm, ...] = (
     ObservationTerm(
-        "joint_angle_sin", lambda of: of.arm_joints, "-", "base", 1.0, 1.0,
-        "Sine of each arm joint's angle.",
-        lambda now: np.sin(_hinges(now, now.robot.q)),
+        name="joint_angle_sin",
+        size=lambda sizes: sizes.arm_joints,
+        unit="-",
+        frame="base",
+        bound=1.0,
+        scale=1.0,
+        doc="Sine of each arm joint's angle.",
+        function=lambda belief: np.sin(_hinges(belief, belief.robot.q)),
     ),
     ObservationTerm(
-        "joint_angle_cos", lambda of: of.arm_joints, "-", "base", 1.0, 1.0,
-        "Cosine of each arm joint's angle.",
-        lambda now: np.cos(_hinges(now, now.robot.q)),
+        name="joint_angle_cos",
+        size=lambda sizes: sizes.arm_joints,
+        unit="-",
+        frame="base",
+        bound=1.0,
+        scale=1.0,
+        doc="Cosine of each arm joint's angle.",
+        function=lambda belief: np.cos(_hinges(belief, belief.robot.q)),
     ),
     ObservationTerm(
-        "joint_velocity", lambda of: of.arm_joints, "rad/s", "base", 4.0, 1.0,
-        "Velocity of each arm joint.",
-        lambda now: _hinges(now, now.robot.qd),
+        name="joint_velocity",
+        size=lambda sizes: sizes.arm_joints,
+        unit="rad/s",
+        frame="base",
+        bound=4.0,
+        scale=1.0,
+        doc="Velocity of each arm joint.",
+        function=lambda belief: _hinges(belief, belief.robot.qd),
     ),
     ObservationTerm(
-        "tool_position", lambda of: 3, "m", "world", 4.0, 1.0,
-        "Position of the tool point.",
-        lambda now: now.robot.tool_world,
+        name="tool_position",
+        size=lambda sizes: 3,
+        unit="m",
+        frame="world",
+        bound=4.0,
+        scale=1.0,
+        doc="Position of the tool point.",
+        function=lambda belief: belief.robot.tool_world,
     ),
     ObservationTerm(
-        "tool_axes", lambda of: 6 * of.hands, "-", "world", 1.0, 1.0,
-        "The tool's x axis, along which fingers move, and its z axis, away from the arm.",
-        lambda now: now.robot.tool_axes_world[..., [0, 2]].swapaxes(-1, -2),
+        name="tool_axes",
+        size=lambda sizes: 6 * sizes.hands,
+        unit="-",
+        frame="world",
+        bound=1.0,
+        scale=1.0,
+        doc="The tool's x axis, along which fingers move, and its z axis, away from the arm.",
+        function=lambda belief: belief.robot.tool_axes_world[..., [0, 2]].swapaxes(-1, -2),
     ),
     ObservationTerm(
-        "hand_opening", lambda of: of.fingers, "m", "tool", 0.2, 0.05,
-        "How far each finger is from the middle.",
-        lambda now: _hand(now).opening_m,
+        name="hand_opening",
+        size=lambda sizes: sizes.fingers,
+        unit="m",
+        frame="tool",
+        bound=0.2,
+        scale=0.05,
+        doc="Distance of each finger from the middle.",
+        function=lambda belief: _hand(belief).opening_m,
     ),
     ObservationTerm(
-        "hand_force", lambda of: of.hands, "N", "tool", 300.0, 100.0,
-        "With which the fingers press together, negative: apart; or what hangs on the cups.",
-        lambda now: _hand(now).force_n,
+        name="hand_force",
+        size=lambda sizes: sizes.hands,
+        unit="N",
+        frame="tool",
+        bound=300.0,
+        scale=100.0,
+        doc="Force that presses the fingers together, negative: apart; or the load on the cups.",
+        function=lambda belief: _hand(belief).force_n,
     ),
     ObservationTerm(
-        "object_from_tool", lambda of: 3 * of.objects, "m", "world", 3.0, 0.5,
-        "From the tool point to the middle of each loose object, as measured.",
-        lambda now: _objects(now).position_world - now.robot.tool_world[:, None],
+        name="object_from_tool",
+        size=lambda sizes: 3 * sizes.objects,
+        unit="m",
+        frame="world",
+        bound=3.0,
+        scale=0.5,
+        doc="From the tool point to the middle of each loose object, as measured.",
+        function=lambda belief: _objects(belief).position_world - belief.robot.tool_world[:, None],
     ),
     ObservationTerm(
-        "object_axes", lambda of: 6 * of.objects, "-", "world", 1.0, 1.0,
-        "Each object's y axis and z axis, as measured.",
-        lambda now: matrix(_objects(now).quaternion_wxyz)[..., 1:].swapaxes(-1, -2),
+        name="object_axes",
+        size=lambda sizes: 6 * sizes.objects,
+        unit="-",
+        frame="world",
+        bound=1.0,
+        scale=1.0,
+        doc="Each object's y axis and z axis, as measured.",
+        function=lambda belief: matrix(_objects(belief).quaternion_wxyz)[..., 1:].swapaxes(-1, -2),
     ),
     ObservationTerm(
-        "object_held", lambda of: of.objects, "-", "-", 1.0, 1.0,
-        "1 for an object that the fingers hold.",
-        lambda now: _objects(now).held.astype(float),
+        name="object_held",
+        size=lambda sizes: sizes.objects,
+        unit="-",
+        frame="-",
+        bound=1.0,
+        scale=1.0,
+        doc="1 for an object that is held.",
+        function=lambda belief: _objects(belief).held.astype(float),
     ),
-)  # fmt: skip
-"""The robot's own state and what it handles, which open the observation."""
+)
+"""First terms of the observation: the state of the robot and of the objects that it handles."""
 
 SLIDE_TERMS: tuple[ObservationTerm, ...] = (
     ObservationTerm(
-        "slide_position", lambda of: of.slides, "m", "world", 10.0, 5.0,
-        "Where each slide is: of a base that drives, x and y of its middle.",
-        lambda now: _slides(now, now.robot.q),
+        name="slide_position",
+        size=lambda sizes: sizes.slides,
+        unit="m",
+        frame="world",
+        bound=10.0,
+        scale=5.0,
+        doc="Position of each slide: for a mobile base, x and y of its middle.",
+        function=lambda belief: _slides(belief, belief.robot.q),
     ),
     ObservationTerm(
-        "slide_velocity", lambda of: of.slides, "m/s", "world", 4.0, 1.0,
-        "Velocity of each slide.",
-        lambda now: _slides(now, now.robot.qd),
+        name="slide_velocity",
+        size=lambda sizes: sizes.slides,
+        unit="m/s",
+        frame="world",
+        bound=4.0,
+        scale=1.0,
+        doc="Velocity of each slide.",
+        function=lambda belief: _slides(belief, belief.robot.qd),
     ),
-)  # fmt: skip
-"""What follows of a robot that drives."""
+)
+"""Next terms, of a robot with slides."""
 
 SHARED_TERMS: tuple[ObservationTerm, ...] = (
     ObservationTerm(
-        "last_action", lambda of: of.actions, "-", "-", 1.0, 1.0,
-        "The action of the previous step, as it was wanted, whatever a shield made of it.",
-        lambda now: now.action,
+        name="last_action",
+        size=lambda sizes: sizes.actions,
+        unit="-",
+        frame="-",
+        bound=1.0,
+        scale=1.0,
+        doc="The agent's action of the previous step, before any shield.",
+        function=lambda belief: belief.action,
     ),
     ObservationTerm(
-        "worker_joints_from_tool", lambda of: of.workers * N_JOINTS * 3, "m", "world", 6.0, 1.0,
-        "From the tool point to each estimated joint of each worker.",
-        lambda now: now.estimate.mean_world - now.robot.tool_world[:, None, None],
+        name="worker_joints_from_tool",
+        size=lambda sizes: sizes.workers * N_JOINTS * 3,
+        unit="m",
+        frame="world",
+        bound=6.0,
+        scale=1.0,
+        doc="From the tool point to each estimated joint of each worker.",
+        function=lambda belief: belief.estimate.mean_world - belief.robot.tool_world[:, None, None],
     ),
     ObservationTerm(
-        "worker_joints_std", lambda of: of.workers * N_JOINTS, "m", "world", 1.0, 0.25,
-        "Standard deviation of each estimated joint (root mean over the axes).",
-        lambda now: standard_deviation_m(now.estimate),
+        name="worker_joints_std",
+        size=lambda sizes: sizes.workers * N_JOINTS,
+        unit="m",
+        frame="world",
+        bound=1.0,
+        scale=0.25,
+        doc="Standard deviation of each estimated joint (root mean over the axes).",
+        function=lambda belief: standard_deviation_m(belief.estimate),
     ),
     ObservationTerm(
-        "worker_joints_age", lambda of: of.workers * N_JOINTS, "s", "-", 2.0, 1.0,
-        "Time since a measurement last supported each joint.",
-        lambda now: now.estimate.age_s,
+        name="worker_joints_age",
+        size=lambda sizes: sizes.workers * N_JOINTS,
+        unit="s",
+        frame="-",
+        bound=2.0,
+        scale=1.0,
+        doc="Time since a measurement last supported each joint.",
+        function=lambda belief: belief.estimate.age_s,
     ),
     ObservationTerm(
-        "worker_joints_velocity", lambda of: of.workers * N_JOINTS * 3, "m/s", "world", 4.0, 2.0,
-        "Estimated velocity of each joint.",
-        lambda now: now.estimate.velocity_world,
+        name="worker_joints_velocity",
+        size=lambda sizes: sizes.workers * N_JOINTS * 3,
+        unit="m/s",
+        frame="world",
+        bound=4.0,
+        scale=2.0,
+        doc="Estimated velocity of each joint.",
+        function=lambda belief: belief.estimate.velocity_world,
     ),
     ObservationTerm(
-        "worker_tracked", lambda of: of.workers, "-", "-", 1.0, 1.0,
-        "1 while there is a track of the worker, 0 where the estimate is the prior or lost.",
-        lambda now: now.estimate.tracked.astype(float),
+        name="worker_tracked",
+        size=lambda sizes: sizes.workers,
+        unit="-",
+        frame="-",
+        bound=1.0,
+        scale=1.0,
+        doc="1 while there is a track of the worker, 0 where the estimate is the prior or lost.",
+        function=lambda belief: belief.estimate.tracked.astype(float),
     ),
     ObservationTerm(
-        "worker_unknown", lambda of: of.workers, "-", "-", 1.0, 1.0,
-        "1 while somebody without a track may be near: lost, or on floor not seen empty.",
-        lambda now: now.estimate.unknown.astype(float),
+        name="worker_unknown",
+        size=lambda sizes: sizes.workers,
+        unit="-",
+        frame="-",
+        bound=1.0,
+        scale=1.0,
+        doc="1 while a person without a track may be near: lost, or on floor not seen empty.",
+        function=lambda belief: belief.estimate.unknown.astype(float),
     ),
     ObservationTerm(
-        "worker_blind", lambda of: of.workers, "s", "-", 5.0, 2.5,
-        "Time since cameras last saw the worker, or that nobody is there.",
-        lambda now: now.estimate.blind_s,
+        name="worker_blind",
+        size=lambda sizes: sizes.workers,
+        unit="s",
+        frame="-",
+        bound=5.0,
+        scale=2.5,
+        doc="Time since cameras last saw the worker, or that the place is empty.",
+        function=lambda belief: belief.estimate.blind_s,
     ),
     ObservationTerm(
-        "worker_separation", lambda of: of.workers, "m", "-", FAR_SEPARATION_M, 0.5,
-        "Distance between the robot's surface and the estimated body's, at most 1 m.",
-        lambda now: np.minimum(now.separation.distance_m, FAR_SEPARATION_M),
+        name="worker_separation",
+        size=lambda sizes: sizes.workers,
+        unit="m",
+        frame="-",
+        bound=FAR_SEPARATION_M,
+        scale=0.5,
+        doc="Distance between the robot's surface and the estimated body's, at most 1 m.",
+        function=lambda belief: np.minimum(belief.separation.distance_m, FAR_SEPARATION_M),
     ),
     ObservationTerm(
-        "worker_direction", lambda of: of.workers * 3, "-", "world", 1.0, 1.0,
-        "Unit vector from the robot to the estimated body where they are nearest; 0 if far.",
-        _nearest_direction,
+        name="worker_direction",
+        size=lambda sizes: sizes.workers * 3,
+        unit="-",
+        frame="world",
+        bound=1.0,
+        scale=1.0,
+        doc="Unit vector from the robot to the estimated body where they are nearest; 0 if far.",
+        function=_nearest_direction,
     ),
     ObservationTerm(
-        "worker_joints_forecast", lambda of: of.workers * of.horizons * N_JOINTS * 3,
-        "m", "world", 6.0, 1.0,
-        "From the tool point now to where each joint will be, for each of `forecast_s`.",
-        _joints_forecast,
+        name="worker_joints_forecast",
+        size=lambda sizes: sizes.workers * sizes.horizons * N_JOINTS * 3,
+        unit="m",
+        frame="world",
+        bound=6.0,
+        scale=1.0,
+        doc="From the present tool point to each joint's forecast, for each of `forecast_s`.",
+        function=_joints_forecast,
     ),
     ObservationTerm(
-        "worker_joints_forecast_std", lambda of: of.workers * of.horizons * N_JOINTS,
-        "m", "world", 1.0, 0.25,
-        "Standard deviation of each of these (root mean over the axes).",
-        lambda now: np.stack([standard_deviation_m(later) for later in now.forecast], axis=2),
+        name="worker_joints_forecast_std",
+        size=lambda sizes: sizes.workers * sizes.horizons * N_JOINTS,
+        unit="m",
+        frame="world",
+        bound=1.0,
+        scale=0.25,
+        doc="Standard deviation of each of these forecasts (root mean over the axes).",
+        function=lambda belief: np.stack(
+            [standard_deviation_m(later) for later in belief.forecast], axis=2
+        ),
     ),
     ObservationTerm(
-        "worker_joints_std_towards_robot",
-        lambda of: of.workers * N_JOINTS * (TOWARDS_ROBOT in of.uncertainty),
-        "m", "-", 1.0, 0.25,
-        "Standard deviation of each joint along the line to the nearest point of the robot.",
-        lambda now: deviation_towards_robot_m(now.robot, now.estimate),
+        name="worker_joints_std_towards_robot",
+        size=lambda sizes: sizes.workers * N_JOINTS * (TOWARDS_ROBOT in sizes.uncertainty),
+        unit="m",
+        frame="-",
+        bound=1.0,
+        scale=0.25,
+        doc="Standard deviation of each joint along the line to the nearest point of the robot.",
+        function=lambda belief: deviation_towards_robot_m(belief.robot, belief.estimate),
     ),
     ObservationTerm(
-        "worker_joints_factor",
-        lambda of: of.workers * N_JOINTS * 6 * (FACTOR in of.uncertainty),
-        "m", "world", 1.0, 0.25,
-        "Cholesky factor L of each joint's covariance L L': xx, yx, yy, zx, zy, zz.",
-        lambda now: covariance_factor_m(now.estimate),
+        name="worker_joints_factor",
+        size=lambda sizes: sizes.workers * N_JOINTS * 6 * (FACTOR in sizes.uncertainty),
+        unit="m",
+        frame="world",
+        bound=1.0,
+        scale=0.25,
+        doc="Cholesky factor L of each joint's covariance L L': xx, yx, yy, zx, zy, zz.",
+        function=lambda belief: covariance_factor_m(belief.estimate),
     ),
-)  # fmt: skip
-"""What closes it: the last action, and the workers as they are estimated."""
+)
+"""Last terms: the last action, and the estimated workers."""
 
 SHIELD_TERMS: tuple[ObservationTerm, ...] = (
     ObservationTerm(
-        "shield_change", lambda of: of.arm_joints + of.slides, "rad/s", "base", 4.0, 1.0,
-        "Joint velocities that the shield gave in the previous step, less those asked for.",
-        lambda now: needed(now.shield_change, "What the shield changed"),
+        name="shield_change",
+        size=lambda sizes: sizes.arm_joints + sizes.slides,
+        unit="rad/s",
+        frame="base",
+        bound=4.0,
+        scale=1.0,
+        doc="Joint velocities of the shield in the previous step, less those of the agent.",
+        function=lambda belief: needed(belief.shield_change, "What the shield changed"),
     ),
-)  # fmt: skip
-"""What is added with `HRCConfig.observe_shield`."""
+)
+"""Terms with `HRCConfig.observe_shield`."""
 
 
 @dataclass(frozen=True, slots=True)
 class ObservationLayout:
-    """Which entries of the flat observation belong to which term."""
+    """The entries of the flat observation that belong to each term."""
 
     terms: tuple[int, ...]
-    """Which of all terms have entries, in their order."""
+    """Indices of the terms that have entries."""
     slices: dict[str, slice]
-    """Of every term."""
+    """Entries of every term by name."""
     low: Tensor
+    """(n,) least value of each entry."""
     high: Tensor
+    """(n,) greatest value of each entry."""
     scale: Floats
-    """(n,) what one unit of each entry stands for, in the term's unit."""
+    """(n,) magnitude of an observed 1 for each entry, in the term's unit."""
 
 
-def layout(terms: tuple[ObservationTerm, ...], of: Sizes) -> ObservationLayout:
-    """The layout of terms for an arm, an action space, a number of workers and of times ahead."""
-    sizes = [term.size if isinstance(term.size, int) else term.size(of) for term in terms]
-    ends = np.cumsum(sizes).tolist()
-    slices = {t.name: slice(end - n, end) for t, n, end in zip(terms, sizes, ends, strict=True)}
-    bound = np.repeat([term.bound / term.scale for term in terms], sizes).astype(np.float32)
-    scale = np.repeat([term.scale for term in terms], sizes)
-    present = tuple(np.flatnonzero(sizes).tolist())
+def make_layout(terms: tuple[ObservationTerm, ...], sizes: Sizes) -> ObservationLayout:
+    """Return the layout of terms for given sizes."""
+    counts = [term.size if isinstance(term.size, int) else term.size(sizes) for term in terms]
+    ends = np.cumsum(counts).tolist()
+    slices = {t.name: slice(end - n, end) for t, n, end in zip(terms, counts, ends, strict=True)}
+    bound = np.repeat([term.bound / term.scale for term in terms], counts).astype(np.float32)
+    scale = np.repeat([term.scale for term in terms], counts)
+    present = tuple(np.flatnonzero(counts).tolist())
     return ObservationLayout(present, slices, -bound, bound, scale)
 
 
-def observe(now: Belief, where: ObservationLayout, terms: tuple[ObservationTerm, ...]) -> Tensor:
-    """(B, n) flat observations of `terms`; `ConfigError` for one with other entries than it says,
-    `FloatingPointError` for one that is no number, a fault of the code, never of a camera."""
-    batch = len(now.action)
-    present = [terms[k] for k in where.terms]
-    values = [_value(term, now) for term in present]
+def observe(
+    belief: Belief, layout: ObservationLayout, terms: tuple[ObservationTerm, ...]
+) -> Tensor:
+    """Return flat observations.
+
+    Args:
+        belief: beliefs of B robots.
+        layout: layout of the terms.
+        terms: all terms.
+
+    Returns:
+        (B, n)
+
+    Raises:
+        ConfigError: a term has another number of entries than its `size`.
+        FloatingPointError: a term is NaN, which is an error in code and never due to a camera.
+    """
+    batch = len(belief.action)
+    present = [terms[k] for k in layout.terms]
+    values = [_value(term, belief) for term in present]
     for term, value in zip(present, values, strict=True):
         name, rows = f"rows of observation term {term.name!r}", np.shape(value)[:1]
         check_shape(name, rows, (batch,), "one an environment")
     parts = [value.reshape(batch, -1) for value in values]
     physical = np.concatenate(parts, axis=1)
-    if physical.shape[1] != len(where.scale):
+    if physical.shape[1] != len(layout.scale):
         for term, part in zip(present, parts, strict=True):
-            size = where.slices[term.name].stop - where.slices[term.name].start
+            size = layout.slices[term.name].stop - layout.slices[term.name].start
             check_shape(f"observation term {term.name!r}", part.shape[1:], (size,), "its `size`")
     observation = np.empty(physical.shape, np.float32)
-    if not _scale(physical, where.scale, where.low, where.high, observation):
-        names = [name for name, part in where.slices.items() if np.isnan(physical[:, part]).any()]
+    if not _scale(physical, layout.scale, layout.low, layout.high, observation):
+        names = [name for name, part in layout.slices.items() if np.isnan(physical[:, part]).any()]
         raise FloatingPointError(f"Observation terms that are not a number: {', '.join(names)}.")
     return observation
 
 
-def _value(term: ObservationTerm, now: Belief) -> Floats:
-    """The value (B, ...) of a term; one of users is given a read-only belief."""
+def _value(term: ObservationTerm, belief: Belief) -> Floats:
+    """Return the value (B, ...) of a term; functions of users get a read-only belief."""
     if is_of_user(term.function):
-        return called(f"Observation term {term.name!r}", term.function, lent_belief(now))
-    return term.function(now)
+        return called(f"Observation term {term.name!r}", term.function, lend_belief(belief))
+    return term.function(belief)
 
 
 @kernel
 def _scale(physical: Floats, scale: Floats, low: Tensor, high: Tensor, observation: Tensor) -> bool:
-    """Entries (B, n) in units to clipped ones in units of `scale`; whether all are numbers."""
+    """Write scaled and clipped entries (B, n), and return whether none is NaN.
+
+    Args:
+        physical: (B, n) entries in the terms' units.
+        scale: (n,) magnitude of an observed 1.
+        low: (n,) least value.
+        high: (n,) greatest value.
+        observation: (B, n) is filled.
+    """
     numbers = True
     for b in range(physical.shape[0]):
         for i in range(physical.shape[1]):
@@ -358,16 +520,18 @@ def _scale(physical: Floats, scale: Floats, low: Tensor, high: Tensor, observati
 
 
 def split(
-    observation: Tensor | Mapping[str, Tensor], where: ObservationLayout
+    observation: Tensor | Mapping[str, Tensor], layout: ObservationLayout
 ) -> dict[str, Floats]:
-    """A flat observation (..., n) as named terms in their units; goals and images beside it as they
-    are."""
+    """Return a flat observation (..., n) as named terms in their units.
+
+    Goals and images of a dict observation are added as they are.
+    """
     if isinstance(observation, Mapping):
         beside: dict[str, Any] = {
             name: part if name.startswith(IMAGE) else np.asarray(part, float)
             for name, part in observation.items()
             if name != FLAT
         }
-        return {**split(observation[FLAT], where), **beside}
-    physical = observation * where.scale
-    return {name: physical[..., part] for name, part in where.slices.items()}
+        return {**split(observation[FLAT], layout), **beside}
+    physical = observation * layout.scale
+    return {name: physical[..., part] for name, part in layout.slices.items()}

@@ -1,6 +1,6 @@
-"""What the robot is rewarded for: one declaration per term.
+"""Rewards: one declaration for each term.
 
-Of people terms read the estimate only; what a step brought for the task is judged in the world.
+Terms about people read the estimate only; progress of the task is measured in the world.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hrc_env.belief import Belief, lent_belief
+from hrc_env.belief import Belief, lend_belief
 from hrc_env.core.brought import check_arguments
 from hrc_env.core.errors import ConfigError, check_fields, check_names, check_shape
 from hrc_env.core.kernels import kernel
@@ -21,26 +21,26 @@ from hrc_env.core.typing import Floats
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class RewardConfig:
-    """Weights of the terms that every task shares; a task's own are in its settings.
+    """Weights of the terms that all tasks share; weights of a task's own terms are in its settings.
 
-    A learner that is charged for closeness before it knows its task learns to stand still, far from
-    people. Let the weight of `proximity` grow from 0 (`set_reward`; `train --ramp`), and look at
-    goals, not at the return.
+    A learner that is penalized for closeness before it knows its task learns to stand still, far
+    from people. Let the weight of `proximity` grow from 0 (`set_reward`; `train --ramp`), and
+    compare goals, not returns.
     """
 
     effort: float = 0.02
-    """Taken off for the mean squared action."""
+    """Weight of the penalty on the mean squared action."""
     smoothness: float = 0.02
-    """Taken off for the mean squared change of the action."""
+    """Weight of the penalty on the mean squared change of the action."""
     proximity: float = 2.0
-    """Taken off for closeness to the *estimated* body, times the term's shape in [0, 2.25]. With 6
-    from the first step PPO (one seed) reached no goal of `HRCReach-v0` in the last 64 episodes
-    before step 135,000, with 0 it reached 5.7 in each."""
+    """Weight of the penalty on closeness to the *estimated* body, a shape in [0, 2.25]. With
+    6 from the first step PPO (one seed) reached no goal of `HRCReach-v0` in the last 64 episodes
+    before step 135,000; with 0 it reached 5.7 in each."""
     proximity_reach_m: float = 0.3
-    """Closeness begins to count below this separation of the surfaces [m]."""
+    """Separation of the surfaces below which closeness counts [m]."""
     unknown: float = 0.25
-    """Closeness that a worker counts with at least who is unknown, in [0, 1]: losing sight of them
-    is not rewarded like being alone."""
+    """Least closeness of an unknown worker, in [0, 1], so that losing sight of a worker is not
+    rewarded like being alone."""
 
     def __post_init__(self) -> None:
         check_fields(self, "be positive", "proximity_reach_m")
@@ -48,58 +48,62 @@ class RewardConfig:
 
 
 KINDS = ("dense", "sparse")
-"""What a task's `reward` can be: whether coming nearer counts, too."""
+"""Values of a task's `reward`: with or without a reward for progress."""
 
 
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class RewardTerm:
-    """One summand of the reward."""
+    """One term of the reward, which is the sum of all terms."""
 
     name: str
-    """It stands in `info` as "reward/NAME"."""
+    """Name of the term, which is "reward/NAME" in `info`."""
     doc: str
-    """A sentence for the environment's page."""
+    """Sentence for the environment's page."""
     function: Callable[[Belief, Any, Floats, Any], Floats]
-    """(belief, step, previous action (B, A), weights) -> (B,). The step is a task's, as
-    `Task.advance` returned it. The weights are a `RewardConfig`; those of a task's term are the
-    task's settings. Of the belief are for example `separation.distance_m` (B, W),
+    """Function of (belief, step, previous action (B, A), weights) that returns (B,). The step is a
+    task's, as returned by `Task.advance`. The weights are a `RewardConfig`, or the task's settings
+    for its own terms. The belief has for example `separation.distance_m` (B, W),
     `robot.tool_world` (B, 3) and `estimate.mean_world` (B, W, J, 3), in metres."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` for a function that does not take four arguments."""
-        what = f"The function of the reward term {self.name!r}"
-        check_arguments(what, self.function, "belief", "step", "previous_action", "weights")
+        label = f"The function of the reward term {self.name!r}"
+        check_arguments(label, self.function, "belief", "step", "previous_action", "weights")
 
 
 def check_kind(config: Any) -> None:
-    """Raise `ConfigError` for settings of a task whose `reward` is not one of `KINDS`."""
+    """Raise `ConfigError` for settings of a task with a `reward` that is not one of `KINDS`."""
     if config.reward not in KINDS:
         name = type(config).__name__
         raise ConfigError(f'{name}.reward must be "dense" or "sparse", got {config.reward!r}.')
 
 
-def progress(says: str) -> RewardTerm:
-    """The term of a task whose steps have `progress_m`, the fall of the ways that are left: as
-    differences of a potential they sum up to no more than there was to go."""
-    said = f'{says}, times `task.progress_per_m`; 0 with `task.reward` "sparse".'
-    return RewardTerm("progress", said, _progress)
+def progress(description: str) -> RewardTerm:
+    """Return the progress term of a task with `progress_m` in its steps.
+
+    It is the decrease of the remaining distance: as differences of a potential, its values add up
+    to no more than the initial distance.
+    """
+    doc = f'{description}, times `task.progress_per_m`; 0 with `task.reward` "sparse".'
+    return RewardTerm("progress", doc, _progress)
 
 
-def _progress(now: Belief, step: Any, previous: Floats, config: Any) -> Floats:
+def _progress(belief: Belief, step: Any, previous: Floats, config: Any) -> Floats:
+    """Return the reward (B,) for progress."""
     share = config.progress_per_m if config.reward == "dense" else 0.0
     return np.asarray(share * step["progress_m"])
 
 
 def closeness(separation_m: Floats, reach_m: float) -> Floats:
-    """Shape of the proximity term: 0 from `reach_m` on, 1 at touch, at most 2.25 inside."""
+    """Return the shape of the proximity term: 0 from `reach_m` on, 1 at contact, at most 2.25."""
     share = np.minimum(np.maximum((reach_m - separation_m) / reach_m, 0.0), 1.5)
     return share * share
 
 
 @kernel(makes_arrays=True)
-def _mean_square(vectors):
-    """(B,) of (B, n)."""
+def _mean_square(vectors: Floats) -> Floats:
+    """Return the mean square (B,) of the entries of vectors (B, n)."""
     mean = np.zeros(len(vectors))
     for b in range(len(vectors)):
         for value in vectors[b]:
@@ -108,9 +112,10 @@ def _mean_square(vectors):
     return mean
 
 
-def _proximity(now: Belief, step: Any, previous: Floats, config: RewardConfig) -> Floats:
-    nearest_m = np.minimum.reduce(now.separation.distance_m, axis=-1, initial=np.inf)
-    least = np.where(now.estimate.unknown.any(-1), config.unknown, 0.0)
+def _proximity(belief: Belief, step: Any, previous: Floats, config: RewardConfig) -> Floats:
+    """Return the reward (B,) for distance from estimated bodies."""
+    nearest_m = np.minimum.reduce(belief.separation.distance_m, axis=-1, initial=np.inf)
+    least = np.where(belief.estimate.unknown.any(-1), config.unknown, 0.0)
     near = np.maximum(closeness(nearest_m, config.proximity_reach_m), least)
     return -config.proximity * near
 
@@ -119,43 +124,52 @@ SHARED_TERMS: tuple[RewardTerm, ...] = (
     RewardTerm(
         "effort",
         "Minus `effort` times the mean squared action.",
-        lambda now, step, previous, config: -config.effort * _mean_square(now.action),
+        lambda belief, step, previous, config: -config.effort * _mean_square(belief.action),
     ),
     RewardTerm(
         "smoothness",
         "Minus `smoothness` times the mean squared change of the action.",
-        lambda now, step, previous, config: (
-            -config.smoothness * _mean_square(now.action - previous)
+        lambda belief, step, previous, config: (
+            -config.smoothness * _mean_square(belief.action - previous)
         ),
     ),
     RewardTerm(
         "proximity",
         "Minus `proximity` times clip((d0 - d) / d0, 0, 1.5)^2, where d is the distance of the "
-        "robot's surface from the nearest estimated body and d0 is `proximity_reach_m`; at least "
-        "`unknown` of that while somebody may be there whom nobody sees.",
+        "robot's surface from the nearest estimated body and d0 is `proximity_reach_m`; the square "
+        "counts as at least `unknown` while a worker is unknown.",
         _proximity,
     ),
 )
 
 
-def evaluated(
-    terms: tuple[RewardTerm, ...], now: Belief, step: Any, previous_action: Floats, weights: Any
+def evaluate_terms(
+    terms: tuple[RewardTerm, ...], belief: Belief, step: Any, previous_action: Floats, weights: Any
 ) -> dict[str, Floats]:
-    """The value (B,) of each of these terms by its name; those of users get read-only arrays."""
-    values = {}
+    """Return the values of terms; functions of users get read-only arrays.
+
+    Args:
+        terms: the terms.
+        belief: beliefs of B robots.
+        step: result of `Task.advance`.
+        previous_action: (B, A) action of the step before.
+        weights: a `RewardConfig`, or the settings of the task.
+
+    Returns:
+        (B,) value of each term by name.
+    """
+    values: dict[str, Floats] = {}
     for term in terms:
-        given: Any = now, step, previous_action, weights
         if is_of_user(term.function):
-            lent = lent_belief(now), *read_only(given[1:3]), weights
+            lent = lend_belief(belief), *read_only((step, previous_action)), weights
             values[term.name] = called(f"Reward term {term.name!r}", term.function, *lent)
         else:
-            values[term.name] = term.function(*given)
+            values[term.name] = term.function(belief, step, previous_action, weights)
     return values
 
 
-def checked_factors(factors: Mapping[str, float], terms: Sequence[RewardTerm]) -> dict[str, float]:
-    """Factors on a reward's terms by name, or `ConfigError` for a name that is none, with the
-    nearest, and for what is no finite number."""
+def check_factors(factors: Mapping[str, float], terms: Sequence[RewardTerm]) -> dict[str, float]:
+    """Return factors on terms by name; `ConfigError` for an unknown name or no finite number."""
     names = [term.name for term in terms]
     check_names("reward term", factors, names)
     for name, factor in factors.items():
@@ -167,9 +181,18 @@ def checked_factors(factors: Mapping[str, float], terms: Sequence[RewardTerm]) -
     return {name: float(factor) for name, factor in factors.items()}
 
 
-def total(terms: Mapping[str, Floats], batch: int) -> Floats:
-    """The reward (B,): the sum of its terms; `ConfigError` for one of another shape,
-    `FloatingPointError` for one that is not finite, a fault of the code, never of a camera."""
+def sum_terms(terms: Mapping[str, Floats], batch: int) -> Floats:
+    """Return the sum of the terms (B,) of a reward.
+
+    Args:
+        terms: values of the terms by name.
+        batch: number B of environments.
+
+    Raises:
+        ConfigError: a term has another shape.
+        FloatingPointError: a term is not finite, which is an error in code and never due to a
+            camera.
+    """
     for name, value in terms.items():
         check_shape(f"reward term {name!r}", np.shape(value), (batch,), "a value an environment")
     reward: Floats = sum(terms.values(), np.zeros(batch))

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from hrc_env import infos, observations, rewards
-from hrc_env.belief import Belief, estimated_separation, of_concern, unseen_floor
-from hrc_env.control import fastest, joint_command, n_actions
+from hrc_env.belief import Belief, drop_distant_unknown, estimated_separation, find_unseen_floor
+from hrc_env.control import joint_command, max_command, n_actions
 from hrc_env.core.batching import State, Stateful, picked, rows, write_rows
 from hrc_env.core.declared import Records2
 from hrc_env.core.errors import ConfigError, check_shape, needed
@@ -151,8 +151,8 @@ class Simulation(Stateful):
             len(self.scene.objects.names),
             n_slides,
         )
-        self.layout = observations.layout(self.terms, sizes)
-        self.model = robot_model(self.scene, fastest(self.control, self.chain, config.control))
+        self.layout = observations.make_layout(self.terms, sizes)
+        self.model = robot_model(self.scene, max_command(self.control, self.chain, config.control))
         self.monitor = IncidentMonitor(
             batch, self.scene.n_workers, self.bodies.capsule_names, self.model, config.ctrl_dt
         )
@@ -246,7 +246,7 @@ class Simulation(Stateful):
                 'set_reward(factors={"NAME": 2.0}).'
             )
         checked = (
-            None if factors is None else rewards.checked_factors(factors, self.task.reward_terms)
+            None if factors is None else rewards.check_factors(factors, self.task.reward_terms)
         )
         self.reward_weights = self.reward_weights if weights is None else weights
         self.reward_factors = self.reward_factors if checked is None else checked
@@ -484,10 +484,10 @@ class Simulation(Stateful):
             estimates: the belief about the workers, and its forecasts.
         """
         estimate = estimates[0]
-        unseen = unseen_floor(world.robot, estimate, self.pipeline.vacancy(ids))
+        unseen = find_unseen_floor(world.robot, estimate, self.pipeline.vacancy(ids))
         belief = Belief(
             robot=world.robot,
-            estimate=of_concern(estimate, unseen),
+            estimate=drop_distant_unknown(estimate, unseen),
             separation=estimated_separation(world.robot, estimate),
             hand=world.hand,
             objects=None if self.measured is None else rows(self.measured, ids),
@@ -538,7 +538,7 @@ class Simulation(Stateful):
         })  # fmt: skip
         over = (cost.contact > 0) & config.cost.contact_terminates
         over |= self._is_terminal(truth.task_step)
-        return StepResult(self._observe(belief), rewards.total(terms, self.batch), over, info)
+        return StepResult(self._observe(belief), rewards.sum_terms(terms, self.batch), over, info)
 
     def _is_terminal(self, task_step: Any) -> Bools:
         """Return (B,) whether the task is over after a step."""
@@ -585,8 +585,8 @@ class Simulation(Stateful):
         own, shared = self.task.own_rewards, rewards.SHARED_TERMS
         step = truth.task_step, command.previous_action
         terms = {
-            **rewards.evaluated(own, belief, *step, self.config.task),
-            **rewards.evaluated(shared, belief, *step, self.reward_weights),
+            **rewards.evaluate_terms(own, belief, *step, self.config.task),
+            **rewards.evaluate_terms(shared, belief, *step, self.reward_weights),
         }
         for name, factor in self.reward_factors.items():
             terms[name] = factor * np.asarray(terms[name])

@@ -290,7 +290,7 @@ def test_the_vector_environment_says_what_the_single_one_says_of_its_shield():
         ("slow_donw", "Did you mean 'slow_down'"),
         (lambda now, velocities, dt_s: (velocities[:, :2], {}), "velocities must have shape"),
         (lambda now, velocities, dt_s: (velocities * np.nan, {}), "velocities must be finite"),
-        (lambda now, velocities, dt_s: (velocities, {"x": np.zeros(7)}), "'x' must have shape"),
+        (lambda now, velocities, dt_s: (velocities, {"x": np.zeros(7)}), "'x' of a shield must"),
         (3, "shield must be a name, a ShieldConfig or a mapping of its fields, a function or None"),
     ],
 )

@@ -8,8 +8,8 @@ from hrc_env.control import (
     ControlConfig,
     joint_command,
     n_actions,
-    resolved_rate,
-    resolved_twist,
+    resolve_rate,
+    resolve_twist,
 )
 from hrc_env.core.errors import ConfigError
 from hrc_env.geometry.chains import angular_jacobian, jacobian
@@ -32,7 +32,7 @@ def test_a_tool_velocity_is_followed_away_from_singular_postures():
     """Damping takes a few per cent off; the direction stays."""
     q = near_home()
     wanted = np.tile([0.1, -0.2, 0.15], (len(q), 1))
-    qd = resolved_rate(CHAIN, q, wanted, HOME, ControlConfig())
+    qd = resolve_rate(CHAIN, q, wanted, HOME, ControlConfig())
     got = np.einsum("bij,bj->bi", jacobian(CHAIN, q), qd)
     cosine = (got * wanted).sum(1) / np.linalg.norm(got, axis=1) / np.linalg.norm(wanted, axis=1)
     assert cosine.min() > 0.99
@@ -41,7 +41,7 @@ def test_a_tool_velocity_is_followed_away_from_singular_postures():
 
 def test_the_posture_pull_does_not_move_the_tool():
     q = near_home()
-    qd = resolved_rate(CHAIN, q, np.zeros((len(q), 3)), HOME, ControlConfig(damping=1e-4))
+    qd = resolve_rate(CHAIN, q, np.zeros((len(q), 3)), HOME, ControlConfig(damping=1e-4))
     moved = np.einsum("bij,bj->bi", jacobian(CHAIN, q), qd)
     assert np.abs(moved).max() < 1e-4
     assert np.abs(qd).max() > 1e-3
@@ -49,7 +49,7 @@ def test_the_posture_pull_does_not_move_the_tool():
 
 def test_joint_limits_of_speed_hold_and_keep_the_direction():
     q = near_home()
-    fast = resolved_rate(CHAIN, q, np.full((len(q), 3), 50.0), HOME, ControlConfig())
+    fast = resolve_rate(CHAIN, q, np.full((len(q), 3), 50.0), HOME, ControlConfig())
     share = np.abs(fast) / CHAIN.velocity_limit_rad_s
     np.testing.assert_allclose(share.max(1), 1.0)
 
@@ -71,4 +71,4 @@ def test_a_twist_is_the_damped_least_squares_solution_also_at_singular_postures(
     expected = (J.swapaxes(1, 2) @ solved)[..., 0]
     assert near[-1] == 1.0
     assert near[0] < 1.0
-    np.testing.assert_allclose(resolved_twist(CHAIN, q, twist, config), expected, atol=1e-9)
+    np.testing.assert_allclose(resolve_twist(CHAIN, q, twist, config), expected, atol=1e-9)

@@ -174,7 +174,7 @@ def shielded(shield):
 
 @pytest.mark.parametrize("name", ["active", "change", "scale"])
 def test_a_shield_says_nothing_that_is_measured_of_all(name):
-    with pytest.raises(hrc_env.ConfigError, match=f"must not say '{name}'"):
+    with pytest.raises(hrc_env.ConfigError, match=f"must not return a value '{name}'"):
         shielded(lambda now, velocities, dt_s: (velocities, {name: np.ones(len(velocities))}))
 
 

@@ -115,7 +115,7 @@ def test_what_is_beyond_a_time_limit_counts_as_the_critic_says():
     learner.policy.action_net.bias.data.fill_(50.0)
     learner.learning_rate = learner.lr_schedule = lambda _: 0.0
     learner.learn(60 * 640)
-    value = learner._values(np_tensor(0.0)).item() * np.sqrt(learner.spread.var)
+    value = learner._predict(np_tensor(0.0)).item() * np.sqrt(learner.spread.var)
     assert value == pytest.approx(1 / (1 - 0.8), rel=0.1)
 
 
@@ -157,7 +157,7 @@ def test_multiplier_critic_and_scale_go_on_where_they_were(tmp_path):
     assert again.multiplier.value > 0
     assert again.spread.var == learner.spread.var
     observation = learner.policy.obs_to_tensor(env.reset())[0]
-    assert again._values(observation).tolist() == learner._values(observation).tolist()
+    assert again._predict(observation).tolist() == learner._predict(observation).tolist()
     moments = [each.cost_optimizer.state_dict()["state"][0]["exp_avg"] for each in (again, learner)]
     assert moments[0].tolist() == moments[1].tolist()
 
@@ -190,4 +190,4 @@ def test_a_limit_that_was_not_kept_is_said_aloud(tmp_path, capsys):
     words = [*LIMITED[:3], "0.001", "--timesteps", "256", "--people", "headlong"]
     words += ["--episodes", "16", "--out", str(tmp_path / "run")]
     assert main(["train", *TINY, *words]) == 0
-    assert "The limit of 0.001 is not kept" in " ".join(capsys.readouterr().out.split())
+    assert "The limit of 0.001 is exceeded" in " ".join(capsys.readouterr().out.split())

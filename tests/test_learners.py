@@ -83,7 +83,7 @@ def test_a_resumed_run_says_that_its_buffer_fills_anew(run, tmp_path):
     n_steps = checkpoints.describe(again / "policy.zip")["num_timesteps"]
     done = train("--resume", again, "--timesteps", n_steps + 8)
     said = " ".join(done.stdout.split())
-    assert "keep no replay buffer: it fills anew with what the policy does" in said
+    assert "contain no replay buffer: it is filled again by the policy" in said
 
 
 def told(task: str, **kwargs):

@@ -7,7 +7,7 @@ from alone import check_observations_alone
 import hrc_env  # noqa: F401  registers the ids
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.env import HRCEnv
-from hrc_env.observations import Sizes, layout
+from hrc_env.observations import Sizes, make_layout
 from hrc_env.tasks.reach import Reach
 
 TERMS = Reach().observation_terms
@@ -25,7 +25,7 @@ def rolled(env, n_steps=15):
 
 
 def test_horizons_add_their_terms_and_no_others():
-    plain, more = layout(TERMS, Sizes(6, 6, 2)), layout(TERMS, Sizes(6, 6, 2, horizons=2))
+    plain, more = make_layout(TERMS, Sizes(6, 6, 2)), make_layout(TERMS, Sizes(6, 6, 2, horizons=2))
     assert len(more.low) - len(plain.low) == 2 * 2 * N_JOINTS * (3 + 1)
     for name, part in plain.slices.items():
         assert part.start == part.stop or more.slices[name] == part
@@ -33,7 +33,7 @@ def test_horizons_add_their_terms_and_no_others():
 
 
 def test_who_gives_no_more_sizes_asks_for_no_more_terms():
-    plain, made = layout(TERMS, Sizes(6, 6, 1)), HRCEnv(perception="none").simulation.layout
+    plain, made = make_layout(TERMS, Sizes(6, 6, 1)), HRCEnv(perception="none").simulation.layout
     assert (plain.slices, plain.terms) == (made.slices, made.terms)
     np.testing.assert_array_equal(plain.low, made.low)
 

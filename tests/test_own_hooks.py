@@ -147,7 +147,10 @@ def test_functions_of_terms_and_goals_are_checked_when_they_are_made() -> None:
 SHIELD_FAULTS = {
     "nothing": (lambda belief, velocities, dt_s: None, "must return two things"),
     "shape": (lambda belief, velocities, dt_s: (velocities[:, :2], {}), "velocities must have"),
-    "values": (lambda belief, velocities, dt_s: (velocities, {"a": np.zeros(7)}), "'a' must have"),
+    "values": (
+        lambda belief, velocities, dt_s: (velocities, {"a": np.zeros(7)}),
+        "'a' of a shield",
+    ),
 }
 
 

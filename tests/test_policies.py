@@ -159,7 +159,7 @@ def test_an_address_is_a_file_of_the_package(exported, tmp_path, monkeypatch):
     with pytest.raises(ConfigError, match="'hrc://HRCReach-v0/tiny'"):
         make_agent("hrc://HRCReach-v0/../../x", here())
     monkeypatch.setattr(policies, "FOLDER", tmp_path)
-    with pytest.raises(ConfigError, match="No policies come with it yet"):
+    with pytest.raises(ConfigError, match="The package has no policies yet"):
         make_agent("hrc://HRCReach-v0/tiny", here())
 
 
@@ -187,9 +187,7 @@ def test_another_order_or_scale_of_terms_is_refused(exported):
     card, info = policies.read(exported)[0], here()
     assert policies.list_differences(card, info) == []
     turned = replace(card, observation=card.observation[::-1])
-    assert policies.list_differences(turned, info) == [
-        "its observation's terms come in another order"
-    ]
+    assert policies.list_differences(turned, info) == ["its observation's terms have another order"]
     finer = replace(card.observation[0], scale=0.5), *card.observation[1:]
     (said,) = policies.list_differences(replace(card, observation=finer), info)
     assert "6 entries of 0.5, here 6 entries of 1" in said
@@ -199,7 +197,7 @@ def test_a_damaged_file_is_refused(own):
     content = bytearray(own.read_bytes())
     content[-1] ^= 1
     own.write_bytes(content)
-    with pytest.raises(CheckpointError, match="is damaged, or not the one of its card"):
+    with pytest.raises(CheckpointError, match="is damaged, or does not belong to its card"):
         make_agent(str(own), here())
 
 
@@ -210,7 +208,9 @@ def test_a_pickled_file_is_not_read(own, run):
 
     for content in (pickle.dumps(Bad()), (run / "policy.zip").read_bytes()):
         own.write_bytes(content)
-        with pytest.raises(CheckpointError, match="is a pickled file, which could run anything"):
+        with pytest.raises(
+            CheckpointError, match="is a pickled file, which could execute anything"
+        ):
             make_agent(str(own), here())
 
 
@@ -219,10 +219,10 @@ def test_files_that_are_no_policies_say_so(own, tmp_path):
         make_agent(str(tmp_path / "missing.safetensors"), here())
     whole = own.read_bytes()
     for content, says in (
-        (b"junk of no form", "holds no policy"),
-        (save({"other": np.zeros(3, "f4")}), "holds no policy: 'actor.0.weight'"),
+        (b"junk of no form", "is not a policy"),
+        (save({"other": np.zeros(3, "f4")}), "is not a policy: 'actor.0.weight'"),
         (save({k: v[..., :-1].copy() if k == "actor.0.weight" else v
-               for k, v in load(whole).items()}), "its card says"),
+               for k, v in load(whole).items()}), "its card describes"),
     ):  # fmt: skip
         own.write_bytes(content)
         spoil(own, sha256=hashlib.sha256(content).hexdigest())
@@ -245,7 +245,7 @@ def test_an_activation_that_nobody_knows_is_refused():
     ("words", "says"),
     [
         (["RUN", "--name", "Tiny"], "takes small letters, digits and _"),
-        (["RUN", "--name", "tiny"], "is there already; give another --name"),
+        (["RUN", "--name", "tiny"], "exists already; give another --name"),
         (["nowhere", "--name", "tiny"], "holds no run"),
         (["RUN", "--name", "tiny", "--episodes", "0"], "--episodes must be 1 or more"),
         (["RUN", "--name", "other", "--shields", "qq"], "Unknown shield 'qq'"),

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hrc_env.control import checked_action, n_actions
+from hrc_env.control import check_action, n_actions
 from hrc_env.core.errors import ConfigError
 from hrc_env.env import HRCEnv
 from hrc_env.observations import ObservationLayout, ObservationTerm, observe
@@ -14,7 +14,7 @@ from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.pipeline import levels
 from hrc_env.pipeline.levels import LEVELS, make_pipeline
 from hrc_env.pipeline.sensor_input import SensorInput, TrueSensorInput, require_truth
-from hrc_env.rewards import check_kind, total
+from hrc_env.rewards import check_kind, sum_terms
 from hrc_env.safety.config import ShieldConfig
 from hrc_env.safety.contact import contact_force, effective_mass, find_region
 from hrc_env.safety.cost import COMPONENTS, CostConfig
@@ -43,11 +43,11 @@ ARM, BASE = (make_chain(ROBOTS[name], (0.0, 0.0, 0.0)) for name in ("ur10e_like"
 )
 def test_an_action_in_which_one_entry_is_wrong_is_refused(action, said):
     with pytest.raises(ConfigError, match=said):
-        checked_action(action, (2, 3), "tool")
+        check_action(action, (2, 3), "tool")
 
 
 def test_an_action_beyond_one_is_taken_as_one():
-    taken = checked_action([[2, -3.0, 0.5], [1.0, -1.0, 0.0]], (2, 3), "tool")
+    taken = check_action([[2, -3.0, 0.5], [1.0, -1.0, 0.0]], (2, 3), "tool")
     assert taken.tolist() == [[1.0, -1.0, 0.5], [1.0, -1.0, 0.0]]
 
 
@@ -78,17 +78,17 @@ def test_a_control_that_a_robot_has_not_is_refused(control, chain, said):
 def test_one_reward_of_one_environment_that_is_none_is_told(environment, wrong):
     """Even where another term makes up for it."""
     terms = {"one": np.ones(2), "two": np.ones(2), "three": np.full(2, np.float64(0.5))}
-    assert total(terms, 2).tolist() == [2.5, 2.5]
-    assert total({}, 2).tolist() == [0.0, 0.0]
+    assert sum_terms(terms, 2).tolist() == [2.5, 2.5]
+    assert sum_terms({}, 2).tolist() == [0.0, 0.0]
     terms["two"][environment] = wrong
     with pytest.raises(FloatingPointError, match=r"not finite: two\.$"):
-        total(terms, 2)
+        sum_terms(terms, 2)
 
 
 @pytest.mark.parametrize("value", [np.zeros(3), np.zeros((2, 1)), 0.0])
 def test_a_reward_of_another_shape_is_refused(value):
     with pytest.raises(ConfigError, match="reward term 'two' must have shape"):
-        total({"one": np.zeros(2), "two": value}, 2)
+        sum_terms({"one": np.zeros(2), "two": value}, 2)
 
 
 def test_rewards_are_of_two_kinds():

@@ -9,7 +9,7 @@ from hrc_env.belief import Belief
 from hrc_env.core.records import PoseEstimate, RobotState
 from hrc_env.env import HRCEnv
 from hrc_env.geometry.distances import Separation
-from hrc_env.rewards import SHARED_TERMS, RewardConfig, closeness, evaluated, total
+from hrc_env.rewards import SHARED_TERMS, RewardConfig, closeness, evaluate_terms, sum_terms
 from hrc_env.tasks.reach import Reach, ReachConfig
 from hrc_env.vector.env import HRCVectorEnv
 
@@ -34,10 +34,10 @@ def reward(now, step, before, shared, own=None):
     """All terms, of which the task's come first."""
     own = own or ReachConfig()
     terms = {
-        **evaluated(Reach().rewards, now, step, before, own),
-        **evaluated(SHARED_TERMS, now, step, before, shared),
+        **evaluate_terms(Reach().rewards, now, step, before, own),
+        **evaluate_terms(SHARED_TERMS, now, step, before, shared),
     }
-    return total(terms, 1), terms
+    return sum_terms(terms, 1), terms
 
 
 def progress(metres: float = 0.0, reached: bool = False) -> dict[str, np.ndarray]:
@@ -93,8 +93,8 @@ def test_one_environment_of_two_whose_reward_is_not_finite_raises():
     for wrong in (np.nan, np.inf):
         terms = {"reach": np.ones(2), "effort": np.array([0.5, wrong])}
         with pytest.raises(FloatingPointError, match="finite: effort"):
-            total(terms, 2)
-    assert total({"reach": np.ones(2), "effort": np.full(2, 0.5)}, 2).tolist() == [1.5, 1.5]
+            sum_terms(terms, 2)
+    assert sum_terms({"reach": np.ones(2), "effort": np.full(2, 0.5)}, 2).tolist() == [1.5, 1.5]
 
 
 def proximity_of(env, weight):

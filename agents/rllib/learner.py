@@ -223,7 +223,7 @@ class RLlibPPO:
         )
 
     def last_error(self) -> str:
-        """Return the last error of a worker: its own, or what RLlib reports of its end."""
+        """Return the last error of a worker: its own, or RLlib's report of its end."""
         if reason := self._reason():
             return reason
         return f"a process that was killed, or ran out of memory ({self._log.message})"

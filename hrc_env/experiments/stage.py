@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from gymnasium.utils import seeding
 
-from hrc_env.control import checked_action
+from hrc_env.control import check_action
 from hrc_env.core.infos import Info
 from hrc_env.core.machine import n_cores
 from hrc_env.core.typing import Bools, Floats
@@ -99,6 +99,6 @@ class EndlessEpisodes:
     def step(self, action: Any) -> tuple[Observation, Floats, Bools, Bools, Info]:
         """Step every environment; no episode ever ends."""
         shape = len(self.terminated), self.env.first.n_actions
-        result = self.env.step(checked_action(action, shape, self.env.first.control))
+        result = self.env.step(check_action(action, shape, self.env.first.control))
         self.terminated, never = result.terminated, np.zeros_like(result.terminated)
         return result.observation, result.reward, never, never, result.info

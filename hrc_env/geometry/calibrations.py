@@ -49,8 +49,8 @@ def is_calibration(content: Mapping[str, Any]) -> bool:
 def parse_calibration(content: Mapping[str, Any], path: Path | str) -> tuple[CameraConfig, ...]:
     """Return the cameras of a calibration that another tool has written.
 
-    Lengths in millimetres are converted to metres; a `UserWarning` reports them, and a world whose
-    z axis is not up.
+    Lengths in millimetres are converted to metres; a `UserWarning` reports them, and a world
+    with a z axis that is not up.
 
     Args:
         content: content of the file.

@@ -201,7 +201,7 @@ def lever(frame: Transforms, is_slide: bool, point: Floats | Vector3) -> Vector3
 
     Args:
         frame: (4, 4) the joint's frame.
-        is_slide: whether the joint is a slide, whose axis is the result; of a hinge it is the
+        is_slide: whether the joint is a slide: the result is then its axis; of a hinge it is the
             axis times (point - origin).
         point: (3,) [m].
     """

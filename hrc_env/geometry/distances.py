@@ -20,7 +20,7 @@ _PARALLEL = 1e-13
 """Squared sine of the angle below which segments count as parallel: a micrometre over their
 length."""
 _ENDS: Ints = np.array([[(e[0], e[-1]) for e in ends[:2]] for ends in SEGMENT_ENDS])
-"""(K, 2, 2) the two joints whose mean is each end; twice the same for an end at a joint."""
+"""(K, 2, 2) the two joints with each end in their middle; twice the same for an end at a joint."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -75,7 +75,7 @@ def check_reach(task: str, robot: str, chain: SerialChain, targets: Iterable[Rea
 def wrist_reach(chain: SerialChain) -> WristReach:
     """Return the reach of an arm's last joint.
 
-    It is the greatest of all poses whose joints are at right angles; arms of the usual kinds are
+    It is the greatest of all poses with joints at right angles; arms of the usual kinds are
     longest in one of these.
     """
     steps = 0.5 * np.pi * np.arange(-2, 3)

@@ -1,7 +1,7 @@
 """Occlusion: whether anything stands between an eye and points.
 
-Of a table of shapes, only those are tested exactly that are in the cone around the points and whose
-bounding spheres a line meets.
+Of a table of shapes, only those are tested exactly that are in the cone around the points and have
+bounding spheres that a line meets.
 """
 
 import math

@@ -2,7 +2,7 @@
 
 A linear solution is refined by Gauss-Newton on the reprojection error (Hartley and Zisserman,
 Multiple View Geometry, 2nd ed., chapter 12). With a gate, the search starts from the pair of
-cameras whose point agrees with the most others, so that a wrong detection in one view does no harm.
+cameras that agrees with the most others, so that a wrong detection in one view does no harm.
 
 Kernels take one point: projections P (C, 3, 4), pixels z (C, 2), their standard deviations
 sigma (C,) [px], and the views to use (C,).

@@ -105,12 +105,12 @@ class Calibration:
     """(P, A, 2) share of the time in which left and right are exchanged: of all joints, of the legs
     alone."""
     swap_s: Annotated[Floats, (2,)]
-    """(2,) time constants of the normal variables whose lower tails these exchanges are [s]."""
+    """(2,) time constants of the normal variables in the lower tails of which they happen [s]."""
     miss_share: Annotated[Floats, (N_POSTURES, N_SEEN)]
     """(P, 16) share of the time in which no worker is found, by the number of joints that are seen,
     0 to 15."""
     miss_s: Annotated[Floats, ()]
-    """Time constant of the normal variable whose lower tail is a miss [s]."""
+    """Time constant of the normal variable in the lower tail of which a miss happens [s]."""
     sigma: Annotated[Floats, (N_POSTURES, N_KINDS, _N_VISIBILITIES)]
     """(P, K, V) standard deviation that is reported, a share of the stature, at `VISIBILITY`."""
 

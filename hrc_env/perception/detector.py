@@ -88,7 +88,7 @@ class DetectorConfig:
     name of a registered one (`hrc_env.register_detector`); searches for people always use
     BlazePose."""
     folded: str = "full"
-    """Landmark network for workers who bend, squat or kneel; "heavy" is more exact, and slower."""
+    """Landmark network for workers that bend, squat or kneel; "heavy" is more exact, and slower."""
 
     def __post_init__(self) -> None:
         check_names("detector.runtime", [self.runtime], network.RUNTIMES)
@@ -187,7 +187,7 @@ class PoseDetector(Stateful):
             source: the cameras' present images.
             windows: (C,) windows of the worker; None for cameras without one.
             track: number of the worker's track.
-            others: windows (C,) of other workers, whom a search does not find again.
+            others: windows (C,) of other workers, which a search leaves out.
             found: result of `search` in these images; None: it was not called.
             folded: whether the worker is expected to be folded (`outline.is_folded`).
             posture: expected posture (`outline.posture_of`).
@@ -206,7 +206,7 @@ class PoseDetector(Stateful):
         return _no_detection([None] * len(windows))
 
     def search(self, source: ImageSource, which: Sequence[int] | None = None) -> list[list[Roi]]:
-        """Search whole images for people of whom both networks are sure.
+        """Search whole images for people, and keep those with high confidence of both networks.
 
         Args:
             source: the cameras' present images.

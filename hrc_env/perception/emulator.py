@@ -172,7 +172,7 @@ def emulate(
         dim: (B, C) quality of the pictures; None: usual light.
 
     Returns:
-        Keypoints in pixels of the images; NaN, 0 and infinity of a worker who is not found.
+        Keypoints in pixels of the images; NaN, 0 and infinity of a worker that is not found.
     """
     batch, n_cameras, n_workers = state.errors.shape
     shape = (batch, n_cameras, n_workers, N_JOINTS)

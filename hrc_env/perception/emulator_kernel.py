@@ -81,7 +81,7 @@ class Errors:
     body: float
     """Logarithm of the factor of the whole body on the errors' size."""
     happening: Annotated[Floats, (3,)]
-    """Normal variables in whose lower tails `SWAPPED`, `CROSSED` and `MISSED` happen."""
+    """Normal variables; `SWAPPED`, `CROSSED` and `MISSED` happen in their lower tails."""
 
 
 class PostureTables:

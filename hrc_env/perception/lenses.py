@@ -27,7 +27,7 @@ from hrc_env.perception.blazepose import to_image
 WIDEST = float(np.tan(np.radians(78.0)))
 """Half width of a pinhole image, beyond which a window is black [focal lengths]."""
 MAPS_KEPT = 64
-"""Number of windows whose resampling maps are kept."""
+"""Number of windows with resampling maps that are kept."""
 
 
 class PinholeRenderer(Protocol):

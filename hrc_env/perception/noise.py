@@ -1,7 +1,7 @@
 """Differences between the network's joints and ours: their standard deviations and mean offsets.
 
 The real pipeline and its emulator use the same numbers. A hip of BlazePose is 17 mm above ours, and
-60 mm ahead of it in a person who bends. Trackers follow the network's joints; estimates are of
+60 mm ahead of it in a bent person. Trackers follow the network's joints; estimates are of
 ours.
 """
 

@@ -17,7 +17,7 @@ from hrc_env.geometry.triangulation import triangulate
 from hrc_env.perception.lenses import pinhole_keypoints
 
 MIN_VISIBILITY = 0.6
-"""Least mean confidence of the joints of a person whom one camera alone shows."""
+"""Least mean confidence of the joints of a person in one camera alone."""
 NEAR_FLOOR_M = 0.5
 """Greatest distance of a standing person from the points of the floor [m]."""
 GATE_SIGMA = 4.0
@@ -30,7 +30,7 @@ LEVELS = tuple(
     [JOINT[f"{side}_{name}"] for side in ("left", "right")]
     for name in ("ankle", "knee", "hip", "shoulder")
 )
-"""Pairs of joints whose heights show whether a person stands."""
+"""Pairs of joints with heights that show whether a person stands."""
 ANKLE_M = 0.1
 """Height of the ankles of a standing person above the floor [m]."""
 LEVELS_M: Floats = np.array([(0.2, 0.9), (0.6, 1.4), (1.0, 2.0), (1.2, 2.3)])

@@ -32,7 +32,7 @@ SEARCH_RAD = math.radians(75.0)
 """Greatest angle of view of a search window [rad]; in wider ones people are too small for the
 detector stage."""
 STATURE_M = 1.75
-"""Stature of the people for whom search windows are laid out [m]."""
+"""Stature of people for the layout of search windows [m]."""
 STATURE_OF_SIDE = 0.75
 """Stature of an upright worker, as a share of the side of BlazePose's window around the worker."""
 ROOM = 2.1
@@ -100,7 +100,7 @@ class SearchResult(NamedTuple):
 
 
 class _People(NamedTuple):
-    """People who would stand on the floor of an image."""
+    """People on the floor in an image."""
 
     middle_px: Points2
     """(N, 2) middles of their bodies [px]."""
@@ -131,7 +131,7 @@ def search_jobs(
     Args:
         source: the present images.
         windows: (C, ...) search windows of each camera.
-        which: indices of the cameras whose windows are searched.
+        which: indices of the cameras to search.
     """
     for c in which:
         for window in windows[c]:
@@ -191,7 +191,7 @@ def search_windows(camera: PinholeCamera, floor_world: Points3 | None = None) ->
 
 
 def _project_people(camera: PinholeCamera, floor_world: Points3) -> _People:
-    """Return the people at points (N, 3) of the floor [m] who are in the image of a camera."""
+    """Return the people at points (N, 3) of the floor [m] inside of the image of a camera."""
     heights_m = np.array([[0.0], [0.5], [1.0]]) * (0.0, 0.0, STATURE_M)
     px, depth_m = project(camera.P[None], (floor_world + heights_m[:, None])[None])
     feet, middle, head = image_from_pinhole(camera, px[0, 0])
@@ -204,7 +204,7 @@ def _cover_people(people: _People) -> list[Roi]:
 
     Windows around each person are candidates; the one that covers the most people comes first.
     """
-    middle_px, height_px = people
+    middle_px, height_px = people.middle_px, people.height_px
     side_px = ROOM * height_px
     fits = side_px[:, None] / height_px
     off_px = np.abs(middle_px[:, None] - middle_px).max(-1)
@@ -235,9 +235,9 @@ def _middles(length_px: int, side_px: float) -> list[float]:
 
 
 def agreed_windows(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Views:
-    """Return the windows of the person on whom cameras agree best.
+    """Return the windows of the person with the best agreement of cameras.
 
-    These are windows whose lines of sight to the hips meet best. Of several cameras, two must have
+    The lines of sight to the hips in these windows meet best. Of several cameras, two must have
     found the person, at a plausible size; a single camera's first candidate counts.
 
     Args:
@@ -256,7 +256,7 @@ def agreed_windows(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> 
 def sightings(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> list[Sighting]:
     """Return the people among candidates (C,).
 
-    Those on whom several cameras agree come first, best first, then those of one camera alone.
+    Those with several cameras that agree come first, best first, then those of one camera alone.
     """
     found: list[Sighting] = []
     while (agreed := _find_agreed(candidates, cameras)) is not None:
@@ -270,7 +270,7 @@ def sightings(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> list[
 
 
 def _find_agreed(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Sighting | None:
-    """Return the person on whom most cameras agree best; None unless two do."""
+    """Return the person with the best agreement of most cameras; None unless two agree."""
     best, best_rank = None, (1, 0.0)
     for point in _find_crossings(candidates, cameras):
         support = _find_support(point, candidates, cameras)
@@ -292,7 +292,7 @@ def _locate_by_size(camera: PinholeCamera, window: Roi) -> Points3:
 def propose_people(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Iterator[Views]:
     """Yield the windows (C,) of possible people among candidates (C,), best first.
 
-    People on whom several cameras agree come first, then those whom only one has found.
+    People that several cameras agree on come first, then those that only one has found.
     """
     left = candidates
     while any(agreed := agreed_windows(left, cameras)):

@@ -1,4 +1,4 @@
-"""Windows: the crop around a worker whose joints are predicted.
+"""Windows: the crop around the predicted joints of a worker.
 
 As in BlazePose's detector stage, it is around the middle of the hips, as large as the body, with
 the torso upright. The landmark stage tolerates a shift of 0.2 of the side, a scale of 0.8 to 1.25,
@@ -28,8 +28,7 @@ ones."""
 MIN_JOINTS_INSIDE = 6
 """Least number of joints in the image, of 15, for which there is a window."""
 MIN_REACH_M = 0.85
-"""Least radius of a window [m]: that of an upright person, as a person who is folded up may
-rise."""
+"""Least radius of a window [m]: that of an upright person, as a folded person may rise."""
 MIN_TORSO_M = 0.15
 """Length of the torso in the image below which it is seen end on [m], and has no direction: the
 window is then upright in the image."""

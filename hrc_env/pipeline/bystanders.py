@@ -1,4 +1,4 @@
-"""People beyond the workers' slots, who are found by searches and remembered.
+"""People beyond the workers' slots, as found by searches and remembered.
 
 Searches of whole images go on while all workers are tracked: every `EVERY` steps, and more often
 while there are other people. The slots belong to the people nearest to the robot.
@@ -32,7 +32,7 @@ APART_M = 0.35
 ROBOT_M = 0.15
 """Distance from the axis of a robot's link below which hips are no person's [m]."""
 TAKEN_M = 0.45
-"""Distance from a worker's track below which a confirmed person who is not found again is the
+"""Distance from a worker's track below which a confirmed person that is not found again is the
 worker [m]."""
 SAME_M, WALKED_M = 0.7, 0.07
 """Distance within which a person is found again, and its growth with every step [m]."""
@@ -52,7 +52,7 @@ GIVEN_UP = 6
 """Number of steps for which that worker is then searched for as if without a track; estimators
 restart after three that contradict them."""
 HIPS = [JOINT["left_hip"], JOINT["right_hip"]]
-"""Joints whose mean is a worker's hips."""
+"""Joints with a worker's hips in their middle."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +124,7 @@ class Bystanders(Stateful):
         """Return the people nearest to the robot, as many as there are free slots.
 
         Args:
-            found: (C,) people whom the cameras have found.
+            found: (C,) people in each camera.
             slots: number of free slots.
             robot_world: (K, 2, 3) the robot's capsules [m]; None: all people are returned.
         """
@@ -148,7 +148,7 @@ class Bystanders(Stateful):
 
         Args:
             b: the environment.
-            found: (C,) people whom the cameras have found.
+            found: (C,) people in each camera.
             taken: windows (C,) in which workers were detected.
             hips_world: (W, 3) hips of the workers [m]; NaN without a track.
             robot_world: (K, 2, 3) the robot's capsules [m]; None: unknown.
@@ -208,7 +208,7 @@ class Bystanders(Stateful):
 
 
 def _exclude_workers(found: Candidates, taken: Windows) -> Candidates:
-    """Return the people (C,) without the workers, each of whom is one detection in a camera."""
+    """Return the people (C,) without the workers, with one detection in a camera each."""
     beside = [list(windows) for windows in found]
     for c, windows in enumerate(beside):
         for mine in (each[c] for each in taken):

@@ -166,7 +166,7 @@ class EmulatorPipeline(PoseTracking):
         super().__init__(batch, make_setup(scene, config), tracker, self.cameras)
 
     def searched_cameras(self, ids: Ints, age_s: Floats) -> Bools:
-        """Return the cameras (B, C) whose images have arrived and are not blank."""
+        """Return the cameras (B, C) with images that have arrived and are not blank."""
         return super().searched_cameras(ids, age_s) & ~self.cameras.blank[ids]
 
     def schedule_of(self, b: int) -> Schedule:

@@ -1,13 +1,13 @@
 """Cameras that differ from episode to episode, by pipelines for single environments.
 
-A pipeline has one rig, one list of faults and one appearance. An environment whose episode has
-others gets a pipeline of its own. As no result depends on the size of a batch, its results are
+A pipeline has one rig, one list of faults and one appearance. An environment with others in its
+episode gets a pipeline of its own. As no result depends on the size of a batch, its results are
 those of a single environment with that rig, bit for bit.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
@@ -91,6 +91,15 @@ class _Part:
     """(n,) their indices in the pipeline."""
     columns: Ints
     """(C,) indices of the pipeline's cameras in the names of the environment."""
+
+
+class _PartRecord(NamedTuple, Generic[RecordT]):
+    """The record of a part of the environments."""
+
+    part: _Part
+    """The environments."""
+    record: RecordT
+    """(n, ...) their record."""
 
 
 class _Place(NamedTuple):
@@ -218,24 +227,23 @@ class EpisodicPipeline(PerceptionPipeline):
         If they have several rigs, every piece of the floor is a group of its own.
         """
         parts = self._parts(ids)
-        found = [(part, part.pipeline.vacancy(part.ids)) for part in parts]
-        known = [(part, each) for part, each in found if each is not None]
+        found = [_PartRecord(part, part.pipeline.vacancy(part.ids)) for part in parts]
+        known = [_PartRecord(part, each) for part, each in found if each is not None]
         if len(known) < 2:
-            return known[0][1] if known else None
-        floor = known[0][1].coverage
+            return known[0].record if known else None
+        floor = known[0].record.coverage
         n_pieces = len(floor.group)
         coverage = Coverage(
             floor.floor_world, floor.piece_m, np.arange(n_pieces), np.zeros((n_pieces, 0), bool)
         )
-        states = [
-            (part, replace(each, level=each.level[..., each.coverage.group], coverage=coverage))
-            for part, each in known
-        ]
+        n = len(ids)
+        levels = [_PartRecord(part, each.level[..., each.coverage.group]) for part, each in known]
         return replace(
-            states[0][1],
-            level=_join(len(ids), [(part, each.level) for part, each in states]),
-            age_s=_join(len(ids), [(part, each.age_s) for part, each in states]),
-            others=_join(len(ids), [(part, each.others) for part, each in states]),
+            known[0].record,
+            coverage=coverage,
+            level=_join(n, levels),
+            age_s=_join(n, [_PartRecord(part, each.age_s) for part, each in known]),
+            others=_join(n, [_PartRecord(part, each.others) for part, each in known]),
         )
 
     def close(self) -> None:
@@ -298,7 +306,7 @@ class EpisodicPipeline(PerceptionPipeline):
 
     def _gather(self, ids: Ints, find: Callable[[_Part], PoseEstimate]) -> PoseEstimate:
         """Return the results of a function of each part as one estimate (B, W, ...)."""
-        return _join(len(ids), [(part, find(part)) for part in self._parts(ids)])
+        return _join(len(ids), [_PartRecord(part, find(part)) for part in self._parts(ids)])
 
 
 class EpisodicSensor(Sensor):
@@ -319,12 +327,12 @@ class EpisodicSensor(Sensor):
             part.pipeline.sensor.expose(replace(rows(now, part.rows), ids=part.ids))
 
 
-def _join(n: int, parts: list[tuple[_Part, RecordT]]) -> RecordT:
+def _join(n: int, parts: list[_PartRecord[RecordT]]) -> RecordT:
     """Return the records of parts of n environments as one."""
-    (first, record), *_ = parts
-    if len(parts) == 1 and len(first.rows) == n:
-        return record
-    whole = mapped(record, lambda array: np.empty((n, *array.shape[1:]), array.dtype))
-    for part, each in parts:
-        write_rows(whole, part.rows, each)
+    first = parts[0].record
+    if len(parts) == 1 and len(parts[0].part.rows) == n:
+        return first
+    whole = mapped(first, lambda array: np.empty((n, *array.shape[1:]), array.dtype))
+    for each in parts:
+        write_rows(whole, each.part.rows, each.record)
     return whole

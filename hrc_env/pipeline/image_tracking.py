@@ -34,7 +34,7 @@ class ImageSensor(Sensor):
         raise NotImplementedError
 
     def stuck_cameras(self, ids: Ints) -> Bools:
-        """Return the cameras (B, C) whose images repeat, and prove no absence; (B, 1): none."""
+        """Return the cameras (B, C) with images that repeat, and prove no absence; (B, 1): none."""
         return np.zeros((len(ids), 1), np.bool_)
 
     def robots_world(self) -> Capsules | None:
@@ -68,7 +68,7 @@ class ImageTracking(PoseTracking):
         self.image_sensor, self.worker_detector = sensor, detector
 
     def detect(self, ids: Ints, expected: PoseEstimate, sensor_rngs: Generators) -> Keypoints:
-        """Return the landmarks of crops around predicted workers, or of people who are searched."""
+        """Return the landmarks of crops around predicted workers, or in a search."""
         sensor = self.image_sensor
         seen = no_keypoints(len(ids), len(self.setup.cameras), self.setup.n_workers)
         time_s, robots_world = np.zeros(seen.px.shape[:2]), sensor.robots_world()
@@ -82,11 +82,11 @@ class ImageTracking(PoseTracking):
         return replace(seen, time_s=time_s if sensor.has_times else None)
 
     def searched_cameras(self, ids: Ints, age_s: Floats) -> Bools:
-        """Return the cameras (B, C) whose whole images have been searched for people."""
+        """Return the cameras (B, C) with whole images that have been searched for people."""
         return self.worker_detector.searched_cameras(ids) & ~self.image_sensor.stuck_cameras(ids)
 
     def cameras_with_others(self, ids: Ints) -> Bools:
-        """Return the cameras (B, C) whose last search found people besides the workers."""
+        """Return the cameras (B, C) with people besides the workers in their last search."""
         return self.worker_detector.unexplained[ids]
 
     def drop_given_up(self, ids: Ints, expected: PoseEstimate) -> PoseEstimate:

@@ -100,7 +100,7 @@ def make_pipeline(
 
 @dataclass(frozen=True, slots=True)
 class PipelineOfEpisode:
-    """A factory of pipelines for single environments, whose episodes have other cameras."""
+    """A factory of pipelines for single environments with other cameras in their episodes."""
 
     level: str
     """Perception level."""

@@ -73,7 +73,7 @@ class ObservedImages:
         return images
 
     def check(self, rig: Sequence[CameraConfig]) -> None:
-        """Raise `ConfigError` for a rig whose images cannot be drawn."""
+        """Raise `ConfigError` for a rig with images that cannot be drawn."""
         for camera in rig:
             bent = camera.lens.model != "none" and f"{IMAGE}{camera.name}" in self.names
             if bent and not self._bends:

@@ -45,7 +45,7 @@ _ALONE = np.arange(1)
 
 
 class _Films(ImageSensor):
-    """The images of a caller; a camera whose images repeat bit for bit is stuck.
+    """The images of a caller; a camera with images that repeat bit for bit is stuck.
 
     Args:
         n_cameras: number C of cameras.
@@ -100,7 +100,7 @@ class PoseTracker:
     Args:
         cameras: the rig: `CameraConfig`s, as `read_rig` returns them, of which the pose, the image
             and the lens count; or cameras as of `make_cameras`.
-        n_workers: greatest number of people who are tracked.
+        n_workers: greatest number of tracked people.
         dt_s: usual time between two sets of frames [s].
         estimator: the estimator, as of an environment.
         tracker: settings of the tracker; None: the defaults.
@@ -158,11 +158,12 @@ class PoseTracker:
 
         Args:
             source: (C,) images of the cameras, (H, W, 3) RGB of uint8 each, or a source of windows
-                of them. Cameras whose images repeat bit for bit are stuck: they prove no absence.
+                of them. Cameras with images that repeat bit for bit are stuck: they prove no
+                absence.
             dt_s: time since the last frames [s]; None: the usual.
             rngs: one generator, for estimators that draw; empty: one with seed 0.
             robot_world: (K, 2, 3) the robot's capsules [m]; of more people than `n_workers` those
-                nearest to it are tracked. None: those who were tracked first.
+                nearest to it are tracked. None: those that were tracked first.
 
         Returns:
             Workers (1, W, J, ...) in the frame of the cameras' poses.

@@ -1,6 +1,7 @@
-"""Searches of whole images: their schedule, and searches for workers whose track has gone astray.
+"""Searches of whole images: their schedule, and searches for workers with a track that has gone
+astray.
 
-A camera in whose image no person was found rests for a while. If fewer than two cameras have shown
+A camera rests for a while if no person was found in its image. If fewer than two cameras have shown
 a tracked worker for some steps, the images of the others are searched; if these agree on a person,
 they use windows there until the estimator follows.
 """
@@ -21,7 +22,7 @@ REMEMBERED = 10
 PATIENCE = 8
 """Number of steps in a row without a worker after which a camera's whole image is searched."""
 FOLLOWED = 5
-"""Number of steps for which a window at a person who was found is used; estimators restart after
+"""Number of steps for which a window from a search is used; estimators restart after
 three that contradict them."""
 ENOUGH = 2
 """Number of cameras that must show a worker to hold the track."""
@@ -60,7 +61,7 @@ class SearchSchedule(Stateful):
         self.ages[b] = np.minimum(self.ages[b] + 1, REMEMBERED)
 
     def due_cameras(self, b: int, has_image: Sequence[bool]) -> list[int]:
-        """Return the cameras with an image whose search is due."""
+        """Return the cameras with an image that is to be searched now."""
         return np.flatnonzero(np.array(has_image) & (self.rests[b] == 0)).tolist()
 
     def remember(
@@ -71,7 +72,7 @@ class SearchSchedule(Stateful):
         Args:
             b: the environment.
             cameras: indices of the cameras that were searched.
-            found: (C,) people whom these cameras have found.
+            found: (C,) people that these cameras have found.
             blank: indices of cameras with a blank image.
 
         Returns:
@@ -89,7 +90,7 @@ class SearchSchedule(Stateful):
 
 
 class Reacquisition(Stateful):
-    """Searches for W tracked workers of B environments whom most cameras do not show.
+    """Searches for W tracked workers of B environments that most cameras do not show.
 
     Args:
         batch: number B of environments.
@@ -116,7 +117,7 @@ class Reacquisition(Stateful):
         self.elsewhere[b][worker] = [None] * self.unseen.shape[2]
 
     def blind_cameras(self, b: int, worker: int, has_image: Sequence[bool]) -> list[int]:
-        """Return the cameras whose images are to be searched for a tracked worker."""
+        """Return the cameras with images that are to be searched for a tracked worker."""
         missing = self.unseen[b, worker] >= PATIENCE
         if self.left[b, worker] or np.sum(~missing) >= min(ENOUGH, len(missing)):
             return []
@@ -130,9 +131,9 @@ class Reacquisition(Stateful):
         Args:
             b: the environment.
             worker: the worker.
-            people: (C,) people whom the search has found.
+            people: (C,) people that the search has found.
             windows: (C,) windows by the track.
-            others: windows (C,) of other workers, who are excluded.
+            others: windows (C,) of other workers, which are excluded.
         """
         blind = self.unseen[b, worker] >= PATIENCE
         candidates = [

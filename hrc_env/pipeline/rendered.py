@@ -87,8 +87,8 @@ class PixelPipeline(ImageTracking):
         tracker: the estimator.
         config: settings of the environment.
         schedule: behaviour of the cameras.
-        like: a pipeline of the same scene and detector with other cameras, whose renderer and
-            networks this one borrows; None: there is none.
+        like: a pipeline of the same scene and detector with other cameras, which lends its
+            renderer and networks; None: there is none.
     """
 
     def __init__(

@@ -130,7 +130,7 @@ class TrackingSetup:
     cameras: tuple[PinholeCamera, ...]
     """The rig, as it is calibrated."""
     n_workers: int
-    """Greatest number W of people who are tracked."""
+    """Greatest number W of tracked people."""
     coverage: Coverage
     """Pieces of the floor, and the cameras that would see a person there."""
     dt_s: float
@@ -236,7 +236,7 @@ class PoseTracking(PerceptionPipeline):
         return self.presence.update(ids, ours, found, keypoints, looks, dt_s, config)
 
     def cameras_with_others(self, ids: Ints) -> Bools:
-        """Return the cameras (B, C) whose last search found people besides the workers.
+        """Return the cameras (B, C) with people besides the workers in their last search.
 
         There are none where keypoints hold all people.
         """
@@ -255,7 +255,7 @@ class PoseTracking(PerceptionPipeline):
         return self.presence.vacancy(ids)
 
     def searched_cameras(self, ids: Ints, age_s: Floats) -> Bools:
-        """Return the cameras (B, C) whose whole images have been searched for people.
+        """Return the cameras (B, C) with whole images that have been searched for people.
 
         Args:
             ids: (B,) indices of environments.

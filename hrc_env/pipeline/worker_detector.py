@@ -49,7 +49,7 @@ class WorkerDetector(Stateful):
         cameras: the rig.
         n_workers: number W of workers.
         config: settings of the detector.
-        floor_world: (N, 3) points where people may stand, for whom searches are laid out [m]; None:
+        floor_world: (N, 3) points where people may stand, for the layout of searches [m]; None:
             unknown.
         error: table `sigma` of a calibration, from which standard deviations follow.
     """
@@ -75,7 +75,7 @@ class WorkerDetector(Stateful):
         self.reacquisition = Reacquisition(batch, n_workers, self.cameras)
         self.bystanders = Bystanders(batch, n_workers, self.cameras)
         self.unexplained = np.zeros((batch, len(self.cameras)), np.bool_)
-        """(B, C) whether a camera's last search found a person who is neither a worker nor one of
+        """(B, C) whether a camera's last search found a person that is neither a worker nor one of
         the `bystanders`."""
         self.last_crops: dict[int, Crops] = {}
         """Last crops of each environment's first worker, for pictures; they are no state."""
@@ -91,8 +91,8 @@ class WorkerDetector(Stateful):
     ) -> None:
         """Detect every worker of environment b.
 
-        Workers with a window come first; one search serves all the others. Workers who are in view
-        only of cameras without an image are left out.
+        Workers with a window come first; one search serves all the others. Workers in view
+        of cameras without an image only are left out.
 
         Args:
             source: the present images.
@@ -101,7 +101,7 @@ class WorkerDetector(Stateful):
             has_image: (C,) whether each camera has an image now.
             out: (C, W, ...) is filled with keypoints.
             robot_world: (K, 2, 3) the robot's capsules [m]; if there are more people than slots,
-                those nearest to it get one. None: those who were tracked first.
+                those nearest to it get one. None: those that were tracked first.
         """
         self.schedule.tick(b)
         self.bystanders.tick(b)
@@ -151,7 +151,7 @@ class WorkerDetector(Stateful):
         )
 
     def searched_cameras(self, ids: Ints) -> Bools:
-        """Return the cameras (B, C) whose whole images were just searched and are not blank."""
+        """Return the cameras (B, C) with images that were just searched and are not blank."""
         return (self.schedule.ages[ids] == 0) & ~self.schedule.blank[ids]
 
     def forget(self, b: int) -> None:
@@ -180,7 +180,7 @@ class WorkerDetector(Stateful):
         return self.schedule.remember(b, cameras, found, self.pose_detector.blank)
 
     def _explain(self, b: int, beside: Sequence[Sighting], no_vacancy: bool) -> None:
-        """Note the searched cameras that show a person who is not explained.
+        """Note the searched cameras that show an unexplained person.
 
         Args:
             b: the environment.

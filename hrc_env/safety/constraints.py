@@ -233,7 +233,8 @@ def add_worker_constraints(
                 near = gap - params.margins_m[s] - z_d
                 clear = near - find_travel(towards.speed_m_s, params)
                 out.clearance_m[e] = min(out.clearance_m[e], clear)
-                reach = write_row(arm, robots.links[c], point, normal, row)
+                link = int(robots.links[c])
+                reach = write_row(arm, link, point, normal, row)
                 braking = min(reach.deceleration_m_s2, params.deceleration_m_s2)
                 bound = bound_approach(clear, braking, moved > 0.0, params)
                 left_m_s = bodies.contact_m_s[e, w, s] - max(towards.speed_m_s, 0.0)
@@ -405,7 +406,8 @@ def find_segment_age(age_s: Floats, s: int) -> float:
     least = np.inf
     for end in range(2):
         for k in range(2):
-            least = min(least, age_s[_JOINTS[s, end, k]])
+            j: int = _JOINTS[s, end, k]
+            least = min(least, float(age_s[j]))
     return least
 
 

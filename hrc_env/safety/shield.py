@@ -3,17 +3,17 @@
 import warnings
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
-from hrc_env.belief import Belief, lent_belief
+from hrc_env.belief import Belief, lend_belief
 from hrc_env.core.brought import check_arguments, described, numbers_of
 from hrc_env.core.errors import ConfigError, unknown
 from hrc_env.core.lending import called, is_of_user
 from hrc_env.core.mapping import from_mapping
 from hrc_env.core.registry import Registry
-from hrc_env.core.typing import Floats, JointVelocities
+from hrc_env.core.typing import Floats, JointVelocities, is_list_or_tuple, is_mapping
 from hrc_env.safety.built_in import ShieldOutput, limit_command
 from hrc_env.safety.config import PRESETS, ShieldConfig
 
@@ -50,7 +50,7 @@ def find_shield(shield: ShieldChoice) -> Shield | None:
         if shield not in SHIELDS:
             raise unknown("shield", shield, SHIELDS)
         return SHIELDS[shield]
-    if isinstance(shield, Mapping):
+    if is_mapping(shield):
         shield = from_mapping(ShieldConfig, shield, "shield.")
     if isinstance(shield, ShieldConfig):
         return partial(limit_command, config=shield)
@@ -94,17 +94,19 @@ def apply_shield(
     """
     if shield is None:
         return ShieldOutput(command, {})
+    output: Any
     if is_of_user(shield):
-        output = called("A shield", shield, lent_belief(belief), command.copy(), dt_s)
+        output = called("A shield", shield, lend_belief(belief), command.copy(), dt_s)
     else:
         output = shield(belief, command.copy(), dt_s)
-    if not (isinstance(output, tuple) and len(output) == 2 and isinstance(output[1], Mapping)):
+    pair = output if is_list_or_tuple(output) else ()
+    if not isinstance(output, tuple) or len(pair) != 2 or not is_mapping(pair[1]):
         raise ConfigError(
             "A shield must return two things, the velocities that it allows (B, joints) and a "
-            f"mapping of values (B,) by name, {{}} for none; got {described(output)}."
+            f"mapping of values (B,) by name, {{}} for none; got {described(cast(object, output))}."
         )
-    allowed = numbers_of("A shield's velocities", output[0], command.shape, "B, joints")
-    values = _check_values(output[1], len(command))
+    allowed = numbers_of("A shield's velocities", pair[0], command.shape, "B, joints")
+    values = _check_values(pair[1], len(command))
     if belief.model is not None and is_of_user(shield):
         _warn_of_speed(allowed, belief.model.chain.velocity_limit_rad_s)
     change = np.sqrt(np.square(allowed - command).sum(-1))

@@ -20,7 +20,7 @@ TOLERANCE_RAD_S = 1e-9
 
 
 class Problem(NamedTuple):
-    """What `solve` minimises, for one robot."""
+    """The problem that `solve` solves, for one robot."""
 
     J: Floats
     """(M, N) rows of the constraints."""

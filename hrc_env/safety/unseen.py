@@ -31,7 +31,7 @@ WRISTS, SHOULDERS = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Undetected:
-    """What follows from people that are not detected at present."""
+    """The consequences of people that are not detected at present."""
 
     is_lost: Bools
     """(B, W) the workers that were detected once, but not lately."""

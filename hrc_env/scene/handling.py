@@ -34,7 +34,7 @@ class LoadedRobot(NamedTuple):
     """Robots with the objects that they carry as part of them."""
 
     world: World
-    """The world, whose robot has the carried objects' capsules."""
+    """The world, in which the robot has the carried objects' capsules."""
     path_world: Capsules
     """(B, T, K, 2, 3) capsules of robot and carried objects after every substep [m]."""
 

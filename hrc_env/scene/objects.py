@@ -82,7 +82,7 @@ class Objects:
     first: int
     """Index of the first object in `qpos` and `qvel`, after the robot's joints."""
     half_size_m: Points3
-    """(O, 3) half edges of each object's bounding box, whose middle is the object's origin [m]."""
+    """(O, 3) half edges of each object's bounding box, with its middle at the origin [m]."""
     parts: Floats
     """(O, n, `shapes.WIDTH`) boxes of each object; surplus rows are absent shapes."""
     capsules: Capsules

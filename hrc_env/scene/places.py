@@ -30,9 +30,9 @@ from hrc_env.world import Grounds, Workplace
 ROBOT_CLEARANCE_M = 0.8
 """Distance that workers' paths keep from the axis of the robot's first joint [m]."""
 HEADROOM_M = 2.1
-"""Height of a shape's lower end above which it blocks nobody [m]: a tall worker with a hat."""
+"""Height of a shape's lower end above which it blocks no worker [m], of any height with a hat."""
 STEP_OVER_M = 0.02
-"""Height of a shape's upper end below which it blocks nobody [m]."""
+"""Height of a shape's upper end below which it blocks no worker [m]."""
 UPRIGHT = 0.999
 """Cosine from which on a box counts as standing upright."""
 KINDS = {

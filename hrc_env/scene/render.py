@@ -58,7 +58,7 @@ VIEWPOINTS: dict[str, tuple[tuple[float, float, float], tuple[float, float, floa
     "arm": ((0.75, -1.55, 1.60), (-0.45, 0.05, 1.10), 56.0),
     "outside": ((3.6, -3.3, 6.6), (-0.25, 0.25, 0.35), 52.0),
     "top": ((0.0, 0.0, 9.0), (0.0, 0.0, 0.0), 60.0),
-    "yard": ((10.5, -3.0, 11.5), (-0.6, -0.6, 0.0), 56.0),
+    "yard": ((4.6, -8.6, 14.6), (0.3, -0.3, 0.0), 56.0),
     "overview": ((8.9, -6.4, 4.3), (-0.7, 0.6, 1.3), 68.0),
 }
 """Viewpoints of pictures for people: eye [m], target [m], horizontal field of view [deg]."""

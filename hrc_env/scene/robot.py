@@ -86,7 +86,7 @@ class Robot:
     capsules: tuple[str, ...]
     """Capsule geoms that represent the surface in contacts, distances and occlusion."""
     watched: tuple[str, ...]
-    """Capsules whose far ends workers watch."""
+    """Capsules with far ends that workers watch."""
     tool_site: str
     """Site at the tool point."""
     home_q: tuple[float, ...]

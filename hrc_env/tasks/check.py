@@ -86,19 +86,23 @@ def _check_goal(who: str, goal: Goal, config: Any) -> None:
     achieved = goal.bound * rng.uniform(-1, 1, (2, 3, size))
     desired = achieved + 0.1 * goal.bound * rng.uniform(-1, 1, (2, 3, size))
     desired[0] = achieved[0]  # reached
-    says = f"(..., {size}) and (..., {size}) to (...), for any leading axes: reduce axis=-1"
+    signature = f"(..., {size}) and (..., {size}) to (...), for any leading axes: reduce axis=-1"
     try:
-        found = [np.asarray(goal.reward(*read_only((achieved[at], desired[at])), config))
-                 for at in (..., 0, (0, 0), 1, (1, 2))]  # fmt: skip
+        rewards = [
+            np.asarray(goal.reward(*read_only((achieved[at], desired[at])), config))
+            for at in (..., 0, (0, 0), 1, (1, 2))
+        ]
     except (ValueError, IndexError, TypeError) as error:
         if "read-only" in str(error):
             refuse_writing(name, error)  # type: ignore[arg-type]
-        raise ConfigError(f"{name} must take {says}; it raises {error}.") from error
-    whole_one, *parts = found
+        raise ConfigError(f"{name} must take {signature}; it raises {error}.") from error
+    of_all, *parts = rewards
     for at, part in zip((0, (0, 0), 1, (1, 2)), parts, strict=True):
-        if whole_one.shape != (2, 3) or part.shape != whole_one[at].shape:
-            raise ConfigError(f"{name} must take {says}; got {whole_one.shape} of (2, 3, {size}).")
-        if not np.allclose(part, whole_one[at], equal_nan=True):
+        if of_all.shape != (2, 3) or part.shape != of_all[at].shape:
+            raise ConfigError(
+                f"{name} must take {signature}; got {of_all.shape} of (2, 3, {size})."
+            )
+        if not np.allclose(part, of_all[at], equal_nan=True):
             raise ConfigError(f"{name} must judge each pair for itself, whatever stands beside it.")
 
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hrc_env.belief import Belief, lent_belief
+from hrc_env.belief import Belief, lend_belief
 from hrc_env.core.brought import check_arguments
 from hrc_env.core.errors import ConfigError, check_shape
 from hrc_env.core.lending import called, is_of_user, read_only
@@ -99,7 +99,7 @@ def observe_goal(goal: Goal, belief: Belief) -> dict[str, Tensor]:
 def _evaluate(name: str, function: Callable[[Belief], Floats], belief: Belief) -> Floats:
     """Return (B, size) the value of a function; a user's function gets a read-only belief."""
     if is_of_user(function):
-        return called(name, function, lent_belief(belief))
+        return called(name, function, lend_belief(belief))
     return function(belief)
 
 

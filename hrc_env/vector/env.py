@@ -17,7 +17,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from hrc_env.control import checked_action
+from hrc_env.control import check_action
 from hrc_env.core.batching import State, copied, mapped, one, write_rows
 from hrc_env.core.errors import ConfigError, check_shape, whole
 from hrc_env.core.typing import Bools, Floats, Ints
@@ -391,7 +391,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         if len(over) > 0 and np.shape(actions) == self.action_space.shape:
             actions = np.array(actions)
             actions[over] = 0.0
-        return checked_action(actions, self._action_shape, self.shards.first.control)
+        return check_action(actions, self._action_shape, self.shards.first.control)
 
 
 def _without_pictures(arguments: dict[str, Any]) -> dict[str, Any]:

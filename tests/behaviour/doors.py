@@ -33,8 +33,8 @@ from hrc_env.belief import (
     covariance_factor_m,
     deviation_towards_robot_m,
     estimated_separation,
+    find_unseen_floor,
     standard_deviation_m,
-    unseen_floor,
 )
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.infos import ENTRIES
@@ -488,7 +488,11 @@ def settings() -> dict[str, str]:
     }
 
 
-SETTING_NAMES: dict[str, str] = {}
+SETTING_NAMES: dict[str, str] = {
+    f"shield_{shield}/{present}": f"shield_{shield}/{former}"
+    for shield in PRESETS
+    for former, present in ShieldConfig.RENAMED.items()
+}
 """Today's names of settings that the probes know by another."""
 
 
@@ -2435,7 +2439,7 @@ class Guarded:
                              np.ones((len(now["floor_m"]), 1), bool))  # fmt: skip
             others = Others(now["others_m"], now["others_age_s"])
             vacancy = Vacancy(floor, now["level"], now["level_age_s"], others)
-            unseen = unseen_floor(robot, estimate, vacancy)
+            unseen = find_unseen_floor(robot, estimate, vacancy)
             self._now = dataclasses.replace(self._now, unseen=unseen)
 
     def measure_floor(self) -> dict[str, NDArray[np.float64]]:

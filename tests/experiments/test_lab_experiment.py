@@ -57,8 +57,8 @@ def test_what_is_finished_is_used_again(end_to_end, monkeypatch):
     def never(*args):
         raise AssertionError("made again")
 
-    monkeypatch.setattr(experiment, "film", never)
-    monkeypatch.setattr(experiment, "report", lambda *args: Report("", "", ()))
+    monkeypatch.setattr(experiment, "measure_film", never)
+    monkeypatch.setattr(experiment, "make_report", lambda *args: Report("", "", ()))
     before = (out / "results.json").read_text()
     run_experiment(TINY, out, lambda share, label: None)
     assert (out / "results.json").read_text() == before

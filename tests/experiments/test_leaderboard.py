@@ -69,10 +69,10 @@ def test_entries_are_written_and_read(tmp_path):
     assert read_entry(path).scores[key] == Metric(12.346, 12.346, 12.346, "", 4)
     content = json.loads(path.read_text())
     path.write_text(json.dumps(content | {"version": VERSION + 1}))
-    with pytest.raises(ConfigError, match=r"version 2 .* Run it again"):
+    with pytest.raises(ConfigError, match=r"version 2 .* Run python -m hrc_env benchmark again"):
         read_entry(path)
     path.write_text("{}")
-    with pytest.raises(ConfigError, match="no entry of the benchmark"):
+    with pytest.raises(ConfigError, match="not an entry of the benchmark"):
         read_entry(path)
 
 

@@ -346,7 +346,7 @@ def test_a_search_goes_on_where_fresh_seeds_say_so(tmp_path, monkeypatch):
     cache, alone = PartCache(tmp_path, "", 1, silent), {"walk": [0] * TINY.n_fresh}
     (eyes,) = find_eyes(["truth"])
     margin_search = experiment.search_margin(TINY, "HRCReach-v0", eyes, alone)
-    (row,) = run_together([margin_search], cache.parts)
+    (row,) = run_together([margin_search], cache.make_parts)
     assert sorted(row.searched) == pytest.approx([-0.8, -0.4, 0.0, 0.4, 0.45, 0.55, 0.75])
     assert row.ends_at(row.evaluate(30.0)[0, 0])
     assert row.margin_m == pytest.approx(0.75)  # what is achieved at the end is played there

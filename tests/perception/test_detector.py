@@ -156,8 +156,10 @@ def test_what_a_camera_does_not_see_is_black_and_joints_there_are_guesses(weight
 def test_the_detector_stage_is_asked_of_a_new_track_and_then_in_turns(four, monkeypatch):
     _, stills = four
     asked = []
-    people = detector_module.people
-    monkeypatch.setattr(detector_module, "people", lambda *args: asked.append(1) or people(*args))
+    find = detector_module.find_people
+    monkeypatch.setattr(
+        detector_module, "find_people", lambda *args: asked.append(1) or find(*args)
+    )
     detector = new_detector(4, DetectorConfig(gate_every=4, sure_presence=0.5))
     counts = []
     for _ in range(9):

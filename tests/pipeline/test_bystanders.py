@@ -46,11 +46,11 @@ def searched(bystanders, found, taken=(), hips_world=NOBODY, robot_world=ROBOT):
 
 def test_people_are_placed_where_lines_of_sight_meet_or_by_their_size():
     both = sightings(shown(NEAR, FAR), RIG)
-    assert [one.cameras for one in both] == [4, 4]
+    assert [one.n_cameras for one in both] == [4, 4]
     for hips in (NEAR, FAR):
         assert min(np.linalg.norm(one.hips_world - hips) for one in both) < 0.05
     alone = sightings(shown(FAR, cameras=[2]), RIG)
-    assert [one.cameras for one in alone] == [1]
+    assert [one.n_cameras for one in alone] == [1]
     assert np.linalg.norm(alone[0].hips_world - FAR) < 0.5
 
 

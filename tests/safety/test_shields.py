@@ -11,7 +11,7 @@ import hrc_env
 from hrc_env import simulation
 from hrc_env.agents.env_info import env_info
 from hrc_env.agents.registry import make_agent
-from hrc_env.belief import estimated_separation, of_concern, unseen_floor
+from hrc_env.belief import drop_distant_unknown, estimated_separation, find_unseen_floor
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import WorkerPath
 from hrc_env.core.skeleton import JOINT
@@ -24,6 +24,7 @@ from hrc_env.render.overlay import SHIELD
 from hrc_env.safety.built_in import limit_command
 from hrc_env.safety.config import PRESETS, ShieldConfig
 from hrc_env.safety.incidents import MOVING_M_S
+from hrc_env.safety.shield import find_shield
 from hrc_env.safety.unseen import find_undetected
 
 VELOCITIES = ("velocity_world", "angular_velocity_world")
@@ -222,8 +223,8 @@ def never_seen(now, *places, level=POSSIBLE):
     coverage = Coverage(where, 0.0, np.zeros(len(where), int), np.ones((1, 4), bool))
     levels = np.full((1, estimate.tracked.shape[1], 1), level)
     vacancy = Vacancy(coverage, levels, np.zeros((1, 1)), no_others(1))
-    floor = unseen_floor(now.robot, estimate, vacancy)
-    return replace(now, estimate=of_concern(estimate, floor), unseen=floor)
+    floor = find_unseen_floor(now.robot, estimate, vacancy)
+    return replace(now, estimate=drop_distant_unknown(estimate, floor), unseen=floor)
 
 
 @pytest.mark.parametrize("task", ["HRCReach-v0", "HRCDelivery-v0"])
@@ -494,3 +495,14 @@ def test_pictures_show_when_it_acts():
     env.close()
     assert (shown[0, 0] == SHIELD).all()
     assert not (plain[0, 0] == SHIELD).all()
+
+
+@pytest.mark.parametrize(("former", "present"), sorted(ShieldConfig.RENAMED.items()))
+def test_a_former_name_of_a_setting_is_an_error_that_gives_the_present_one(former, present):
+    assert present in ShieldConfig.__dataclass_fields__
+    with pytest.raises(
+        ConfigError, match=f"field of ShieldConfig {former} is called {present} now"
+    ):
+        ShieldConfig(**{former: 0.1})
+    with pytest.raises(ConfigError, match=rf"shield\.{former} is called shield\.{present} now"):
+        find_shield({former: 0.1})

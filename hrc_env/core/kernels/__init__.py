@@ -53,7 +53,8 @@ def kernel(
         fastmath: the liberties of the optimiser with sums and products (LLVM's flags).
         forceinline: whether it becomes a part of its callers.
 
-    Named tuples are passed as they are: numba takes .4 us longer for each than for a plain tuple.
+    Python passes named tuples as they are, at which numba looks longer than at plain tuples, the
+    longer the more fields they have.
     """
     if function is None:
         return partial(

@@ -163,13 +163,13 @@ class Price:
 
     def play(self, cache: PartCache) -> Played:
         """Return the results of all searches."""
-        alone = cache.parts([_play_unshielded(self, task) for task in self.tasks])
+        alone = cache.make_parts([_play_unshielded(self, task) for task in self.tasks])
         unshielded = dict(zip(self.tasks, alone, strict=True))
         searches = [
             search_margin(self, task, eyes, unshielded[task]) for task, eyes in self.list_cases()
         ]
         table: dict[str, dict[str, Row]] = {}
-        rows = run_together(searches, cache.parts)
+        rows = run_together(searches, cache.make_parts)
         for (task, eyes), row in zip(self.list_cases(), rows, strict=True):
             table.setdefault(task, {})[eyes.name] = row
         return Played(table, unshielded, _compare_levels(self, cache, table))
@@ -302,7 +302,7 @@ def _compare_levels(
         _make_part(config, config.task, _change_level(eyes, each), seeds, margin_m)
         for each in levels
     ]
-    return dict(zip(levels, cache.parts(parts), strict=True))
+    return dict(zip(levels, cache.make_parts(parts), strict=True))
 
 
 def _change_level(eyes: Eyes, level: str) -> Eyes:
@@ -358,7 +358,7 @@ def replay(config: Price, cache: PartCache, margins_m: Mapping[str, float]) -> N
         if level is not None:
             eyes = _change_level(eyes, level)
         parts.append(_make_part(config, task, eyes, seeds, margin_m, suffix != "unshielded"))
-    cache.parts(parts)
+    cache.make_parts(parts)
 
 
 def check_walks(task: str, alone: Rows, row: Row) -> None:

@@ -1,1 +1,1 @@
-"""What goes wrong with cameras: asked for by argument, drawn from a generator of its own."""
+"""Faults of cameras, chosen by argument and drawn from a generator of their own."""

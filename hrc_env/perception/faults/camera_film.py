@@ -17,7 +17,7 @@ from hrc_env.perception.lenses import LensRenderer
 
 MovingT = TypeVar("MovingT", WorkerMotion, Held)
 BLUR_IMAGES = 5
-"""Number of images whose mean is an image with an open shutter."""
+"""Number of images that are averaged for an image with an open shutter."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class CameraFilm:
     def __init__(self, viewer: LensRenderer, schedule: Schedule) -> None:
         self.renderer, self.viewer, self.schedule = viewer.renderer, viewer, schedule
         self._now = schedule
-        """Schedule of the episode whose images are shown."""
+        """Schedule of the present episode."""
         self._shots: Sequence[Shot | None] = ()
         self._seed = 0
         self._drawn: Any = None

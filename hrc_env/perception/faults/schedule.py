@@ -29,7 +29,7 @@ class Frame(NamedTuple):
     """An image that arrives."""
 
     scene_step: int
-    """Step whose scene it shows."""
+    """Step of the scene that it shows."""
     taken_step: int
     """Step at which it claims to have been taken."""
 
@@ -47,7 +47,7 @@ class Arrivals(NamedTuple):
     """The images that arrive at a step."""
 
     records: list[Any]
-    """(C,) record of the step whose scene each camera shows; None: no image."""
+    """(C,) record of the step that each camera shows; None: no image."""
     times_s: Floats
     """(C,) times at which they claim to have been taken, with the reset's at `dt_s` [s]; NaN: no
     image."""
@@ -87,7 +87,7 @@ class Schedule:
 
     @property
     def frozen_steps(self) -> frozenset[int]:
-        """Steps whose scenes frozen images show."""
+        """Steps of the scenes that frozen images show."""
         return frozenset(self._frozen_at(f) for f in self.faults if f.kind == "frozen")
 
     def draw_episode(self, seed: int) -> "Schedule":
@@ -153,7 +153,7 @@ class Schedule:
         return math.ceil((self.cameras[c].latency_s + late_s) / self.dt_s - _EARLY)
 
     def _scene_step(self, taken: int, c: int) -> int:
-        """Return the step whose scene an image shows that is taken at a step."""
+        """Return the step of the scene in an image that is taken at a step."""
         for _, fault in self.faults_of(TIMING, c, taken):
             if fault.kind == "frozen":
                 return self._frozen_at(fault)

@@ -135,7 +135,7 @@ class Tree:
 
 
 class View:
-    """What a hypothesis remembers of one camera."""
+    """Memory of one camera in a hypothesis."""
 
     swap_chance: float
     """Probability that the camera exchanges left and right."""
