@@ -276,6 +276,7 @@ SETTINGS = {
     "third_party_perception.md": "41 MB, 59 MB, 180 MB",
     "architecture.md": "1 s",
     "conventions.md": "0.04 s",
+    "glossary.md": "0.05 m, 0.10 m, 0.15 m, 95 %",
     "start.md": "250 steps, 0.04 s, 25 frames",
     "experiments.md": "72 degrees, 0.9 m, 0 to 320 ms, 5 %, 95 %, 25 images",
     "many_environments.md": "8 ms",
