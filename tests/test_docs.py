@@ -289,7 +289,7 @@ SETTINGS = {
     "cameras.md": "80 degrees, 118.2 degrees, 0.2 s, 0.02 rad, 0.05 m, 0.1 rad, 0.04 s, 8 px",
     "tracking.md": (
         "1 s, 2 cm, 10 %, 95 %, 20 degrees, 25 degrees, 50 degrees, 0.05 rad, 0.014 to 0.14 rad, "
-        "0.5 m, 2 ms"
+        "0.5 m"
     ),
 }
 """Sizes, limits and defaults by page: numbers with a unit that nobody measured of this project."""
