@@ -16,7 +16,11 @@ from docs import leaderboard, names, reference, tables
 from hrc_env.tasks import BUILT_IN
 
 DOCS = Path(__file__).resolve().parent
-PAGES = (DOCS.parent / "README.md", *sorted(DOCS.glob("*.md")))
+PAGES = (
+    DOCS.parent / "README.md",
+    *sorted(DOCS.glob("*.md")),
+    *sorted(DOCS.glob("bring_your_own/*.md")),
+)
 """Written by hand, with tables that are filled in."""
 REFERENCE: dict[Path, Callable[[], str]] = {
     DOCS / "reference" / "environment.md": reference.environment,

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import hrc_env
 from hrc_env import PUBLIC
+from hrc_env.core.docstrings import get_own_doc
 
 INDEX = """\
 # Python API
@@ -62,7 +63,9 @@ def doc_of(name: str) -> str:
     """Return the documentation of a public name: its own docstring, or the text after a constant;
     "" if there is none."""
     value = getattr(hrc_env, name)
-    if inspect.isclass(value) or inspect.isfunction(value) or inspect.ismodule(value):
+    if inspect.isclass(value):
+        return get_own_doc(value)
+    if inspect.isfunction(value) or inspect.ismodule(value):
         return inspect.cleandoc(value.__doc__ or "")
     module = Path(str(import_module(PUBLIC[name]).__file__))
     for node, after in itertools.pairwise(ast.parse(module.read_text()).body):

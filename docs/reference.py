@@ -19,7 +19,7 @@ from benchmarks.__main__ import Benchmarks
 from docs.names import doc_of
 from hrc_env import __main__, observations
 from hrc_env.belief import NEAR_FLOOR_M
-from hrc_env.core.docstrings import attribute_docs, field_docs
+from hrc_env.core.docstrings import attribute_docs, field_docs, get_own_doc
 from hrc_env.core.infos import ALWAYS, ENTRIES, FAULT, OF_WORKERS, Entry
 from hrc_env.env import HRCEnv
 from hrc_env.env_config import EnvConfig
@@ -229,7 +229,7 @@ def environment() -> str:
     tasks = [find_task(each)() for each in BUILT_IN]
     return ENVIRONMENT.format(
         notice=NOTICE,
-        doc=inspect.cleandoc(HRCEnv.__doc__ or "").splitlines()[0],
+        doc=get_own_doc(HRCEnv).splitlines()[0],
         tasks=_table(
             ("environment", "what the robot has to do"),
             [(f"[{task.id}]({task.id}.md)", task.description) for task in tasks],
@@ -316,7 +316,7 @@ def declarations() -> str:
     return DECLARATIONS.format(
         notice=NOTICE,
         attributes=_table(("attribute", "default", "meaning"), attributes),
-        goal=_as_page(inspect.cleandoc(Goal.__doc__ or "")),
+        goal=_as_page(get_own_doc(Goal)),
         fields=_table(("field", "meaning"), fields),
     )
 
