@@ -12,7 +12,7 @@ from pathlib import Path
 
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # where benchmarks/ and docs/ are
 
-from docs import leaderboard, names, reference, tables
+from docs import leaderboard, names, records, reference, tables
 from hrc_env.tasks import BUILT_IN
 
 DOCS = Path(__file__).resolve().parent
@@ -34,6 +34,7 @@ REFERENCE: dict[Path, Callable[[], str]] = {
     DOCS / "reference" / "leaderboard.md": leaderboard.page,
     DOCS / "reference" / "declarations.md": reference.declarations,
     DOCS / "reference" / "names.md": names.index,
+    DOCS / "reference" / "records.md": records.page,
     **{
         DOCS / "reference" / "api" / names.page_name(each): partial(names.page, each)
         for each in names.groups()

@@ -5,8 +5,9 @@
     python -m tests.language --lower      # lower the limits to the present counts
 
 Counted are docstrings, among them the sentences below fields and constants, of the folders in
-`FOLDERS`, and the prose of README.md and docs/*.md, docs/bring_your_own/*.md outside of code, tables and generated blocks.
-Limits in `language.toml` are occurrences per 1,000 words, `half` their number. They only fall.
+`FOLDERS`, and the prose of README.md and docs/*.md, docs/bring_your_own/*.md outside of code,
+tables and generated blocks. Limits in `language.toml` are occurrences per 1,000 words, `half` their
+number. They only fall.
 """
 
 import argparse
