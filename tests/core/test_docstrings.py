@@ -17,7 +17,8 @@ RECORDS = [
 def test_the_records_that_users_fill_and_read_are_among_them():
     assert {
         "Belief", "EnvConfig", "EnvInfo", "Episode", "EstimatorSpec", "Goal", "HRCConfig",
-        "Keypoints", "PoseEstimate", "ResetOptions", "Robot", "Row", "Study", "Task", "Transition", "World",
+        "Keypoints", "PoseEstimate", "ResetOptions", "Robot", "Row", "Study", "Task",
+        "Transition", "World",
     } <= set(RECORDS)  # fmt: skip
 
 
