@@ -1,11 +1,12 @@
 """Compare an estimator of your own with two of the package, on the same detections and in use.
 
-python -m hrc_env record HRCReach-v0 --people unaware --episodes 40 --poses --keypoints \
-    --folder out/detections
-python examples/compare_estimator.py out/detections
+python examples/compare_estimator.py --file examples/bring_your_own/estimator.py
 """
 
 import argparse
+import subprocess
+import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -17,30 +18,23 @@ NAMES = ["dlt_kalman", "triangulation", "particle"]
 INSIDE = 7.815  # 95 % of a chi-squared variable with 3 degrees of freedom are smaller
 
 
-def track(estimator, detections):
-    """Return the mean error [mm], coverage [%] and tracked time [%] of each episode, (3, n)."""
-    episodes, dt_s = list(detections), detections.metadata["ctrl_dt_s"]
-    P = np.array([camera["P"] for camera in detections.metadata["cameras"]])
-    made = hrc_env.make_estimator(estimator, P, dt_s)
-    state = made.init(len(episodes), episodes[0].keypoints.px.shape[2])
-    rngs = [np.random.default_rng(episode.seed) for episode in episodes]
-    made.reset(state, np.arange(len(episodes)), rngs)
-    scores = []
-    for t in range(1 + len(episodes[0])):
-        px, confidence, sigma_px = (
-            np.stack([getattr(episode.keypoints, name)[t] for episode in episodes])
-            for name in ("px", "confidence", "sigma_px")
-        )
-        if t:
-            made.predict(state, dt_s, rngs)
-        made.update(state, hrc_env.Keypoints(px, confidence, sigma_px), rngs)
-        estimate = made.estimate(state)
-        error = estimate.mean_world - [episode.truth["joints_world"][t] for episode in episodes]
-        distance = np.einsum("...i,...ij,...j", error, np.linalg.inv(estimate.cov_world), error)
-        score = np.stack([1e3 * np.linalg.norm(error, axis=-1), 1e2 * (distance < INSIDE)])
-        tracked = np.where(estimate.tracked, 1.0, np.nan)[..., None]
-        scores.append([*(score * tracked).mean((-2, -1)), 1e2 * estimate.tracked.mean(-1)])
-    return np.nanmean(scores, axis=0)
+def record(estimator, file, options):
+    """Return episodes with estimated and true joints; the seeds are always the same."""
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, "-m", "hrc_env", "--import", file, "record", "HRCReach-v0"]
+        command += ["--people", "unaware", "--poses", "--keypoints", "--estimator", estimator]
+        subprocess.run([*command, "--folder", f"{folder}/episodes", *options], check=True)
+        return list(hrc_env.load_episodes(f"{folder}/episodes"))
+
+
+def score(episode):
+    """Return mean error [mm], coverage [%] and tracked time [%] of an episode with one worker."""
+    tracked = episode.belief["tracked"]
+    cov_world = episode.belief["joints_cov_world"][tracked]
+    error = (episode.belief["joints_world"] - episode.truth["joints_world"])[tracked]
+    distance = np.einsum("...i,...ij,...j", error, np.linalg.inv(cov_world), error)
+    error_mm = 1e3 * np.linalg.norm(error, axis=-1)
+    return error_mm.mean(), 1e2 * (distance < INSIDE).mean(), 1e2 * tracked.mean()
 
 
 def show(metric):
@@ -48,10 +42,14 @@ def show(metric):
     return f"{metric.value:.1f} ({metric.low:.1f} to {metric.high:.1f})"
 
 
-def print_accuracy(names, detections):
+def compare_accuracy(names, file, options):
     """Print the scores of each estimator, and the differences between the first and the last."""
-    scores = {name: track(name, detections) for name in names}
-    print(f"{'':14} {'error [mm]':>22} {'coverage [%]':>22} {'tracked [%]':>12}")
+    recorded = {name: record(name, file, options) for name in names}
+    for episodes in zip(*recorded.values(), strict=True):  # all received the same detections
+        for episode in episodes:
+            np.testing.assert_array_equal(episode.keypoints.px, episodes[0].keypoints.px)
+    scores = {name: np.transpose([score(each) for each in recorded[name]]) for name in names}
+    print(f"\n{'':14} {'error [mm]':>22} {'coverage [%]':>22} {'tracked [%]':>12}")
     for name in names:
         error, coverage, tracked = map(hrc_env.estimate_mean, scores[name])
         print(f"{name:14} {show(error):>22} {show(coverage):>22} {tracked.value:12.1f}")
@@ -82,13 +80,13 @@ def compare_safety(names, n_episodes, folder):
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser()
-    parser.add_argument("detections", type=Path, help="folder that `record` wrote")
+    parser = argparse.ArgumentParser(epilog="Further options are passed to hrc_env record.")
     parser.add_argument("--file", default="examples/bring_your_own/estimator.py")
     parser.add_argument("--estimators", nargs="+", default=NAMES)
-    parser.add_argument("--episodes", type=int, default=200, help="episodes of the safety study")
+    parser.add_argument("--episodes", default="40", help="number of recorded episodes")
+    parser.add_argument("--safety-episodes", type=int, default=200)
     parser.add_argument("--out", type=Path, default=Path("out/compare_estimator"))
-    args = parser.parse_args()
+    args, options = parser.parse_known_args()
     hrc_env.import_files(args.file)
-    print_accuracy(args.estimators, hrc_env.load_episodes(args.detections))
-    compare_safety(args.estimators, args.episodes, args.out)
+    compare_accuracy(args.estimators, args.file, ["--episodes", args.episodes, *options])
+    compare_safety(args.estimators, args.safety_episodes, args.out)
