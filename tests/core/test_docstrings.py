@@ -58,4 +58,4 @@ def test_a_subclass_has_its_own_docstring():
         """A task of my own."""
 
     assert Mine.__doc__ == "A task of my own."
-    assert "Attributes:" in hrc_env.Task.__doc__
+    assert "Attributes:" in (hrc_env.Task.__doc__ or "")
