@@ -88,7 +88,7 @@ class Task(Generic[ConfigT, StateT]):
             raise ConfigError(
                 "Task is a base class. Write class MyTask(hrc_env.Task) with the attributes and "
                 "methods that its documentation names, and register the class "
-                "(docs/bring_your_own.md)."
+                "(docs/bring_your_own/task.md)."
             )
         return super().__new__(cls)
 
