@@ -218,8 +218,10 @@ def _alone() -> Iterator[Callable[[], float]]:
 
 
 def _turn(learner: Any) -> tuple[float, float, int, int]:
-    """Return times of a rollout alone and with learning [s], and steps and bytes of a rollout of
-    all workers."""
+    """Return times of a rollout alone and with learning [s], its steps and its bytes.
+
+    Steps and bytes are of a rollout of all workers.
+    """
     group = learner.algorithm.env_runner_group
     started_s = time.monotonic()
     samples = group.foreach_env_runner(lambda runner: runner.sample(), local_env_runner=False)

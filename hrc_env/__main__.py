@@ -30,8 +30,7 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     ),
     "list": (
         "hrc_env.cli.listing", "List",
-        "List environments, perception levels, estimators, scenes, cameras, shields and agents by"
-        " name.",
+        "List the names that arguments take: tasks, perception levels, robots, agents and others.",
     ),
     "play": (
         "hrc_env.cli.play", "Play",
@@ -76,9 +75,11 @@ MOVED = {
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Run a command, of the process's words if none are given; errors that explain themselves are
-    shown without a traceback. Returns the exit status: 2 for what was asked wrongly, 130 for what
-    was stopped by Ctrl-C."""
+    """Run a command; return the exit status.
+
+    Without words it takes those of the process. Errors that explain themselves are shown without a
+    traceback. The status is 2 for wrong arguments, and 130 after Ctrl-C.
+    """
     given = list(sys.argv[1:] if words is None else words)
     if not given or given[0] in ("-h", "--help"):
         print(overview())

@@ -76,8 +76,9 @@ def _estimate(
 def _smooth(
     rig: Rig, sequences: Sequences, seeds: list[int]
 ) -> Iterator[tuple[Points3, Covariances3]]:
-    """Yield the results of the smoother, some sequences at once; late frames are used at their
-    time.
+    """Yield the results of the smoother, some sequences at once.
+
+    Late frames are used at their time.
 
     With several people it smooths the tracks to which `kalman` assigned the poses.
     """
