@@ -31,8 +31,7 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     ),
     "list": (
         "hrc_env.cli.listing", "List",
-        "List environments, perception levels, estimators, scenes, cameras, shields and agents by"
-        " name.",
+        "List the names that arguments take: tasks, perception levels, robots, agents and others.",
     ),
     "play": (
         "hrc_env.cli.play", "Play",

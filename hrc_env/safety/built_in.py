@@ -174,8 +174,10 @@ def build_constraints(
 
 
 def _describe_bodies(belief: Belief, pose: ArmPose, is_lost: Bools, config: ShieldConfig) -> Bodies:
-    """Return the estimated bodies, those of lost workers (B, W) at rest where they were seen
-    last."""
+    """Return the estimated bodies.
+
+    Lost workers (B, W) are at rest at their last estimate.
+    """
     estimate = belief.estimate
     mean, velocity, cov = estimate.mean_world, estimate.velocity_world, estimate.cov_world
     touches = _find_allowed_touches(belief, pose, config)
@@ -210,8 +212,7 @@ class AllowedTouches:
 
 
 def _find_allowed_touches(belief: Belief, pose: ArmPose, config: ShieldConfig) -> AllowedTouches:
-    """Return the touches that "pfl" allows everywhere, and other kinds where the task allows
-    them."""
+    """Return the touches that are allowed: by "pfl" everywhere, by others as the task permits."""
     model, links = pose.model, pose.links
     shape = (*belief.estimate.tracked.shape, len(SEGMENT_REGIONS))
     if config.kind == "pfl":
