@@ -58,8 +58,7 @@ def field_docs(kind: type) -> dict[str, str]:
 
 
 def list_attributes(kind: type) -> list[Attribute]:
-    """Return the public documented attributes of a class, with those of its bases in this
-    package."""
+    """Return the public documented attributes of a class and of its bases in this package."""
     found: dict[str, Attribute] = {}
     for base in reversed(kind.__mro__):
         if base.__module__.partition(".")[0] == "hrc_env":
