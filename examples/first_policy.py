@@ -8,6 +8,7 @@ scripted agent, on the same seeds. Everything is written into the folder `--out`
 from dataclasses import dataclass
 from pathlib import Path
 
+import torch
 import tyro
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
@@ -35,11 +36,12 @@ class Arguments:
 
 def train(arguments: Arguments) -> Path:
     """Train a policy, and return the path of its checkpoint."""
+    torch.set_num_threads(1)  # the network is too small for several
     envs = hrc_env.HRCVecEnv(arguments.num_envs, perception=arguments.perception, stagger=True)
     scaled = VecNormalize(envs, norm_obs=False, gamma=0.98)  # rewards only
-    model = PPO("MlpPolicy", scaled, **hrc_env.PPOSettings().keywords(), seed=0)
+    model = PPO("MlpPolicy", scaled, **hrc_env.PPOSettings().keywords(), seed=0, verbose=1)
     ramp = hrc_env.ProximityRamp(arguments.timesteps // 2)
-    model.learn(arguments.timesteps, callback=ramp)
+    model.learn(arguments.timesteps, callback=ramp, log_interval=20)
     path = arguments.out / "policy.zip"
     path.parent.mkdir(parents=True, exist_ok=True)
     model.save(path)
