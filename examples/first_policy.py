@@ -22,7 +22,7 @@ Episodes = list[dict[str, float]]
 class Arguments:
     """Train a first policy on HRCReach-v0."""
 
-    timesteps: int = 300_000
+    timesteps: int = 500_000
     """Environment steps of the training, in total."""
     num_envs: int = 64
     """Environments that step together."""
@@ -40,7 +40,7 @@ def train(arguments: Arguments) -> Path:
     envs = hrc_env.HRCVecEnv(arguments.num_envs, perception=arguments.perception, stagger=True)
     scaled = VecNormalize(envs, norm_obs=False, gamma=0.98)  # rewards only
     model = PPO("MlpPolicy", scaled, **hrc_env.PPOSettings().keywords(), seed=0, verbose=1)
-    ramp = hrc_env.ProximityRamp(arguments.timesteps // 2)
+    ramp = hrc_env.ProximityRamp(400_000)  # the penalty on closeness grows slowly
     model.learn(arguments.timesteps, callback=ramp, log_interval=20)
     path = arguments.out / "policy.zip"
     path.parent.mkdir(parents=True, exist_ok=True)
