@@ -61,6 +61,14 @@ def report(name: str, episodes: Episodes) -> None:
     print(f"{name:18s}" + "".join(f"{cell:>24s}" for cell in cells))
 
 
+def compare(ours: str, theirs: str, played: dict[str, Episodes]) -> None:
+    """Print the difference in cost between two agents on the same seeds."""
+    costs = ([each["cost"] for each in played[name]] for name in (ours, theirs))
+    difference = hrc_env.compare_means(*costs, "control steps").difference
+    text = f"{difference.value:.2f} ({difference.low:.2f} to {difference.high:.2f})"
+    print(f"cost of ({ours}) minus ({theirs}): {text}")
+
+
 def main(arguments: Arguments) -> None:
     """Train, evaluate and compare."""
     policy = str(train(arguments))
@@ -76,10 +84,8 @@ def main(arguments: Arguments) -> None:
             agent, arguments.episodes, perception=arguments.perception, shield=shield
         )
         report(name, played[name])
-    ours, theirs = ([e["cost"] for e in played[name]] for name in ("policy", "scripted"))
-    change = hrc_env.compare_means(ours, theirs, "control steps")
-    low, high = change.difference.low, change.difference.high
-    print(f"cost, policy - scripted: {change.difference.value:.1f} ({low:.1f} to {high:.1f})")
+    compare("policy", "scripted", played)
+    compare("policy, shield qp", "policy", played)
 
 
 if __name__ == "__main__":

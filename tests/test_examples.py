@@ -32,7 +32,7 @@ def test_the_first_policy_is_trained_compared_and_can_be_played(tmp_path):
     interval = r"-?[\d.]+ \(-?[\d.]+ to -?[\d.]+\)"
     rows = re.findall(rf"^(\w[\w, ]+?) {{2,}}{interval} +{interval} +{interval}$", printed, re.M)
     assert rows == ["scripted", "policy", "policy, shield qp"]
-    assert re.search(rf"^cost, policy - scripted: {interval}$", printed, re.M)
+    assert len(re.findall(rf"^cost of \(.+\) minus \(.+\): {interval}$", printed, re.M)) == 2
     policy = str(tmp_path / "first" / "policy.zip")
     assert hrc_env.evaluate(policy, 1, perception="truth").episodes == 1
 
