@@ -63,8 +63,8 @@ def report(name: str, episodes: Episodes) -> None:
 
 def compare(ours: str, theirs: str, played: dict[str, Episodes]) -> None:
     """Print the difference in cost between two agents on the same seeds."""
-    costs = ([each["cost"] for each in played[name]] for name in (ours, theirs))
-    difference = hrc_env.compare_means(*costs, "control steps").difference
+    ours_cost, theirs_cost = ([each["cost"] for each in played[name]] for name in (ours, theirs))
+    difference = hrc_env.compare_means(ours_cost, theirs_cost, "control steps").difference
     text = f"{difference.value:.2f} ({difference.low:.2f} to {difference.high:.2f})"
     print(f"cost of ({ours}) minus ({theirs}): {text}")
 
