@@ -53,8 +53,7 @@ class Curriculum(BaseCallback):
     """Sets the proximity term's weight, and the limit in force, before every rollout.
 
     A resumed run continues it. With the whole weight from the start a learner first learns to stay
-    away, and finds its goals about nine times later; its final policy is more careful
-    (docs/learning.md has both).
+    away, and finds its goals about nine times later; its final policy is more careful.
     """
 
     def __init__(self, ramp: Ramp, env: HRCVecEnv) -> None:

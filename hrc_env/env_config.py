@@ -108,7 +108,7 @@ class EnvConfig:
     the defaults, or the path of a TOML file with such changes."""
     render_mode: str | None = field(default=None, metadata=NO_WORD)
     """Kind of pictures that `render` returns: "rgb_array", "depth_array" or None; `gymnasium.make`
-    also takes "human", a window (docs/start.md)."""
+    also takes "human", a window (docs/pictures.md)."""
     width: int = field(default=PICTURE_SIZE[0], metadata=NO_WORD)
     """Width of a picture that `render` returns [px]."""
     height: int = field(default=PICTURE_SIZE[1], metadata=NO_WORD)
@@ -117,7 +117,7 @@ class EnvConfig:
     """Whether `render` shows the markers of the task, such as goals."""
     overlay: str | None = field(default=None, metadata=NO_WORD)
     """Overlay of `render`: "capsules", the shapes of robot and people from which distances are
-    computed (docs/start.md); None for no overlay."""
+    computed (docs/pictures.md); None for no overlay."""
 
     def arguments(self) -> dict[str, Any]:
         """Return the fields that differ from the defaults, by name."""

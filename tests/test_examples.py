@@ -9,6 +9,8 @@ import pytest
 import torch
 from commands import ROOT, called
 
+import hrc_env
+
 SMALL = ("--num-envs", "8", "--n-steps", "32", "--timesteps", "3000", "--perception", "truth")
 
 
@@ -22,6 +24,17 @@ def test_the_plain_ppo_runs_and_says_how_many_goals_it_reached():
     said = run("ppo_cleanrl_style.py", *SMALL)
     assert re.search(r"3072 steps in \d+ s", said)
     assert re.search(r"goals reached in the last \d+ episodes: \d+%", said)
+
+
+def test_the_first_policy_is_trained_compared_and_can_be_played(tmp_path):
+    words = ("--timesteps", "1024", "--num-envs", "16", "--episodes", "2", "--perception", "truth")
+    printed = run("first_policy.py", *words, "--out", str(tmp_path / "first"))
+    interval = r"-?[\d.]+ \(-?[\d.]+ to -?[\d.]+\)"
+    rows = re.findall(rf"^(\w[\w, ]+?) {{2,}}{interval} +{interval} +{interval}$", printed, re.M)
+    assert rows == ["scripted", "policy", "policy, shield qp"]
+    assert len(re.findall(rf"^cost of \(.+\) minus \(.+\): {interval}$", printed, re.M)) == 2
+    policy = str(tmp_path / "first" / "policy.zip")
+    assert hrc_env.evaluate(policy, 1, perception="truth").episodes == 1
 
 
 @pytest.mark.parametrize("pretrain", ["0", "256"])
