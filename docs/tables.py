@@ -1,12 +1,13 @@
-"""Tables and numbers that were measured, in the pages that ask for them.
+"""Measured tables and numbers in the pages of the documentation.
 
 Studies declare their tables (`hrc_env.experiments.report.Table`); the numbers are those that their
-commands found last, `docs/results/whole/COMMAND.json`. A page asks with `<!-- results: NAME -->`,
-or `<!-- results: NAME without intervals -->`, and the table stands between that and
-`<!-- end of results -->`; for one of its numbers in a sentence with `<!-- number: NAME.WHICH -->`,
-and it stands between that and `<!-- end -->`. Where all this comes from stands once a page, between
-`<!-- provenance -->` and `<!-- end of provenance -->`. A file of `examples/` stands between
-`<!-- example: PATH -->` and `<!-- end of example -->`.
+commands found last, `docs/results/whole/COMMAND.json`. A page marks the place of a table with `<!-- results: NAME -->`
+and `<!-- end of results -->`; after the name it can choose rows by the text below one of the
+table's headings, and leave out intervals:
+`<!-- results: baselines where perception is keypoints without intervals -->`. The place of a single
+number in a sentence is between `<!-- number: NAME.WHICH -->` and `<!-- end -->`, that of the
+provenance of all tables of a page between `<!-- provenance -->` and `<!-- end of provenance -->`,
+and that of a file of `examples/` between `<!-- example: PATH -->` and `<!-- end of example -->`.
 """
 
 import json
@@ -24,7 +25,8 @@ from hrc_env.experiments.versions import SUBSYSTEMS
 
 RESULTS = Path(__file__).parent / "results"
 BLOCK = re.compile(
-    r"<!-- results: (?P<name>\w+)(?P<plain> without intervals)? -->\n.*?<!-- end of results -->",
+    r"<!-- results: (?P<name>\w+)(?: where (?P<head>[\w ]+?) is (?P<cell>[^>]+?))?"
+    r"(?P<plain> without intervals)? -->\n.*?<!-- end of results -->",
     re.S,
 )
 NUMBER = re.compile(r"<!-- number: (?P<name>\w+)\.(?P<which>\w+) -->.*?<!-- end -->", re.S)
@@ -98,8 +100,11 @@ def filled(page: str) -> str:
 
 def _block(found: re.Match[str]) -> str:
     first, result = found[0].split("\n", 1)[0], read(found["name"])
-    table = result.table.to_markdown(result.metrics, intervals=not found["plain"])
-    return f"{first}\n{table}\n<!-- end of results -->"
+    table = result.table
+    if found["head"]:
+        table = table.select_rows(found["head"], found["cell"])
+    text = table.to_markdown(result.metrics, intervals=not found["plain"])
+    return f"{first}\n{text}\n<!-- end of results -->"
 
 
 def _number(found: re.Match[str]) -> str:

@@ -15,10 +15,12 @@ from benchmarks import __main__ as benchmarks
 from benchmarks import results
 from docs import generate, tables
 from hrc_env.__main__ import main
+from hrc_env.core.errors import ConfigError
 from hrc_env.tasks import BUILT_IN
 
 ROOT = Path(__file__).resolve().parent.parent
 README = ROOT / "README.md"
+RESULTS = ROOT / "docs" / "results.md"
 LEADERBOARD = ROOT / "docs" / "reference" / "leaderboard.md"
 WRITTEN = [*generate.PAGES, ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"]
 PAGES = [*WRITTEN, *generate.REFERENCE]
@@ -51,19 +53,34 @@ def test_tables_are_those_of_the_results(page):
 
 
 def test_every_table_is_shown_with_where_it_comes_from():
-    shown = set()
     for page in generate.PAGES:
         names = [found["name"] for found in tables.BLOCK.finditer(page.read_text())]
         assert bool(names) == bool(tables.PROVENANCE.search(page.read_text())), page
-        shown |= set(names)
-    assert shown == set(tables.names())
+    whole = [found for found in tables.BLOCK.finditer(RESULTS.read_text()) if not found["head"]]
+    assert sorted(found["name"] for found in whole) == tables.names()
 
 
-def test_the_baselines_are_in_the_readme_and_in_learning():
-    for page in (README, ROOT / "docs" / "learning.md"):
-        text = page.read_text()
-        assert "| `pixels` | PPO with the safety term |" in text
-        assert tables.filled(text.replace("| `random` |", "| `other` |")) == text
+def test_the_baselines_stand_whole_in_results_and_for_one_level_in_the_readme():
+    level = "| `pixels` | PPO with the safety term |"
+    text = RESULTS.read_text()
+    assert level in text
+    assert tables.filled(text.replace("| `random` |", "| `other` |")) == text
+    rows = [line for line in README.read_text().splitlines() if line.startswith("| `keypoints` |")]
+    assert len(rows) == 5
+    assert level not in README.read_text()
+
+
+def test_a_page_can_show_some_rows_of_a_table():
+    block = "<!-- results: baselines where {} -->\n<!-- end of results -->"
+    shown = tables.filled(block.format("agent is PPO with the safety term without intervals"))
+    rows = [line for line in shown.splitlines() if line.startswith("| `")]
+    assert len(rows) == 4
+    assert all("| PPO with the safety term |" in row for row in rows)
+    assert tables.filled(shown) == shown
+    with pytest.raises(ConfigError, match="'levels'.*perception, agent"):
+        tables.filled(block.format("levels is keypoints"))
+    with pytest.raises(ConfigError, match="'keypoint'.*truth, keypoints"):
+        tables.filled(block.format("perception is keypoint"))
 
 
 NO_NUMBERS = re.compile(r'"(?:columns|heads|heading|digits|beside|title|note)":')
