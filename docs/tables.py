@@ -1,13 +1,13 @@
 """Measured tables and numbers in the pages of the documentation.
 
 Studies declare their tables (`hrc_env.experiments.report.Table`); the numbers are those that their
-commands found last, `docs/results/whole/COMMAND.json`. A page marks the place of a table with `<!-- results: NAME -->`
-and `<!-- end of results -->`; after the name it can choose rows by the text below one of the
-table's headings, and leave out intervals:
-`<!-- results: baselines where perception is keypoints without intervals -->`. The place of a single
-number in a sentence is between `<!-- number: NAME.WHICH -->` and `<!-- end -->`, that of the
-provenance of all tables of a page between `<!-- provenance -->` and `<!-- end of provenance -->`,
-and that of a file of `examples/` between `<!-- example: PATH -->` and `<!-- end of example -->`.
+commands found last, `docs/results/whole/COMMAND.json`. A page marks the place of a table with
+`<!-- results: NAME -->` and `<!-- end of results -->`. After the name it can choose rows by the
+text below one of the table's headings, and leave out intervals:
+`<!-- results: baselines where perception is keypoints without intervals -->`. A single number in a
+sentence is between `<!-- number: NAME.WHICH -->` and `<!-- end -->`, the provenance of all tables
+of a page between `<!-- provenance -->` and `<!-- end of provenance -->`, and a file of `examples/`
+between `<!-- example: PATH -->` and `<!-- end of example -->`.
 """
 
 import json

@@ -43,7 +43,9 @@ def report(metrics: Metrics, selection: Selection = EVERYTHING) -> Report:
     for each in (BENCH, *(table_of_kind(kind, names, selection) for kind in KINDS)):
         shown.append(each.to_markdown(metrics, intervals=False))
     spread = "95 % intervals over seeds, times with the smallest and the largest"
-    return Report("Tracking bench", _LEAD, [*parts, *filter(None, shown)], spread)
+    return Report(
+        "Estimators on simulated sequences", _LEAD, [*parts, *filter(None, shown)], spread
+    )
 
 
 def _lead(metrics: Metrics, selection: Selection) -> str:
