@@ -65,8 +65,8 @@ TABLE = Table(
         Column("speedup.{}", "speedup over one worker", digits=2),
     ),
     note="Every worker collects 64 steps of 64 environments per update; {n[update_s.1]} updates, "
-    "in turns. Stable-Baselines3 steps its environments on all cores. The model assumes that sampling "
-    "is parallel and learning is not. One step of 64 environments on one thread takes {step_ms} "
+    "in turns. Stable-Baselines3 steps its environments on all cores. The model assumes parallel "
+    "sampling and serial learning. One step of 64 environments on one thread takes {step_ms} "
     "ms. One environment step is {bytes} bytes, so that a network of 1 Gbit/s carries the steps of "
     "{carried} workers.",
     numbers={
