@@ -535,7 +535,7 @@ As far as people are where they are believed to be and move no faster than the s
 - what a task lets people touch is touched no faster than the region of the body bears.
 
 `tests/safety/test_shields.py` holds each of these; how far beliefs are right is measured
-([experiments](../experiments.md)).
+([results](../results.md#shield)).
 
 ## How it decides
 {rows}

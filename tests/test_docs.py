@@ -77,9 +77,9 @@ def test_a_page_can_show_some_rows_of_a_table():
     assert len(rows) == 4
     assert all("| PPO with the safety term |" in row for row in rows)
     assert tables.filled(shown) == shown
-    with pytest.raises(ConfigError, match=r"'levels'.*perception, agent"):
+    with pytest.raises(ConfigError, match=r"'levels'.*'perception', 'agent'"):
         tables.filled(block.format("levels is keypoints"))
-    with pytest.raises(ConfigError, match=r"'keypoint'.*truth, keypoints"):
+    with pytest.raises(ConfigError, match=r"'keypoint'.*'truth', 'keypoints'"):
         tables.filled(block.format("perception is keypoint"))
 
 
