@@ -20,7 +20,7 @@ from typing import Any
 
 from benchmarks.studies import COMMANDS
 from hrc_env.core.results import Metric
-from hrc_env.experiments.report import Metrics, Table
+from hrc_env.experiments.report import Metrics, Table, format_table
 from hrc_env.experiments.versions import SUBSYSTEMS
 
 RESULTS = Path(__file__).parent / "results"
@@ -119,21 +119,26 @@ def _example(found: re.Match[str]) -> str:
 
 
 def provenance(names: list[str]) -> str:
-    """Return one line: by which commands, at which versions, when and on what tables were made."""
+    """Return by which commands, at which versions, when and on which machines tables were made.
+
+    Args:
+        names: names of the tables.
+
+    Returns:
+        A sentence if one command made all of them, else a table with a row for each command.
+    """
     found = [read(name) for name in dict.fromkeys(names)]
-    stated = {pair for each in found for pair in (("", each.version), *each.depends.items())}
-    is_same = len(dict(stated)) == len(stated)
-    sources: dict[str, list[str]] = {}
+    sources: dict[tuple[str, ...], list[str]] = {}
     for each in found:
-        at = "" if is_same else f" at {_versions(each.version, each.depends)}"
-        source = f"`{each.command}`{at} ({each.date})"
-        sources.setdefault(source, []).append(f'"{each.table.title}"')
-    parts = [f"{', '.join(titles)} by {source}" for source, titles in sources.items()]
+        source = (f"`{each.command}`", _versions(each.version, each.depends), each.date)
+        sources.setdefault(source, []).append(each.table.title)
     machines = ", ".join(dict.fromkeys(each.machine for each in found))
-    if is_same and found:
-        depends = {name: number for each in found for name, number in each.depends.items()}
-        machines += f", at {_versions(found[0].version, depends)}"
-    return f"*Measured on {machines}: {'; '.join(parts)}.*"
+    if len(sources) == 1:
+        command, version, date = next(iter(sources))
+        return f"*Measured by {command} on {machines}; version {version}, {date}.*"
+    lines = [("; ".join(titles), *source) for source, titles in sources.items()]
+    heads = ("tables", "command", "version (of parts)", "date")
+    return f"Measured on {machines}:\n\n{format_table(heads, lines, len(heads))}"
 
 
 def _versions(version: str, depends: Mapping[str, int]) -> str:

@@ -83,6 +83,13 @@ def test_a_page_can_show_some_rows_of_a_table():
         tables.filled(block.format("perception is keypoint"))
 
 
+def test_tables_of_several_commands_have_a_row_of_provenance_for_each():
+    text = tables.provenance(["site", "impact", "lateness"])
+    rows = [line for line in text.splitlines() if "`python -m" in line]
+    assert [row.split("|")[1].count(";") for row in rows] == [0, 1]
+    assert "`python -m hrc_env experiment site`" in rows[0]
+
+
 NO_NUMBERS = re.compile(r'"(?:columns|heads|heading|digits|beside|title|note)":')
 """Keys of a table that is declared."""
 
