@@ -29,10 +29,10 @@ from hrc_env.tracking.config import TrackerConfig
 _DETECTING = 0.5
 """Share of the progress for detection."""
 _LEAD = """\
-Leave-one-camera-out reprojection [px]; `renamed`: where it fits better, the held-out detector is
-taken to have exchanged left and right. Coverage: share of held-out detections within the 95 %
-region of belief and detector. Bones and jerk with all cameras. The smoother is offline: it sees the
-whole recording at once."""
+Leave-one-camera-out reprojection [px]; best of both sides: where it fits better, left and right of
+the held-out detections are exchanged. Coverage: share of held-out detections within the 95 % region
+of estimate and detector. Bones and jerk are those with all cameras. The smoother is offline: it
+uses the whole recording."""
 FOOTAGE = Table(
     "footage",
     "Recorded footage",

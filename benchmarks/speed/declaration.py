@@ -7,7 +7,7 @@ from hrc_env.experiments.columns import Column
 from hrc_env.experiments.report import Table
 from hrc_env.tasks import BUILT_IN, DEFAULT
 
-ASKED = "What does a step of an environment cost, alone and beside others, and where does it go?"
+ASKED = "How long does a step take, alone and in a batch, and which parts take the time?"
 SINGLE = "single"
 """The environment of `gymnasium.make`, unlike a vector of one."""
 REACHER = "reacher"

@@ -113,7 +113,7 @@ BENCH = Table(
     f"choose settings ({{n[coverage95.env.after_return.{SMOOTHER}]}} for `{SMOOTHER}`, which is "
     "offline). `lab` and `site`: simulated walkers, independent detection errors of 3 px; `env`: "
     "the environment's worker through the emulator. `hard`: occlusion, 10 % gross errors and "
-    "exchanged sides; `drifting`: errors that last half a second; `late`: images that are 40 to "
-    "200 ms old; `one camera`: one camera for 4 s, after 1 s of four. DLT: linear triangulation of "
-    "each frame.",
+    "exchanged sides; `drifting`: errors that last half a second; `late`: images that arrive 40 "
+    "to 220 ms late, with some lost; `one camera`: one camera for 4 s, after 1 s of four. DLT: "
+    "linear triangulation of each frame.",
 )
