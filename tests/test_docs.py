@@ -309,7 +309,7 @@ SETTINGS = {
     "results.md": "0.15 m, 95 %, 1,000 steps",
     "workers_and_scenes.md": (
         "0.4 to 0.8 s, 1.55 to 1.92 m, 6.1 x 5.5 x 2.6 m, 20 x 20 m, 5 m, 2.5 x 4.0 m, "
-        "11.6 x 12.3 m, 0.6 m, 2.5 to 3.5 m, 2.4 m, 0.6 s, 0.9 s, 15 to 40 s"
+        "11.6 x 12.3 m, 0.6 m, 2.5 to 3.5 m, 2.4 m, 0.9 s, 15 to 40 s"
     ),
     "perception_and_estimators.md": (
         "80 degrees, 118.2 degrees, 0.2 s, 0.02 rad, 0.05 m, 0.1 rad, 0.04 s, 8 px"
