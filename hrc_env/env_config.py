@@ -80,7 +80,7 @@ class EnvConfig:
     (docs/motion_capture.md); None for the value in `config` (no clips)."""
     faults: "Sequence[FaultConfig | Mapping[str, Any]] | None" = field(default=None, metadata=MANY)
     """Faults of cameras: `FaultConfig`s or mappings, such as
-    {"kind": "late", "cameras": ["camera_1"], "amount": 0.2} (docs/perception_and_estimators.md);
+    {"kind": "late", "cameras": ["camera_1"], "amount": 0.2} (docs/cameras.md);
     None for the value in `config` (no faults)."""
     appearance: "str | AppearanceConfig | Mapping[str, Any] | None" = None
     """Appearance of scene and workers, drawn for every episode: "as_built", "varied", "lights",

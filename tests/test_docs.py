@@ -300,6 +300,7 @@ SETTINGS = {
     "third_party_perception.md": "41 MB, 59 MB, 180 MB",
     "architecture.md": "1 s",
     "conventions.md": "0.04 s",
+    "glossary.md": "0.05 m, 0.10 m, 0.15 m, 95 %",
     "start.md": "250 steps, 0.04 s, 25 frames",
     "experiments.md": "72 degrees, 0.9 m, 5 %, 95 %, 25 images",
     "many_environments.md": "8 ms",
@@ -311,16 +312,17 @@ SETTINGS = {
         "0.4 to 0.8 s, 1.55 to 1.92 m, 6.1 x 5.5 x 2.6 m, 20 x 20 m, 5 m, 2.5 x 4.0 m, "
         "11.6 x 12.3 m, 0.6 m, 2.5 to 3.5 m, 2.4 m, 0.9 s, 15 to 40 s"
     ),
-    "perception_and_estimators.md": (
-        "80 degrees, 118.2 degrees, 0.2 s, 0.02 rad, 0.05 m, 0.1 rad, 0.04 s, 8 px"
+    "cameras.md": "80 degrees, 118.2 degrees, 0.2 s, 0.02 rad, 0.05 m, 0.1 rad, 0.04 s, 8 px",
+    "tracking.md": (
+        "1 s, 2 cm, 10 %, 95 %, 20 degrees, 25 degrees, 50 degrees, 0.05 rad, 0.014 to 0.14 rad, "
+        "0.5 m"
     ),
-    "tracking.md": "1 s, 2 cm, 10 %, 20 degrees, 25 degrees, 50 degrees, 0.5 m, 2 ms, 0.1 s",
 }
 """Sizes, limits and defaults by page: numbers with a unit that nobody measured of this project."""
 BOUNDS = {
     "emulator.md": "15 %",
     "learning.md": "120,000 steps, 80 %",
-    "perception_and_estimators.md": "90 %, 95 %",
+    "perception.md": "90 %, 95 %",
     "tracking.md": "0.3 m, 0.4 s, 1 m, 2.5 %, 5 %, 75 %",
     "workers_and_scenes.md": "30 to 35 %, 6 to 25 %",
 }
