@@ -79,7 +79,7 @@ def make_organs_table(configurations: Iterable[str]) -> Table:
         [Column(f"us_per_env_step.{{}}.{each}", f"{title(each)} [us]") for each in configurations],
         ("part",),
         "Per environment and step. With two threads the time of a part is divided by two, so that "
-        "every column is wall-clock time. A reset takes {reset_one} ms; that of 8 out of 64 "
+        "every column is wall-clock time. A reset takes {reset_one} ms; that of 8 of 64 "
         "environments takes {reset_some} ms.",
         RESETS,
     )
