@@ -108,8 +108,10 @@ class ProximityRamp(Curriculum):
 
 
 class Interrupt:
-    """Handler of Ctrl-C: after `listen` the first one sets `asked`, and the second one
-    interrupts."""
+    """Handler of Ctrl-C, active after `listen`.
+
+    The first Ctrl-C sets `asked`, and the second one interrupts.
+    """
 
     def __init__(self) -> None:
         self.asked = False

@@ -1,4 +1,6 @@
-"""Scores of simple agents and PPO at every perception level: python -m benchmarks.baselines
+"""Scores of simple agents and PPO at every perception level.
+
+    python -m benchmarks.baselines
 
 Random actions, the scripted reacher without and with yielding, and PPO without and with the safety
 term are compared by return, goals a minute, cost and contacts on the same seeds. PPO is trained at

@@ -1,4 +1,6 @@
-"""Scores of the scripted agents in all tasks: python -m benchmarks.experts
+"""Scores of the scripted agents in all tasks.
+
+    python -m benchmarks.experts
 
 Success, time, cost and contacts on the same seeds: without workers, and beside attentive ones at
 several perception levels. Episodes at `pixels` are played one by one.

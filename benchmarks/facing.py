@@ -1,4 +1,6 @@
-"""Accuracy of one camera by the direction in which the worker faces: python -m benchmarks.facing
+"""Accuracy of one camera by the direction in which the worker faces.
+
+    python -m benchmarks.facing
 
 The paper concludes that a single camera gives an accurate 3D pose only of people who face it. Here
 workers of all bodies work in view of the four cameras of the laboratory, which see every moment at

@@ -1,4 +1,6 @@
-"""Scores of the package's policies: python -m benchmarks.kept
+"""Scores of the package's policies.
+
+    python -m benchmarks.kept
 
 Policies that `python -m benchmarks.learners` and `python -m benchmarks.limited` made are part of
 the package, one or more for every task. Each is evaluated as it was trained and with the shield

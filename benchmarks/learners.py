@@ -1,4 +1,6 @@
-"""Scores of policies that are trained for every task: python -m benchmarks.learners
+"""Scores of policies that are trained for every task.
+
+    python -m benchmarks.learners
 
 Each id is trained by the command on its page, `python -m hrc_env train --task ID`, with three
 seeds, and evaluated beside its scripted agent on the same fixed seeds: success, cost, contacts, and

@@ -1,4 +1,6 @@
-"""Training with a cost limit, or without one and then with a shield: python -m benchmarks.limited
+"""Training with a cost limit, or without one and then with a shield.
+
+    python -m benchmarks.limited
 
 For each seed PPO-Lagrangian is trained with a cost limit, and PPO without any safety term. For the
 first the table shows when it reached its limit and how well it kept it: the cost of its noisy

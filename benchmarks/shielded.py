@@ -1,4 +1,6 @@
-"""Throughput and safety with the shield: python -m benchmarks.shielded
+"""Throughput and safety with the shield.
+
+    python -m benchmarks.shielded
 
 Goals, contacts and cost of the scripted reacher, which drives to its goals and ignores people,
 beside people who ignore it: without a shield, and with `qp` and the perception of each row.

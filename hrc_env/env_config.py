@@ -46,7 +46,8 @@ class EnvConfig:
     """
 
     task: "str | TaskType" = DEFAULT
-    """Task of the robot: an id ("HRCReach-v0") or a subclass of `Task` (docs/bring_your_own.md)."""
+    """Task of the robot: an id ("HRCReach-v0") or a subclass of `Task`
+    (docs/bring_your_own/task.md)."""
     perception: str = "pixels"
     """Perception of people: "pixels" (rendered images through MediaPipe Pose), "keypoints" (an
     emulator of that), "truth" (the workers' true poses) or "none". The default of `HRCVectorEnv`
@@ -55,7 +56,7 @@ class EnvConfig:
     """Estimator of poses from keypoints: "particle", "kalman" (the same with one hypothesis),
     "paper" (Algorithm 1 as printed), "paper_restarts" (Algorithm 1 with restarts), "triangulation"
     or "ransac"; the name of a registered one, an `EstimatorSpec`, or a function that makes an
-    estimator (docs/bring_your_own.md)."""
+    estimator (docs/bring_your_own/estimator.md)."""
     cameras: "str | Path | Sequence[Any] | RigDistribution | Mapping[str, Any] | None" = field(
         default=None, metadata=MANY
     )

@@ -192,7 +192,8 @@ def test_the_documentation_is_short():
     assert len(README.read_text().splitlines()) <= 150
     docs = [page for page in generate.PAGES if page != README]
     assert sum(len(by_hand(page).split()) for page in docs) <= 15_000
-    assert len((ROOT / "CHANGELOG.md").read_text().split("## 0.1.0")[1].split()) <= 500
+    first = (ROOT / "CHANGELOG.md").read_text().split("\n## [0.1.0]")[1].split("\n## ")[0]
+    assert len(first.split()) <= 500
 
 
 def anchors(page: Path) -> set[str]:
@@ -298,7 +299,7 @@ SETTINGS = {
     # Other people's packages; the rate of contacts that was asked for (PriceConfig.level).
     "README.md": "1.1 GB, 2.0 GB, 5.8 GB, 30 times, 1,000 episodes",
     "third_party_perception.md": "41 MB, 59 MB, 180 MB",
-    "architecture.md": "1 s",
+    "compare_estimator.md": "40 episodes, 95 %",
     "conventions.md": "0.04 s",
     "glossary.md": "0.05 m, 0.10 m, 0.15 m, 95 %",
     "start.md": "250 steps, 0.04 s, 25 frames",

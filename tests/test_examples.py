@@ -50,6 +50,30 @@ def test_fsrl_learns_with_our_cost_and_is_judged_as_ours_are():
     assert len(re.findall(r"^\w+: cost [\d.]+, goals/min [\d.]+$", said, re.M)) == 2
 
 
+@pytest.mark.usefixtures("brought")  # so that the estimator is gone afterwards
+def test_an_estimator_is_compared_in_accuracy_and_in_safety(tmp_path):
+    words = ("--episodes", "3", "--safety-episodes", "2", "--out", str(tmp_path / "report"))
+    text = run("compare_estimator.py", *words)
+    number = r"(-?[\d.]+) \(-?[\d.]+ to -?[\d.]+\)"
+    scores = {name: [float(value) for value in values] for name, *values in re.findall(
+        rf"^(\w+) +{number} +{number} +([\d.]+)$", text, re.M)}  # fmt: skip
+    assert list(scores) == ["dlt_kalman", "triangulation", "particle"]
+    for error_mm, coverage, tracked in scores.values():
+        assert 10 < error_mm < 60
+        assert 70 < coverage < 100
+        assert tracked > 95
+    ((error_mm, coverage),) = re.findall(rf"^first - last +{number} +{number}$", text, re.M)
+    assert float(error_mm) == pytest.approx(
+        scores["dlt_kalman"][0] - scores["particle"][0], abs=0.11
+    )
+    assert float(coverage) == pytest.approx(
+        scores["dlt_kalman"][1] - scores["particle"][1], abs=0.11
+    )
+    assert (
+        len(re.findall(r"^\| (?:dlt_kalman|triangulation|particle) \| [\d.]+ \(", text, re.M)) == 3
+    )
+
+
 def load(name: str):
     spec = importlib.util.spec_from_file_location(name, ROOT / "examples" / f"{name}.py")
     module = importlib.util.module_from_spec(spec)

@@ -70,8 +70,7 @@ class ImportMotion:
     """Also draw a film strip of the clip into this PNG file (needs OpenGL)."""
 
     def run(self) -> int:
-        """Read and fit the recording, print the errors and write the clip; return the exit
-        status."""
+        """Read and fit the recording, print the errors and write the clip; return the status."""
         check_writable_file(self.out, ".npz")
         if self.out.resolve() == self.file.resolve():
             raise ConfigError("--out is the recording itself; give the clip another name.")

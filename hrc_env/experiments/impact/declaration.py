@@ -123,8 +123,9 @@ def make_differences_table(policy: str, setups: Sequence[str], marked: bool) -> 
 
 
 def make_documentation_table(setups: Sequence[str]) -> Table:
-    """Return the table of the documentation, without setups of rendered images, whose rows are
-    short.
+    """Return the documentation's table.
+
+    Setups of rendered images are left out, as their rows are short.
 
     Args:
         setups: names of setups.
