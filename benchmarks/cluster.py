@@ -49,7 +49,7 @@ Played = Mapping[str, list[float]]
 
 TABLE = Table(
     name="cluster",
-    title="Steps a second of training, by workers of one core each",
+    title="Training speed by number of rollout workers, one core each",
     rows={
         "sb3": ("none", "Stable-Baselines3, measured"),
         "1": ("1", "measured"),
@@ -57,17 +57,18 @@ TABLE = Table(
         "2_predicted": ("2", "predicted from one"),
         **{str(n): (f"{n:,}", "model") for n in MODELLED},
     },
-    heads=("workers", ""),
+    heads=("workers", "source"),
     columns=(
         Column("sampling_s.{}", "sampling [s]", digits=2),
         Column("learning_s.{}", "learning [s]", digits=2),
         Column("steps_per_s.{}", "steps/s", digits=0),
-        Column("speedup.{}", "times one worker", digits=2),
+        Column("speedup.{}", "speedup over one worker", digits=2),
     ),
-    note="Stable-Baselines3 steps its environments on all cores. {n[update_s.1]} rounds in turns "
-    "of 64 environments, 64 steps each, a worker. One step of 64 environments on one thread takes "
-    "{step_ms} ms. A step is {bytes} bytes, so that 1 Gbit/s carries the steps of {carried} "
-    "workers.",
+    note="Every worker collects 64 steps of 64 environments per update; {n[update_s.1]} updates, "
+    "in turns. Stable-Baselines3 steps its environments on all cores. The model assumes parallel "
+    "sampling and serial learning. One step of 64 environments on one thread takes {step_ms} "
+    "ms. One environment step is {bytes} bytes, so that a network of 1 Gbit/s carries the steps of "
+    "{carried} workers.",
     numbers={
         "step_ms": Column("step_s", digits=1, scale=1e3, plain=True),
         "bytes": Column("bytes_per_step", digits=0, plain=True),

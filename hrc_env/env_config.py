@@ -78,7 +78,7 @@ class EnvConfig:
     `PeopleConfig` or a mapping; None for the value in `config` (attentive)."""
     motions: "Sequence[str | Path | Clip] | None" = field(default=None, metadata=MANY)
     """Clips of recorded motion that workers also play, or paths of such clips
-    (docs/people_and_scenes.md); None for the value in `config` (no clips)."""
+    (docs/motion_capture.md); None for the value in `config` (no clips)."""
     faults: "Sequence[FaultConfig | Mapping[str, Any]] | None" = field(default=None, metadata=MANY)
     """Faults of cameras: `FaultConfig`s or mappings, such as
     {"kind": "late", "cameras": ["camera_1"], "amount": 0.2} (docs/cameras.md);

@@ -97,24 +97,24 @@ WORDS = {
 TABLES = (
     Table(
         "trueness",
-        "Trueness: what nothing was fitted on",
+        "Trueness on new bodies and motions",
         {name: (words,) for name, words in WORDS.items()},
         (
             Column("{}.joint.median.upright", "upright, median [mm]"),
             Column("{}.joint.p95.upright", "95 % [mm]", 0),
             Column("{}.joint.coverage.upright", "coverage", 3),
-            Column("{}.landmark.median.upright", "median from landmarks [mm]"),
-            Column("{}.emulator_error_ratio.upright", "emulator / pixels, median", 2),
-            Column("{}.emulator_coverage_difference.upright", "emulator less pixels, coverage", 3),
+            Column("{}.landmark.median.upright", "median to landmarks [mm]"),
+            Column("{}.emulator_error_ratio.upright", "median, emulator / pixels", 2),
+            Column("{}.emulator_coverage_difference.upright", "coverage, emulator - pixels", 3),
             Column("{}.joint.median.fold", "folded, median [mm]"),
             Column("{}.joint.coverage.fold", "coverage", 3),
         ),
         ("held out",),
-        "Errors of joints at `pixels` after the default tracker; upright: all motions but those of "
-        "folded bodies, of which the default workers do little. Fitted to six bodies, the lab and "
-        "all motions but one of each family; cameras and seeds are others in every row. From "
-        "landmarks: errors from anatomical (COCO) landmarks instead of where BlazePose means a "
-        "joint to be. Intervals are 95 % bootstraps over clips.",
+        "Errors of joints at `pixels` after the default estimator; 95 % bootstrap intervals over "
+        "clips. The fit has six bodies, the laboratory, and all motions but one of each family; "
+        "cameras and seeds differ from those of the fit in every row. Folded: bent, squatting or "
+        "kneeling bodies, which are rare with the default jobs; upright: all others. To landmarks: "
+        "distance to anatomical (COCO) landmarks instead of the points that BlazePose detects.",
     ),
 )
 """Tables of the documentation."""

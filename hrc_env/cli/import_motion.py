@@ -42,7 +42,7 @@ class ImportMotion:
     Unit, upward axis, a T-pose in the first frame, short gaps and exchanged axes are detected,
     repaired and reported; a recording that cannot be repaired is refused with the reason. The
     joints are fitted by a worker's body, standing feet are locked, and the error of each joint is
-    printed. docs/people_and_scenes.md lists the joint names that are recognized.
+    printed. docs/motion_capture.md lists the joint names that are recognized.
     """
 
     file: tyro.conf.Positional[Path]

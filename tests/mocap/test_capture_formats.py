@@ -182,6 +182,6 @@ def test_an_npz_file_of_another_shape_is_refused_with_the_right_one(work, tmp_pa
 
 
 def test_the_page_has_every_name_that_is_understood():
-    page = (Path(__file__).parents[2] / "docs" / "people_and_scenes.md").read_text()
+    page = (Path(__file__).parents[2] / "docs" / "motion_capture.md").read_text()
     for names in (*SIDED.values(), HEAD):
         assert f"| {', '.join(names)} |" in page
