@@ -115,7 +115,7 @@ Floor is seen empty by at least two cameras that would find whoever stood there 
 five heights of a body), after two looks over whole images each at `keypoints`, six at `pixels`;
 what one of them alone sees is probably empty after three looks. That is forgotten
 `tracker.lost_after_s` after cameras last looked; images that are stuck, dark, of one colour or
-without any edge are no looks. Who was lost may hide where they were for 3 times `tracker.forget_s`.
+without any edge are no looks. Who was lost may hide where they were for 3 times `tracker.lost_relaxation_s`.
 
 People whom several cameras show in several looks in a row and whom no pose explains, as with a
 wrong calibration, make the slots unknown; `info["perception/miscalibrated"]` counts the cameras.

@@ -83,8 +83,8 @@ def make_pipeline(
         raise unknown("perception", level, LEVELS)
     check_supported(level, config.appearance, config.faults, shows_images)
     schedule = Schedule(scene.rig, config.faults, config.ctrl_dt)
-    memory_s = max(config.tracker.longest_delay_s, min(schedule.longest_delay_s, 1.0))
-    settings = replace(config.tracker, longest_delay_s=memory_s)
+    memory_s = max(config.tracker.max_delay_s, min(schedule.max_delay_s, 1.0))
+    settings = replace(config.tracker, max_delay_s=memory_s)
     tracker = make_estimator(estimator, projections(scene.cameras), config.ctrl_dt, settings)
     if level == "truth":
         absence = oracle.estimate_absence(batch, scene.n_workers, config.tracker)

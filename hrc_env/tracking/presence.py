@@ -13,8 +13,8 @@ each piece is
 
 The slot is *absent* if every piece is empty, else *unknown*. A lost worker may be hidden at the
 last estimated place. Therefore no piece becomes empty until the worker is tracked again, or until
-that estimate is forgotten (after `FORGOTTEN` time constants `forget_s` without a measurement) and
-searches find no person. A search is forgotten like a track, after `lost_after_s`.
+that estimate is forgotten (after `FORGOTTEN` time constants `lost_relaxation_s` without a
+measurement) and searches find no person. A search is forgotten like a track, after `lost_after_s`.
 """
 
 from dataclasses import dataclass, replace
@@ -53,7 +53,7 @@ SEVERAL = 3
 """Number of searches by one camera after which floor is probably empty."""
 FORGOTTEN = 3.0
 """Time without a measurement after which the place of a lost worker is forgotten, as a multiple of
-`forget_s`."""
+`lost_relaxation_s`."""
 REPEATED = 2
 """Number of successive images with an unexplained person before it counts; the detector
 occasionally takes the robot for a person."""
@@ -268,7 +268,7 @@ class Presence(Stateful):
             enough=searches.enough,
             dt_s=dt_s,
             lost_after_s=config.lost_after_s - 1e-9,
-            forgotten_s=FORGOTTEN * config.forget_s,
+            forgotten_s=FORGOTTEN * config.lost_relaxation_s,
         )
         shape = estimate.tracked.shape
         report = PresenceReport(

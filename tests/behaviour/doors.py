@@ -114,7 +114,7 @@ from hrc_env.tasks.reach import MIDDLE
 from hrc_env.tasks.task import find_task
 from hrc_env.tracking import metrics, oracle, presence
 from hrc_env.tracking.calibration_monitor import forget_monitor, make_monitor, monitor
-from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.config import PaperConfig, ParticleConfig, TrackerConfig
 from hrc_env.tracking.contradiction import DetectedPoses, find_unexplained
 from hrc_env.tracking.estimators import ESTIMATORS, find_estimator, make_estimator
 from hrc_env.tracking.forecast import forecast
@@ -478,22 +478,17 @@ def _of_reset(info: dict[str, Any]) -> dict[str, Any]:
 def settings() -> dict[str, str]:
     """Return every setting's default by its place in the configuration, as "ID/task/radius_m"."""
     return {
-        SETTING_NAMES.get(name, name): default
+        f"{place}/{_former_name(record, field.name)}": repr(getattr(record, field.name))
         for place, record in _records().items()
-        for name, default in (
-            (f"{place}/{field.name}", repr(getattr(record, field.name)))
-            for field in dataclasses.fields(record)
-            if not _is_record(getattr(record, field.name))
-        )
+        for field in dataclasses.fields(record)
+        if not _is_record(getattr(record, field.name))
     }
 
 
-SETTING_NAMES: dict[str, str] = {
-    f"shield_{shield}/{present}": f"shield_{shield}/{former}"
-    for shield in PRESETS
-    for former, present in ShieldConfig.RENAMED.items()
-}
-"""Today's names of settings that the probes know by another."""
+def _former_name(record: Any, name: str) -> str:
+    """Return the name of a setting that the probes know, before it was renamed."""
+    present = {new: old for old, new in getattr(record, "RENAMED", {}).items()}
+    return present.get(name, name)
 
 
 APPEARANCE_NAMES = tuple(looks.APPEARANCES)
@@ -1166,7 +1161,7 @@ class Crew:
 # --- Tracker and geometry (tracker.py) -----------------------------------------------------------
 
 TRACKER_SETTINGS: dict[str, str] = {
-    name: name
+    name: (ParticleConfig.RENAMED | PaperConfig.RENAMED).get(name, name)
     for name in (
         "prior_mean_world", "prior_std_m", "lost_after_s", "forget_s", "longest_delay_s",
         "acquire_min_joints", "sigma_scale", "noise_bounds", "noise_share", "wait_updates",
@@ -1824,7 +1819,7 @@ class Faults:
         """Return whether nothing is wrong, the longest delay, the memory and what is frozen."""
         plan = self._schedule
         frozen = sum(step + 1 for step in plan.frozen_steps)
-        return np.array([plan.is_plain, plan.longest_delay_s, plan.longest_memory, frozen], float)
+        return np.array([plan.is_plain, plan.max_delay_s, plan.longest_memory, frozen], float)
 
     def list_images(self, seed: int, step: int) -> NDArray[np.float64]:
         """Return of each camera (C, 3): the step that its image shows, when it says it was taken

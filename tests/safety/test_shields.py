@@ -24,7 +24,6 @@ from hrc_env.render.overlay import SHIELD
 from hrc_env.safety.built_in import limit_command
 from hrc_env.safety.config import PRESETS, ShieldConfig
 from hrc_env.safety.incidents import MOVING_M_S
-from hrc_env.safety.shield import find_shield
 from hrc_env.safety.unseen import find_undetected
 
 VELOCITIES = ("velocity_world", "angular_velocity_world")
@@ -495,14 +494,3 @@ def test_pictures_show_when_it_acts():
     env.close()
     assert (shown[0, 0] == SHIELD).all()
     assert not (plain[0, 0] == SHIELD).all()
-
-
-@pytest.mark.parametrize(("former", "present"), sorted(ShieldConfig.RENAMED.items()))
-def test_a_former_name_of_a_setting_is_an_error_that_gives_the_present_one(former, present):
-    assert present in ShieldConfig.__dataclass_fields__
-    with pytest.raises(
-        ConfigError, match=f"field of ShieldConfig {former} is called {present} now"
-    ):
-        ShieldConfig(**{former: 0.1})
-    with pytest.raises(ConfigError, match=rf"shield\.{former} is called shield\.{present} now"):
-        find_shield({former: 0.1})
