@@ -115,7 +115,8 @@ Floor is seen empty by at least two cameras that would find whoever stood there 
 five heights of a body), after two looks over whole images each at `keypoints`, six at `pixels`;
 what one of them alone sees is probably empty after three looks. That is forgotten
 `tracker.lost_after_s` after cameras last looked; images that are stuck, dark, of one colour or
-without any edge are no looks. Who was lost may hide where they were for 3 times `tracker.lost_relaxation_s`.
+without any edge are no looks. Who was lost may hide where they were for 3 times
+`tracker.lost_relaxation_s`.
 
 People whom several cameras show in several looks in a row and whom no pose explains, as with a
 wrong calibration, make the slots unknown; `info["perception/miscalibrated"]` counts the cameras.
@@ -126,8 +127,8 @@ is there. With four cameras an empty room is known to be empty one step after th
 each was shown by some camera's first image, and 400 of 400 were found by then. At level `truth`
 nobody is unknown; at `none` everybody is who could be there.
 
-A reward counts an unknown worker with closeness `reward.unknown` at least, so that losing sight is
-not rewarded like being alone. `scripted_slowed` is no faster than 0.25 m/s then, or stands still
+A reward counts an unknown worker with closeness `reward.unknown_closeness` at least, so that losing
+sight is not rewarded like being alone. `scripted_slowed` is no faster than 0.25 m/s then, or stands still
 (`agents.scripted.Yielding.unknown_m_s`); a room that is known to be empty is free.
 
 ## Reward
@@ -236,8 +237,8 @@ def environment() -> str:
         ),
         arguments=arguments(),
         share=config.control.joint_speed_share,
-        tool=config.control.tool_speed_mps,
-        turn=config.control.tool_turn_rad_s,
+        tool=config.control.tool_speed_m_s,
+        turn=config.control.tool_rotation_rad_s,
         far=observations.FAR_SEPARATION_M,
         concern=NEAR_FLOOR_M,
         pages="\n".join(BUILT_IN),

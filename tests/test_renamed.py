@@ -3,10 +3,17 @@
 import pytest
 
 import hrc_env
+from hrc_env.control import ControlConfig
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.mapping import from_mapping
+from hrc_env.env_words import read_cameras
+from hrc_env.perception.detector import DetectorConfig
+from hrc_env.perception.faults.fault import FaultConfig
+from hrc_env.rewards import RewardConfig
 from hrc_env.safety.config import ShieldConfig
 from hrc_env.safety.shield import find_shield
+from hrc_env.scene.domain_randomization import AppearanceConfig
+from hrc_env.scene.rig_distribution import RigDistribution
 from hrc_env.tracking.config import (
     PaperConfig,
     ParticleConfig,
@@ -16,7 +23,8 @@ from hrc_env.tracking.config import (
 from hrc_env.tracking.people.association import AssociationConfig
 
 RECORDS = (
-    AssociationConfig, PaperConfig, ParticleConfig, ShieldConfig, TrackerConfig,
+    AppearanceConfig, AssociationConfig, ControlConfig, DetectorConfig, FaultConfig, PaperConfig,
+    ParticleConfig, RewardConfig, RigDistribution, ShieldConfig, TrackerConfig,
     TriangulationConfig,
 )  # fmt: skip
 """All records that have fields with former names."""
@@ -43,3 +51,9 @@ def test_former_names_are_answered_wherever_settings_are_given():
         find_shield({"sigmas": 2.0})
     with pytest.raises(ConfigError, match=r"tracker\.forget_s is called tracker\.lost_relax"):
         hrc_env.HRCEnv(config={"tracker": {"forget_s": 2.0}})
+    with pytest.raises(
+        ConfigError, match=r"faults\[0\]\.from_s is called faults\[0\]\.start_s now"
+    ):
+        hrc_env.HRCEnv(faults=[{"kind": "lost", "cameras": ["all"], "from_s": 1.0}])
+    with pytest.raises(ConfigError, match=r"cameras\.place_m is called cameras\.max_shift_m now"):
+        hrc_env.HRCEnv(cameras=read_cameras(['{"place_m": 0.1}']))

@@ -11,7 +11,7 @@ from hrc_env.env import HRCEnv
 from hrc_env.rewards import RewardConfig
 from hrc_env.vector.env import HRCVectorEnv
 
-BLIND = [{"kind": "lost", "cameras": ["all"], "from_s": 0.4, "until_s": 2.0}]
+BLIND = [{"kind": "lost", "cameras": ["all"], "start_s": 0.4, "end_s": 2.0}]
 EMPTY_SEED = 1
 """Of an episode for one worker or none in which none is there."""
 
@@ -43,7 +43,7 @@ def test_losing_sight_is_not_rewarded_like_being_alone():
     _, unknown, _, _, proximity = played(faults=BLIND, config={"reward": {"proximity": 3.0}})
     assert (proximity[unknown] <= -3.0 * 0.25).all()
     _, unknown, _, _, proximity = played(
-        faults=BLIND, config={"reward": {"proximity": 3.0, "unknown": 0.0}}
+        faults=BLIND, config={"reward": {"proximity": 3.0, "unknown_closeness": 0.0}}
     )
     assert unknown.any()
     assert (proximity[unknown] == 0).all()
@@ -52,7 +52,7 @@ def test_losing_sight_is_not_rewarded_like_being_alone():
 @pytest.mark.parametrize("worth", [-0.1, 1.5, np.nan])
 def test_what_an_unknown_worker_counts_must_be_a_share(worth):
     with pytest.raises(ConfigError, match=r"unknown must be in \[0, 1\]"):
-        RewardConfig(unknown=worth)
+        RewardConfig(unknown_closeness=worth)
 
 
 def test_an_empty_room_is_known_to_be_empty_and_blind_cameras_make_it_unknown():

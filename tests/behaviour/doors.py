@@ -177,8 +177,8 @@ SETTINGS = {
 }
 """Names of the probes for settings, and the paths of today's fields."""
 FAULT_FIELDS = {
-    "kind": "kind", "cameras": "cameras", "amount": "amount", "from_s": "from_s",
-    "until_s": "until_s",
+    "kind": "kind", "cameras": "cameras", "amount": "amount", "from_s": "start_s",
+    "until_s": "end_s",
 }  # fmt: skip
 CAMERA_FIELDS = {
     "name": "name", "eye_m": "eye_world", "target_m": "target_world", "latency_s": "latency_s",
@@ -2044,7 +2044,7 @@ Window = tuple[float, float, float, float]
 Picture = NDArray[np.uint8]
 PERSON_FIELDS = ("score", "box", "hip", "rim")
 DETECTOR_FIELDS = {
-    name: name
+    name: detector.DetectorConfig.RENAMED.get(name, name)
     for name in (
         "min_presence", "sure_presence", "gate_every", "max_offset", "outside_confidence",
         "search_every",

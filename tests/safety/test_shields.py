@@ -354,7 +354,7 @@ def test_whom_another_environment_has_lost_slows_nobody():
 
 
 def test_robots_whose_cameras_all_fail_come_no_nearer_to_where_people_were():
-    lost = [{"kind": "lost", "cameras": ["all"], "from_s": 1.0}]
+    lost = [{"kind": "lost", "cameras": ["all"], "start_s": 1.0}]
     gaps_m, blind_s, driven = [], [], []
     for _, now in steps(vector(24, "qp", perception="keypoints", faults=lost), 75):
         there = replace(now.estimate, mean_world=now.estimate.seen_world)

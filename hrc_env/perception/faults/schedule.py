@@ -167,7 +167,7 @@ class Schedule:
 
     def _frozen_at(self, fault: FaultConfig) -> int:
         """Return the last step before a camera froze."""
-        return max(0, math.ceil(fault.from_s / self.dt_s - _EARLY) - 1)
+        return max(0, math.ceil(fault.start_s / self.dt_s - _EARLY) - 1)
 
 
 class History(Stateful):
