@@ -128,8 +128,8 @@ each was shown by some camera's first image, and 400 of 400 were found by then. 
 nobody is unknown; at `none` everybody is who could be there.
 
 A reward counts an unknown worker with closeness `reward.unknown_closeness` at least, so that losing
-sight is not rewarded like being alone. `scripted_slowed` is no faster than 0.25 m/s then, or stands still
-(`agents.scripted.Yielding.unknown_m_s`); a room that is known to be empty is free.
+sight is not rewarded like being alone. `scripted_slowed` is no faster than 0.25 m/s then, or stands
+still (`agents.scripted.Yielding.unknown_m_s`); a room that is known to be empty is free.
 
 ## Reward
 The sum of the task's terms and of those that all tasks share, each in `info["reward/<name>"]`;

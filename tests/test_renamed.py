@@ -6,6 +6,7 @@ import hrc_env
 from hrc_env.control import ControlConfig
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.mapping import from_mapping
+from hrc_env.core.records import PoseEstimate
 from hrc_env.env_words import read_cameras
 from hrc_env.perception.detector import DetectorConfig
 from hrc_env.perception.faults.fault import FaultConfig
@@ -14,6 +15,7 @@ from hrc_env.safety.config import ShieldConfig
 from hrc_env.safety.shield import find_shield
 from hrc_env.scene.domain_randomization import AppearanceConfig
 from hrc_env.scene.rig_distribution import RigDistribution
+from hrc_env.scene.robot import Robot
 from hrc_env.tracking.config import (
     PaperConfig,
     ParticleConfig,
@@ -24,7 +26,7 @@ from hrc_env.tracking.people.association import AssociationConfig
 
 RECORDS = (
     AppearanceConfig, AssociationConfig, ControlConfig, DetectorConfig, FaultConfig, PaperConfig,
-    ParticleConfig, RewardConfig, RigDistribution, ShieldConfig, TrackerConfig,
+    ParticleConfig, PoseEstimate, RewardConfig, RigDistribution, Robot, ShieldConfig, TrackerConfig,
     TriangulationConfig,
 )  # fmt: skip
 """All records that have fields with former names."""

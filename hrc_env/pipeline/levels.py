@@ -209,13 +209,13 @@ class NoPerception(PerceptionPipeline):
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
         """Begin environments `ids` anew, with a prior of age zero."""
-        self.prior.blind_s[ids] = 0.0
+        self.prior.unobserved_s[ids] = 0.0
 
     def perceive(
         self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators
     ) -> PoseEstimate:
         """Return the prior of environments `ids`, older by a step."""
-        self.prior.blind_s[ids] += self.dt_s
+        self.prior.unobserved_s[ids] += self.dt_s
         return rows(self.prior, ids)
 
     def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:

@@ -1270,7 +1270,7 @@ def _as_values(estimate: PoseEstimate) -> dict[str, NDArray[Any]]:
         "age_s": estimate.age_s,
         "tracked": estimate.tracked,
         "unknown": estimate.unknown,
-        "blind_s": estimate.blind_s,
+        "blind_s": estimate.unobserved_s,
         "seen_world": estimate.seen_world,
     }
 

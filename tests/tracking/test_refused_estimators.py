@@ -37,7 +37,7 @@ def believed(**changes: Any) -> PoseEstimate:
             "age_s": np.ones(SHAPE),
             "tracked": np.zeros(SHAPE[:2], bool),
             "unknown": np.ones(SHAPE[:2], bool),
-            "blind_s": np.ones(SHAPE[:2]),
+            "unobserved_s": np.ones(SHAPE[:2]),
             "seen_world": np.full((*SHAPE, 3), np.nan),
         }
         | changes
