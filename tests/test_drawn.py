@@ -57,12 +57,12 @@ def test_the_rig_is_the_one_of_the_episode() -> None:
             for each in env.rig
         ]
         assert info["episode/n_cameras"] == len(env.rig)
-        assert info["episode/moved_m"] == pytest.approx(max(moved_m))
-        assert 0 < info["episode/turned_rad"] <= 0.05 + 1e-6
+        assert info["episode/max_camera_shift_m"] == pytest.approx(max(moved_m))
+        assert 0 < info["episode/max_camera_rotation_rad"] <= 0.05 + 1e-6
         counts.add(len(env.rig))
     assert len(counts) > 1
     _, info = env.reset(seed=0)
-    assert (info["episode/n_cameras"], info["episode/moved_m"]) == (4, 0)
+    assert (info["episode/n_cameras"], info["episode/max_camera_shift_m"]) == (4, 0)
 
 
 def test_light_and_delays_are_told_of_each_environment_of_a_batch() -> None:

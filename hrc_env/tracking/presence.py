@@ -72,7 +72,7 @@ class Slot:
     lost: bool
     """Whether the slot had a track, which was lost."""
     unobserved_s: float
-    """Time since cameras last saw the worker or found the floor empty [s]."""
+    """Time since the cameras last observed the worker, or that the floor is empty [s]."""
     seen_world: Annotated[Points3, (N_JOINTS, 3)]
     """Estimated joints when a camera last saw the worker [m]; NaN if none has."""
 
@@ -244,8 +244,8 @@ class Presence(Stateful):
             config: times after which tracks are lost and forgotten.
 
         Returns:
-            The estimate with `unknown`, `unobserved_s` and `seen_world`; contradicted tracks are not
-            `tracked`.
+            The estimate with `unknown`, `unobserved_s` and `seen_world`; contradicted tracks are
+            not `tracked`.
         """
         strange = np.where(searches.shown.unexplained, self.strangers[ids] + 1, 0)
         strange = np.where(searches.whole | searches.shown.poses, strange, self.strangers[ids])

@@ -36,6 +36,7 @@ from hrc_env.belief import (
     find_unseen_floor,
     standard_deviation_m,
 )
+from hrc_env.core import infos
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.infos import ENTRIES
 from hrc_env.core.records import (
@@ -176,6 +177,8 @@ SETTINGS = {
     "step_s": "ctrl_dt",
 }
 """Names of the probes for settings, and the paths of today's fields."""
+COMPONENTS = {"too_near": "separation_violated"}
+"""Names of the probes for components of the cost, and today's where they differ."""
 FAULT_FIELDS = {
     "kind": "kind", "cameras": "cameras", "amount": "amount", "from_s": "start_s",
     "until_s": "end_s",
@@ -214,7 +217,9 @@ DRAWING = (
     ("map", ("znear", "zfar", "fogstart", "fogend", "haze", "shadowclip", "shadowscale", "alpha")),
 )
 """How MuJoCo draws, by its names."""
-RENAMED: dict[str, str] = {"shield/clearance_m": "shield/least_m"}
+RENAMED: dict[str, str] = {"shield/clearance_m": "shield/least_m"} | {
+    present: former for former, present in infos.RENAMED.items()
+}
 """Today's names of observation terms, reward terms and infos that the probes know by another."""
 
 
@@ -231,6 +236,8 @@ def _arguments(options: Mapping[str, Any]) -> dict[str, Any]:
             arguments["cameras"] = [_renamed(each, CAMERA_FIELDS) for each in value]
         elif name in ("kept_cameras", "rig"):
             arguments["cameras"] = value
+        elif name == "cost_components":
+            _put(config, SETTINGS[name], [COMPONENTS.get(each, each) for each in value])
         else:
             _put(config, SETTINGS[name], value)
     return {**arguments, "config": config}
@@ -380,7 +387,7 @@ class Env:
                  if _is_plain(name) and _are_measured(info, name)}  # fmt: skip
         named["is_success"] = bool(named["is_success"])
         named |= self._env.unwrapped.words(info)
-        if "perception/more_people" not in info:
+        if "perception/more_people_than_slots" not in info:
             del named["perception/miscalibrated"]
         return named
 
@@ -459,10 +466,10 @@ def _is_plain(name: str) -> bool:
 def _are_measured(infos: Mapping[str, Any], name: str) -> Any:
     """Return of which environments a number is one that was measured."""
     known = np.isfinite(infos[name])
-    if name in ("safety/contact_came_m_s", "safety/contact_closing_m_s",
+    if name in ("safety/contact_robot_speed_m_s", "safety/contact_closing_speed_m_s",
                 "safety/contact_force_ratio"):  # fmt: skip
         return known & (infos["safety/contact_severity"] > 0)
-    if name == "task/largest_n":
+    if name == "task/max_hand_force_n":
         return known & (infos[name] > 0)
     return known & (infos[FLAGS_OF[name]] > 0) if name in FLAGS_OF else known
 
@@ -470,7 +477,7 @@ def _are_measured(infos: Mapping[str, Any], name: str) -> Any:
 def _of_reset(info: dict[str, Any]) -> dict[str, Any]:
     """Return what was known of resets at first: neither rewards nor what happens in a step."""
     later = ("reward/", "shield/", "safety/contact_", "safety/min_", "safety/robot_",
-             "safety/worker_", "safety/too_", "safety/time_")  # fmt: skip
+             "safety/worker_", "safety/too_", "safety/separation_", "safety/time_")  # fmt: skip
     kept = ("safety/contact_kind", "safety/contact_region")
     return {name: each for name, each in info.items() if name in kept or not name.startswith(later)}
 
@@ -2524,6 +2531,17 @@ def protective_distance(robot_m_s: Any, human_m_s: Any, **times: Any) -> NDArray
     return separation.protective_distance(robot_m_s, human_m_s, **times)
 
 
+INCIDENT_FIELDS = {
+    "robot_speed_m_s": "came_m_s",
+    "closing_speed_m_s": "closing_m_s",
+    "is_separation_violated": "too_near",
+    "contact_robot_speed_m_s": "contact_came_m_s",
+    "contact_closing_speed_m_s": "contact_closing_m_s",
+    "separation_violated": "too_near",
+}
+"""Today's fields of incidents and their summaries that the probes know by another name."""
+
+
 class Watched:
     """What happens to people, step after step."""
 
@@ -2556,7 +2574,8 @@ class Watched:
         values = {}
         for group, records in (("one", found), ("all", told), ("known", self._watch.history)):
             for name in records.dtype.names:
-                values[f"{group}/{name.removeprefix('is_')}"] = records[name].copy()
+                named = INCIDENT_FIELDS.get(name, name).removeprefix("is_")
+                values[f"{group}/{named}"] = records[name].copy()
         return {**values, "stop_s": self._watch.find_stop_time(state)}
 
 

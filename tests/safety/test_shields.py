@@ -318,10 +318,9 @@ def unseen(now, away_m, unobserved_s=0.5, **known):
     """A belief in which the worker was seen last so far beside the tool, and not since."""
     place, _ = np.broadcast_arrays(now.robot.tool_world[:, None, None], now.estimate.mean_world)
     seen = place + np.array([away_m, 0.0, 0.0]) + np.linspace(0, 0.1, 15)[:, None]
-    blind = np.full_like(now.estimate.unobserved_s, unobserved_s)
-    return replace(
-        now, estimate=replace(now.estimate, seen_world=seen, unobserved_s=blind, **known)
-    )
+    blind_s = np.full_like(now.estimate.unobserved_s, unobserved_s)
+    known |= {"seen_world": seen, "unobserved_s": blind_s}
+    return replace(now, estimate=replace(now.estimate, **known))
 
 
 @pytest.mark.parametrize("is_tracked", [True, False])
