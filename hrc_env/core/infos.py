@@ -52,6 +52,7 @@ RENAMED = {
     "safety/contact_came_m_s": "safety/contact_robot_speed_m_s",
     "safety/contact_closing_m_s": "safety/contact_closing_speed_m_s",
     "safety/too_near": "safety/separation_violated",
+    "shield/least_m": "shield/clearance_m",
     "task/fixed_hits": "task/obstacle_hits",
     "task/largest_n": "task/max_hand_force_n",
     "task/screws_left": "task/screws_remaining",

@@ -217,9 +217,7 @@ DRAWING = (
     ("map", ("znear", "zfar", "fogstart", "fogend", "haze", "shadowclip", "shadowscale", "alpha")),
 )
 """How MuJoCo draws, by its names."""
-RENAMED: dict[str, str] = {"shield/clearance_m": "shield/least_m"} | {
-    present: former for former, present in infos.RENAMED.items()
-}
+RENAMED: dict[str, str] = {present: former for former, present in infos.RENAMED.items()}
 """Today's names of observation terms, reward terms and infos that the probes know by another."""
 
 
