@@ -56,7 +56,7 @@ def test_losing_sight_is_not_rewarded_like_being_alone():
 
 @pytest.mark.parametrize("worth", [-0.1, 1.5, np.nan])
 def test_what_an_unknown_worker_counts_must_be_a_share(worth):
-    with pytest.raises(ConfigError, match=r"unknown must be in \[0, 1\]"):
+    with pytest.raises(ConfigError, match=r"unknown_closeness must be in \[0, 1\]"):
         RewardConfig(unknown_closeness=worth)
 
 
