@@ -68,7 +68,7 @@ def make_arm_action(
     """
     config, twist = env_info.control_config, np.concatenate([velocity, turn], axis=1)
     if env_info.control == "twist":
-        scale = np.repeat([config.tool_speed_mps, config.tool_turn_rad_s], 3)
+        scale = np.repeat([config.tool_speed_m_s, config.tool_rotation_rad_s], 3)
         return np.clip(twist / scale, -1.0, 1.0)
     q = np.arctan2(terms["joint_angle_sin"], terms["joint_angle_cos"])
     qd = resolve_twist(env_info.chain, q, twist, config)

@@ -127,7 +127,7 @@ class PickPlacer:
         """Return velocities (n, 3) to targets from the tool."""
         error = plan_around_foot(tool, target, self._foot, ROUND_M)
         length = np.linalg.norm(error, axis=1, keepdims=True)
-        most = self.env_info.control_config.tool_speed_mps
+        most = self.env_info.control_config.tool_speed_m_s
         return error / np.maximum(length, 1e-9) * speed_m_s(length, most)
 
 

@@ -86,7 +86,7 @@ class Reacher:
             speed = np.linalg.norm(velocity, axis=-1)
             blind = self.yielding.blind_share(terms, speed)[..., None]
         if self.env_info.control == "tool":
-            action = velocity / self.env_info.control_config.tool_speed_mps
+            action = velocity / self.env_info.control_config.tool_speed_m_s
         else:
             q = np.arctan2(terms["joint_angle_sin"], terms["joint_angle_cos"])
             action = self._make_joint_action(q, velocity)
@@ -94,7 +94,7 @@ class Reacher:
 
     def _compute_tool_velocity(self, goal_from_tool: Array) -> Array:
         error_m = np.linalg.norm(goal_from_tool, axis=-1, keepdims=True)
-        speed = speed_m_s(error_m, self.env_info.control_config.tool_speed_mps)
+        speed = speed_m_s(error_m, self.env_info.control_config.tool_speed_m_s)
         return goal_from_tool / np.maximum(error_m, 1e-9) * speed
 
     def _make_joint_action(self, q: Array, velocity: Array) -> Array:

@@ -134,7 +134,7 @@ person there, which means that they see three of five heights of a body. If only
 piece of floor, it counts as probably empty after three searches. This knowledge expires
 `tracker.lost_after_s` after the last search. Images that are frozen, dark, of a single colour or
 without edges do not count as searches. After a track is lost, its worker may still be at the last
-place for 3 times `tracker.forget_s`.
+place for 3 times `tracker.lost_relaxation_s`.
 
 All slots also become unknown if several cameras repeatedly detect people whom no pose explains, as
 with a wrong calibration; `info["perception/miscalibrated"]` counts such cameras.
@@ -144,7 +144,7 @@ With four cameras an empty room is known to be empty one step after the reset at
 second after it at `pixels`, where cameras search every fifth step. At level `truth` no slot is
 unknown; at level `none` every slot is.
 
-The reward counts an unknown worker at least with the closeness `reward.unknown`, so that a lost
+The reward counts an unknown worker at least with the closeness `reward.unknown_closeness`, so that a lost
 track is not rewarded like an empty room. The agent `scripted_slowed` then moves its tool at no more
 than 0.25 m/s, or stops (`agents.scripted.Yielding.unknown_m_s`). If all slots are absent, it moves
 freely.
@@ -255,8 +255,8 @@ def environment() -> str:
         ),
         arguments=arguments(),
         share=config.control.joint_speed_share,
-        tool=config.control.tool_speed_mps,
-        turn=config.control.tool_turn_rad_s,
+        tool=config.control.tool_speed_m_s,
+        turn=config.control.tool_rotation_rad_s,
         far=observations.FAR_SEPARATION_M,
         concern=NEAR_FLOOR_M,
         pages="\n".join(BUILT_IN),

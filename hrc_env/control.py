@@ -7,7 +7,9 @@ singular postures, where the tool then lags behind the command.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +17,7 @@ from numpy.typing import ArrayLike
 from hrc_env.core.batching import flat
 from hrc_env.core.errors import ConfigError, check_fields, check_shape, unknown
 from hrc_env.core.kernels import kernel
+from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.typing import Floats, JointAngles, JointVelocities, Velocities3
 from hrc_env.geometry.chains import SerialChain, angular_jacobian, jacobian
 
@@ -30,15 +33,22 @@ SINGULAR_M3 = 0.05
 """Manipulability below which the damping of `twist` fades in."""
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class ControlConfig:
     """Scales of actions, by `control`."""
 
+    RENAMED: ClassVar[Mapping[str, str]] = {
+        "tool_speed_mps": "tool_speed_m_s",
+        "tool_turn_rad_s": "tool_rotation_rad_s",
+    }
+    """Present names of fields that were renamed, by their old names."""
+
     joint_speed_share: float = 0.5
     """Velocity of a joint for an action of 1, as a share of its limit (`joint`)."""
-    tool_speed_mps: float = 0.6
+    tool_speed_m_s: float = 0.6
     """Velocity of the tool point along a world axis for an action of 1 (`tool`, `twist`) [m/s]."""
-    tool_turn_rad_s: float = 1.2
+    tool_rotation_rad_s: float = 1.2
     """Turn rate of the tool about a world axis for an action of 1 (`twist`) [rad/s]."""
     damping: float = 0.07
     """Damping of the least-squares solution (`tool`, `twist`) [m]."""
@@ -48,8 +58,8 @@ class ControlConfig:
 
     def __post_init__(self) -> None:
         check_fields(self, "be in (0, 1]", "joint_speed_share")
-        check_fields(self, "be positive", "tool_speed_mps", "damping", "posture_gain_hz")
-        check_fields(self, "be positive", "tool_turn_rad_s")
+        check_fields(self, "be positive", "tool_speed_m_s", "damping", "posture_gain_hz")
+        check_fields(self, "be positive", "tool_rotation_rad_s")
 
 
 def n_actions(control: str, chain: SerialChain, grips: bool = False) -> int:
@@ -130,8 +140,8 @@ def joint_command(
     if control == "joint":
         return action * max_command(control, chain, config)
     if control == "tool":
-        return resolve_rate(chain, q, action * config.tool_speed_mps, q_rest, config)
-    scale = np.repeat([config.tool_speed_mps, config.tool_turn_rad_s], 3)
+        return resolve_rate(chain, q, action * config.tool_speed_m_s, q_rest, config)
+    scale = np.repeat([config.tool_speed_m_s, config.tool_rotation_rad_s], 3)
     return resolve_twist(chain, q, action * scale, config)
 
 

@@ -30,7 +30,8 @@ def read_cameras(words: Sequence[str]) -> Any:
         if words[0].endswith(".toml") or words[0] in RIGS:
             return words[0]
         value = read_word(words[0])
-        if isinstance(value, dict) and value.keys() <= {f.name for f in fields(RigDistribution)}:
+        names = {each.name for each in fields(RigDistribution)} | RigDistribution.RENAMED.keys()
+        if isinstance(value, dict) and value.keys() <= names:
             return value
     return [int(word) if word.isdigit() else read_word(word) for word in words]
 

@@ -209,7 +209,7 @@ class EpisodeCameras:
             return
         for b in ids.tolist():
             schedule = self.pipeline.schedule_of(b)
-            delay_s = 0.0 if schedule is None else schedule.longest_delay_s
+            delay_s = 0.0 if schedule is None else schedule.max_delay_s
             drawn = {DELAY: delay_s, LIGHT: self.pipeline.light_of(b)}
             drawn |= _difference(self.rig_of(b), self.scene.rig)
             drawn |= _amounts(self.faults_of(b), self._kinds)

@@ -347,7 +347,7 @@ SHARED_TERMS: tuple[ObservationTerm, ...] = (
         bound=5.0,
         scale=2.5,
         doc="Time since cameras last saw the worker, or that the place is empty.",
-        function=lambda belief: belief.estimate.blind_s,
+        function=lambda belief: belief.estimate.unobserved_s,
     ),
     ObservationTerm(
         name="worker_separation",

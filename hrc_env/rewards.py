@@ -5,7 +5,7 @@ Terms about people read the estimate only; progress of the task is measured in t
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -28,6 +28,9 @@ class RewardConfig:
     compare goals, not returns.
     """
 
+    RENAMED: ClassVar[Mapping[str, str]] = {"unknown": "unknown_closeness"}
+    """Present names of fields that were renamed, by their old names."""
+
     effort: float = 0.02
     """Weight of the penalty on the mean squared action."""
     smoothness: float = 0.02
@@ -38,13 +41,13 @@ class RewardConfig:
     before step 135,000; with 0 it reached 5.7 in each."""
     proximity_reach_m: float = 0.3
     """Separation of the surfaces below which closeness counts [m]."""
-    unknown: float = 0.25
+    unknown_closeness: float = 0.25
     """Least closeness of an unknown worker, in [0, 1], so that losing sight of a worker is not
     rewarded like being alone."""
 
     def __post_init__(self) -> None:
         check_fields(self, "be positive", "proximity_reach_m")
-        check_fields(self, "be in [0, 1]", "unknown")
+        check_fields(self, "be in [0, 1]", "unknown_closeness")
 
 
 KINDS = ("dense", "sparse")
@@ -115,7 +118,7 @@ def _mean_square(vectors: Floats) -> Floats:
 def _proximity(belief: Belief, step: Any, previous: Floats, config: RewardConfig) -> Floats:
     """Return the reward (B,) for distance from estimated bodies."""
     nearest_m = np.minimum.reduce(belief.separation.distance_m, axis=-1, initial=np.inf)
-    least = np.where(belief.estimate.unknown.any(-1), config.unknown, 0.0)
+    least = np.where(belief.estimate.unknown.any(-1), config.unknown_closeness, 0.0)
     near = np.maximum(closeness(nearest_m, config.proximity_reach_m), least)
     return -config.proximity * near
 

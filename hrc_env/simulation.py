@@ -347,7 +347,7 @@ class Simulation(Stateful):
                 config.motion,
                 grounds,
                 fewest,
-                settings.robot.girth_m,
+                settings.robot.base_radius_m,
             )
         except NoRoomError as error:
             scenes = all_grounds(config.scene)
@@ -442,7 +442,7 @@ class Simulation(Stateful):
 
     def _show_workers(self, world: World, motion: WorkerMotion) -> WorkerProgress | None:
         """Show robot and signals to the workers; return their progress if they wait for signals."""
-        seen_world = world.robot.capsules_world[:, self.scene.watched, 1]
+        seen_world = world.robot.capsules_world[:, self.scene.watched_capsules, 1]
         signal = self.task.signal(self.task_state)
         generator.watch(self.motion, seen_world, motion, self.config.ctrl_dt, signal)
         return None if signal is None else generator.progress(self.motion, motion)

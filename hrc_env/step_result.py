@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.infos import Info, published
+from hrc_env.core.infos import Info, InfoDict, published
 from hrc_env.core.typing import Bools, Floats
 
 Observation = NDArray[np.float32] | dict[str, NDArray[Any]]
@@ -28,9 +28,9 @@ class StepResult:
     info: Info
     """Infos (B,) by name."""
 
-    def info_of(self, b: int) -> dict[str, Any]:
+    def info_of(self, b: int) -> InfoDict:
         """Return the info of one environment, as NumPy scalars."""
-        return {name: value[b] for name, value in published(self.info).items()}
+        return InfoDict({name: value[b] for name, value in published(self.info).items()})
 
 
 def check_keys(keys: list[str], info: Info) -> Info:

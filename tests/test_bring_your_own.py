@@ -434,7 +434,7 @@ SERVO = '<velocity joint="bend" kv="400" ctrlrange="-3 3"/>'
         ({"joints": ("turn", "lift", "bent")}, "no joint 'bent'"),
         ({"joints": ("lift", "turn", "bend")}, "in its order"),
         ({"capsules": ("turret", "boom", "claw")}, "no geom 'claw'"),
-        ({"watched": ("jip",)}, "Did you mean 'jib'"),
+        ({"watched_capsules": ("jip",)}, "Did you mean 'jib'"),
         ({"home_q": (0.0, 0.6)}, "home_q must be 3 angles"),
         ({"home_q": (0.0, 0.6, np.nan)}, "home_q must be 3 angles"),
         ({"home_q": (3.0, 0.6, 1.2)}, "outside of the joints' ranges"),

@@ -24,7 +24,7 @@ ODD = {
     "people": "hurried",
     "cameras": "lab_gopro",
     "appearance": "varied",
-    "faults": [{"kind": "lost", "cameras": ["all"], "until_s": 2.5}],
+    "faults": [{"kind": "lost", "cameras": ["all"], "end_s": 2.5}],
     "config": {"worker": ["worker_1", "worker_2"], "motion": {"motions": ['a "b"\\.npz']}},
 }
 

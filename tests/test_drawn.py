@@ -12,7 +12,7 @@ from hrc_env.perception.faults.fault import IMAGE, KINDS
 
 LATE = {"kind": "late", "cameras": ["all"], "amount": [0.0, 0.3]}
 TURNED = {"kind": "wrong_rotation", "cameras": ["camera_2"], "amount": [0.01, 0.03]}
-LOST = {"kind": "lost", "cameras": ["camera_3"], "from_s": 2.0}
+LOST = {"kind": "lost", "cameras": ["camera_3"], "start_s": 2.0}
 
 
 def drawn(info: dict[str, Any]) -> dict[str, float]:
@@ -48,7 +48,7 @@ def test_nothing_is_told_of_what_is_as_it_was_made() -> None:
 def test_the_rig_is_the_one_of_the_episode() -> None:
     env = HRCEnv(perception="keypoints")
     made = {camera.name: camera for camera in env.rig}
-    options = {"cameras": RigDistribution(place_m=0.2, turn_rad=0.05, n_cameras=(2, 4))}
+    options = {"cameras": RigDistribution(max_shift_m=0.2, max_rotation_rad=0.05, n_cameras=(2, 4))}
     counts = set()
     for seed in range(6):
         _, info = env.reset(seed=seed, options=options)
@@ -57,12 +57,12 @@ def test_the_rig_is_the_one_of_the_episode() -> None:
             for each in env.rig
         ]
         assert info["episode/n_cameras"] == len(env.rig)
-        assert info["episode/moved_m"] == pytest.approx(max(moved_m))
-        assert 0 < info["episode/turned_rad"] <= 0.05 + 1e-6
+        assert info["episode/max_camera_shift_m"] == pytest.approx(max(moved_m))
+        assert 0 < info["episode/max_camera_rotation_rad"] <= 0.05 + 1e-6
         counts.add(len(env.rig))
     assert len(counts) > 1
     _, info = env.reset(seed=0)
-    assert (info["episode/n_cameras"], info["episode/moved_m"]) == (4, 0)
+    assert (info["episode/n_cameras"], info["episode/max_camera_shift_m"]) == (4, 0)
 
 
 def test_light_and_delays_are_told_of_each_environment_of_a_batch() -> None:
@@ -90,7 +90,7 @@ def test_a_state_tells_what_was_drawn() -> None:
 def test_what_was_drawn_is_truth_and_in_no_observation() -> None:
     """Two episodes that differ in a fault that nobody has seen yet look the same."""
     env = HRCEnv(perception="keypoints")
-    late = {**TURNED, "from_s": 5.0}
+    late = {**TURNED, "start_s": 5.0}
     free, _ = env.reset(seed=0)
     seen, info = env.reset(seed=0, options={"faults": [late]})
     assert info["episode/fault_wrong_rotation"] > 0

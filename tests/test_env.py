@@ -337,7 +337,7 @@ def test_a_large_site_has_room_and_memory_for_many_workers():
         ({"config": {"task": {"height_m": [0.8, 1.4, 9]}}}, "must be 2 values"),
         ({"config": {"scene": {"sim_dt": "fast"}}}, "must be a finite number"),
         ({"config": {"scene": {"cameras": [{"name": "a"}]}}}, "eye_world is missing"),
-        ({"config": {"control": {"tool_speed_mps": -1.0}}}, "tool_speed_mps must be positive"),
+        ({"config": {"control": {"tool_speed_m_s": -1.0}}}, "tool_speed_m_s must be positive"),
         ({"config": {"start_spread_rad": [1.0, 2.0]}}, "start_spread_rad must have shape"),
         ({"cameras": "camera_1"}, "is no rig.*list of names, indices"),
         ({"cameras": [0.5]}, "Camera index .* 0 to 3, got 0.5"),

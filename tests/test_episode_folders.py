@@ -94,7 +94,7 @@ def test_images_are_what_the_cameras_see(tmp_path, pixels):
     assert (first != second).any()
 
 
-DRAWN = '{"place_m": 0.2, "turn_rad": 0.05, "n_cameras": [2, 3]}'
+DRAWN = '{"max_shift_m": 0.2, "max_rotation_rad": 0.05, "n_cameras": [2, 3]}'
 
 
 def test_drawn_rigs_are_kept_with_their_keypoints(tmp_path):

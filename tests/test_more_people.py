@@ -51,7 +51,7 @@ class Crowded(RenderedCameras):
         plain = pipeline.cameras.history.schedule
         super().__init__(scene, 1, pipeline.cameras.appearance, plain)
         state = generator.make_state(
-            1, 1, sim.bodies, sim.config.motion, sim.scene.grounds, 1, sim.scene.robot.girth_m
+            1, 1, sim.bodies, sim.config.motion, sim.scene.grounds, 1, sim.scene.robot.base_radius_m
         )
         generator.reset(state, np.arange(1), [np.random.default_rng(seed)])
         self.other = generator.current(state)

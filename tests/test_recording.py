@@ -153,7 +153,7 @@ def test_the_environment_comes_back_with_its_arguments():
 
 def test_images_and_drawn_rigs_load_back(root, pixels):
     """What each episode's cameras see, where they hang in it, beside the goals."""
-    rigs = '{"place_m": 0.2, "n_cameras": [2, 3]}'
+    rigs = '{"max_shift_m": 0.2, "n_cameras": [2, 3]}'
     words = ["--perception", "keypoints", "--cameras", rigs, "--observe-images", "24", "32"]
     words += ["--keypoints", "--num-envs", "1", "--episodes", "2"]
     assert record("HRCReachGoal-v0", *words) == 0

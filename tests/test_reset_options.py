@@ -21,7 +21,9 @@ from hrc_env.vector.make import PixelVectorEnv
 
 GOAL = (0.5, 0.3, 1.1)
 STEPS = 12
-DRAWN = RigDistribution(place_m=0.2, turn_rad=0.05, focal_share=0.05, n_cameras=(2, 4))
+DRAWN = RigDistribution(
+    max_shift_m=0.2, max_rotation_rad=0.05, max_focal_change=0.05, n_cameras=(2, 4)
+)
 LATE = {"kind": "late", "cameras": ["all"], "amount": [0.0, 0.3]}
 OPTIONS: list[dict[str, Any]] = [
     {"goal": GOAL, "people": "unaware"},
@@ -212,7 +214,7 @@ def test_rigs_are_drawn_within_their_bounds_for_every_episode() -> None:
 
 def test_the_estimator_knows_the_rig_of_its_episode() -> None:
     """With cameras half a metre elsewhere, workers are tracked as well as with the scene's own."""
-    env = make(cameras=RigDistribution(place_m=0.5, turn_rad=0.1))
+    env = make(cameras=RigDistribution(max_shift_m=0.5, max_rotation_rad=0.1))
     env.reset(seed=3)
     errors_m = []
     for _ in range(60):
@@ -311,8 +313,8 @@ REFUSED: list[tuple[dict[str, Any], str]] = [
     ({"start_q": [0.0, 1.5, 0.0, 0.0, 0.0, 0.0]}, "touch"),
     ({"cameras": ["camera_9"]}, "Did you mean"),
     ({"cameras": [(1.0, 1.0, 2.4)] * 5}, "'camera_5'"),
-    ({"cameras": {"place": 0.1}}, "Did you mean 'cameras.place_m'"),
-    ({"cameras": {"place_m": 50.0}}, "in 100 draws"),
+    ({"cameras": {"max_shift": 0.1}}, "Did you mean 'cameras.max_shift_m'"),
+    ({"cameras": {"max_shift_m": 50.0}}, "in 100 draws"),
     ({"cameras": {"n_cameras": (3, 2)}}, "fewest, most"),
     ({"cameras": ["camera_1"], "faults": [{**LATE, "cameras": ["camera_2"]}]}, "camera of fault"),
     ({"faults": [{**LATE, "amount": [0.3, 0.0]}]}, "(least, most)"),
@@ -372,9 +374,9 @@ def test_factors_that_cannot_be_are_refused(factors: dict) -> None:
         make(perception="truth").set_reward(factors=factors)
 
 
-@pytest.mark.parametrize("cameras", [{"place_m": -1.0}, {"focal_share": 1.0},
-                                     {"around": "lab_gopr"}, {"n_cameras": 5},
-                                     {"place_m": 50.0}])  # fmt: skip
+@pytest.mark.parametrize("cameras", [{"max_shift_m": -1.0}, {"max_focal_change": 1.0},
+                                     {"nominal": "lab_gopr"}, {"n_cameras": 5},
+                                     {"max_shift_m": 50.0}])  # fmt: skip
 def test_rigs_that_cannot_be_are_refused_at_make(cameras: dict) -> None:
     with pytest.raises(ConfigError):
         make(cameras=cameras)
@@ -423,7 +425,7 @@ def test_images_are_of_the_rig_of_the_episode() -> None:
     for name in ("image_camera_1", "image_camera_3"):
         np.testing.assert_array_equal(whole[name], fewer[name])
     assert not fewer["image_camera_2"].any()
-    drawn, _ = env.reset(seed=1, options={"cameras": RigDistribution(turn_rad=0.2)})
+    drawn, _ = env.reset(seed=1, options={"cameras": RigDistribution(max_rotation_rad=0.2)})
     assert (drawn["image_camera_1"] != whole["image_camera_1"]).any()
     again, _ = env.reset(seed=1)
     np.testing.assert_array_equal(whole["image_camera_2"], again["image_camera_2"])
@@ -447,7 +449,7 @@ def test_images_show_no_other_rig_where_nothing_looks_through_cameras(pixels) ->
 
 def test_drawn_cameras_hang_in_the_room() -> None:
     """The laboratory's walls, and its ceiling, end at 3.045, 2.74 and 2.59 m."""
-    env = make(cameras=RigDistribution(place_m=0.3, n_cameras=4))
+    env = make(cameras=RigDistribution(max_shift_m=0.3, n_cameras=4))
     for seed in range(10):
         env.reset(seed=seed)
         eyes_world = np.abs([camera.eye_world for camera in env.rig])
@@ -455,6 +457,6 @@ def test_drawn_cameras_hang_in_the_room() -> None:
 
 
 def test_where_images_would_show_a_rig_that_is_not_drawn_it_is_refused() -> None:
-    drawn = RigDistribution(place_m=0.1)
+    drawn = RigDistribution(max_shift_m=0.1)
     with pytest.raises(ConfigError, match="at perception='truth' no rig is drawn"):
         make(perception="truth", observe_images=(32, 32), cameras=drawn)

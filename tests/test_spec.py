@@ -101,7 +101,7 @@ def own_shield(now, velocities, dt_s):
         {"robot": replace(ROBOTS["ur10e_like"], name="mine", home_q=(0.1, -1.2, 1.4, 0.2, 1.5, 0))},
         {"robot": replace(ROBOTS["ur10e_gripper"], mjcf=Path(ROBOTS["ur10e_gripper"].mjcf))},
         {"robot": ROBOTS["ur10e_cups"], "shield": ShieldConfig("ssm", margin_m=0.3)},
-        {"task": "HRCDelivery-v0", "robot": replace(ROBOTS["mobile_base"], girth_m=0.4)},
+        {"task": "HRCDelivery-v0", "robot": replace(ROBOTS["mobile_base"], base_radius_m=0.4)},
         {"config": HRCConfig(), "estimator": "paper"},
         {"config": HRCConfig(forecast_s=(0.2,)), "task": find_task("HRCReachGoal-v0")},
         {"estimator": ESTIMATORS["kalman"], "shield": SHIELDS["qp"]},

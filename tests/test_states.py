@@ -55,7 +55,7 @@ def test_the_single_environment_goes_on_from_a_state(level, n_steps):
         {"estimator": "paper_restarts"},
         {"estimator": "triangulation"},
         {"n_workers": 2, "control": "tool"},
-        {"config": {"forecast_s": (0.2,), "tracker": {"longest_delay_s": 0.2}}},
+        {"config": {"forecast_s": (0.2,), "tracker": {"max_delay_s": 0.2}}},
     ],
     ids=str,
 )

@@ -25,7 +25,7 @@ from hrc_env.tasks import BUILT_IN, DEFAULT
 
 ID = "hrc_env:HRCReach-v0"
 LEVELS = ("pixels", "keypoints", "none")
-BLIND = [{"kind": "lost", "cameras": ["all"], "from_s": 0.2, "until_s": 1.4}]
+BLIND = [{"kind": "lost", "cameras": ["all"], "start_s": 0.2, "end_s": 1.4}]
 """Nobody is seen for longer than a track lives: it is lost, and they are searched for again."""
 pytestmark = pytest.mark.usefixtures("brought")
 

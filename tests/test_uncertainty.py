@@ -83,7 +83,7 @@ def test_the_factor_holds_the_whole_covariance():
 
 def test_what_one_camera_does_not_know_lies_along_its_ray():
     """After the other cameras are gone; the root mean says nothing about the direction."""
-    lost = [{"kind": "lost", "cameras": ["camera_2", "camera_3", "camera_4"], "from_s": 0.2}]
+    lost = [{"kind": "lost", "cameras": ["camera_2", "camera_3", "camera_4"], "start_s": 0.2}]
     env = HRCEnv(perception="keypoints", faults=lost, config=ASKED)
     terms = env.split_observation(rolled(env, 40)[-1])
     factor = np.zeros((N_JOINTS, 3, 3))

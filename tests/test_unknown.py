@@ -11,7 +11,7 @@ from hrc_env.env import HRCEnv
 from hrc_env.rewards import RewardConfig
 from hrc_env.vector.env import HRCVectorEnv
 
-BLIND = [{"kind": "lost", "cameras": ["all"], "from_s": 0.4, "until_s": 2.0}]
+BLIND = [{"kind": "lost", "cameras": ["all"], "start_s": 0.4, "end_s": 2.0}]
 EMPTY_SEED = 1
 """Of an episode for one worker or none in which none is there."""
 
@@ -24,26 +24,31 @@ def played(n_steps=75, seed=3, **arguments):
     for _ in range(n_steps):
         info = env.step(np.zeros(env.action_space.shape, np.float32))[-1]
         now = env.simulation.estimate
-        said = now.unknown[0, 0], now.tracked[0, 0], now.blind_s[0, 0], info["reward/proximity"]
+        said = (
+            now.unknown[0, 0],
+            now.tracked[0, 0],
+            now.unobserved_s[0, 0],
+            info["reward/proximity"],
+        )
         told.append(said)
     return env, *map(np.array, zip(*told, strict=True))
 
 
 @pytest.mark.parametrize("kind", ["lost", "frozen"])
 def test_a_worker_whom_all_cameras_lose_is_unknown_until_they_are_seen_again(kind):
-    _, unknown, tracked, blind_s, _ = played(faults=[{**BLIND[0], "kind": kind}])
+    _, unknown, tracked, unobserved_s, _ = played(faults=[{**BLIND[0], "kind": kind}])
     assert (unknown == ~tracked).all()
     assert unknown[40:48].all()
     assert not unknown[:30].any()
     assert not unknown[-10:].any()
-    assert blind_s[45] == pytest.approx(36 * 0.04, abs=0.05)
+    assert unobserved_s[45] == pytest.approx(36 * 0.04, abs=0.05)
 
 
 def test_losing_sight_is_not_rewarded_like_being_alone():
     _, unknown, _, _, proximity = played(faults=BLIND, config={"reward": {"proximity": 3.0}})
     assert (proximity[unknown] <= -3.0 * 0.25).all()
     _, unknown, _, _, proximity = played(
-        faults=BLIND, config={"reward": {"proximity": 3.0, "unknown": 0.0}}
+        faults=BLIND, config={"reward": {"proximity": 3.0, "unknown_closeness": 0.0}}
     )
     assert unknown.any()
     assert (proximity[unknown] == 0).all()
@@ -51,8 +56,8 @@ def test_losing_sight_is_not_rewarded_like_being_alone():
 
 @pytest.mark.parametrize("worth", [-0.1, 1.5, np.nan])
 def test_what_an_unknown_worker_counts_must_be_a_share(worth):
-    with pytest.raises(ConfigError, match=r"unknown must be in \[0, 1\]"):
-        RewardConfig(unknown=worth)
+    with pytest.raises(ConfigError, match=r"unknown_closeness must be in \[0, 1\]"):
+        RewardConfig(unknown_closeness=worth)
 
 
 def test_an_empty_room_is_known_to_be_empty_and_blind_cameras_make_it_unknown():
@@ -68,14 +73,16 @@ def test_an_empty_room_is_known_to_be_empty_and_blind_cameras_make_it_unknown():
 
 def test_the_truth_is_never_unknown_and_without_cameras_everybody_is():
     for n_workers in (1, (0, 1)):
-        _, unknown, _, blind_s, _ = played(5, EMPTY_SEED, perception="truth", n_workers=n_workers)
+        _, unknown, _, unobserved_s, _ = played(
+            5, EMPTY_SEED, perception="truth", n_workers=n_workers
+        )
         assert not unknown.any()
-        assert not blind_s.any()
-    env, unknown, _, blind_s, _ = played(5, perception="none")
+        assert not unobserved_s.any()
+    env, unknown, _, unobserved_s, _ = played(5, perception="none")
     assert unknown.all()
-    assert blind_s == pytest.approx(0.04 * np.arange(2, 7))
+    assert unobserved_s == pytest.approx(0.04 * np.arange(2, 7))
     env.reset(seed=3)
-    assert env.simulation.estimate.blind_s == pytest.approx(0.04)
+    assert env.simulation.estimate.unobserved_s == pytest.approx(0.04)
     assert HRCEnv(perception="none", n_workers=0).simulation.estimate.unknown.shape == (1, 0)
 
 
@@ -83,7 +90,7 @@ def test_the_observation_says_who_is_unknown_and_for_how_long():
     env, *_ = played(45, faults=BLIND)
     terms = env.split_observation(env.step(np.zeros(6, np.float32))[0])
     assert terms["worker_unknown"] == [1.0]
-    assert terms["worker_blind"] == pytest.approx(env.simulation.estimate.blind_s[0], abs=1e-6)
+    assert terms["worker_blind"] == pytest.approx(env.simulation.estimate.unobserved_s[0], abs=1e-6)
 
 
 def test_several_environments_know_what_single_ones_do_and_states_keep_it():

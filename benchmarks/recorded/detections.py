@@ -68,7 +68,7 @@ def _detect(films: Films, cameras: list[PinholeCamera], tick: PartProgress) -> D
     rngs = [np.random.default_rng([0, 6])]
     state = tracker.init(1, 1)
     tracker.reset(state, np.arange(1), rngs)
-    detector = PoseDetector(pinholes, DetectorConfig(gate_every=round(films.frames_per_s)))
+    detector = PoseDetector(pinholes, DetectorConfig(check_every=round(films.frames_per_s)))
     rows: list[tuple[Points2, Floats, Floats]] = []
     n_frames = films.n_frames
     try:

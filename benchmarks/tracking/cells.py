@@ -97,7 +97,7 @@ def _smooth(rig: Rig, sequences: Sequences, seeds: list[int]) -> Iterator[Belief
     """
     if sequences.time_s is not None:
         px = restore_times(sequences.px, sequences.time_s)
-        config = replace(sequences.config, longest_delay_s=0.0)
+        config = replace(sequences.config, max_delay_s=0.0)
         sequences = replace(sequences, px=px, time_s=None, config=config)
     if sequences.order is None:
         clip = [sequences.keypoints(t) for t in range(len(sequences.px))]

@@ -171,7 +171,7 @@ def make_sequences(rig: Rig, condition: str, seeds: list[int]) -> Sequences:
     joints = MOTIONS.get(condition, walk)(rig.walk_m, seeds, n_frames)
     if condition == LATE:
         px, time_s = deliver(detect(rig.P, joints, Damage(), seeds), seeds)
-        config = replace(rig.tracker, longest_delay_s=LONGEST_DELAY_S)
+        config = replace(rig.tracker, max_delay_s=LONGEST_DELAY_S)
         return Sequences(joints[:, :, None], px[:, :, :, None], windows, config, time_s=time_s)
     px = detect(rig.P, joints, (CONDITIONS | SURPRISES)[condition], seeds)
     return Sequences(joints[:, :, None], px[:, :, :, None], windows, rig.tracker)
@@ -187,9 +187,9 @@ def _make_matched(rig: Rig, seeds: list[int]) -> Sequences:
         rig.tracker,
         root_acceleration=MATCHED_ROOT_ACCELERATION,
         outlier_weight=1e-9,
-        swap_begins=1e-9,
+        swap_start_probability=1e-9,
         noise_bounds=(1.0, 1.0),
-        bone_give=1.0,
+        bone_variation_scale=1.0,
         floor_std_m=np.inf,
         body_radius_m=10.0,
     )

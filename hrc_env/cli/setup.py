@@ -16,7 +16,8 @@ class Setup:
     """
 
     networks: tuple[Literal["lite", "heavy"], ...] = ()
-    """Other landmark networks to fetch, too (41 MB), for detector.folded and detector.network."""
+    """Other landmark networks to fetch, too (41 MB), for detector.folded_network and
+    detector.network."""
 
     def run(self) -> int:
         """Set up; return 0, even without OpenGL, which only pictures need."""

@@ -37,10 +37,45 @@ PEOPLE = ("activity", "body")
 Words = dict[str, tuple[str, ...]]
 _WORKER = re.compile(r"^worker_\d+/")
 MISCALIBRATED = "perception/miscalibrated"
-MORE_PEOPLE = "perception/more_people"
-N_CAMERAS, MOVED, TURNED = "episode/n_cameras", "episode/moved_m", "episode/turned_rad"
+MORE_PEOPLE = "perception/more_people_than_slots"
+N_CAMERAS = "episode/n_cameras"
+MOVED, TURNED = "episode/max_camera_shift_m", "episode/max_camera_rotation_rad"
 DELAY, LIGHT, FAULT = "episode/delay_s", "episode/light", "episode/fault_"
 """Keys of the random draws of an episode."""
+
+
+RENAMED = {
+    "cost_too_near": "cost_separation_violated",
+    "episode/moved_m": MOVED,
+    "episode/turned_rad": TURNED,
+    "perception/more_people": MORE_PEOPLE,
+    "safety/contact_came_m_s": "safety/contact_robot_speed_m_s",
+    "safety/contact_closing_m_s": "safety/contact_closing_speed_m_s",
+    "safety/too_near": "safety/separation_violated",
+    "shield/least_m": "shield/clearance_m",
+    "task/fixed_hits": "task/obstacle_hits",
+    "task/largest_n": "task/max_hand_force_n",
+    "task/screws_left": "task/screws_remaining",
+    "task/studs_left": "task/studs_remaining",
+    "task/way_left_m": "task/remaining_path_m",
+    "task/worst_m": "task/max_offset_m",
+    "task/worst_measured": "task/max_offset_measured",
+    "task/worst_rad": "task/max_rotation_rad",
+}
+"""Present keys of infos that were renamed, by their former keys."""
+
+
+class InfoDict(dict[str, Any]):
+    """An info of a reset or a step, whose `KeyError` for a former key gives the present one."""
+
+    def __missing__(self, key: str) -> Any:
+        """Raise the `KeyError` for a key that is not there."""
+        raise KeyError(_describe_renaming(key) if key in RENAMED else key)
+
+
+def _describe_renaming(key: str) -> str:
+    """Return the message for a former key of an info."""
+    return f"The info key {key!r} is called {RENAMED[key]!r} now."
 
 
 class Entry(NamedTuple):
@@ -88,7 +123,8 @@ ENTRIES: dict[str, Entry] = {
         "sum of `cost.components`: by default 1 for a step nearer than `cost.proximity_m` and 1 "
         "for a step with a touch; 0 after a reset. Other components are `towards`, contacts that "
         "begin while the robot moves towards the worker; `force`, the `contact_force_ratio` of "
-        "contacts; `too_near`; `near_miss`. Each chosen one has its own key `cost_<name>`",
+        "contacts; `separation_violated`; `near_miss`. Each chosen one has its own key "
+        "`cost_<name>`",
     ),
     "cost_sum": Entry("control steps", "the same, under the name that some safe-RL libraries read"),
     "episode_cost": Entry("control steps", "sum of `cost` over the episode so far"),
@@ -108,16 +144,16 @@ ENTRIES: dict[str, Entry] = {
         0.0,
         "safety/towards_measured",
     ),
-    "safety/too_near": Entry(
+    "safety/separation_violated": Entry(
         "0 or 1",
         "the robot moves towards a worker at more than 0.05 m/s within the protective distance of "
         "ISO/TS 15066, with both true directed speeds, 0.1 s of reaction and `time_to_stop_s`",
     ),
     "safety/time_to_stop_s": Entry("s", "time in which all joints stop, at the greatest slew"),
-    "safety/contact_came_m_s": Entry(
+    "safety/contact_robot_speed_m_s": Entry(
         "m/s", f"contact that begins: the robot's directed speed in the step before; {CAME}", 0.0
     ),
-    "safety/contact_closing_m_s": Entry(
+    "safety/contact_closing_speed_m_s": Entry(
         "m/s", f"contact that begins: that speed plus the worker's directed speed; {CAME}", 0.0
     ),
     "safety/contact_force_ratio": Entry(
@@ -178,34 +214,34 @@ ENTRIES: dict[str, Entry] = {
     "task/goals_reached": Entry("-", "goals reached in the episode so far"),
     "task/goals_missed": Entry("-", "goals of the episode so far whose time ran out"),
     "task/studs_placed": Entry("-", "pieces that rest in their places, released"),
-    "task/studs_left": Entry("-", "pieces that are not in their places"),
+    "task/studs_remaining": Entry("-", "pieces that are not in their places"),
     "task/dropped": Entry("0 or 1", "a piece lies below the table, or the tool was lost"),
     "task/screws_driven": Entry("-", "screws that hold the board"),
-    "task/screws_left": Entry("-", "screws that are not driven yet"),
-    "task/worst_m": Entry(
+    "task/screws_remaining": Entry("-", "screws that are not driven yet"),
+    "task/max_offset_m": Entry(
         "m",
         "greatest deviation of the board from its place while screws were driven; -1 before",
         -1.0,
-        "task/worst_measured",
+        "task/max_offset_measured",
     ),
-    "task/worst_rad": Entry(
+    "task/max_rotation_rad": Entry(
         "rad",
         "greatest rotation of the board from its place while screws were driven; -1 before",
         -1.0,
-        "task/worst_measured",
+        "task/max_offset_measured",
     ),
     "task/handed_over": Entry(
         "0 or 1", "the worker has the tool, and the robot has released it and moved away"
     ),
     "task/not_handed_over": Entry("0 or 1", "the opposite of `task/handed_over`"),
-    "task/largest_n": Entry(
+    "task/max_hand_force_n": Entry(
         "N", "largest force on the worker's hand in the episode so far; 0 before any", 0.0
     ),
     "task/delivered": Entry("0 or 1", "the base is in its zone, without a collision on the way"),
     "task/not_delivered": Entry("0 or 1", "the opposite of `task/delivered`"),
-    "task/fixed_hits": Entry("-", "number of collisions of the base with fixed objects"),
+    "task/obstacle_hits": Entry("-", "number of collisions of the base with fixed objects"),
     "task/people_hits": Entry("-", "number of collisions of the base with workers"),
-    "task/way_left_m": Entry("m", "length of the path to the zone"),
+    "task/remaining_path_m": Entry("m", "length of the path to the zone"),
     "is_success": Entry("0 or 1", "success of the task, as its page defines it"),
     MISCALIBRATED: Entry(
         "-",
@@ -292,6 +328,8 @@ def matching(patterns: str | Sequence[str], names: Sequence[str]) -> tuple[str, 
             f"{described(patterns)}."
         )
     for each in given:
+        if each in RENAMED:
+            raise ConfigError(_describe_renaming(each))
         if not any(fnmatch.fnmatchcase(name, each) for name in names):
             folders = dict.fromkeys(f"{name.rpartition('/')[0]}/*" for name in names if "/" in name)
             raise unknown("info", each, [*folders, *names])

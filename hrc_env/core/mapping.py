@@ -30,7 +30,8 @@ def answer_unknown_fields(record: type[RecordT]) -> type[RecordT]:
     The error names the nearest field, or the present name of one that was renamed: a class may list
     these as `RENAMED: ClassVar[Mapping[str, str]]`, new names by old ones.
     """
-    init, names = record.__init__, [each.name for each in dataclasses.fields(record)]  # type: ignore[arg-type]
+    init = record.__init__
+    names = frozenset(each.name for each in dataclasses.fields(record))  # type: ignore[arg-type]
 
     @wraps(init)
     def checked(self: RecordT, *args: Any, **values: Any) -> None:

@@ -8,12 +8,14 @@ worker, `WorkerTruth` is the worker. Observations, rewards and shields take the 
 metrics the second (`tests/test_architecture.py` verifies this).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from hrc_env.core.errors import ConfigError
+from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.typing import (
     Bools,
     Capsules,
@@ -61,12 +63,16 @@ class Roi:
     """Rotation of the region's upright direction, clockwise in the image [rad]; 0 is upright."""
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class PoseEstimate:
     """The belief about the workers.
 
     It is everything that reward, observation, shield and agent know about them.
     """
+
+    RENAMED: ClassVar[Mapping[str, str]] = {"blind_s": "unobserved_s"}
+    """Present names of fields that were renamed, by their old names."""
 
     mean_world: Points3
     """Means of the joints (B, W, J, 3) in the world frame [m]; without a track: the documented
@@ -85,9 +91,10 @@ class PoseEstimate:
     detected but not tracked, or on floor that no two cameras see (`tracking.presence`); True for
     all slots while there are more people than slots. A slot that is neither tracked nor unknown is
     empty. Default: every slot without a track is unknown."""
-    blind_s: Floats = None  # type: ignore[assignment]
-    """Time since the cameras last saw the worker, or saw that the slot is empty (B, W) [s]; without
-    any look, the time since the reset. Default: age of the joint with the youngest measurement."""
+    unobserved_s: Floats = None  # type: ignore[assignment]
+    """Time since the cameras last observed the worker, or that the slot is empty (B, W) [s];
+    without any observation, the time since the reset. Default: age of the joint with the youngest
+    measurement."""
     seen_world: Points3 = None  # type: ignore[assignment]
     """Last detected place of the worker (B, W, J, 3) [m]; NaN without any detection, or if the
     place was seen empty since. Default: the mean of a track."""
@@ -107,8 +114,8 @@ class PoseEstimate:
         given: Any = self
         if given.unknown is None:
             object.__setattr__(self, "unknown", ~self.tracked)
-        if given.blind_s is None:
-            object.__setattr__(self, "blind_s", self.age_s.min(-1))
+        if given.unobserved_s is None:
+            object.__setattr__(self, "unobserved_s", self.age_s.min(-1))
         if given.seen_world is None:
             seen = np.where(self.tracked[..., None, None], self.mean_world, np.nan)
             object.__setattr__(self, "seen_world", seen)

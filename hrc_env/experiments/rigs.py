@@ -44,7 +44,7 @@ class Turn:
 def keep_cameras(rig: Sequence[CameraConfig], kept: Rig) -> Turn:
     """Return a turn with a rig of which only the given cameras work after the warm-up."""
     lost = tuple(camera.name for c, camera in enumerate(rig) if c not in kept)
-    return Turn(tuple(rig), (FaultConfig("lost", lost, from_s=WARM_UP_S),) if lost else ())
+    return Turn(tuple(rig), (FaultConfig("lost", lost, start_s=WARM_UP_S),) if lost else ())
 
 
 def make_turns(scene: str, rigs: Sequence[Rig]) -> tuple[Turn, ...]:

@@ -43,7 +43,7 @@ class NoticeParams(NamedTuple):
     """Approach speed above which the arm is noticed from twice that distance [m/s]."""
     calm_s: float
     """Time after a reaction in which nothing startles a worker [s]."""
-    girth_m: float
+    base_radius_m: float
     """Reach of a driving robot around the points that are watched [m]; 0 for an arm."""
 
 
@@ -74,10 +74,10 @@ def notice_robot(
             if worker.clock_s >= worker.reacts_at_s:
                 worker.reacts_at_s = math.inf
                 _react(w, workers[b])
-                calm_s = params.calm_s if params.girth_m == 0.0 else MACHINE_CALM_S
+                calm_s = params.calm_s if params.base_radius_m == 0.0 else MACHINE_CALM_S
                 worker.calm_until_s = worker.clock_s + worker.reaction_s + calm_s
             elif worker.reacts_at_s == math.inf and worker.clock_s > worker.calm_until_s:
-                if params.girth_m > 0.0:
+                if params.base_radius_m > 0.0:
                     chest, chest_velocity = position_world[b, w, CHEST], velocity_world[b, w, CHEST]
                     startled = _is_machine_startling(
                         dt_s, params, robot_world[b], chest, chest_velocity, worker
@@ -229,7 +229,7 @@ def _is_machine_startling(
             nearest_s = -(x * vx + y * vy) / max(vx * vx + vy * vy, 1e-6)
             later_s = min(nearest_s, MACHINE_S)
         if later_s >= 0.0 and (
-            math.hypot(x + later_s * vx, y + later_s * vy) - params.girth_m < params.notice_m
+            math.hypot(x + later_s * vx, y + later_s * vy) - params.base_radius_m < params.notice_m
         ):
             return True
     return False

@@ -6,10 +6,10 @@ interpreters of its own, so that results do not depend on the order in which cro
 
 import functools
 import threading
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, ClassVar, TypeAlias, TypeVar
 
 import cv2
 import numpy as np
@@ -63,14 +63,22 @@ DETECTORS: Registry[Callable[[], KeypointFunction] | None] = Registry(
 class DetectorConfig:
     """Settings of the detector: its networks, and the thresholds of detections."""
 
+    RENAMED: ClassVar[Mapping[str, str]] = {
+        "gate_every": "check_every",
+        "sure_presence": "check_presence",
+        "folded": "folded_network",
+        "max_offset": "max_hip_offset",
+    }
+    """Present names of fields that were renamed, by their old names."""
+
     min_presence: float = 0.5
     """Least person flag [0..1] of landmarks that count; the default is MediaPipe's."""
-    sure_presence: float = 0.9
+    check_presence: float = 0.9
     """Person flag [0..1] below which the detector stage checks a detection."""
-    gate_every: int = 25
+    check_every: int = 25
     """Number of detections after which the detector stage checks one in any case; 25 is once a
     second at 25 Hz."""
-    max_offset: float = 0.25
+    max_hip_offset: float = 0.25
     """Greatest distance of hips from the middle of the window, as a share of its side; hips beyond
     it are another person's."""
     outside_confidence: float = 0.1
@@ -87,21 +95,21 @@ class DetectorConfig:
     """Function that finds joints in crops: "blazepose" for BlazePose's landmark network, or the
     name of a registered one (`hrc_env.register_detector`); searches for people always use
     BlazePose."""
-    folded: str = "full"
+    folded_network: str = "full"
     """Landmark network for workers that bend, squat or kneel; "heavy" is more exact, and slower."""
 
     def __post_init__(self) -> None:
         check_names("detector.runtime", [self.runtime], network.RUNTIMES)
         check_names("detector.keypoints", [self.keypoints], DETECTORS)
         check_names("detector.network", [self.network], network.NETWORKS)
-        check_names("detector.folded", [self.folded], network.NETWORKS)
-        check_fields(self, "be in (0, 1]", "min_presence", "sure_presence", "outside_confidence")
-        check_fields(self, "be positive", "gate_every", "search_every", "max_offset")
+        check_names("detector.folded_network", [self.folded_network], network.NETWORKS)
+        check_fields(self, "be in (0, 1]", "min_presence", "check_presence", "outside_confidence")
+        check_fields(self, "be positive", "check_every", "search_every", "max_hip_offset")
 
     @property
     def weights(self) -> tuple[str, ...]:
         """Names of the weights that these networks need."""
-        landmark = dict.fromkeys((self.network, self.folded))
+        landmark = dict.fromkeys((self.network, self.folded_network))
         return ("pose_detection", *(f"pose_landmark_{name}" for name in landmark))
 
 
@@ -222,7 +230,7 @@ class PoseDetector(Stateful):
         people = drop_duplicates([one for each in done for one in each.found], len(self.cameras))
         self.blank = frozenset(which) - {each.camera for each in done if each.is_usable}
         checked = [(c, window) for c, windows in enumerate(people) for window in windows]
-        sure = replace(self.config, min_presence=self.config.sure_presence)
+        sure = replace(self.config, min_presence=self.config.check_presence)
         joints_of = self._run_jobs(
             functools.partial(
                 _find_joints, self._crop(source, c, window).picture, window, True, False, sure
@@ -297,7 +305,7 @@ class PoseDetector(Stateful):
 
     def _must_check(self, count: int, camera: int) -> bool:
         """Return whether the detector stage is due; cameras take turns, to spread its cost."""
-        every = self.config.gate_every
+        every = self.config.check_every
         return count == 0 or (count + camera * every // len(self.cameras)) % every == 0
 
     def _run_jobs(self, jobs: Iterable[Callable[[_Networks], ResultT]]) -> list[ResultT]:
@@ -346,7 +354,7 @@ def _no_detection(windows: Sequence[Roi | None]) -> Detection:
 
 def _make_networks(config: DetectorConfig) -> _Networks:
     """Return the networks of one thread."""
-    names, runtime = {config.network, config.folded}, config.runtime
+    names, runtime = {config.network, config.folded_network}, config.runtime
     landmark = {name: network.load_landmarker(name, runtime) for name in names}
     make = DETECTORS[config.keypoints]
     return _Networks(network.load_person_detector(runtime), landmark, make and make())
@@ -397,13 +405,13 @@ def _find_joints(
     """
     if nets.registered is not None:
         return call_detector(nets.registered, crop, window)
-    landmark = nets.landmark[config.folded if folded else config.network]
+    landmark = nets.landmark[config.folded_network if folded else config.network]
     points, presence, heat = landmark(blazepose.landmark_input(crop))
     if presence < config.min_presence:
         return None
-    if check or presence < config.sure_presence:
+    if check or presence < config.check_presence:
         offsets = [np.hypot(*(person.hip - 0.5)) for person in find_people(nets.detect, crop)]
-        if min(offsets, default=np.inf) > config.max_offset:
+        if min(offsets, default=np.inf) > config.max_hip_offset:
             return None
     joints = blazepose.decode_landmarks(points, heat)[BLAZEPOSE_INDEX]
     joints[:, :2] = blazepose.to_image(joints[:, :2], window)

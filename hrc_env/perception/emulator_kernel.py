@@ -62,7 +62,7 @@ N_OF_BODY = 4
 mistake."""
 FOLLOWED_M = 0.5
 """Greatest distance of a track's hips from a worker's [m] at which windows of the track show the
-worker: about `DetectorConfig.max_offset` of a window's side."""
+worker: about `DetectorConfig.max_hip_offset` of a window's side."""
 FIRST_OF_LEGS = JOINT["left_knee"]
 """First joint of those that are exchanged with the legs."""
 

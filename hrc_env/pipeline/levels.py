@@ -83,8 +83,8 @@ def make_pipeline(
         raise unknown("perception", level, LEVELS)
     check_supported(level, config.appearance, config.faults, shows_images)
     schedule = Schedule(scene.rig, config.faults, config.ctrl_dt)
-    memory_s = max(config.tracker.longest_delay_s, min(schedule.longest_delay_s, 1.0))
-    settings = replace(config.tracker, longest_delay_s=memory_s)
+    memory_s = max(config.tracker.max_delay_s, min(schedule.max_delay_s, 1.0))
+    settings = replace(config.tracker, max_delay_s=memory_s)
     tracker = make_estimator(estimator, projections(scene.cameras), config.ctrl_dt, settings)
     if level == "truth":
         absence = oracle.estimate_absence(batch, scene.n_workers, config.tracker)
@@ -209,13 +209,13 @@ class NoPerception(PerceptionPipeline):
 
     def reset(self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators) -> None:
         """Begin environments `ids` anew, with a prior of age zero."""
-        self.prior.blind_s[ids] = 0.0
+        self.prior.unobserved_s[ids] = 0.0
 
     def perceive(
         self, ids: Ints, sensor_rngs: Generators, tracker_rngs: Generators
     ) -> PoseEstimate:
         """Return the prior of environments `ids`, older by a step."""
-        self.prior.blind_s[ids] += self.dt_s
+        self.prior.unobserved_s[ids] += self.dt_s
         return rows(self.prior, ids)
 
     def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:

@@ -270,7 +270,7 @@ class PoseTracking(PerceptionPipeline):
         whole = len(ids) == len(self.keypoints.px)
         state = self.state if whole else rows(self.state, ids)
         later = our_joints(self.tracker.forecast(state, horizon_s), self.setup.calibration)
-        kept = {name: getattr(now, name) for name in ("unknown", "blind_s", "seen_world")}
+        kept = {name: getattr(now, name) for name in ("unknown", "unobserved_s", "seen_world")}
         return replace(later, **kept)
 
     def detect(self, ids: Ints, expected: PoseEstimate, sensor_rngs: Generators) -> Keypoints:

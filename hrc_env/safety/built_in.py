@@ -195,7 +195,7 @@ def _describe_bodies(belief: Belief, pose: ArmPose, is_lost: Bools, config: Shie
         cov=cov,
         age_s=estimate.age_s,
         is_located=estimate.tracked | is_lost,
-        moved_m=np.where(is_lost, walking_m_s * estimate.blind_s, 0.0),
+        moved_m=np.where(is_lost, walking_m_s * estimate.unobserved_s, 0.0),
         contact_m_s=contact_m_s,
         robot_share_m_s=touches.capsule_m_s,
     )

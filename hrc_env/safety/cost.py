@@ -13,7 +13,9 @@ from hrc_env.safety.incidents import TOWARDS, Incident
 _BY_INCIDENT: dict[str, Callable[[Records2[Incident]], Floats]] = {
     "towards": lambda incidents: (incidents["kind"] == TOWARDS).sum(1).astype(float),
     "force": lambda incidents: np.nansum(incidents["force_ratio"], axis=1),
-    "too_near": lambda incidents: incidents["is_too_near"].any(1).astype(float),
+    "separation_violated": lambda incidents: (
+        incidents["is_separation_violated"].any(1).astype(float)
+    ),
     "near_miss": lambda incidents: incidents["is_near_miss"].sum(1).astype(float),
 }
 """Components of the cost (B,) by incidents (B, W): contacts that begin while the robot moves
@@ -21,6 +23,8 @@ towards the worker; the force of contacts that begin, as a share of what the bod
 robot moves towards a worker within the protective distance; near misses."""
 COMPONENTS = ("proximity", "contact", *_BY_INCIDENT)
 """Components that `CostConfig.components` may name."""
+FORMER_COMPONENT = "too_near"
+"""Former name of the component "separation_violated"."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +40,10 @@ class CostConfig:
 
     def __post_init__(self) -> None:
         check_fields(self, "not be negative", "proximity_m")
+        if FORMER_COMPONENT in self.components:
+            raise ConfigError(
+                f"The cost component {FORMER_COMPONENT!r} is called 'separation_violated' now."
+            )
         check_names("cost component", self.components, COMPONENTS)
         if not self.components or len(set(self.components)) < len(self.components):
             raise ConfigError(

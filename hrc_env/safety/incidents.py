@@ -93,15 +93,15 @@ class Incident:
     """Kind of a contact that begins, as an index into `KINDS`; -1: none begins."""
     region: int
     """Region of the body that is touched, as an index into `REGION_NAMES`; -1: none."""
-    came_m_s: float
+    robot_speed_m_s: float
     """Directed speed of the robot before a contact that begins [m/s]; NaN: none begins."""
-    closing_m_s: float
+    closing_speed_m_s: float
     """Closing speed of a contact that begins [m/s]; NaN: none begins."""
     force_ratio: float
     """Force of a contact that begins, as a share of what is permitted; NaN: none begins."""
     severity: int
     """`WITHIN`, `BEYOND` or `NEVER`; 0: no contact begins."""
-    is_too_near: bool
+    is_separation_violated: bool
     """Whether the robot moves towards the worker within the protective distance."""
     is_near_miss: bool
     """Whether a near miss ends."""
@@ -114,11 +114,11 @@ class Summary:
     """Directed speed of the robot towards the nearest worker [m/s]."""
     worker_towards_m_s: float
     """Directed speed of the nearest worker towards the robot [m/s]."""
-    too_near: float
+    separation_violated: float
     """1 if the robot moves towards any worker within the protective distance, else 0."""
-    contact_came_m_s: float
+    contact_robot_speed_m_s: float
     """Greatest directed speed of the robot before a contact that begins [m/s]."""
-    contact_closing_m_s: float
+    contact_closing_speed_m_s: float
     """Greatest closing speed of a contact that begins [m/s]."""
     contact_force_ratio: float
     """Greatest force of a contact that begins, as a share of what is permitted."""
@@ -138,8 +138,8 @@ HISTORY, INCIDENT, SUMMARY = dtype_of(WorkerHistory), dtype_of(Incident), dtype_
 NOT_ALWAYS_MEASURED = (
     "robot_towards_m_s",
     "worker_towards_m_s",
-    "contact_came_m_s",
-    "contact_closing_m_s",
+    "contact_robot_speed_m_s",
+    "contact_closing_speed_m_s",
     "contact_force_ratio",
 )
 """Fields of `Summary` that may be NaN."""
@@ -225,7 +225,7 @@ def detect_incidents(
             reaction_s=REACTION_S,
             stopping_s=stop_s[b],
         )
-        incidents["is_too_near"][b, w] = incidents["separation_m"][b, w] < least_m
+        incidents["is_separation_violated"][b, w] = incidents["separation_m"][b, w] < least_m
     return incidents
 
 
@@ -264,7 +264,7 @@ def _rate_contact(
 ) -> None:
     """Write the force and the severity of a contact; the limit of the head is that of clamping."""
     bears_n = region.transient_n or region.quasi_static_n
-    force_n = contact_force(region.name, incidents["closing_m_s"][b, w], robot_kg)
+    force_n = contact_force(region.name, incidents["closing_speed_m_s"][b, w], robot_kg)
     incidents["force_ratio"][b, w] = force_n / bears_n
     within = WITHIN if incidents["force_ratio"][b, w] <= 1.0 else BEYOND
     incidents["severity"][b, w] = within if region.is_touched else NEVER
@@ -292,18 +292,24 @@ def _advance_history(
     for b in range(history.shape[0]):
         for w in range(history.shape[1]):
             past, now, gap = history[b, w], incidents[b, w], gaps_m[0, b, w]
-            now.separation_m, now.region, now.severity, now.is_too_near = gap, -1, 0, False
+            now.separation_m, now.region, now.severity, now.is_separation_violated = (
+                gap,
+                -1,
+                0,
+                False,
+            )
             now.robot_m_s = (gaps_m[1, b, w] - gap) / took_s
             now.worker_m_s = (gaps_m[2, b, w] - gap) / took_s
             is_touching = first_touch[b, w] >= 0
-            now.kind, now.came_m_s, now.closing_m_s, now.force_ratio = -1, np.nan, np.nan, np.nan
+            now.kind, now.force_ratio = -1, np.nan
+            now.robot_speed_m_s = now.closing_speed_m_s = np.nan
             if is_touching and past.since_s >= CONTACT_GAP_S:
                 speed = past.robot_m_s
                 now.kind = TOWARDS if speed > MOVING_M_S else STANDING
                 if speed < -MOVING_M_S:
                     now.kind = FLEEING
-                now.came_m_s = speed
-                now.closing_m_s = max(speed + _replace_nan(now.worker_m_s), 0.0)
+                now.robot_speed_m_s = speed
+                now.closing_speed_m_s = max(speed + _replace_nan(now.worker_m_s), 0.0)
                 past.contacts[now.kind] += 1
             past.robot_m_s = _replace_nan(now.robot_m_s)
             past.since_s = 0.0 if is_touching else past.since_s + dt_s
@@ -337,8 +343,9 @@ def _write_summaries(
     for b in range(len(incidents)):
         total, least = summaries[b], np.inf
         total.robot_towards_m_s = total.worker_towards_m_s = np.nan
-        total.contact_came_m_s = total.contact_closing_m_s = total.contact_force_ratio = np.nan
-        total.contact_severity = total.too_near = total.near_misses = 0.0
+        total.contact_robot_speed_m_s = total.contact_closing_speed_m_s = np.nan
+        total.contact_force_ratio = np.nan
+        total.contact_severity = total.separation_violated = total.near_misses = 0.0
         total.contacts_towards = total.contacts_fleeing = total.contacts_standing = 0.0
         for w in range(incidents.shape[1]):
             one, past = incidents[b, w], history[b, w]
@@ -346,9 +353,15 @@ def _write_summaries(
                 least = one.separation_m
                 total.robot_towards_m_s = one.robot_m_s
                 total.worker_towards_m_s = one.worker_m_s
-            total.too_near = 1.0 if one.is_too_near else total.too_near
-            total.contact_came_m_s = _find_greater(total.contact_came_m_s, one.came_m_s)
-            total.contact_closing_m_s = _find_greater(total.contact_closing_m_s, one.closing_m_s)
+            total.separation_violated = (
+                1.0 if one.is_separation_violated else total.separation_violated
+            )
+            total.contact_robot_speed_m_s = _find_greater(
+                total.contact_robot_speed_m_s, one.robot_speed_m_s
+            )
+            total.contact_closing_speed_m_s = _find_greater(
+                total.contact_closing_speed_m_s, one.closing_speed_m_s
+            )
             total.contact_force_ratio = _find_greater(total.contact_force_ratio, one.force_ratio)
             total.contact_severity = max(total.contact_severity, one.severity)
             total.contacts_towards += past.contacts[TOWARDS]

@@ -42,7 +42,7 @@ class Undetected:
 def find_undetected(belief: Belief, config: ShieldConfig) -> Undetected:
     """Return the workers that are lost, and the speed limit for people that are not detected."""
     estimate = belief.estimate
-    lately = estimate.tracked & (estimate.blind_s <= config.stale_after_s)
+    lately = estimate.tracked & (estimate.unobserved_s <= config.stale_after_s)
     lost = ~lately & np.isfinite(estimate.seen_world[..., 0, 0])
     never_seen = estimate.unknown & ~lost
     limit = _limit_near_hidden_hands(belief, config)

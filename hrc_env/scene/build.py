@@ -120,7 +120,7 @@ class Scene:
     """(N,) home pose of the robot [rad]."""
     servo_lead_s: Floats
     """(N,) lead of the rate servos [s]: inertia at the home pose over damping, joint by joint."""
-    watched: Ints
+    watched_capsules: Ints
     """Indices of the chain's capsules that workers watch."""
     worker_mocap: Ints
     """(W, S) mocap row of every body segment of every worker."""
@@ -241,7 +241,7 @@ def _build(recipe: Recipe) -> Scene:
         cameras=make_cameras(select(recipe.config.cameras, recipe.cameras)),
         home_q=np.array(robot.home_q),
         servo_lead_s=servo_lead_s(robot, model),
-        watched=np.array([robot.capsules.index(name) for name in robot.watched]),
+        watched_capsules=np.array([robot.capsules.index(name) for name in robot.watched_capsules]),
         worker_mocap=np.stack(rows) if rows else np.zeros((0, 0), np.int64),
         worker_capsules=np.array(geoms, np.int64).reshape(n_workers, len(body.capsule_names)),
         obstacles=still,

@@ -4,8 +4,9 @@ It changes images and nothing else: places, occlusion, the workers' motion, goal
 those of the same seed without it. It is drawn from a random stream of its own.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import mujoco
 import numpy as np
@@ -37,6 +38,9 @@ STREAM = 0x10075
 class AppearanceConfig:
     """Ranges of the visual domain randomization; with the defaults nothing is randomized."""
 
+    RENAMED: ClassVar[Mapping[str, str]] = {"plain": "untextured"}
+    """Present names of fields that were renamed, by their old names."""
+
     light: tuple[float, float] = (1.0, 1.0)
     """Least and greatest factor on the strength of all light."""
     light_turn_deg: float = 0.0
@@ -45,7 +49,7 @@ class AppearanceConfig:
     """Largest tilt of the directions of lamps and sun [deg]."""
     warmth: float = 0.0
     """Largest share by which light is redder and less blue, or less red and bluer."""
-    plain: float = 0.0
+    untextured: float = 0.0
     """Share of the scene's surfaces that lose their texture (wood, concrete, plaster)."""
     tint: float = 0.0
     """Largest share by which each colour channel of each surface of the scene is darker."""
@@ -66,7 +70,7 @@ class AppearanceConfig:
                 f"{self.light}; (0.5, 1.3) is from half the light to a third more."
             )
         bounds = {"light_turn_deg": 180.0, "light_tilt_deg": 60.0, "litter": MOST_LITTER}
-        shares = dict.fromkeys(("warmth", "plain", "tint", "clothing", "skin", "hat"), 1)
+        shares = dict.fromkeys(("warmth", "untextured", "tint", "clothing", "skin", "hat"), 1)
         for name, most in (bounds | shares).items():
             if not 0 <= getattr(self, name) <= most:
                 raise ConfigError(f"{name} must be from 0 to {most:g}, got {getattr(self, name)}.")
@@ -81,7 +85,7 @@ VARIED = AppearanceConfig(
     light_turn_deg=180.0,
     light_tilt_deg=25.0,
     warmth=0.2,
-    plain=0.3,
+    untextured=0.3,
     tint=0.5,
     clothing=0.6,
     skin=0.5,
@@ -95,7 +99,7 @@ APPEARANCES: dict[str, AppearanceConfig] = {
     "lights": AppearanceConfig(
         light=(0.4, 1.4), light_turn_deg=180.0, light_tilt_deg=40.0, warmth=0.3
     ),
-    "surfaces": AppearanceConfig(plain=0.5, tint=0.7, litter=40),
+    "surfaces": AppearanceConfig(untextured=0.5, tint=0.7, litter=40),
     "people": AppearanceConfig(clothing=0.8, skin=0.6, hat=0.5),
 }
 """Randomizations by name: none, all, and of one kind at a time."""
@@ -120,7 +124,7 @@ class Look(NamedTuple):
     """(W, 3) factors on the colours of skins."""
     has_hat: Floats
     """(W,) 1 for a worker with a hat on, else 0."""
-    plain: float
+    untextured: float
     """Share of surfaces without their textures."""
     tint: float
     """Largest share by which the colour channels of surfaces are darker."""
@@ -150,7 +154,7 @@ def draw_look(config: AppearanceConfig, n_workers: int, rng: np.random.Generator
         clothing_rgb=1.0 - config.clothing * own.uniform(0, 1, (n_workers, 3)),
         skin_rgb=np.repeat(1.0 - config.skin * own.uniform(0, 1, (n_workers, 1)), 3, 1),
         has_hat=(own.uniform(0, 1, n_workers) < config.hat).astype(float),
-        plain=config.plain,
+        untextured=config.untextured,
         tint=config.tint,
         n_litter=int(own.integers(config.litter + 1)),
         seed=int(own.integers(2**31)),
@@ -231,7 +235,7 @@ def _randomize_surfaces(model: mujoco.MjModel, built: mujoco.MjModel, look: Look
     still = np.unique(built.geom_matid[(built.geom_bodyid == 0) & (built.geom_matid >= 0)])
     tint = 1.0 - look.tint * draws.uniform(0, 1, (len(still), 3))
     has_picture = (built.mat_texid[still] >= 0).any(1)
-    plain = has_picture & (draws.uniform(0, 1, len(still)) < look.plain)
+    plain = has_picture & (draws.uniform(0, 1, len(still)) < look.untextured)
     colour = np.where(plain[:, None], PLAIN_RGB, built.mat_rgba[still, :3])
     model.mat_rgba[still, :3] = colour * tint
     model.mat_texid[:] = built.mat_texid

@@ -1,14 +1,15 @@
 """Distribution of camera rigs, from which one is drawn for every episode."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from hrc_env.core.brought import check_kinds
 from hrc_env.core.errors import ConfigError, check_fields, unknown, whole
+from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.streams import children
 from hrc_env.core.typing import Floats
 from hrc_env.geometry.camera_config import MOST_CAMERAS, CameraConfig, axes_of, intrinsics
@@ -32,6 +33,7 @@ class CameraCounts(NamedTuple):
     """Greatest number of cameras."""
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class RigDistribution:
     """Rigs around a nominal rig: poses, lenses and number of cameras are drawn in every episode.
@@ -42,13 +44,21 @@ class RigDistribution:
     Levels without cameras draw none.
     """
 
-    around: str | tuple[CameraConfig, ...] = ()
+    RENAMED: ClassVar[Mapping[str, str]] = {
+        "around": "nominal",
+        "place_m": "max_shift_m",
+        "turn_rad": "max_rotation_rad",
+        "focal_share": "max_focal_change",
+    }
+    """Present names of fields that were renamed, by their old names."""
+
+    nominal: str | tuple[CameraConfig, ...] = ()
     """Nominal rig: its name ("lab_gopro") or its cameras; empty for the scene's own."""
-    place_m: float = 0.0
+    max_shift_m: float = 0.0
     """Largest shift of each camera from its nominal place along each axis [m]."""
-    turn_rad: float = 0.0
+    max_rotation_rad: float = 0.0
     """Largest rotation of each camera about any axis [rad]."""
-    focal_share: float = 0.0
+    max_focal_change: float = 0.0
     """Largest share by which a focal length is longer or shorter."""
     lenses: tuple[Lens, ...] = ()
     """Lenses of which each camera has one; empty for the nominal lenses."""
@@ -57,10 +67,10 @@ class RigDistribution:
     drawn, too; images of the others (`observe_images`) are black."""
 
     def __post_init__(self) -> None:
-        if isinstance(self.around, str) and self.around not in RIGS:
-            raise unknown("rig in RigDistribution.around", self.around, RIGS)
-        check_fields(self, "not be negative", "place_m", "turn_rad")
-        check_fields(self, "be in [0, 1)", "focal_share")
+        if isinstance(self.nominal, str) and self.nominal not in RIGS:
+            raise unknown("rig in RigDistribution.nominal", self.nominal, RIGS)
+        check_fields(self, "not be negative", "max_shift_m", "max_rotation_rad")
+        check_fields(self, "be in [0, 1)", "max_focal_change")
         if self.lenses:
             check_kinds("RigDistribution.lenses", self.lenses, Lens)
         if self.n_cameras is not None:
@@ -83,7 +93,7 @@ class RigDistribution:
     @property
     def rig(self) -> tuple[CameraConfig, ...]:
         """The nominal rig; empty for the scene's own."""
-        return RIGS[self.around] if isinstance(self.around, str) else self.around
+        return RIGS[self.nominal] if isinstance(self.nominal, str) else self.nominal
 
     def counts(self, n_cameras: int) -> CameraCounts:
         """Return the fewest and the most cameras of an episode, for a rig of `n_cameras`."""
@@ -93,7 +103,7 @@ class RigDistribution:
         if high > n_cameras:
             raise ConfigError(
                 f"RigDistribution.n_cameras={self.n_cameras}: the rig that it is around has "
-                f"{n_cameras} cameras. Name no more, or give `around` more of them."
+                f"{n_cameras} cameras. Name no more, or give `nominal` more of them."
             )
         return CameraCounts(low, high)
 
@@ -133,9 +143,9 @@ def _draw_camera(
     refused = ""
     for _ in range(TRIES):
         lens, axis = camera.lens, rng.standard_normal(3)
-        by_m = distribution.place_m * rng.uniform(-1, 1, 3)
-        turn_rad = distribution.turn_rad * rng.uniform() * axis / np.linalg.norm(axis)
-        focal = 1.0 + distribution.focal_share * rng.uniform(-1, 1)
+        by_m = distribution.max_shift_m * rng.uniform(-1, 1, 3)
+        turn_rad = distribution.max_rotation_rad * rng.uniform() * axis / np.linalg.norm(axis)
+        focal = 1.0 + distribution.max_focal_change * rng.uniform(-1, 1)
         if distribution.lenses:
             lens = distribution.lenses[rng.integers(len(distribution.lenses))]
         try:

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import mujoco
 import numpy as np
@@ -77,6 +77,12 @@ class Suction:
 class Robot:
     """A serial arm, or a mobile base; names are those of its MJCF."""
 
+    RENAMED: ClassVar[Mapping[str, str]] = {
+        "watched": "watched_capsules",
+        "girth_m": "base_radius_m",
+    }
+    """Present names of fields that were renamed, by their old names."""
+
     name: str
     """Name of the robot in `robot=`."""
     mjcf: str | Path
@@ -85,7 +91,7 @@ class Robot:
     """The N hinges and slides, from the foot to the tool."""
     capsules: tuple[str, ...]
     """Capsule geoms that represent the surface in contacts, distances and occlusion."""
-    watched: tuple[str, ...]
+    watched_capsules: tuple[str, ...]
     """Capsules with far ends that workers watch."""
     tool_site: str
     """Site at the tool point."""
@@ -102,9 +108,9 @@ class Robot:
     drives: bool = False
     """Whether the robot drives on the floor, with its foot at the world's origin; else its foot is
     on the scene's pedestal."""
-    girth_m: float = 0.0
-    """Radius of a mobile base round the far ends of `watched` [m]; people keep clear of all of it,
-    from the floor upwards."""
+    base_radius_m: float = 0.0
+    """Radius of a mobile base round the far ends of `watched_capsules` [m]; people keep clear of
+    all of it, from the floor upwards."""
     slew: tuple[float, ...] = ()
     """Limit on the change of each joint's commanded velocity [rad/s^2]; empty for
     `SceneConfig.slew_rad_s2` at every joint."""
@@ -231,7 +237,7 @@ def check_robot(robot: Robot) -> None:
     if not (robot.joints and robot.capsules):
         raise ConfigError(f"{robot.name}: joints and capsules must name at least one each.")
     chain = make_chain(robot, (0.0, 0.0, 0.0))
-    check_names(f"watched capsule of {robot.name}", robot.watched, robot.capsules)
+    check_names(f"watched capsule of {robot.name}", robot.watched_capsules, robot.capsules)
     if grips := robot.hand or robot.suction:
         check_names(f"capsule for the hand of {robot.name}", grips.spans, robot.capsules)
     low, high = chain.range_rad.T

@@ -98,7 +98,7 @@ def robot_from_mjcf(
         mjcf=spec.to_xml(),
         joints=tuple(joints),
         capsules=tuple(names),
-        watched=tuple(watched or names),
+        watched_capsules=tuple(watched or names),
         tool_site=site,
         home_q=home,
         spread_rad=_limit_spread(_one_a_joint("spread_rad", spread_rad, n), spec, joints),

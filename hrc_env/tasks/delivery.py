@@ -373,9 +373,9 @@ class Delivery(Task[DeliveryConfig, Records1[DeliveryState]]):
         return {
             "task/delivered": delivered,
             "task/not_delivered": 1.0 - delivered,
-            "task/fixed_hits": state["hits"][:, 0].astype(float),
+            "task/obstacle_hits": state["hits"][:, 0].astype(float),
             "task/people_hits": state["hits"][:, 1].astype(float),
-            "task/way_left_m": state["way_m"].copy(),
+            "task/remaining_path_m": state["way_m"].copy(),
             "is_success": delivered,
         }
 

@@ -103,9 +103,9 @@ class DrywallState:
     """Number of screws that are driven."""
     boring: bool
     """Whether a screw is being driven."""
-    worst_m: float
+    max_offset_m: float
     """Largest distance of the board from its target while screws were driven [m]."""
-    worst_rad: float
+    max_rotation_rad: float
     """Largest turn of the board against its target while screws were driven [rad]."""
     spoilt: bool
     """Whether the board was out of place while a screw was driven."""
@@ -252,7 +252,7 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
         ),
     )
     achieved = "task/screws_driven"
-    failed = "task/screws_left"
+    failed = "task/screws_remaining"
     starts = (
         "The arm is near home. The board lies on the stack, moved by up to 2 cm and turned by up "
         "to 0.06 rad. The worker waits out of reach until it is pressed against the studs; without "
@@ -325,9 +325,11 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
         driven, boring = _advance_screws(state, world, dt_s)
         step["driven"] = driven - state["driven"]
         state["driven"], state["boring"] = driven, boring
-        state["worst_m"] = np.where(boring, np.maximum(state["worst_m"], off_m), state["worst_m"])
-        state["worst_rad"] = np.where(
-            boring, np.maximum(state["worst_rad"], off_rad), state["worst_rad"]
+        state["max_offset_m"] = np.where(
+            boring, np.maximum(state["max_offset_m"], off_m), state["max_offset_m"]
+        )
+        state["max_rotation_rad"] = np.where(
+            boring, np.maximum(state["max_rotation_rad"], off_rad), state["max_rotation_rad"]
         )
         state["spoilt"] |= boring & ~fine
         done = (driven == len(SCREWS_M)) & ~board.held[:, 0] & fine & ~state["spoilt"]
@@ -389,9 +391,9 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
         begun = (state["driven"] > 0) | state["boring"]
         return {
             "task/screws_driven": state["driven"].astype(float),
-            "task/screws_left": len(SCREWS_M) - state["driven"].astype(float),
-            "task/worst_m": np.where(begun, state["worst_m"], np.nan),
-            "task/worst_rad": np.where(begun, state["worst_rad"], np.nan),
+            "task/screws_remaining": len(SCREWS_M) - state["driven"].astype(float),
+            "task/max_offset_m": np.where(begun, state["max_offset_m"], np.nan),
+            "task/max_rotation_rad": np.where(begun, state["max_rotation_rad"], np.nan),
             "is_success": state["done"].astype(float),
         }
 

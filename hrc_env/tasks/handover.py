@@ -119,7 +119,7 @@ class HandoverState:
     """Index of the worker that has taken it."""
     push: Annotated[Floats, (6,)]
     """Force [N] and torque [Nm] of the hand at the tool's middle, in the world frame."""
-    largest_n: float
+    max_hand_force_n: float
     """Greatest force on the hand in this episode [N]."""
     away_s: float
     """Time for which the fingers have left the tool [s]."""
@@ -207,7 +207,7 @@ def _pull_tools(
     """Write the push of hands that have taken a tool: springs with damping to where they grip.
 
     Args:
-        state: (B,) of which `push`, `taken_s`, `largest_n` and `dropped` are written.
+        state: (B,) of which `push`, `taken_s`, `max_hand_force_n` and `dropped` are written.
         workers: places and velocities of the hands.
         tool: (B, 1) the tools.
         handle: the tools' handles.
@@ -230,7 +230,7 @@ def _pull_tools(
     push = np.where(state["taken"][:, None], np.concatenate([force, torque], axis=1), 0.0)
     state["push"] = push
     force_n = np.linalg.norm(push[:, :3], axis=1)
-    state["largest_n"] = np.maximum(state["largest_n"], force_n)
+    state["max_hand_force_n"] = np.maximum(state["max_hand_force_n"], force_n)
     lost = state["taken"] & (np.linalg.norm(stretch, axis=-1) > 2 * APART_M)
     state["dropped"] |= lost
 
@@ -369,7 +369,7 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
         away = state["taken"] & ~held & (away_m > APART_M)
         state["away_s"] = np.where(away, state["away_s"] + dt_s, 0.0)
         state["dropped"] |= middle[:, 2] < STAND_UP_M - 0.3
-        gentle = state["largest_n"] <= self.config.gentle_n
+        gentle = state["max_hand_force_n"] <= self.config.gentle_n
         done = (state["away_s"] >= APART_S) & ~state["dropped"] & gentle
         step["taken"], step["done"] = state["taken"] & ~before, done & ~state["done"]
         state["done"] |= done
@@ -422,7 +422,7 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
             "task/handed_over": state["done"].astype(float),
             "task/not_handed_over": 1.0 - state["done"],
             "task/dropped": state["dropped"].astype(float),
-            "task/largest_n": np.where(state["taken"], state["largest_n"], np.nan),
+            "task/max_hand_force_n": np.where(state["taken"], state["max_hand_force_n"], np.nan),
             "is_success": state["done"].astype(float),
         }
 

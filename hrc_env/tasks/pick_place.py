@@ -180,7 +180,7 @@ class PickPlace(Task[PlacedConfig, Records1[PickPlaceState]]):
         ),
     )
     achieved = "task/studs_placed"
-    failed = "task/studs_left"
+    failed = "task/studs_remaining"
     starts = (
         "The arm is near home, the fingers open. Three pieces stand on edge on the table, each "
         "moved by up to 2 cm and turned by up to 0.2 rad; four more lie beside them, of which the"
@@ -262,7 +262,7 @@ class PickPlace(Task[PlacedConfig, Records1[PickPlaceState]]):
         placed = state["placed"].sum(1).astype(float)
         return {
             "task/studs_placed": placed,
-            "task/studs_left": STUDS - placed,
+            "task/studs_remaining": STUDS - placed,
             "task/dropped": state["dropped"].astype(float),
             "is_success": (placed == STUDS).astype(float),
         }

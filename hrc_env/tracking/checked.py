@@ -128,7 +128,7 @@ class CheckedEstimator(Generic[State]):
             age_s=read("age_s", "s"),
             tracked=flags_of(f"{lead}tracked", given.tracked, slots, "B, W"),
             unknown=flags_of(f"{lead}unknown", given.unknown, slots, "B, W"),
-            blind_s=numbers_of(f"{lead}blind_s", given.blind_s, slots, "B, W"),
+            unobserved_s=numbers_of(f"{lead}unobserved_s", given.unobserved_s, slots, "B, W"),
             seen_world=read("seen_world", "m", 3, finite=False),
         )
         self._check_covariance(f"{lead}cov_world", checked.cov_world)

@@ -1,7 +1,8 @@
 """Settings of the estimators: those that all of them share, and a class for each estimator."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import TypeVar
+from typing import ClassVar, TypeVar
 
 import numpy as np
 
@@ -20,6 +21,12 @@ class TrackerConfig:
         ConfigError: a value is out of its range; the error names the field and the range.
     """
 
+    RENAMED: ClassVar[Mapping[str, str]] = {
+        "forget_s": "lost_relaxation_s",
+        "longest_delay_s": "max_delay_s",
+    }
+    """Present names of fields that were renamed, by their old names."""
+
     prior_mean_world: tuple[float, float, float] = (1.3, 0.0, 1.0)
     """Position at which a worker is assumed before any measurement, x, y, z in the world frame [m].
     The default is the centre of the working area."""
@@ -30,9 +37,9 @@ class TrackerConfig:
     """Upper bound of the reported ages [s]."""
     lost_after_s: float = 1.0
     """Time without a measurement of any joint after which a track is lost [s]."""
-    forget_s: float = 2.0
+    lost_relaxation_s: float = 2.0
     """Time constant with which the estimate of a lost worker relaxes to the prior [s]."""
-    longest_delay_s: float = 0.0
+    max_delay_s: float = 0.0
     """Largest delay with which a frame is still used at its own time, `Keypoints.time_s`; in [0, 1]
     [s]. With 0, every frame counts as taken at the update that brings it."""
     acquire_min_joints: int = 6
@@ -55,12 +62,18 @@ class TrackerConfig:
 
     def __post_init__(self) -> None:
         positive = (
-            *("prior_std_m", "max_age_s", "lost_after_s", "forget_s", "acquire_min_joints"),
+            *(
+                "prior_std_m",
+                "max_age_s",
+                "lost_after_s",
+                "lost_relaxation_s",
+                "acquire_min_joints",
+            ),
             *("body_radius_m", "conflict_frames", "gate_sigma", "sigma_scale", "min_std_m"),
             "root_acceleration",
         )
         check_fields(self, "be positive", *positive)
-        check_fields(self, "be in [0, 1]", "longest_delay_s")
+        check_fields(self, "be in [0, 1]", "max_delay_s")
         if self.lost_after_s > self.max_age_s:
             raise ConfigError(
                 f"lost_after_s ({self.lost_after_s}) must not exceed max_age_s ({self.max_age_s})."
@@ -79,6 +92,23 @@ class ParticleConfig(TrackerConfig):
         ConfigError: a value is out of its range; the error names the field and the range.
     """
 
+    RENAMED: ClassVar[Mapping[str, str]] = {
+        **TrackerConfig.RENAMED,
+        "noise_persists_s": "noise_correlation_s",
+        "bone_give": "bone_variation_scale",
+        "wait_updates": "one_view_wait_updates",
+        "stands_std_m": "initial_foot_height_std_m",
+        "look_every_s": "hypothesis_search_period_s",
+        "open_depth_m": "min_ambiguous_depth_std_m",
+        "evidence_trust": "evidence_exponent",
+        "anatomy_trust": "anatomy_exponent",
+        "walking_odds": "walking_log_odds_per_s",
+        "least_weight": "min_weight",
+        "swap_begins": "swap_start_probability",
+        "swap_ends": "swap_end_probability",
+    }
+    """Present names of fields that were renamed, by their old names."""
+
     noise_bounds: tuple[float, float] = (1.0, 6.0)
     """Lower and upper bound of the factor on the detector's variance that is learnt for every
     camera and joint. Errors that all views share do not show as disagreement between views, so a
@@ -86,7 +116,7 @@ class ParticleConfig(TrackerConfig):
     that number."""
     noise_tau_s: float = 4.0
     """Time constant with which the factors on the noise are learnt and forgotten [s]."""
-    noise_persists_s: float = 0.5
+    noise_correlation_s: float = 0.5
     """Correlation time of the persistent part of the detector's errors [s]. For BlazePose it is
     half a second."""
     noise_share: float = 0.9
@@ -95,7 +125,7 @@ class ParticleConfig(TrackerConfig):
     floor_std_m: float = 0.05
     """Standard deviation of the pseudo-measurement that puts a joint found below the floor, z < 0,
     back onto it [m]. With infinity no floor is assumed."""
-    bone_give: float = 1.5
+    bone_variation_scale: float = 1.5
     """Factor on the variation of bone lengths. A detector's joints wander on the body, so that even
     a rigid bone seems to change its length; use 1 for points that do not."""
     gauss_newton_steps: int = 2
@@ -118,55 +148,77 @@ class ParticleConfig(TrackerConfig):
     n_hypotheses: int = 8
     """Maximum number of hypotheses about one worker. With 1 the estimator is a single Gaussian
     (estimator="kalman")."""
-    wait_updates: int = 5
+    one_view_wait_updates: int = 5
     """Number of updates to wait for a second view of a new person before a track is started from
     one view alone. A rig of one camera does not wait."""
     size_std: float = 0.06
     """Relative standard deviation of people's size, as of adult statures. It sets the depth
     uncertainty of a body that was started from one view."""
-    stands_std_m: float = 0.0
+    initial_foot_height_std_m: float = 0.0
     """Standard deviation of the height of the lowest joint above the floor, z = 0, assumed when one
     view starts a body [m]. It measures the size of the body; 0.1 suits people on the floor. With 0,
     people may be at any height."""
     mirrored_parts: tuple[str, ...] = ("body", "limbs")
     """Parts that may be mirrored in depth while only one view shows them: "body", "limbs" or
     both."""
-    look_every_s: float = 0.12
+    hypothesis_search_period_s: float = 0.12
     """Time between two searches for alternative hypotheses [s]."""
-    open_depth_m: float = 0.04
+    min_ambiguous_depth_std_m: float = 0.04
     """Smallest standard deviation of the depth of a part seen in one view at which alternative
     hypotheses are searched for [m]. Below it, recent measurements of other views still fix the
     depth."""
     turn_std_rad: float = 0.7
     """Standard deviation of the turn between a new hypothesis and a known one [rad]. A body turned
     by this angle starts with e^-0.5 of the weight."""
-    evidence_trust: float = 0.1
+    evidence_exponent: float = 0.1
     """Exponent on the evidence of a set of frames when hypotheses are weighted, because model
     errors are correlated from frame to frame."""
-    anatomy_trust: float = 1.0
+    anatomy_exponent: float = 1.0
     """Exponent on the anatomical prior when hypotheses are weighted: the places of nose, toes,
     knees and elbows relative to the body."""
-    walking_odds: float = 2.0
+    walking_log_odds_per_s: float = 2.0
     """Log-odds per second that a hypothesis which walks forwards gains on one which does not
     [1/s]."""
-    least_weight: float = 1e-3
+    min_weight: float = 1e-3
     """Probability below which a hypothesis is dropped."""
-    swap_begins: float = 0.01
+    swap_start_probability: float = 0.01
     """Probability per update that a camera starts to exchange left and right."""
-    swap_ends: float = 0.15
+    swap_end_probability: float = 0.15
     """Probability per update that a camera stops exchanging left and right."""
 
     def __post_init__(self) -> None:
         TrackerConfig.__post_init__(self)
         positive = (
-            *("floor_std_m", "bone_give", "noise_tau_s", "noise_persists_s", "gauss_newton_steps"),
+            *(
+                "floor_std_m",
+                "bone_variation_scale",
+                "noise_tau_s",
+                "noise_correlation_s",
+                "gauss_newton_steps",
+            ),
             *("image_area_px", "one_view_inflation", "lying_inflation", "n_hypotheses"),
-            *("look_every_s", "open_depth_m", "turn_std_rad", "evidence_trust", "size_std"),
+            *(
+                "hypothesis_search_period_s",
+                "min_ambiguous_depth_std_m",
+                "turn_std_rad",
+                "evidence_exponent",
+                "size_std",
+            ),
         )
         check_fields(self, "be positive", *positive)
-        not_negative = ("mean_correction", "anatomy_trust", "walking_odds", "wait_updates")
-        check_fields(self, "not be negative", *not_negative, "stands_std_m")
-        probabilities = ("least_weight", "outlier_weight", "swap_begins", "swap_ends")
+        not_negative = (
+            "mean_correction",
+            "anatomy_exponent",
+            "walking_log_odds_per_s",
+            "one_view_wait_updates",
+        )
+        check_fields(self, "not be negative", *not_negative, "initial_foot_height_std_m")
+        probabilities = (
+            "min_weight",
+            "outlier_weight",
+            "swap_start_probability",
+            "swap_end_probability",
+        )
         check_fields(self, "be in (0, 1)", *probabilities, "damping")
         check_fields(self, "be in [0, 1)", "noise_share")
         least, most = self.noise_bounds
@@ -187,6 +239,12 @@ class PaperConfig(TrackerConfig):
         ConfigError: a value is out of its range; the error names the field and the range.
     """
 
+    RENAMED: ClassVar[Mapping[str, str]] = {
+        **TrackerConfig.RENAMED,
+        "place_m": "initial_bounds_m",
+    }
+    """Present names of fields that were renamed, by their old names."""
+
     velocity_tau_s: float = 0.2
     """Time constant of the low-pass filter on differenced velocities [s]."""
     n_particles: int = 1000
@@ -196,7 +254,7 @@ class PaperConfig(TrackerConfig):
     gives no number."""
     n_iterations: int = 1
     """Number of passes of Algorithm 1 over one set of frames, the paper's N."""
-    place_m: tuple[tuple[float, float], ...] = ()
+    initial_bounds_m: tuple[tuple[float, float], ...] = ()
     """Lower and upper bounds of x, y and z within which line 1 draws particles [m]. If empty, the
     area that the cameras surround, from the floor to 2.2 m."""
 
@@ -209,13 +267,13 @@ class PaperConfig(TrackerConfig):
                 f"n_particles must be at least 10, got {self.n_particles}: after a resampling "
                 "fewer have no covariance."
             )
-        place = np.array(self.place_m)
-        if self.place_m and not (
+        place = np.array(self.initial_bounds_m)
+        if self.initial_bounds_m and not (
             place.shape == (3, 2) and np.isfinite(place).all() and (np.diff(place) > 0).all()
         ):
             raise ConfigError(
-                "place_m must be empty or hold the least and the most x, y and z, as "
-                f"((-3, 3), (-3, 3), (0, 2.2)), got {self.place_m}."
+                "initial_bounds_m must be empty or hold the least and the most x, y and z, as "
+                f"((-3, 3), (-3, 3), (0, 2.2)), got {self.initial_bounds_m}."
             )
 
 

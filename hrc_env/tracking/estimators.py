@@ -157,7 +157,7 @@ def make_estimator(
 
     Returns:
         The estimator. The arguments and the estimates of one that is not built in are checked
-        (`checked.CheckedEstimator`). With `config.longest_delay_s`, late frames are used at their
+        (`checked.CheckedEstimator`). With `config.max_delay_s`, late frames are used at their
         own time (`out_of_sequence.OutOfSequence`), unless the estimator handles them itself.
 
     Raises:
@@ -174,8 +174,8 @@ def make_estimator(
     made: Estimator[Any] = spec.make(cameras, ctrl_dt, settings)
     if spec not in BUILT_IN:
         made = CheckedEstimator(spec.name, made)
-    if settings.longest_delay_s > 0 and not spec.handles_late_frames:
-        memory_s = settings.longest_delay_s
+    if settings.max_delay_s > 0 and not spec.handles_late_frames:
+        memory_s = settings.max_delay_s
         return OutOfSequence(made, len(cameras), ctrl_dt, memory_s, spec.needs_pairs)
     return made
 

@@ -235,7 +235,7 @@ def forecast(now: PoseEstimate, horizon_s: float, config: TrackerConfig) -> Pose
     workers = EstimateArrays(*(getattr(later, name) for name in EstimateArrays._fields))
     drift = Drift(
         heading_m2=config.root_acceleration * horizon_s**3 / 3,
-        keep=float(np.exp(-horizon_s / config.forget_s)),
+        keep=float(np.exp(-horizon_s / config.lost_relaxation_s)),
         prior_mean=config.prior_mean_world,
         prior_std=config.prior_std_m,
     )

@@ -314,8 +314,8 @@ def undo_swaps(tree: Tree, frame: Frame, views: Records1[View], settings: Settin
         if view.trusted_updates > 0:
             view.swap_chance = _LEAST_CHANCE
             continue
-        stays = view.swap_chance * (1.0 - settings.swap_ends)
-        prior = stays + (1.0 - view.swap_chance) * settings.swap_begins
+        stays = view.swap_chance * (1.0 - settings.swap_end_probability)
+        prior = stays + (1.0 - view.swap_chance) * settings.swap_start_probability
         evidence = _weigh_swap(tree, frame, c, settings.inlier_odds)
         odds = math.log(prior / (1.0 - prior)) + evidence
         chance = min(max(1.0 / (1.0 + math.exp(-odds)), _LEAST_CHANCE), 1.0 - _LEAST_CHANCE)

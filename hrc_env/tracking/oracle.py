@@ -38,7 +38,7 @@ def estimate_absence(batch: int, n_workers: int, config: TrackerConfig) -> PoseE
         config: the prior, which the arrays (B, W, J, ...) hold.
     """
     known = np.zeros((batch, n_workers))
-    return replace(estimate_prior(batch, n_workers, config), unknown=known > 0, blind_s=known)
+    return replace(estimate_prior(batch, n_workers, config), unknown=known > 0, unobserved_s=known)
 
 
 def estimate_prior(batch: int, n_workers: int, config: TrackerConfig) -> PoseEstimate:

@@ -70,7 +70,7 @@ class LateState(NamedTuple, Generic[State]):
 
 @dataclass(frozen=True, slots=True)
 class OutOfSequence(Generic[State]):
-    """An estimator with a memory of `longest_delay_s`; see `tracking.estimators.Estimator`.
+    """An estimator with a memory of `max_delay_s`; see `tracking.estimators.Estimator`.
 
     It stores a copy of the inner state for every control step of that time, which takes megabytes
     for the estimator `paper`.
@@ -82,7 +82,7 @@ class OutOfSequence(Generic[State]):
     """Number of cameras."""
     ctrl_dt: float
     """Usual time between two predictions [s]. If they come more often, the memory is shorter."""
-    longest_delay_s: float
+    max_delay_s: float
     """Age beyond which frames are ignored [s]."""
     needs_pairs: bool = False
     """Whether the inner estimator cannot use a single camera. It then also receives the last frames
@@ -96,7 +96,7 @@ class OutOfSequence(Generic[State]):
     def init(self, batch: int, n_workers: int) -> LateState[State]:
         """Return the state before any detection, at time 0."""
         now = self.inner.init(batch, n_workers)
-        n_slots = ceil(self.longest_delay_s / self.ctrl_dt - 1e-9) + 2
+        n_slots = ceil(self.max_delay_s / self.ctrl_dt - 1e-9) + 2
         return LateState(
             now=now,
             clock_s=np.zeros(batch),
@@ -137,7 +137,7 @@ class OutOfSequence(Generic[State]):
             check_shape("Keypoints.time_s", keypoints.time_s.shape, shape[:2], "B, C")
             time_s = _snap_to_present(keypoints.time_s, time_s)
         ends_s = _list_ends(state)
-        use = _select_usable(state, keypoints, time_s, ends_s, self.longest_delay_s)
+        use = _select_usable(state, keypoints, time_s, ends_s, self.max_delay_s)
         first_s = np.where(use, time_s, np.inf).min(1)
         late = first_s < state.clock_s - SAME_S
         seen_now = (state.frames.newest_s >= state.clock_s[:, None] - SAME_S).any(1)
@@ -269,7 +269,7 @@ def _select_usable(
     keypoints: Keypoints,
     time_s: Floats,
     ends_s: Floats,
-    longest_delay_s: float,
+    max_delay_s: float,
 ) -> Bools:
     """Return (B, C) the frames that can be used; count the others in `state.ignored`.
 
@@ -278,7 +278,7 @@ def _select_usable(
         keypoints: (B, C, W, J) keypoints.
         time_s: (B, C) times of the frames [s].
         ends_s: (B, K - 1) ends of the steps that can be restored [s].
-        longest_delay_s: greatest age of a frame [s].
+        max_delay_s: greatest age of a frame [s].
     """
     now_s = state.clock_s[:, None]
     oldest_s = np.where(np.isfinite(ends_s), ends_s, now_s).min(1)[:, None]
@@ -289,7 +289,7 @@ def _select_usable(
         finite & (time_s <= state.frames.newest_s + SAME_S),
         finite
         & (time_s < now_s)
-        & ((time_s < now_s - longest_delay_s - SAME_S) | (time_s <= oldest_s + SAME_S)),
+        & ((time_s < now_s - max_delay_s - SAME_S) | (time_s <= oldest_s + SAME_S)),
     )
     use = finite
     for k, reason in enumerate(reasons):

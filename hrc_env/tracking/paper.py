@@ -46,7 +46,7 @@ from hrc_env.tracking.tree.update import count_conflict
 BEHIND = -1e12
 """Log-likelihood of a particle behind the camera that saw the joint, so that it is chosen last."""
 HEIGHTS_M = (0.0, 2.2)
-"""Bounds of z of the first particles, unless `PaperConfig.place_m` is given [m]."""
+"""Bounds of z of the first particles, unless `PaperConfig.initial_bounds_m` is given [m]."""
 _NARROWEST_M = 1.0
 """Least extent of the cameras along an axis that bounds the first particles [m]."""
 
@@ -178,8 +178,8 @@ def find_place(P: Floats, config: PaperConfig) -> Floats:
         P: (C, 3, 4) projections.
         config: settings of the algorithm.
     """
-    if config.place_m:
-        return np.array(config.place_m)
+    if config.initial_bounds_m:
+        return np.array(config.initial_bounds_m)
     centres = -np.linalg.solve(P[:, :, :3], P[:, :, 3:])[:, :2, 0]
     place = np.array([*zip(centres.min(0), centres.max(0), strict=True), HEIGHTS_M])
     for i in np.flatnonzero(np.diff(place)[:, 0] < _NARROWEST_M):

@@ -13,8 +13,8 @@ each piece is
 
 The slot is *absent* if every piece is empty, else *unknown*. A lost worker may be hidden at the
 last estimated place. Therefore no piece becomes empty until the worker is tracked again, or until
-that estimate is forgotten (after `FORGOTTEN` time constants `forget_s` without a measurement) and
-searches find no person. A search is forgotten like a track, after `lost_after_s`.
+that estimate is forgotten (after `FORGOTTEN` time constants `lost_relaxation_s` without a
+measurement) and searches find no person. A search is forgotten like a track, after `lost_after_s`.
 """
 
 from dataclasses import dataclass, replace
@@ -53,7 +53,7 @@ SEVERAL = 3
 """Number of searches by one camera after which floor is probably empty."""
 FORGOTTEN = 3.0
 """Time without a measurement after which the place of a lost worker is forgotten, as a multiple of
-`forget_s`."""
+`lost_relaxation_s`."""
 REPEATED = 2
 """Number of successive images with an unexplained person before it counts; the detector
 occasionally takes the robot for a person."""
@@ -71,8 +71,8 @@ class Slot:
     """Whether it is known that no person is there."""
     lost: bool
     """Whether the slot had a track, which was lost."""
-    blind_s: float
-    """Time since cameras last saw the worker or found the floor empty [s]."""
+    unobserved_s: float
+    """Time since the cameras last observed the worker, or that the floor is empty [s]."""
     seen_world: Annotated[Points3, (N_JOINTS, 3)]
     """Estimated joints when a camera last saw the worker [m]; NaN if none has."""
 
@@ -141,7 +141,7 @@ class PresenceReport(NamedTuple):
 
     unknown: Bools
     """(b, W) whether a person without a track may be there."""
-    blind_s: Floats
+    unobserved_s: Floats
     """(b, W) time since cameras last saw the worker or found the floor empty [s]."""
     seen_world: Points3
     """(b, W, J, 3) estimated joints when a camera last saw the worker [m]."""
@@ -244,8 +244,8 @@ class Presence(Stateful):
             config: times after which tracks are lost and forgotten.
 
         Returns:
-            The estimate with `unknown`, `blind_s` and `seen_world`; contradicted tracks are not
-            `tracked`.
+            The estimate with `unknown`, `unobserved_s` and `seen_world`; contradicted tracks are
+            not `tracked`.
         """
         strange = np.where(searches.shown.unexplained, self.strangers[ids] + 1, 0)
         strange = np.where(searches.whole | searches.shown.poses, strange, self.strangers[ids])
@@ -268,7 +268,7 @@ class Presence(Stateful):
             enough=searches.enough,
             dt_s=dt_s,
             lost_after_s=config.lost_after_s - 1e-9,
-            forgotten_s=FORGOTTEN * config.forget_s,
+            forgotten_s=FORGOTTEN * config.lost_relaxation_s,
         )
         shape = estimate.tracked.shape
         report = PresenceReport(
@@ -278,7 +278,10 @@ class Presence(Stateful):
         _update_slots(PresenceArrays(*arrays), ids, evidence, report)
         unknown = report.unknown | searches.others.any[:, None]
         return replace(
-            estimate, unknown=unknown, blind_s=report.blind_s, seen_world=report.seen_world
+            estimate,
+            unknown=unknown,
+            unobserved_s=report.unobserved_s,
+            seen_world=report.seen_world,
         )
 
 
@@ -294,9 +297,9 @@ def _update_slots(
             level = state.levels[ids[row], w]
             shown = _count_searches(search, row, w, evidence)
             if tracked[row, w]:
-                if not slot.lost or age_s[row, w] < slot.blind_s + 0.5 * evidence.dt_s:
+                if not slot.lost or age_s[row, w] < slot.unobserved_s + 0.5 * evidence.dt_s:
                     _copy_points(evidence.mean_world[row, w], slot.seen_world)
-                slot.lost, slot.absent, slot.blind_s = True, False, age_s[row, w]
+                slot.lost, slot.absent, slot.unobserved_s = True, False, age_s[row, w]
                 level[:] = POSSIBLE
             else:
                 if evidence.has_strangers[row]:  # the last estimated place need not be theirs
@@ -308,7 +311,7 @@ def _update_slots(
                 for c in range(len(search)):
                     search[c].empty = 0
             report.unknown[row, w] = not (tracked[row, w] or slot.absent)
-            report.blind_s[row, w] = slot.blind_s
+            report.unobserved_s[row, w] = slot.unobserved_s
             _copy_points(slot.seen_world, report.seen_world[row, w])
 
 
@@ -362,8 +365,8 @@ def _judge_floor(
     Returns:
         The age of the oldest search that found floor empty [s]; 0 if none did.
     """
-    slot.blind_s += evidence.dt_s
-    hides = slot.lost and slot.blind_s < evidence.forgotten_s
+    slot.unobserved_s += evidence.dt_s
+    hides = slot.lost and slot.unobserved_s < evidence.forgotten_s
     slot.absent, emptied, oldest = True, False, 0.0
     for g in range(len(cameras)):
         level[g], age_s = _judge_group(search, cameras[g], level[g], evidence.enough, shown, hides)
@@ -371,7 +374,7 @@ def _judge_floor(
         if level[g] != POSSIBLE:
             emptied, oldest = True, max(oldest, age_s)
     if slot.absent:
-        slot.blind_s = oldest
+        slot.unobserved_s = oldest
     if slot.absent or (emptied and not hides):
         _forget_place(slot)
     return oldest

@@ -23,18 +23,18 @@ class Settings(NamedTuple):
     conflict_frames: int
     """Number of successive updates in which two views disagree with a joint before it is acquired
     anew."""
-    wait_updates: int
+    one_view_wait_updates: int
     """Number of updates to wait for a second view before one view starts a track."""
     size_std: float
     """Relative standard deviation of people's size."""
-    stands_std_m: float
+    initial_foot_height_std_m: float
     """Standard deviation of the height of the lowest joint of a body started from one view [m]; 0
     if people may be at any height."""
     inlier_odds: float
     """Odds of a perfect inlier against an outlier, times the variance of its pixel [px^2]."""
-    swap_begins: float
+    swap_start_probability: float
     """Probability per update that a camera starts to exchange left and right."""
-    swap_ends: float
+    swap_end_probability: float
     """Probability per update that a camera stops exchanging left and right."""
     gauss_newton_steps: int
     """Number of Gauss-Newton steps in the search for the posterior mode."""
@@ -46,7 +46,7 @@ class Settings(NamedTuple):
     """Upper bound of the ages [s]."""
     lost_after_s: float
     """Time without a measurement of any joint after which a track is lost [s]."""
-    forget_s: float
+    lost_relaxation_s: float
     """Time constant with which the estimate of a lost worker relaxes to the prior [s]."""
     mean_correction: float
     """Share of Laplace's correction from the mode to the mean that is applied."""
@@ -58,25 +58,25 @@ class Settings(NamedTuple):
     """Smallest standard deviation that is reported in any direction [m]."""
     floor_std_m: float
     """Standard deviation of the pseudo-measurement that puts a joint back onto the floor [m]."""
-    bone_give: float
+    bone_variation_scale: float
     """Factor on the variation of bone lengths."""
     mirrors_body: bool
     """Whether hypotheses may turn a whole body the other way."""
     mirrors_limbs: bool
     """Whether hypotheses may reflect a limb in depth."""
-    look_every_s: float
+    hypothesis_search_period_s: float
     """Time between two searches for alternative hypotheses, short by a tolerance [s]."""
-    open_depth_m: float
+    min_ambiguous_depth_std_m: float
     """Smallest standard deviation of a part's depth at which hypotheses are searched for [m]."""
     turn_std_rad: float
     """Standard deviation of the turn between a new hypothesis and a known one [rad]."""
-    evidence_trust: float
+    evidence_exponent: float
     """Exponent on the evidence of a set of frames when hypotheses are weighted."""
-    anatomy_trust: float
+    anatomy_exponent: float
     """Exponent on the anatomical prior when hypotheses are weighted."""
-    walking_odds: float
+    walking_log_odds_per_s: float
     """Log-odds per second that a hypothesis gains by walking forwards [1/s]."""
-    log_least_weight: float
+    log_min_weight: float
     """Log-probability below which a hypothesis is dropped."""
 
 
@@ -91,8 +91,8 @@ def make_settings(config: TrackerConfig) -> Settings:
         "inlier_odds": (1.0 - weight) * area_px / (2.0 * math.pi * weight),
         "mirrors_body": "body" in config.mirrored_parts,
         "mirrors_limbs": "limbs" in config.mirrored_parts,
-        "look_every_s": config.look_every_s - _TICK_S,
-        "log_least_weight": math.log(config.least_weight),
+        "hypothesis_search_period_s": config.hypothesis_search_period_s - _TICK_S,
+        "log_min_weight": math.log(config.min_weight),
     }
     names = set(Settings._fields) - set(derived)
     return Settings(**derived, **{name: getattr(config, name) for name in names})

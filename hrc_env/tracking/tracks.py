@@ -151,7 +151,7 @@ def age_worker(
         return True
     for j in range(len(conflict)):
         conflict[j] = 0
-    keep = np.exp(-dt / settings.forget_s)
+    keep = np.exp(-dt / settings.lost_relaxation_s)
     relax(mean, cov, velocity, keep, settings.prior_mean_world, settings.prior_std_m)
     return False
 

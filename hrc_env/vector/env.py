@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from hrc_env.control import check_action
 from hrc_env.core.batching import State, copied, mapped, one, write_rows
 from hrc_env.core.errors import ConfigError, check_shape, whole
+from hrc_env.core.infos import InfoDict
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.env import RENDER_MODES, EnvBase, make_spaces
 from hrc_env.env_config import check_keywords
@@ -199,7 +200,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
             over, ended = ended, np.zeros_like(ended)
         self._observation, self._ended = observation, ended
         self.pictures.take(np.ones_like(over), over)
-        infos = {**finals, **info.arrays(np.ones_like(ended))}
+        infos = InfoDict({**finals, **info.arrays(np.ones_like(ended))})
         return copied(observation), reward, terminated, truncated, infos
 
     def words(self, infos: Mapping[str, Any]) -> dict[str, NDArray[np.object_]]:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.core.infos import matching, published, worded
+from hrc_env.core.infos import InfoDict, matching, published, worded
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.env_config import EnvConfig
 from hrc_env.infos import words_of
@@ -33,9 +33,9 @@ class InfoTable:
         for name, values in result.info.items():
             self.values[name][ids] = values
 
-    def arrays(self, mask: Bools) -> dict[str, Any]:
+    def arrays(self, mask: Bools) -> InfoDict:
         """Return values and masks by name; environments outside of the mask (B,) have none."""
-        infos: dict[str, Any] = {}
+        infos = InfoDict()
         for name, values in published(self.values).items():
             infos[name] = np.where(mask, values, np.zeros_like(values))
             infos[f"_{name}"] = mask.copy()

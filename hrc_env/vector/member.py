@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from hrc_env import observations
 from hrc_env.core.batching import copied, one
 from hrc_env.core.errors import ConfigError, NoAttributeError, unknown
+from hrc_env.core.infos import InfoDict
 from hrc_env.core.mapping import plain
 from hrc_env.core.typing import Floats
 from hrc_env.env import ENDLESS, HRCEnv
@@ -194,6 +195,7 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
         return sorted({*super().__dir__(), *ALIKE, *self._vector.notes[self._k]})
 
 
-def info_of(infos: Mapping[str, Any], b: int) -> dict[str, Any]:
+def info_of(infos: Mapping[str, Any], b: int) -> InfoDict:
     """Return the info of environment `b` among the infos of a vector environment."""
-    return {name: infos[name][b] for name in infos if not name.startswith(("_", "final_"))}
+    names = (name for name in infos if not name.startswith(("_", "final_")))
+    return InfoDict({name: infos[name][b] for name in names})

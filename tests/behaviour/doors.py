@@ -36,6 +36,7 @@ from hrc_env.belief import (
     find_unseen_floor,
     standard_deviation_m,
 )
+from hrc_env.core import infos
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.infos import ENTRIES
 from hrc_env.core.records import (
@@ -114,7 +115,7 @@ from hrc_env.tasks.reach import MIDDLE
 from hrc_env.tasks.task import find_task
 from hrc_env.tracking import metrics, oracle, presence
 from hrc_env.tracking.calibration_monitor import forget_monitor, make_monitor, monitor
-from hrc_env.tracking.config import TrackerConfig
+from hrc_env.tracking.config import PaperConfig, ParticleConfig, TrackerConfig
 from hrc_env.tracking.contradiction import DetectedPoses, find_unexplained
 from hrc_env.tracking.estimators import ESTIMATORS, find_estimator, make_estimator
 from hrc_env.tracking.forecast import forecast
@@ -176,9 +177,11 @@ SETTINGS = {
     "step_s": "ctrl_dt",
 }
 """Names of the probes for settings, and the paths of today's fields."""
+COMPONENTS = {"too_near": "separation_violated"}
+"""Names of the probes for components of the cost, and today's where they differ."""
 FAULT_FIELDS = {
-    "kind": "kind", "cameras": "cameras", "amount": "amount", "from_s": "from_s",
-    "until_s": "until_s",
+    "kind": "kind", "cameras": "cameras", "amount": "amount", "from_s": "start_s",
+    "until_s": "end_s",
 }  # fmt: skip
 CAMERA_FIELDS = {
     "name": "name", "eye_m": "eye_world", "target_m": "target_world", "latency_s": "latency_s",
@@ -214,7 +217,7 @@ DRAWING = (
     ("map", ("znear", "zfar", "fogstart", "fogend", "haze", "shadowclip", "shadowscale", "alpha")),
 )
 """How MuJoCo draws, by its names."""
-RENAMED: dict[str, str] = {"shield/clearance_m": "shield/least_m"}
+RENAMED: dict[str, str] = {present: former for former, present in infos.RENAMED.items()}
 """Today's names of observation terms, reward terms and infos that the probes know by another."""
 
 
@@ -231,6 +234,8 @@ def _arguments(options: Mapping[str, Any]) -> dict[str, Any]:
             arguments["cameras"] = [_renamed(each, CAMERA_FIELDS) for each in value]
         elif name in ("kept_cameras", "rig"):
             arguments["cameras"] = value
+        elif name == "cost_components":
+            _put(config, SETTINGS[name], [COMPONENTS.get(each, each) for each in value])
         else:
             _put(config, SETTINGS[name], value)
     return {**arguments, "config": config}
@@ -380,7 +385,7 @@ class Env:
                  if _is_plain(name) and _are_measured(info, name)}  # fmt: skip
         named["is_success"] = bool(named["is_success"])
         named |= self._env.unwrapped.words(info)
-        if "perception/more_people" not in info:
+        if "perception/more_people_than_slots" not in info:
             del named["perception/miscalibrated"]
         return named
 
@@ -459,10 +464,10 @@ def _is_plain(name: str) -> bool:
 def _are_measured(infos: Mapping[str, Any], name: str) -> Any:
     """Return of which environments a number is one that was measured."""
     known = np.isfinite(infos[name])
-    if name in ("safety/contact_came_m_s", "safety/contact_closing_m_s",
+    if name in ("safety/contact_robot_speed_m_s", "safety/contact_closing_speed_m_s",
                 "safety/contact_force_ratio"):  # fmt: skip
         return known & (infos["safety/contact_severity"] > 0)
-    if name == "task/largest_n":
+    if name == "task/max_hand_force_n":
         return known & (infos[name] > 0)
     return known & (infos[FLAGS_OF[name]] > 0) if name in FLAGS_OF else known
 
@@ -470,7 +475,7 @@ def _are_measured(infos: Mapping[str, Any], name: str) -> Any:
 def _of_reset(info: dict[str, Any]) -> dict[str, Any]:
     """Return what was known of resets at first: neither rewards nor what happens in a step."""
     later = ("reward/", "shield/", "safety/contact_", "safety/min_", "safety/robot_",
-             "safety/worker_", "safety/too_", "safety/time_")  # fmt: skip
+             "safety/worker_", "safety/too_", "safety/separation_", "safety/time_")  # fmt: skip
     kept = ("safety/contact_kind", "safety/contact_region")
     return {name: each for name, each in info.items() if name in kept or not name.startswith(later)}
 
@@ -478,22 +483,17 @@ def _of_reset(info: dict[str, Any]) -> dict[str, Any]:
 def settings() -> dict[str, str]:
     """Return every setting's default by its place in the configuration, as "ID/task/radius_m"."""
     return {
-        SETTING_NAMES.get(name, name): default
+        f"{place}/{_former_name(record, field.name)}": repr(getattr(record, field.name))
         for place, record in _records().items()
-        for name, default in (
-            (f"{place}/{field.name}", repr(getattr(record, field.name)))
-            for field in dataclasses.fields(record)
-            if not _is_record(getattr(record, field.name))
-        )
+        for field in dataclasses.fields(record)
+        if not _is_record(getattr(record, field.name))
     }
 
 
-SETTING_NAMES: dict[str, str] = {
-    f"shield_{shield}/{present}": f"shield_{shield}/{former}"
-    for shield in PRESETS
-    for former, present in ShieldConfig.RENAMED.items()
-}
-"""Today's names of settings that the probes know by another."""
+def _former_name(record: Any, name: str) -> str:
+    """Return the name of a setting that the probes know, before it was renamed."""
+    present = {new: old for old, new in getattr(record, "RENAMED", {}).items()}
+    return present.get(name, name)
 
 
 APPEARANCE_NAMES = tuple(looks.APPEARANCES)
@@ -1166,7 +1166,7 @@ class Crew:
 # --- Tracker and geometry (tracker.py) -----------------------------------------------------------
 
 TRACKER_SETTINGS: dict[str, str] = {
-    name: name
+    name: (ParticleConfig.RENAMED | PaperConfig.RENAMED).get(name, name)
     for name in (
         "prior_mean_world", "prior_std_m", "lost_after_s", "forget_s", "longest_delay_s",
         "acquire_min_joints", "sigma_scale", "noise_bounds", "noise_share", "wait_updates",
@@ -1275,7 +1275,7 @@ def _as_values(estimate: PoseEstimate) -> dict[str, NDArray[Any]]:
         "age_s": estimate.age_s,
         "tracked": estimate.tracked,
         "unknown": estimate.unknown,
-        "blind_s": estimate.blind_s,
+        "blind_s": estimate.unobserved_s,
         "seen_world": estimate.seen_world,
     }
 
@@ -1824,7 +1824,7 @@ class Faults:
         """Return whether nothing is wrong, the longest delay, the memory and what is frozen."""
         plan = self._schedule
         frozen = sum(step + 1 for step in plan.frozen_steps)
-        return np.array([plan.is_plain, plan.longest_delay_s, plan.longest_memory, frozen], float)
+        return np.array([plan.is_plain, plan.max_delay_s, plan.longest_memory, frozen], float)
 
     def list_images(self, seed: int, step: int) -> NDArray[np.float64]:
         """Return of each camera (C, 3): the step that its image shows, when it says it was taken
@@ -2049,7 +2049,7 @@ Window = tuple[float, float, float, float]
 Picture = NDArray[np.uint8]
 PERSON_FIELDS = ("score", "box", "hip", "rim")
 DETECTOR_FIELDS = {
-    name: name
+    name: detector.DetectorConfig.RENAMED.get(name, name)
     for name in (
         "min_presence", "sure_presence", "gate_every", "max_offset", "outside_confidence",
         "search_every",
@@ -2529,6 +2529,17 @@ def protective_distance(robot_m_s: Any, human_m_s: Any, **times: Any) -> NDArray
     return separation.protective_distance(robot_m_s, human_m_s, **times)
 
 
+INCIDENT_FIELDS = {
+    "robot_speed_m_s": "came_m_s",
+    "closing_speed_m_s": "closing_m_s",
+    "is_separation_violated": "too_near",
+    "contact_robot_speed_m_s": "contact_came_m_s",
+    "contact_closing_speed_m_s": "contact_closing_m_s",
+    "separation_violated": "too_near",
+}
+"""Today's fields of incidents and their summaries that the probes know by another name."""
+
+
 class Watched:
     """What happens to people, step after step."""
 
@@ -2561,7 +2572,8 @@ class Watched:
         values = {}
         for group, records in (("one", found), ("all", told), ("known", self._watch.history)):
             for name in records.dtype.names:
-                values[f"{group}/{name.removeprefix('is_')}"] = records[name].copy()
+                named = INCIDENT_FIELDS.get(name, name).removeprefix("is_")
+                values[f"{group}/{named}"] = records[name].copy()
         return {**values, "stop_s": self._watch.find_stop_time(state)}
 
 

@@ -77,7 +77,7 @@ def test_eyes_are_called_what_they_are():
 def test_cameras_that_are_left_come_after_a_second_of_four():
     (lost,) = PerceptionSetup(n_cameras=1).turns[1].faults
     assert lost.cameras == ("camera_1", "camera_3", "camera_4")
-    assert lost.from_s == 1.0
+    assert lost.start_s == 1.0
     assert not PerceptionSetup(n_cameras=1, is_alone=True).turns[1].faults
 
 

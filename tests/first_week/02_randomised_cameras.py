@@ -6,9 +6,9 @@ import numpy as np
 import hrc_env
 
 rigs = hrc_env.RigDistribution(
-    place_m=0.3,  # each camera hangs so far from its place at most, along each axis
-    turn_rad=0.1,
-    focal_share=0.05,
+    max_shift_m=0.3,  # each camera hangs so far from its place at most, along each axis
+    max_rotation_rad=0.1,
+    max_focal_change=0.05,
     n_cameras=(2, 4),  # which of them hang is drawn, too
 )
 faults = [
@@ -41,7 +41,10 @@ print("errors of the tracked workers [m]:", infos["tracking/mpjpe_m"].round(3))
 # One episode with other cameras, and distributions that cannot be.
 envs.reset(seed=0, options={"cameras": ["camera_1", "camera_3"], "faults": []})
 assert [len(rig) for rig in envs.get_attr("rig")] == [2] * 4
-for wrong in ({"cameras": {"place_m": 50.0}}, {"faults": [{**faults[1], "amount": (0.3, 0.0)}]}):
+for wrong in (
+    {"cameras": {"max_shift_m": 50.0}},
+    {"faults": [{**faults[1], "amount": (0.3, 0.0)}]},
+):
     try:
         gymnasium.make("HRCReach-v0", perception="keypoints", **wrong)
     except hrc_env.ConfigError as error:

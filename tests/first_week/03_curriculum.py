@@ -10,7 +10,7 @@ from hrc_env import HRCVecEnv, RewardConfig, RigDistribution
 STAGES = [  # from which step on: options of all resets, factors on terms of the reward
     (0, {"n_workers": 0}, {"proximity": 0.0}),
     (256, {"n_workers": 1, "activity": "stand"}, {"proximity": 0.5, "goal": 2.0}),
-    (512, {"cameras": RigDistribution(place_m=0.2)}, {}),
+    (512, {"cameras": RigDistribution(max_shift_m=0.2)}, {}),
 ]
 
 

@@ -160,7 +160,7 @@ def test_the_detector_stage_is_asked_of_a_new_track_and_then_in_turns(four, monk
     monkeypatch.setattr(
         detector_module, "find_people", lambda *args: asked.append(1) or find(*args)
     )
-    detector = new_detector(4, DetectorConfig(gate_every=4, sure_presence=0.5))
+    detector = new_detector(4, DetectorConfig(check_every=4, check_presence=0.5))
     counts = []
     for _ in range(9):
         asked.clear()
@@ -218,7 +218,7 @@ def test_folded_workers_have_a_network_of_their_own(four, monkeypatch):
 
     monkeypatch.setattr(detector_module.network, "load_landmarker", load)
     monkeypatch.setattr(detector_module, "fetch_weights", lambda names: names)
-    detector = new_detector(4, DetectorConfig(folded="heavy"))
+    detector = new_detector(4, DetectorConfig(folded_network="heavy"))
     detector.detect(stills, [WINDOW] * 4)
     assert set(asked) == {"full"}
     asked.clear()
@@ -229,7 +229,7 @@ def test_folded_workers_have_a_network_of_their_own(four, monkeypatch):
 
 def test_a_network_that_there_is_not_is_told_those_that_there_are():
     with pytest.raises(ConfigError, match="Did you mean 'heavy'"):
-        DetectorConfig(folded="heavvy")
+        DetectorConfig(folded_network="heavvy")
 
 
 def test_wrong_shapes_are_explained(four):

@@ -98,7 +98,7 @@ def test_amounts_of_faults_end_where_their_kind_says(kind):
 
 @pytest.mark.parametrize(
     "taken",
-    [{"cameras": (0,)}, {"cameras": ("left", np.int64(1))}, {"from_s": 0.0, "until_s": 1e-9},
+    [{"cameras": (0,)}, {"cameras": ("left", np.int64(1))}, {"start_s": 0.0, "end_s": 1e-9},
      {"amount": 1}, {"amount": 0}],
 )  # fmt: skip
 def test_a_fault_in_which_nothing_is_wrong_is_taken(taken):
@@ -117,11 +117,11 @@ def test_a_fault_in_which_nothing_is_wrong_is_taken(taken):
         ({"cameras": (None, "left")}, "must name its cameras"),
         ({"amount": "0.2"}, "amount must be from 0 to 1 s"),
         ({"amount": True}, "amount must be from 0 to 1 s"),
-        ({"from_s": -1e-9}, "must begin at 0 s or later"),
-        ({"from_s": 1.0, "until_s": 1.0}, "must begin at 0 s or later"),
-        ({"from_s": 1.0, "until_s": 0.5}, "must begin at 0 s or later"),
-        ({"from_s": np.nan}, "must begin at 0 s or later"),
-        ({"until_s": np.nan}, "must begin at 0 s or later"),
+        ({"start_s": -1e-9}, "must begin at 0 s or later"),
+        ({"start_s": 1.0, "end_s": 1.0}, "must begin at 0 s or later"),
+        ({"start_s": 1.0, "end_s": 0.5}, "must begin at 0 s or later"),
+        ({"start_s": np.nan}, "must begin at 0 s or later"),
+        ({"end_s": np.nan}, "must begin at 0 s or later"),
     ],
 )
 def test_a_fault_in_which_one_thing_is_wrong_is_refused(wrong, said):

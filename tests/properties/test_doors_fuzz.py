@@ -46,8 +46,8 @@ def meet_estimates(rng):
     from hrc_env.env import HRCEnv
     from hrc_env.tracking.estimators import make_estimator
 
-    names = ["mean_world", "cov_world", "velocity_world", "age_s", "tracked", "unknown", "blind_s",
-             "seen_world"]  # fmt: skip
+    names = ["mean_world", "cov_world", "velocity_world", "age_s", "tracked", "unknown",
+             "unobserved_s", "seen_world"]  # fmt: skip
     chosen = rng.choice(names, rng.integers(1, 4), replace=False)
 
     class Mine:

@@ -79,7 +79,7 @@ def test_how_hard_a_contact_is_follows_from_region_and_closing_speed():
     line = Line(0.03)
     line.step(0.4, 0.0)
     hit = line.step(0.4, -1.0)[0]
-    assert (hit["came_m_s"], hit["closing_m_s"]) == pytest.approx((0.4, 1.4))
+    assert (hit["robot_speed_m_s"], hit["closing_speed_m_s"]) == pytest.approx((0.4, 1.4))
     assert incidents.REGION_NAMES[hit["region"]] == "hand and fingers"
     assert hit["force_ratio"] == pytest.approx(contact_force("hand and fingers", 1.4, 15.0) / 280.0)
     assert hit["severity"] == (1 if hit["force_ratio"] <= 1 else 2)
@@ -88,7 +88,7 @@ def test_how_hard_a_contact_is_follows_from_region_and_closing_speed():
 def test_the_head_is_never_to_be_hit():
     assert incidents.CAPSULE_REGIONS["head"] == "skull and forehead"
     hits = np.zeros((1, 1), incidents.INCIDENT)
-    hits["closing_m_s"] = 0.01
+    hits["closing_speed_m_s"] = 0.01
     head = contact.REGIONS[incidents.REGION_NAMES[incidents.find_regions(["head"])[0]]]
     incidents._rate_contact(hits, 0, 0, head, 15.0)
     assert hits["severity"] == incidents.NEVER
@@ -107,9 +107,9 @@ def test_a_near_miss_ends_without_a_touch():
 
 def test_too_near_is_nearer_than_the_protective_distance_while_the_robot_comes():
     """S_p = 1.6 x 0.2 + 0.5 x 0.15 = 0.395 m."""
-    assert Line(0.40).step(0.5, -1.6)[0]["is_too_near"]
-    assert not Line(0.50).step(0.5, -1.6)[0]["is_too_near"]
-    assert not Line(0.20).step(0.0, -1.6)[0]["is_too_near"]
+    assert Line(0.40).step(0.5, -1.6)[0]["is_separation_violated"]
+    assert not Line(0.50).step(0.5, -1.6)[0]["is_separation_violated"]
+    assert not Line(0.20).step(0.0, -1.6)[0]["is_separation_violated"]
 
 
 def test_every_worker_has_contacts_of_their_own():

@@ -24,7 +24,6 @@ from hrc_env.render.overlay import SHIELD
 from hrc_env.safety.built_in import limit_command
 from hrc_env.safety.config import PRESETS, ShieldConfig
 from hrc_env.safety.incidents import MOVING_M_S
-from hrc_env.safety.shield import find_shield
 from hrc_env.safety.unseen import find_undetected
 
 VELOCITIES = ("velocity_world", "angular_velocity_world")
@@ -315,12 +314,13 @@ def test_hands_that_no_camera_shows_may_be_anywhere_within_an_arm_of_their_shoul
         assert fastest_m_s(part, allowed) <= limit[0] + 1e-4
 
 
-def unseen(now, away_m, blind_s=0.5, **known):
+def unseen(now, away_m, unobserved_s=0.5, **known):
     """A belief in which the worker was seen last so far beside the tool, and not since."""
     place, _ = np.broadcast_arrays(now.robot.tool_world[:, None, None], now.estimate.mean_world)
     seen = place + np.array([away_m, 0.0, 0.0]) + np.linspace(0, 0.1, 15)[:, None]
-    blind = np.full_like(now.estimate.blind_s, blind_s)
-    return replace(now, estimate=replace(now.estimate, seen_world=seen, blind_s=blind, **known))
+    blind_s = np.full_like(now.estimate.unobserved_s, unobserved_s)
+    known |= {"seen_world": seen, "unobserved_s": blind_s}
+    return replace(now, estimate=replace(now.estimate, **known))
 
 
 @pytest.mark.parametrize("is_tracked", [True, False])
@@ -349,21 +349,21 @@ def test_whom_another_environment_has_lost_slows_nobody():
     envs = vector(2, None, n_workers=1)
     envs.reset(seed=0)
     lost = unseen(envs.unwrapped.shards.first.belief, 0.9)
-    lost.estimate.blind_s[1] = 0.0
+    lost.estimate.unobserved_s[1] = 0.0
     limits = find_undetected(lost, ShieldConfig()).speed_limit_m_s
     assert np.isfinite(limits).tolist() == [True, False]
 
 
 def test_robots_whose_cameras_all_fail_come_no_nearer_to_where_people_were():
-    lost = [{"kind": "lost", "cameras": ["all"], "from_s": 1.0}]
-    gaps_m, blind_s, driven = [], [], []
+    lost = [{"kind": "lost", "cameras": ["all"], "start_s": 1.0}]
+    gaps_m, unobserved_s, driven = [], [], []
     for _, now in steps(vector(24, "qp", perception="keypoints", faults=lost), 75):
         there = replace(now.estimate, mean_world=now.estimate.seen_world)
         there.tracked[:] = True
         gaps_m.append(estimated_separation(now.robot, there).distance_m[:, 0])
-        blind_s.append(now.estimate.blind_s[:, 0])
+        unobserved_s.append(now.estimate.unobserved_s[:, 0])
         driven.append(now.command.any(1))
-    gaps, blind = np.array(gaps_m)[:-1], np.array(blind_s)[:-1]
+    gaps, blind = np.array(gaps_m)[:-1], np.array(unobserved_s)[:-1]
     narrowed = -np.diff(gaps_m, axis=0)
     near = (blind > 0.6) & (gaps < 0.5) & driven[1:]
     assert near.any(0).sum() > 5
@@ -376,7 +376,7 @@ def test_it_stands_near_where_somebody_was_and_one_seen_just_now_changes_nothing
     wanted = part.model.fastest_rad_s[None]
     near, _ = limit_command(unseen(now, 0.3), wanted, 0.04, ShieldConfig())
     np.testing.assert_array_equal(near, 0.0)
-    lately, _ = limit_command(unseen(now, 0.3, blind_s=0.2), wanted, 0.04, ShieldConfig())
+    lately, _ = limit_command(unseen(now, 0.3, unobserved_s=0.2), wanted, 0.04, ShieldConfig())
     seen, said = limit_command(now, wanted, 0.04, ShieldConfig())
     np.testing.assert_array_equal(lately, seen)
     assert said["unknown"] == 0.0
@@ -495,14 +495,3 @@ def test_pictures_show_when_it_acts():
     env.close()
     assert (shown[0, 0] == SHIELD).all()
     assert not (plain[0, 0] == SHIELD).all()
-
-
-@pytest.mark.parametrize(("former", "present"), sorted(ShieldConfig.RENAMED.items()))
-def test_a_former_name_of_a_setting_is_an_error_that_gives_the_present_one(former, present):
-    assert present in ShieldConfig.__dataclass_fields__
-    with pytest.raises(
-        ConfigError, match=f"field of ShieldConfig {former} is called {present} now"
-    ):
-        ShieldConfig(**{former: 0.1})
-    with pytest.raises(ConfigError, match=rf"shield\.{former} is called shield\.{present} now"):
-        find_shield({former: 0.1})

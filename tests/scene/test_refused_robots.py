@@ -144,7 +144,8 @@ REFUSED = {
     "a finger without mass": (
         changed(GRIPPER, (f'<body name="right">{WEIGHT}', '<body name="right">')),
         "'right' needs an <inertial>"),
-    "something watched that is no capsule": (replace(ARM, watched=("boom", "tip")), "watched"),
+    "something watched that is no capsule": (
+        replace(ARM, watched_capsules=("boom", "tip")), "watched"),
     "a hand's capsule that is none": (
         replace(GRIPPER, hand=replace(HAND, spans=("thumb", "thump"))), "Did you mean 'thumb'"),
     "cups' capsule that is none": (

@@ -122,7 +122,7 @@ def test_what_moves_or_is_of_another_kind_does_not_block_sight(kind, parent):
         find_obstacles(standing(kind, parent))
 
 
-SHARES = ("warmth", "plain", "tint", "clothing", "skin", "hat")
+SHARES = ("warmth", "untextured", "tint", "clothing", "skin", "hat")
 LOOKS = [
     ("light", (0.05, 0.05), (0.0499, 1.0)),
     ("light", (3.0, 3.0), (1.0, 3.0001)),

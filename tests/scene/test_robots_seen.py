@@ -124,7 +124,7 @@ def test_a_robot_given_directly_is_checked_as_a_registered_one_is():
     for changes, said in (
         ({"home_q": (0.0, -1.9, 4.0, -1.8, -1.6, 0.0)}, "outside of the joints' ranges"),
         ({"spread_rad": (30.0,) * 6}, "spread_rad must be from 0"),
-        ({"watched": ("tail",)}, "watched"),
+        ({"watched_capsules": ("tail",)}, "watched"),
         ({"joints": "shoulder_pan"}, "must be a list"),
         ({"capsules": ()}, "must name at least one"),
         ({"mjcf": "<mujoco"}, "cannot be used"),

@@ -214,7 +214,7 @@ def test_wild_driving_breaks_nothing():
         assert np.isfinite(reward).all()
     q = envs.unwrapped.shards.first.physics.q
     assert np.abs(q[:, :2]).max() < BASE.range_rad[0, 1]
-    hits = TASK.info(envs.unwrapped.shards.first.task_state)["task/fixed_hits"]
+    hits = TASK.info(envs.unwrapped.shards.first.task_state)["task/obstacle_hits"]
     assert hits.max() > 0
     envs.close()
 

@@ -81,7 +81,7 @@ def test_the_hand_takes_the_weight_over_and_pulls_like_a_spring():
     np.testing.assert_allclose(push[3:], 0.0, atol=1e-9)
     go_on(state, world(0.10), DT_S)
     assert TASK.effects(state).push_world[0, 0, 1] == pytest.approx(10.0)
-    assert state["largest_n"][0] == pytest.approx(np.hypot(10.0, BAR_KG * GRAVITY_M_S2))
+    assert state["max_hand_force_n"][0] == pytest.approx(np.hypot(10.0, BAR_KG * GRAVITY_M_S2))
 
 
 def test_it_is_handed_over_when_the_fingers_have_let_go_and_gone():
@@ -97,7 +97,7 @@ def test_it_is_handed_over_when_the_fingers_have_let_go_and_gone():
 def test_a_pull_that_is_not_gentle_is_no_success():
     state = begun()
     go_on(state, world(), 1.0)
-    state["largest_n"] = 61.0
+    state["max_hand_force_n"] = 61.0
     go_on(state, world(held=False, away_m=0.3), 1.0)
     assert not state["done"][0]
 
@@ -112,7 +112,7 @@ def test_the_expert_hands_the_tool_over():
         over = terminated or truncated
     assert terminated
     assert info["is_success"]
-    assert 0.0 < info["task/largest_n"] < 60.0
+    assert 0.0 < info["task/max_hand_force_n"] < 60.0
     assert contacts == 0.0
     env.close()
 

@@ -266,5 +266,5 @@ def test_wrong_shapes_and_settings_are_said():
         associate(LAB[:3], seen, nobody(2))
     with pytest.raises(ConfigError, match="gate_sigma"):
         AssociationConfig(gate_sigma=0)
-    with pytest.raises(ConfigError, match="slack_m"):
-        AssociationConfig(slack_m=-1)
+    with pytest.raises(ConfigError, match="prediction_std_m"):
+        AssociationConfig(prediction_std_m=-1)

@@ -12,7 +12,7 @@ from hrc_env.tracking.people.association import associate
 
 CHI2_95_3D = 7.815
 ALONE = LAB[:1]
-AT_ONCE = ParticleConfig(wait_updates=0)
+AT_ONCE = ParticleConfig(one_view_wait_updates=0)
 eight = range(40, 48)
 
 
@@ -66,7 +66,9 @@ def test_the_uncertainty_lies_along_the_ray():
 def test_a_second_view_is_waited_for_and_begins_as_if_the_first_had_never_been():
     joints = people(12)
     px = seen(joints, 12)
-    waiting = track(make_estimator("particle", LAB, DT, ParticleConfig(wait_updates=5)), px)
+    waiting = track(
+        make_estimator("particle", LAB, DT, ParticleConfig(one_view_wait_updates=5)), px
+    )
     assert [bool(e.tracked.all()) for e in waiting] == [False] * 5 + [True] * 7
     assert not any(e.tracked.any() for e in waiting[:5])
     px[4:] = seen(joints, 0)[4:]
@@ -102,11 +104,11 @@ def test_points_anywhere_in_a_box_are_no_body():
 def test_the_floor_tells_the_size_where_people_are_said_to_stand_on_it():
     joints = people(1, np.linspace(0.85, 1.15, 8))
     px, error = seen(joints, 1, ALONE), {}
-    for stands_std_m in (0.05, 0.0):
-        config = ParticleConfig(stands_std_m=stands_std_m)
+    for initial_foot_height_std_m in (0.05, 0.0):
+        config = ParticleConfig(initial_foot_height_std_m=initial_foot_height_std_m)
         estimate = track(make_estimator("particle", ALONE, DT, config), px)[0]
         assert inside(estimate, joints[0]).mean() > 0.8
-        error[stands_std_m] = np.sqrt((off_m(estimate, joints[0]) ** 2).mean())
+        error[initial_foot_height_std_m] = np.sqrt((off_m(estimate, joints[0]) ** 2).mean())
     assert error[0.05] < 0.7 * error[0.0]
 
 

@@ -12,7 +12,7 @@ from hrc_env.tracking.config import PaperConfig
 from hrc_env.tracking.estimators import ESTIMATORS, make_estimator
 from hrc_env.tracking.out_of_sequence import IGNORED
 
-LATE = PaperConfig(longest_delay_s=0.5, n_particles=200)
+LATE = PaperConfig(max_delay_s=0.5, n_particles=200)
 every = pytest.mark.parametrize("name", sorted(ESTIMATORS))
 FIELDS = ("mean_world", "cov_world", "velocity_world", "age_s", "tracked")
 
@@ -64,7 +64,7 @@ def assert_same(ours, theirs):
 @every
 def test_frames_of_now_are_used_as_if_there_were_no_memory(name):
     _, px = walks(2, 30)
-    plain = make_estimator(name, LAB, DT, replace(LATE, longest_delay_s=0.0))
+    plain = make_estimator(name, LAB, DT, replace(LATE, max_delay_s=0.0))
     _, expected = follow(plain, map(keypoints, px), 2)
     for arriving in (map(keypoints, px), arrivals(px, np.zeros((2, 4), int))):
         state, estimates = follow(late(name), arriving, 2)
@@ -106,7 +106,7 @@ def test_late_frames_are_worth_more_at_their_own_time(name):
     joints, px = walks(4, 80, Damage())
     delays = np.tile([1, 2, 4, 5], (4, 1))
     as_of_now = (replace(frame, time_s=None) for frame in arrivals(px, delays))
-    plain = make_estimator(name, LAB, DT, replace(LATE, longest_delay_s=0.0))
+    plain = make_estimator(name, LAB, DT, replace(LATE, max_delay_s=0.0))
     naive = error_m(follow(plain, as_of_now, 4)[1][40:], joints[40:])
     ours = error_m(follow(late(name), arrivals(px, delays), 4)[1][40:], joints[40:])
     assert ours < 0.75 * naive
@@ -241,7 +241,7 @@ def test_a_camera_whose_clock_jumps_back_is_ignored_until_it_has_caught_up():
 
 def test_more_frames_than_the_memory_holds_shorten_it_and_are_data():
     _, px = walks(1, 12, Damage())
-    e, rngs = late(config=replace(LATE, longest_delay_s=0.08)), generators(1)
+    e, rngs = late(config=replace(LATE, max_delay_s=0.08)), generators(1)
     state, _ = follow(e, map(keypoints, px[:10]), 1)
     e.predict(state, DT, rngs)
     for k in range(30):  # camera 0 at 1 kHz
@@ -283,8 +283,8 @@ def test_a_copied_state_continues_as_the_original_does():
 
 
 def test_delays_beyond_a_second_and_times_of_another_rig_are_refused():
-    with pytest.raises(ConfigError, match=r"longest_delay_s must be in \[0, 1\]"):
-        PaperConfig(longest_delay_s=1.5)
+    with pytest.raises(ConfigError, match=r"max_delay_s must be in \[0, 1\]"):
+        PaperConfig(max_delay_s=1.5)
     _, px = walks(1, 1)
     e = late()
     with pytest.raises(ConfigError, match="time_s must have shape"):

@@ -122,14 +122,16 @@ def test_particles_begin_all_over_the_room_that_the_cameras_stand_round():
 def test_cameras_on_one_wall_leave_the_depth_of_the_place_to_the_prior():
     wall = make_estimator("paper", LAB[[0, 3]], DT, PaperConfig(prior_std_m=1.0))
     np.testing.assert_allclose(find_place(wall.P, wall.config)[0], [-0.7, 3.3])
-    told = PaperConfig(place_m=((-1, 2), (-3, 4), (0, 1)))
-    np.testing.assert_array_equal(find_place(LAB, told), told.place_m)
+    told = PaperConfig(initial_bounds_m=((-1, 2), (-3, 4), (0, 1)))
+    np.testing.assert_array_equal(find_place(LAB, told), told.initial_bounds_m)
 
 
-@pytest.mark.parametrize("place_m", [((0, 1), (0, 1)), ((0, 1), (0, 1), (2, 2)), (1, 2, 3)])
-def test_a_place_that_is_none_is_refused(place_m):
-    with pytest.raises(ConfigError, match="place_m must be empty or hold the least"):
-        PaperConfig(place_m=place_m)
+@pytest.mark.parametrize(
+    "initial_bounds_m", [((0, 1), (0, 1)), ((0, 1), (0, 1), (2, 2)), (1, 2, 3)]
+)
+def test_a_place_that_is_none_is_refused(initial_bounds_m):
+    with pytest.raises(ConfigError, match="initial_bounds_m must be empty or hold the least"):
+        PaperConfig(initial_bounds_m=initial_bounds_m)
 
 
 def test_clouds_from_all_over_the_room_find_the_body_and_are_tracked_from_then_on():

@@ -320,8 +320,8 @@ def test_exchanging_slots_exchanges_every_array():
     [
         {"n_hypotheses": 0},
         {"mirrored_parts": ("head",)},
-        {"least_weight": 0.0},
-        {"look_every_s": 0},
+        {"min_weight": 0.0},
+        {"hypothesis_search_period_s": 0},
     ],
 )
 def test_settings_that_cannot_work_are_refused(change):

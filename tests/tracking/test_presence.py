@@ -68,7 +68,7 @@ class Watch:
         """Whether each slot is unknown, and for how long nobody said anything of it."""
         said = self.estimate(*args, **more)
         assert not (said.unknown & said.tracked).any()
-        return said.unknown[0].tolist(), said.blind_s[0]
+        return said.unknown[0].tolist(), said.unobserved_s[0]
 
     @property
     def floor(self):
@@ -232,4 +232,4 @@ def test_a_track_that_several_cameras_contradict_is_not_believed_until_they_agre
 def test_an_estimate_of_which_nobody_says_more_calls_unknown_whoever_has_no_track():
     said = belief(True, False, age_s=0.3)
     assert said.unknown.tolist() == [[False, True]]
-    assert said.blind_s.tolist() == [[0.3, 0.3]]
+    assert said.unobserved_s.tolist() == [[0.3, 0.3]]

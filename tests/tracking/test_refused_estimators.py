@@ -37,7 +37,7 @@ def believed(**changes: Any) -> PoseEstimate:
             "age_s": np.ones(SHAPE),
             "tracked": np.zeros(SHAPE[:2], bool),
             "unknown": np.ones(SHAPE[:2], bool),
-            "blind_s": np.ones(SHAPE[:2]),
+            "unobserved_s": np.ones(SHAPE[:2]),
             "seen_world": np.full((*SHAPE, 3), np.nan),
         }
         | changes
@@ -172,7 +172,7 @@ def test_a_time_between_updates_that_is_none_is_refused(ctrl_dt):
 
 def test_a_delay_is_used_where_one_is_set():
     for delay_s, late in ((0.0, False), (0.04, True)):
-        made = make_estimator("particle", LAB, 1e-3, ParticleConfig(longest_delay_s=delay_s))
+        made = make_estimator("particle", LAB, 1e-3, ParticleConfig(max_delay_s=delay_s))
         assert isinstance(made, OutOfSequence) == late
 
 
@@ -187,7 +187,7 @@ def test_who_handles_late_frames_gets_them_as_they_arrive():
     spec = spec_of(make=lambda *given: Own(believed(), believed()), handles_late_frames=True)
     check_estimator(spec)
     assert any(times is not None and (times[:, 0] < DT).all() for times in seen)
-    made = make_estimator(spec, LAB, DT, TrackerConfig(longest_delay_s=0.5))
+    made = make_estimator(spec, LAB, DT, TrackerConfig(max_delay_s=0.5))
     assert not isinstance(made, OutOfSequence)
     kept = pickle.loads(cloudpickle.dumps(spec))
     assert kept.handles_late_frames
@@ -242,13 +242,13 @@ ROOM = ((-3.0, 3.0), (-2.0, 2.0), (0.0, 2.2))
         (ParticleConfig, "noise_bounds", (1.0, 1.0), (-1.0, 1.0)),
         (ParticleConfig, "noise_bounds", (1.0, 6.0), (np.nan, 6.0)),
         (PaperConfig, "n_particles", 10, 9),
-        (PaperConfig, "place_m", ((0.0, 0.5),) * 3, ROOM[:2]),
-        (PaperConfig, "place_m", (), ROOM[:1]),
-        (PaperConfig, "place_m", ROOM, (*ROOM[:2], (2.2, 2.2))),
-        (PaperConfig, "place_m", ROOM, ((3.0, -3.0), *ROOM[1:])),
-        (PaperConfig, "place_m", ROOM, (*ROOM[:2], (0.0, np.inf))),
-        (PaperConfig, "place_m", ROOM, tuple((0.0, *pair) for pair in ROOM)),
-        (PaperConfig, "place_m", ROOM, ROOM[0]),
+        (PaperConfig, "initial_bounds_m", ((0.0, 0.5),) * 3, ROOM[:2]),
+        (PaperConfig, "initial_bounds_m", (), ROOM[:1]),
+        (PaperConfig, "initial_bounds_m", ROOM, (*ROOM[:2], (2.2, 2.2))),
+        (PaperConfig, "initial_bounds_m", ROOM, ((3.0, -3.0), *ROOM[1:])),
+        (PaperConfig, "initial_bounds_m", ROOM, (*ROOM[:2], (0.0, np.inf))),
+        (PaperConfig, "initial_bounds_m", ROOM, tuple((0.0, *pair) for pair in ROOM)),
+        (PaperConfig, "initial_bounds_m", ROOM, ROOM[0]),
     ],
 )
 def test_settings_end_where_they_say(kind, name, taken, refused):

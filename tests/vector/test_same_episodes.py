@@ -22,7 +22,10 @@ TURNED = {"kind": "wrong_rotation", "cameras": ["camera_2"], "amount": [0.01, 0.
 OPTIONS: list[dict[str, Any]] = [
     {"faults": [TURNED, LATE]},
     {"n_workers": 2, "bodies": ["worker_2", "worker_1"], "people": "unaware"},
-    {"n_workers": 1, "cameras": RigDistribution(place_m=0.2, turn_rad=0.05, n_cameras=(2, 4))},
+    {
+        "n_workers": 1,
+        "cameras": RigDistribution(max_shift_m=0.2, max_rotation_rad=0.05, n_cameras=(2, 4)),
+    },
     {"faults": [{"kind": "late", "cameras": ["all"], "amount": 0.12}]},
 ]
 """Of four environments: a range of faults, workers by number and kind, a drawn rig, a delay."""

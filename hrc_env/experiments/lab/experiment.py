@@ -62,7 +62,7 @@ class Lab:
     def __post_init__(self) -> None:
         """Raise `ConfigError` for settings that cannot work."""
         check_at_least_one(self, "n_seeds")
-        DetectorConfig(folded=self.folded)
+        DetectorConfig(folded_network=self.folded)
 
     @property
     def seeds(self) -> list[int]:
@@ -128,7 +128,7 @@ def make_laboratory(seed: int, folded: str = "full") -> Laboratory:
     names = worker_names()
     config = HRCConfig(
         worker=names[seed % len(names)],
-        detector=DetectorConfig(folded=folded),
+        detector=DetectorConfig(folded_network=folded),
         scene=SceneConfig(cameras=RIGS[RIG]),
     )
     return Laboratory(build(config.scene, "lab", 1, config.worker), config)

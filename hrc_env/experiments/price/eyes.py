@@ -55,13 +55,13 @@ GROUPS = {
 
 
 def _fail_all(
-    kind: str, amount: float | None, from_s: float = 0.0, until_s: float = FOREVER_S
+    kind: str, amount: float | None, start_s: float = 0.0, end_s: float = FOREVER_S
 ) -> tuple[Faults, ...]:
-    return ((FaultConfig(kind, (ALL,), amount, from_s, until_s),),)
+    return ((FaultConfig(kind, (ALL,), amount, start_s, end_s),),)
 
 
-def _fail_each(kind: str, amount: float | None = None, from_s: float = 0.0) -> tuple[Faults, ...]:
-    return tuple((FaultConfig(kind, (camera.name,), amount, from_s),) for camera in RIGS["lab"])
+def _fail_each(kind: str, amount: float | None = None, start_s: float = 0.0) -> tuple[Faults, ...]:
+    return tuple((FaultConfig(kind, (camera.name,), amount, start_s),) for camera in RIGS["lab"])
 
 
 def _make_late(latency_s: float, is_told: bool) -> Eyes:

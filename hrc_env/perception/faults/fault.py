@@ -5,9 +5,9 @@ the same seed without faults.
 """
 
 import numbers
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -77,6 +77,12 @@ ALL = "all"
 class FaultConfig:
     """One fault of some cameras during a part of every episode."""
 
+    RENAMED: ClassVar[Mapping[str, str]] = {
+        "from_s": "start_s",
+        "until_s": "end_s",
+    }
+    """Present names of fields that were renamed, by their old names."""
+
     kind: str
     """Kind of the fault, a key of `KINDS`."""
     cameras: tuple[int | str, ...]
@@ -85,9 +91,9 @@ class FaultConfig:
     amount: float | tuple[float, float] | None = None
     """Amount of the fault in the kind's unit; a pair (least, greatest) is a range from which each
     episode's amount is drawn uniformly, None the kind's default."""
-    from_s: float = 0.0
+    start_s: float = 0.0
     """Time in the episode at which the fault begins [s]; 0 is the reset."""
-    until_s: float = FOREVER_S
+    end_s: float = FOREVER_S
     """Time in the episode at which the fault ends [s]."""
 
     def __post_init__(self) -> None:
@@ -113,10 +119,10 @@ class FaultConfig:
                 f"Fault {self.kind!r}: a range of amounts must be (least, most), from which every "
                 f"episode's amount is drawn, got {self.amount!r}."
             )
-        if not 0 <= self.from_s < self.until_s:
+        if not 0 <= self.start_s < self.end_s:
             raise ConfigError(
                 f"Fault {self.kind!r} must begin at 0 s or later and end after that, "
-                f"got from {self.from_s} to {self.until_s} s."
+                f"got from {self.start_s} to {self.end_s} s."
             )
 
     @property
@@ -144,7 +150,7 @@ class FaultConfig:
 
     def is_active(self, time_s: float) -> bool:
         """Return whether an image of a time in the episode has the fault, to within 0.5 ms."""
-        return self.from_s - 5e-4 <= time_s < self.until_s - 5e-4
+        return self.start_s - 5e-4 <= time_s < self.end_s - 5e-4
 
 
 def check_cameras(faults: Sequence[FaultConfig], names: Sequence[str]) -> None:

@@ -75,7 +75,7 @@ class Schedule:
         )
 
     @property
-    def longest_delay_s(self) -> float:
+    def max_delay_s(self) -> float:
         """Greatest age of an image with its true time [s]."""
         return self.dt_s * max(self._delay(c, None) for c in range(len(self.cameras)))
 
@@ -83,7 +83,7 @@ class Schedule:
     def longest_memory(self) -> int:
         """Greatest number of steps since the scene of an image, without frozen ones."""
         behind = [f.max_amount for f in self.faults if f.kind == "out_of_step"]
-        return round(self.longest_delay_s / self.dt_s) + math.ceil(max(behind, default=0.0))
+        return round(self.max_delay_s / self.dt_s) + math.ceil(max(behind, default=0.0))
 
     @property
     def frozen_steps(self) -> frozenset[int]:
@@ -167,7 +167,7 @@ class Schedule:
 
     def _frozen_at(self, fault: FaultConfig) -> int:
         """Return the last step before a camera froze."""
-        return max(0, math.ceil(fault.from_s / self.dt_s - _EARLY) - 1)
+        return max(0, math.ceil(fault.start_s / self.dt_s - _EARLY) - 1)
 
 
 class History(Stateful):

@@ -49,13 +49,13 @@ class AssociationSettings(NamedTuple):
 
     gate_sigma: float
     """Gate of a joint around its predicted pixel, in standard deviations."""
-    slack_m: float
+    prediction_std_m: float
     """Standard deviation of errors that predictions do not account for [m]."""
     min_joints: int
     """Number of joints on which two cameras must agree for a new person."""
-    apart_m: float
+    merge_distance_m: float
     """Distance between two bodies below which they are one person [m]."""
-    rejoin_m: float
+    rejoin_distance_m: float
     """Greatest distance of a new body from the hidden worker that it is taken for [m]."""
     image_area_px: float
     """Area of an image [px^2]."""
@@ -63,7 +63,12 @@ class AssociationSettings(NamedTuple):
 
 @kernel(makes_arrays=True)
 def project_body(
-    camera: Floats, mean: Points3, cov: Covariances3, known: Bools, slack_m: float, image: Floats
+    camera: Floats,
+    mean: Points3,
+    cov: Covariances3,
+    known: Bools,
+    prediction_std_m: float,
+    image: Floats,
 ) -> None:
     """Predict the pixels of a body's joints in one camera.
 
@@ -72,7 +77,7 @@ def project_body(
         mean: (J, 3) positions [m].
         cov: (J, 3, 3) covariances of the positions [m^2].
         known: (J,) joints with a known position.
-        slack_m: standard deviation of errors that `cov` does not hold [m].
+        prediction_std_m: standard deviation of errors that `cov` does not hold [m].
         image: (J, 3) u, v [px] and mean variance of a coordinate [px^2], filled in. The variance is
             -1 for joints that are not known or not in front of the camera.
     """
@@ -83,7 +88,7 @@ def project_body(
         u, v, depth = pixel_of(camera, mean[j, 0], mean[j, 1], mean[j, 2])
         if depth > NEAREST_DEPTH_M:
             spread = compute_pixel_variance(camera, u, v, depth, cov[j])
-            spread += slack_m**2 * compute_pixel_variance(camera, u, v, depth, _ISOTROPIC)
+            spread += prediction_std_m**2 * compute_pixel_variance(camera, u, v, depth, _ISOTROPIC)
             if math.isfinite(u + v + spread) and spread >= 0.0:
                 image[j, 0], image[j, 1], image[j, 2] = u, v, spread
 

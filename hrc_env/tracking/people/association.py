@@ -9,13 +9,16 @@ person. If the rig has a single camera, they are assigned to slots without a tra
 workers are seen.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from hrc_env.core.declared import Records1, Records2, make_records
 from hrc_env.core.errors import check_fields, check_shape
 from hrc_env.core.kernels import kernel
+from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Covariances3, Floats, Ints, Points2, Points3
@@ -42,6 +45,7 @@ from hrc_env.tracking.people.new_people import (
 from hrc_env.tracking.tracks import EstimateArrays, get_estimate_arrays
 
 
+@answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class AssociationConfig:
     """When a 2D pose is assigned to a worker.
@@ -50,24 +54,33 @@ class AssociationConfig:
         ConfigError: a value is out of its range; the error names the field and the range.
     """
 
+    RENAMED: ClassVar[Mapping[str, str]] = {
+        "slack_m": "prediction_std_m",
+        "apart_m": "merge_distance_m",
+        "rejoin_m": "rejoin_distance_m",
+    }
+    """Present names of fields that were renamed, by their old names."""
+
     gate_sigma: float = 5.0
     """Gate of a joint around its predicted pixel, in standard deviations. Half of a pose's joints
     must be within it."""
-    slack_m: float = 0.05
+    prediction_std_m: float = 0.05
     """Standard deviation of errors that predictions do not account for [m]: errors of a detector
     persist for half a second, and people start and stop."""
     min_joints: int = 8
     """Number of joints, of 15, on which two cameras must agree for a new person."""
-    apart_m: float = 0.35
+    merge_distance_m: float = 0.35
     """Distance between two bodies below which they are one person [m]."""
-    rejoin_m: float = 1.0
+    rejoin_distance_m: float = 1.0
     """Distance within which a new body is taken for a tracked worker that no camera sees [m]."""
     image_area_px: float = 1920.0 * 1080.0
     """Area of an image [px^2]. Its inverse is the density of poses that belong to no worker."""
 
     def __post_init__(self) -> None:
         check_fields(self, "be positive", "gate_sigma", "min_joints", "image_area_px")
-        check_fields(self, "not be negative", "slack_m", "apart_m", "rejoin_m")
+        check_fields(
+            self, "not be negative", "prediction_std_m", "merge_distance_m", "rejoin_distance_m"
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,7 +208,7 @@ def _assign_to_tracked(
         for w in range(n_workers):
             if not tracked[w]:
                 continue
-            project_body(cameras[c].P, mean[w], cov[w], known, settings.slack_m, image)
+            project_body(cameras[c].P, mean[w], cov[w], known, settings.prediction_std_m, image)
             for d in range(n_poses):
                 if poses[c, d].free:
                     fit[w, d] = -compute_affinity(image, poses[c, d], settings)
@@ -321,9 +334,9 @@ def _find_worker(
     distance = np.empty(len(tracked))
     for w in range(len(tracked)):
         distance[w] = _measure_distance(body, mean[w])
-    nearest = _find_nearest(distance, tracked, settings.apart_m)
+    nearest = _find_nearest(distance, tracked, settings.merge_distance_m)
     if nearest < 0:
-        nearest = _find_nearest(distance, unseen, settings.rejoin_m)
+        nearest = _find_nearest(distance, unseen, settings.rejoin_distance_m)
     return nearest if nearest >= 0 else _find_nearest(distance, vacant, np.inf)
 
 

@@ -109,7 +109,7 @@ def _update_worker(
         read_worker(measured, b, w, settings.sigma_scale, frame)
         if start_track(worker, frame, settings):
             return
-    is_due = worker.since_search_s[0] >= settings.look_every_s
+    is_due = worker.since_search_s[0] >= settings.hypothesis_search_period_s
     searches_now = len(worker.trees) > 1 and is_due
     if searches_now:
         read_worker(measured, b, w, settings.sigma_scale, frame)
@@ -125,7 +125,7 @@ def _update_worker(
             tree.slope[:] = 0.0
         evidence = condition_on_frame(tree, prior, is_weighed, frame, settings, work)
         if is_weighed:
-            weigh_pose(tree, has_rivals, settings.evidence_trust * evidence, settings)
+            weigh_pose(tree, has_rivals, settings.evidence_exponent * evidence, settings)
         learn_from_frame(frame, tree, noise, noise_model, work)
         if branches:
             worker.since_search_s[0] = 0.0
@@ -194,9 +194,9 @@ def _move_worker(
         predict_tree(tree, model, dt, work)
         if has_rivals:
             tree.offset[:], tree.offset_count[:] = work.offset, work.offset_count
-            tree.log_weight += settings.walking_odds * dt * _score_walk(tree.body)
+            tree.log_weight += settings.walking_log_odds_per_s * dt * _score_walk(tree.body)
     if has_rivals:
-        normalise_weights(worker, settings.log_least_weight)
+        normalise_weights(worker, settings.log_min_weight)
 
 
 @kernel

@@ -120,7 +120,7 @@ def _find_ambiguous_view(part: int, tree: Tree, frame: Frame, settings: Settings
     if c < 0:
         return -1
     depth_std = measure_depth_std(part, frame.cameras[c].eye, tree.body, tree.cov)
-    return c if depth_std > settings.open_depth_m else -1
+    return c if depth_std > settings.min_ambiguous_depth_std_m else -1
 
 
 @kernel(makes_arrays=True)
@@ -157,7 +157,7 @@ def branch(
         if penalty < np.inf:
             tree = trees[n]
             before = tree.pose_log_prior
-            tree.pose_log_prior = settings.anatomy_trust * score_pose(tree.body)
+            tree.pose_log_prior = settings.anatomy_exponent * score_pose(tree.body)
             tree.log_weight += tree.pose_log_prior - before - penalty
             worker.n_alive[0] = n + 1
 
@@ -241,7 +241,7 @@ def _search_mode(
     """
     new, known = trees[n], trees[0].body
     _restore_prediction(new, prior)
-    set_bone_variances(new.bone_variance, settings.bone_give, work.bone_variance)
+    set_bone_variances(new.bone_variance, settings.bone_variation_scale, work.bone_variance)
     find_pose_near(new, frame, settings, _SEARCH_STEPS, 0.0, work)
     moved = 0.0
     for j in range(len(known)):

@@ -295,7 +295,7 @@ def weigh_pose(tree: Tree, has_rivals: bool, gain: float, settings: Settings) ->
         gain: log-evidence of the frame, times the trust in it.
         settings: settings of the estimator.
     """
-    pose_log_prior = settings.anatomy_trust * score_pose(tree.body)
+    pose_log_prior = settings.anatomy_exponent * score_pose(tree.body)
     if has_rivals:
         tree.log_weight += gain + pose_log_prior - tree.pose_log_prior
     tree.pose_log_prior = pose_log_prior
@@ -307,9 +307,9 @@ def prune_and_merge(worker: WorkerHypotheses, settings: Settings, work: Work) ->
     for h in range(worker.n_alive[0] - 1, -1, -1):
         if worker.n_alive[0] > 1 and not worker.trees[h].tracked:
             drop_hypothesis(worker, h)
-    normalise_weights(worker, settings.log_least_weight)
+    normalise_weights(worker, settings.log_min_weight)
     merge_close(worker, _CLOSE**2, work)
-    normalise_weights(worker, settings.log_least_weight)
+    normalise_weights(worker, settings.log_min_weight)
 
 
 @kernel(makes_arrays=True)

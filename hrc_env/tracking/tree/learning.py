@@ -86,7 +86,7 @@ def make_noise_model(config: ParticleConfig, ctrl_dt: float) -> NoiseModel:
     """Return the constants for updates that are `ctrl_dt` [s] apart."""
     min_factor, max_factor = config.noise_bounds
     keep, correlation = (
-        math.exp(-ctrl_dt / tau) for tau in (config.noise_tau_s, config.noise_persists_s)
+        math.exp(-ctrl_dt / tau) for tau in (config.noise_tau_s, config.noise_correlation_s)
     )
     return NoiseModel(keep**_TURNS, correlation, config.noise_share, min_factor, max_factor)
 

@@ -63,10 +63,10 @@ def start_from_one_view(
     tree, cameras = worker.trees[0], np.zeros(2, np.int64)
     n_views, n = count_views(frame, settings.acquire_min_joints, cameras), tree.one_view_updates
     tree.one_view_updates = n + 1 if n_views == 1 else max(n - 1, 0)
-    has_waited = tree.one_view_updates > settings.wait_updates or len(frame.P) == 1
+    has_waited = tree.one_view_updates > settings.one_view_wait_updates or len(frame.P) == 1
     if n_views == 1 and has_waited:
         fit_to_one_view(worker, cameras[1], frame, settings, work, prior)
-        tree.one_view_updates, worker.since_search_s[0] = 0, settings.look_every_s
+        tree.one_view_updates, worker.since_search_s[0] = 0, settings.hypothesis_search_period_s
 
 
 @kernel(makes_arrays=True)
@@ -90,7 +90,7 @@ def fit_to_one_view(
     """
     tree, best = worker.trees[0], worker.trees[:1].copy()
     most = least = _LEAST_EVIDENCE * frame.ok[:, camera].sum()
-    set_bone_variances(tree.bone_variance, settings.bone_give, work.bone_variance)
+    set_bone_variances(tree.bone_variance, settings.bone_variation_scale, work.bone_variance)
     for turn in range(_N_TURNS):
         if not _stand_body(tree, frame, camera, 2.0 * math.pi * turn / _N_TURNS):
             continue
@@ -100,7 +100,7 @@ def fit_to_one_view(
         evidence = log_evidence(prior[0], tree, frame, settings, work)
         correct_mean(tree, frame, settings, work)
         learn_lengths(tree, work.n_views)
-        tree.pose_log_prior = settings.anatomy_trust * score_pose(tree.body)
+        tree.pose_log_prior = settings.anatomy_exponent * score_pose(tree.body)
         if evidence + tree.pose_log_prior > most:
             best[0], most = tree, evidence + tree.pose_log_prior
     worker.trees[0] = best[0]
@@ -108,7 +108,7 @@ def fit_to_one_view(
         tree.tracked, tree.size_std = True, settings.size_std
         for c in range(len(frame.P)):
             worker.views[0, c].unseen_updates = 0 if c == camera else _UNSEEN_UPDATES
-        if settings.stands_std_m > 0.0:
+        if settings.initial_foot_height_std_m > 0.0:
             _measure_size(tree, frame.cameras[camera].eye, settings)
 
 
@@ -163,7 +163,7 @@ def _measure_size(tree: Tree, eye: Floats, settings: Settings) -> None:
     """
     size_std, drop = settings.size_std, eye[2] - tree.body[:, 2].min()
     if drop > 0.0:
-        trust = size_std**2 / (size_std**2 + (settings.stands_std_m / drop) ** 2)
+        trust = size_std**2 / (size_std**2 + (settings.initial_foot_height_std_m / drop) ** 2)
         size = 1.0 + trust * (eye[2] / drop - 1.0)
         tree.size_std *= math.sqrt(1.0 - trust)
         tree.bone_length[:] *= size

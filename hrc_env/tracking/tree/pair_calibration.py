@@ -104,7 +104,7 @@ def _may_start_turned(tree: Tree, cameras: Records1[Camera], settings: Settings)
         settings: settings of the estimator.
     """
     if not tree.tracked:
-        return tree.pair.untracked_updates > settings.wait_updates
+        return tree.pair.untracked_updates > settings.one_view_wait_updates
     measure_displacement(tree.pair, cameras, tree.body, tree.displaced_m2)
     return np.diag(tree.displaced_m2).max() < WIDEST_STD_M**2
 

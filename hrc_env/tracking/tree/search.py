@@ -42,7 +42,7 @@ def find_pose(tree: Tree, frame: Frame, settings: Settings, work: Work) -> None:
             log-likelihood as a function of the positions (of joints, and of joints less their
             parents') minus their predicted means, at 0.
     """
-    set_bone_variances(tree.bone_variance, settings.bone_give, work.bone_variance)
+    set_bone_variances(tree.bone_variance, settings.bone_variation_scale, work.bone_variance)
     for j in range(len(tree.body)):
         for i in range(3):
             work.point[j, i] = tree.body[j, i]

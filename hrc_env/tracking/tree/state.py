@@ -363,7 +363,7 @@ def reset_hypotheses(state: Hypotheses, ids: Ints, config: ParticleConfig) -> No
     fresh["offset"], fresh["offset_count"] = STANDING_M, STANDING_COUNT
     fresh["bone_length"], fresh["bone_variance"] = make_bone_prior()
     state.trees[ids] = fresh
-    state.views[ids] = np.array((config.swap_begins, 0, 0), VIEW)
+    state.views[ids] = np.array((config.swap_start_probability, 0, 0), VIEW)
     factor = np.clip(1.0, *config.noise_bounds)  # 1: the detector's own variance
     state.noise[ids] = np.array((factor, np.zeros(N_SUMS), np.zeros(2)), NOISE)
     state.n_alive[ids], state.since_search_s[ids] = 1, 0.0

@@ -45,7 +45,7 @@ def test_without_faults_every_image_is_of_now():
 
 
 def test_a_fault_is_of_its_cameras_and_of_its_time_only():
-    plan = schedule(first("lost", from_s=0.12, until_s=0.24))
+    plan = schedule(first("lost", start_s=0.12, end_s=0.24))
     assert [frame is None for frame in film(plan, n=8)] == [False] * 3 + [True] * 3 + [False] * 2
     assert film(plan, c=1) == film(schedule(), c=1)
 
@@ -80,7 +80,7 @@ def test_the_environment_counts_a_faults_cameras_among_those_that_it_uses():
 
 
 def test_a_frozen_camera_shows_its_last_image_as_if_new():
-    assert film(schedule(first("frozen", from_s=0.16)), n=7)[3:] == [
+    assert film(schedule(first("frozen", start_s=0.16)), n=7)[3:] == [
         Frame(3, 3), Frame(3, 4), Frame(3, 5), Frame(3, 6),
     ]  # fmt: skip
 
@@ -116,7 +116,7 @@ def test_wrong_calibrations_are_as_large_as_said_and_drawn_for_the_episode():
     rig = make_cameras(RIG)
     amounts = {"wrong_rotation": 0.1, "wrong_translation": 0.2, "wrong_focal": 0.1, "knocked": 0.3}
     for kind, amount in amounts.items():
-        plan = schedule(first(kind, amount, from_s=1.0))
+        plan = schedule(first(kind, amount, start_s=1.0))
         assert plan.actual_cameras(rig, 5, 0) is rig
         real, told = plan.actual_cameras(rig, 5, 25)[0], rig[0]
         assert plan.actual_cameras(rig, 5, 30)[0] is real
@@ -134,7 +134,7 @@ def test_wrong_calibrations_are_as_large_as_said_and_drawn_for_the_episode():
 @pytest.mark.parametrize("kind", NOT_OF_IMAGES)
 def test_a_fault_changes_what_is_seen_and_nothing_of_the_world(kind):
     plain = rolled()
-    spoilt = rolled(faults=[{"kind": kind, "cameras": ["camera_1"], "from_s": 0.4}])
+    spoilt = rolled(faults=[{"kind": kind, "cameras": ["camera_1"], "start_s": 0.4}])
     for name in ("safety/min_separation_m", "worker_0/activity", "task/goals_reached"):
         assert [info.get(name) for info in plain] == [info.get(name) for info in spoilt]
     error = [[info.get("tracking/mpjpe_m") for info in each] for each in (plain, spoilt)]
@@ -144,7 +144,7 @@ def test_a_fault_changes_what_is_seen_and_nothing_of_the_world(kind):
 
 @pytest.mark.parametrize("kind", NOT_OF_IMAGES)
 def test_a_batch_with_faults_is_its_environments_one_by_one(kind):
-    faults = [FaultConfig(kind, ("camera_1", "camera_3"), from_s=0.2)]
+    faults = [FaultConfig(kind, ("camera_1", "camera_3"), start_s=0.2)]
     batch = HRCVectorEnv(3, faults=faults, num_threads=1)
     together = [batch.reset(seed=10)[0]]
     together += [batch.step(np.zeros((3, 6)))[0] for _ in range(12)]
@@ -194,7 +194,7 @@ def test_of_somebody_who_walks_late_images_tell_more_than_images_that_claim_to_b
         ({"kind": "broken", "cameras": ["camera_1"]}, "Unknown fault"),
         ({"kind": "late", "cameras": ["camera_1"], "amount": 3.0}, "from 0 to 1 s"),
         ({"kind": "late", "cameras": ["camera_1"], "amount": "much"}, "from 0 to 1 s"),
-        ({"kind": "lost", "cameras": ["camera_1"], "from_s": 2.0, "until_s": 1.0}, "end after"),
+        ({"kind": "lost", "cameras": ["camera_1"], "start_s": 2.0, "end_s": 1.0}, "end after"),
         ({"kind": "defocus", "cameras": ["camera_1"]}, 'use perception="pixels"'),
         ({"kind": "lost", "cameras": ["camera_1"], "to_s": 1.0}, "Unknown config field"),
     ],

@@ -44,19 +44,23 @@ WITHOUT = {
     "velocity forgotten": Variant("no motion model (velocity forgotten)", {"motion": "forgotten"}),
     "bones of any length": Variant("no bones (any length)", {"bones": "none"}),
     "no outliers": Variant("no outliers in the likelihood", {"outlier_weight": 1e-9}),
-    "no swaps": Variant("no exchanged sides", {"swap_begins": 1e-30, "swap_ends": 1.0 - 1e-16}),
+    "no swaps": Variant(
+        "no exchanged sides", {"swap_start_probability": 1e-30, "swap_end_probability": 1.0 - 1e-16}
+    ),
     "noise as told": Variant("no learnt noise (only the detector's)", {"noise_bounds": (1.0, 1.0)}),
     "mode for mean": Variant("no step from the mode to the mean", {"mean_correction": 0.0}),
     "no widening": Variant("no wider covariance for one view", {"one_view_inflation": 1.0}),
     "no floor": Variant("no floor", {"floor_std_m": math.inf}),
-    "stiff bones": Variant("stiff bones (no more variation than in people)", {"bone_give": 1.0}),
+    "stiff bones": Variant(
+        "stiff bones (no more variation than in people)", {"bone_variation_scale": 1.0}
+    ),
     "kalman": Variant("no mixture (kalman)", {"estimator": "kalman"}),
     "one hypothesis": Variant("no mixture (one hypothesis)", {"n_hypotheses": 1}),
     "no turned body": Variant("no turned body", {"mirrored_parts": ("limbs",)}),
     "no limbs": Variant("no limbs", {"mirrored_parts": ("body",)}),
-    "no anatomy": Variant("no anatomy", {"anatomy_trust": 0.0}),
-    "no walking direction": Variant("no walking direction", {"walking_odds": 0.0}),
-    "evidence in full": Variant("evidence in full", {"evidence_trust": 1.0}),
+    "no anatomy": Variant("no anatomy", {"anatomy_exponent": 0.0}),
+    "no walking direction": Variant("no walking direction", {"walking_log_odds_per_s": 0.0}),
+    "evidence in full": Variant("evidence in full", {"evidence_exponent": 1.0}),
     "4 hypotheses": Variant("4 hypotheses", {"n_hypotheses": 4}),
     "16 hypotheses": Variant("16 hypotheses", {"n_hypotheses": 16}),
     "paper": Variant("paper: Algorithm 1 as printed", {"estimator": "paper"}),
