@@ -144,9 +144,9 @@ With four cameras an empty room is known to be empty one step after the reset at
 second after it at `pixels`, where cameras search every fifth step. At level `truth` no slot is
 unknown; at level `none` every slot is.
 
-The reward counts an unknown worker at least with the closeness `reward.unknown_closeness`, so that a lost
-track is not rewarded like an empty room. The agent `scripted_slowed` then moves its tool at no more
-than 0.25 m/s, or stops (`agents.scripted.Yielding.unknown_m_s`). If all slots are absent, it moves
+The reward counts an unknown worker at least with the closeness `reward.unknown_closeness`, so that
+a lost track is not rewarded like an empty room. The agent `scripted_slowed` then moves its tool at
+no more than 0.25 m/s, or stops (`agents.scripted.Yielding.unknown_m_s`). If all slots are absent, it moves
 freely.
 
 ## Reward
