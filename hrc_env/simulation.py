@@ -76,7 +76,7 @@ class Command:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Truth:
-    """The true state of the world, for sensors, task, cost and metrics; no belief reads it."""
+    """The true state of the world for sensors, task, cost and metrics; beliefs never read it."""
 
     ids: Ints
     """(B,) index of the environment of each row."""

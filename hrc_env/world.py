@@ -137,8 +137,8 @@ class WorkerSignal:
     """A task's signal to the workers that wait for it."""
 
     stage: Ints
-    """(B,) stage of the task: 0 while workers wait, 1 when they may begin, 2 when an object has
-    been handed to them."""
+    """(B,) stage of the task: 0 while workers wait, 1 when they may begin, 2 after one of them has
+    taken an object."""
     offered_world: Points3
     """(B, 3) position at which an object is offered [m]; NaN if none is offered."""
 
