@@ -1,4 +1,4 @@
-"""hrc_env: robot learning beside people who are observed by cameras only.
+"""hrc_env: learning of robots that work beside people and observe them only by cameras.
 
 Importing this package registers the environments; `gymnasium.make("hrc_env:HRCReach-v0")` imports
 the package and makes an environment. `PUBLIC` lists the names of the public interface and the
@@ -253,7 +253,7 @@ EXTRAS = dict.fromkeys(("HRCSubprocVecEnv", "HRCVecEnv", "ProximityRamp"), "stab
 
 
 def __getattr__(name: str) -> Any:
-    """Import a public name when it is first used (PEP 562); `help` of a class shows its fields.
+    """Import a public name when it is first used (PEP 562), and show a class's fields in `help`.
 
     Raises:
         AttributeError: the name is unknown, or it is a former name; the error suggests the most

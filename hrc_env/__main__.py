@@ -79,7 +79,7 @@ def main(words: Sequence[str] | None = None) -> int:
     """Run a command, and show errors of the package without a traceback.
 
     Args:
-        words: the command and its options; None for those of this process.
+        words: the command and its options; None for the arguments of this process.
 
     Returns:
         The exit status: 2 for a wrong command or option, 130 after Ctrl-C.

@@ -64,13 +64,13 @@ class HRCConfig:
     """Body of the workers: a name, several names, or "any" for all bodies. From several bodies, one
     is assigned to each worker in every episode; they differ from each other as far as possible."""
     scene: SceneConfig = field(default_factory=SceneConfig)
-    """Scene, cameras and physics."""
+    """Settings of the scene, the cameras and the physics."""
     motion: MotionConfig = field(default_factory=MotionConfig)
-    """Motion of the workers."""
+    """Settings of the workers' motion."""
     detector: DetectorConfig = field(default_factory=DetectorConfig)
-    """Pose detector (`perception="pixels"`)."""
+    """Settings of the pose detector (`perception="pixels"`)."""
     emulator: EmulatorConfig = field(default_factory=EmulatorConfig)
-    """Emulator of the pose detector (`perception="keypoints"`)."""
+    """Settings of the emulator of the pose detector (`perception="keypoints"`)."""
     faults: tuple[FaultConfig, ...] = ()
     """Faults of the cameras, with the times at which they occur (docs/cameras.md)."""
     appearance: AppearanceConfig = field(default_factory=AppearanceConfig)
@@ -78,7 +78,7 @@ class HRCConfig:
     tracker: TrackerConfig = field(default_factory=ParticleConfig)
     """Settings of the estimator, an instance of `EstimatorSpec.config`."""
     association: AssociationConfig = field(default_factory=AssociationConfig)
-    """Association of detections with several workers."""
+    """Settings of the association of detections with workers."""
     control: ControlConfig = field(default_factory=ControlConfig)
     """Scaling and limits of actions."""
     objects: ObjectsConfig = field(default_factory=ObjectsConfig)
@@ -129,7 +129,8 @@ def resolve(config: ConfigChoice, task: TaskType, estimator: EstimatorSpec) -> H
         estimator: the estimator.
 
     Raises:
-        ConfigError: an unknown field, an invalid value, or the settings of another task.
+        ConfigError: a field is unknown, a value is invalid, or the settings are those of another
+            task.
     """
     if isinstance(config, str | Path):
         config = read_toml(config)

@@ -114,7 +114,7 @@ class EnvBase(HasSpec, Stateful):
 
     @property
     def compute_truncated(self) -> Callable[[Any, Any, Any], Any]:
-        """Function of (achieved_goal, desired_goal, info) that returns False, for many goals (B,).
+        """Function of (achieved_goal, desired_goal, info) that returns False for each transition.
 
         Only the time limit truncates an episode.
 
@@ -136,7 +136,7 @@ class EnvBase(HasSpec, Stateful):
 class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
     EnvBase, gymnasium.Env[Observation, NDArray[np.float32]]
 ):
-    """A Gymnasium environment of a robot beside people whom it observes only by cameras.
+    """A Gymnasium environment in which a robot observes the people beside it only by cameras.
 
     Args:
         task: the robot's task, an id or a subclass of `Task`.
@@ -236,7 +236,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
 
     @property
     def body_names(self) -> tuple[str, ...]:
-        """Names of the bodies, to which `worker_N/body` in infos is an index."""
+        """Names of the workers' bodies; `worker_N/body` in infos is an index into them."""
         return self.simulation.bodies.names
 
     @property
@@ -355,7 +355,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         return self.views.picture(is_depth, size=self._size, camera=camera, **self._shown)
 
     def mosaic(self) -> NDArray[np.uint8]:
-        """Return the tiled images of the cameras with crops, keypoints and estimated skeletons."""
+        """Return a mosaic of the cameras' images with crops, keypoints and estimated skeletons."""
         self.refuse_closed()
         return self.views.mosaic()
 

@@ -31,9 +31,10 @@ if TYPE_CHECKING:  # at run time they would import the simulator, which `--help`
 PICTURE_SIZE = (960, 720)
 """Default width and height of a picture [px]."""
 MANY = {"many": True}
-"""Metadata of a field whose option on the command line takes several values."""
+"""Metadata of a field that takes several values on the command line."""
 NO_WORD = {"words": False}
-"""Metadata of a field without an option on the command line, where films have separate options."""
+"""Metadata of a field that is not available on the command line, which has other options for
+films."""
 
 
 @answer_unknown_fields

@@ -1,7 +1,7 @@
 """The cameras of each environment's episode, and the drawing of rigs, faults and appearances.
 
-Usually all environments share one perception pipeline; an environment whose cameras differ from the
-common ones has a separate pipeline (`pipeline.episodic`).
+Usually all environments share one perception pipeline; an environment with different cameras has a
+separate pipeline (`pipeline.episodic`).
 """
 
 from collections.abc import Mapping

@@ -134,7 +134,7 @@ def perception_info(cameras: tuple[str, ...], suspected: Bools, vacancy: Vacancy
 
 
 def words_of(bodies: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
-    """Return the words of each kind of index in infos.
+    """Return the names that correspond to the indices in infos, by kind of index.
 
     Args:
         bodies: names of the workers' bodies.

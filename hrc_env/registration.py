@@ -247,7 +247,7 @@ OTHERWISE = (
 
 
 class Spec(EnvSpec):
-    """An environment specification whose JSON contains all arguments of the environment."""
+    """An environment specification that stores all arguments of the environment in its JSON."""
 
     def to_json(self) -> str:
         """Return the specification as JSON; raise `ConfigError` if it cannot hold an argument."""

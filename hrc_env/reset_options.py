@@ -33,7 +33,7 @@ from hrc_env.tasks.task import AnyTask
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ResetOptions:
-    """Fixed parts of an episode, whose names are the keys of `reset(options={...})`.
+    """Fixed parts of an episode; the field names are the keys of `reset(options={...})`.
 
     An instance of this class is also accepted in place of the mapping. All other parts are drawn
     from the same random streams as without options. A vector environment takes one value for all

@@ -37,14 +37,14 @@ class RewardConfig:
     smoothness: float = 0.02
     """Weight of the penalty on the mean squared change of the action."""
     proximity: float = 2.0
-    """Weight of the penalty on closeness to the *estimated* bodies, whose shape function is in [0,
-    2.25]. With a weight of 6 from the first step, PPO (one seed) reached no goal of `HRCReach-v0`
-    in the last 64 episodes before step 135,000; with 0, it reached 5.7 goals per episode."""
+    """Weight of the penalty on closeness to the *estimated* bodies, which is in [0, 2.25]. With a
+    weight of 6 from the first step, PPO (one seed) reached no goal of `HRCReach-v0` in the last 64
+    episodes before step 135,000; with 0, it reached 5.7 goals per episode."""
     proximity_reach_m: float = 0.3
     """Separation between the surfaces of robot and body below which closeness is penalized [m]."""
     unknown_closeness: float = 0.25
-    """Lower bound on the closeness while a worker is unknown, in [0, 1]. It prevents that losing
-    sight of a worker pays."""
+    """Lower bound on the closeness while a worker is unknown, in [0, 1]. With a positive value,
+    losing sight of a worker is not rewarded like being alone."""
 
     def __post_init__(self) -> None:
         check_fields(self, "be positive", "proximity_reach_m")

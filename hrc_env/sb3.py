@@ -51,7 +51,7 @@ class HRCVecEnv(VecEnv):
     no `Monitor` is needed. `infos=` adds infos to every step, for example for wrappers that shape
     the reward. Infos "reward/..." are computed from the belief; "cost", "safety/...",
     "tracking/..." and "worker_N/..." are computed from the truth, which is unavailable to robots
-    (docs/reference/infos.md). `hrc_env.vector.member.Member` documents the attributes and methods
+    (docs/reference/infos.md). `hrc_env.vector.member.Member` describes the attributes and methods
     of one environment.
 
     Args:
@@ -103,7 +103,7 @@ class HRCVecEnv(VecEnv):
         return self._member(0).spec
 
     def seed(self, seed: int | None = None) -> list[int | None]:  # type: ignore[override]
-        """Set the seed of each environment k at the next reset to seed + k; None draws one."""
+        """Set the seed of environment k at the next reset to seed + k; None draws a seed."""
         seeds = list(super().seed(seed))
         self._phases = np.random.default_rng(seeds[0]) if self.stagger else None
         return seeds

@@ -266,7 +266,7 @@ class Simulation(Stateful):
         return {"settings": self.settings, **super().get_state(), **factors}
 
     def set_state(self, state: State) -> None:
-        """Restore exactly a state that was taken with the same settings."""
+        """Restore the exact state that `get_state` returned with the same settings."""
         for name in {**self.settings, **state["settings"]}:
             taken, value = state["settings"].get(name), self.settings.get(name)
             if taken != value:
@@ -543,7 +543,7 @@ class Simulation(Stateful):
         return StepResult(self._observe(belief), rewards.sum_terms(terms, self.batch), over, info)
 
     def _is_terminal(self, task_step: Any) -> Bools:
-        """Return a mask (B,) of the environments whose task ends the episode after a step."""
+        """Return a mask (B,) of the environments in which the task ends the episode."""
         over = np.asarray(self.task.is_terminal(task_step))
         if over.ndim:
             name = f"{self.task.id}: is_terminal"
@@ -563,7 +563,7 @@ class Simulation(Stateful):
         return q
 
     def _load(self, world: World) -> World:
-        """Return the world, in which carried loads are parts of the robots."""
+        """Return a world in which carried loads are parts of the robots."""
         arm, qpos = world.robot.capsules_world[:, None], self.physics.qpos[:, None]
         return handling.attach_load(
             self.scene, world, arm, qpos, self.task.is_load(self.task_state)

@@ -30,7 +30,7 @@ class StepResult:
     """Infos (B,) by name."""
 
     def info_of(self, b: int) -> InfoDict:
-        """Return the info of one environment, whose values are NumPy scalars."""
+        """Return the info of one environment with NumPy scalars as values."""
         return InfoDict({name: value[b] for name, value in published(self.info).items()})
 
 

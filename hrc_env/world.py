@@ -54,9 +54,9 @@ WORKPLACE_KINDS = (
     "open",
     "task",
 )
-"""Kinds of workplaces: beside the robot, with the hands in its workspace; at a table; kneeling; at
-a wall; above the head; at materials to lift; at a place where a cart is taken or left; before a
-tread 0.3 m ahead; on open floor; at an object of the task."""
+"""Kinds of workplaces, in this order: beside the robot with the hands in its workspace, at a table,
+on the knees, at a wall, above the head, at a pile of material, at a cart, in front of a step 0.3 m
+ahead, on open floor, and at an object of the task."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -102,7 +102,7 @@ class Recipe(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """A compiled scene, whose model all environments of a batch share."""
+    """A compiled scene with a model that all environments of a batch share."""
 
     config: SceneConfig
     """Settings of the scene, including all of its cameras."""
@@ -262,7 +262,7 @@ def _build(recipe: Recipe) -> Scene:
 
 
 def with_rig(scene: Scene, rig: tuple[CameraConfig, ...]) -> Scene:
-    """Return a scene with another rig, all of whose cameras are in use; the physics is shared."""
+    """Return a scene with another rig and all of its cameras in use; the physics is shared."""
     config = replace(scene.config, cameras=rig)
     return replace(scene, config=config, cameras=make_cameras(select(rig)))
 
@@ -343,7 +343,7 @@ def _add_contact_pairs(spec: mujoco.MjSpec, robot: Robot, chain: SerialChain) ->
     geoms out of the robot's reach.
 
     Args:
-        spec: specification of the scene, whose geoms lose their collision bits.
+        spec: specification of the scene; its geoms lose their collision bits.
         robot: the robot.
         chain: kinematics of the robot.
     """

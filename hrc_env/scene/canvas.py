@@ -62,9 +62,9 @@ STILL = Part(mujoco.mjtCatBit.mjCAT_STATIC, True)
 MOVING = Part(mujoco.mjtCatBit.mjCAT_DYNAMIC, False)
 """The moving geoms."""
 IN_THE_SHADE = Part(mujoco.mjtCatBit.mjCAT_STATIC, True, sunny=False)
-"""The static geoms without the light of lights that cast shadows."""
+"""The static geoms, with lights that cast shadows switched off."""
 BEFORE_THE_SUN = Part(mujoco.mjtCatBit.mjCAT_DYNAMIC, False, sunny=False)
-"""The moving geoms without the light of lights that cast shadows."""
+"""The moving geoms, with lights that cast shadows switched off."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -233,7 +233,7 @@ class Canvas:
         """Render the next pictures by a parallel projection, for example along sun rays.
 
         Args:
-            axes: (3, 3) matrix whose columns are the directions right, down and along the rays.
+            axes: (3, 3) matrix with the directions right, down and along the rays as columns.
             middle_world: (3,) centre of the square in the near plane [m].
             half_m: half side of that square [m].
             far_m: distance of the far plane from the near plane [m].

@@ -109,7 +109,7 @@ APPEARANCES: dict[str, AppearanceConfig] = {
 
 
 class Look(NamedTuple):
-    """The drawn appearance of one episode."""
+    """The appearance drawn for one episode."""
 
     light: float
     """Factor on the brightness of all light."""
@@ -143,7 +143,7 @@ def draw_look(config: AppearanceConfig, n_workers: int, rng: np.random.Generator
     Args:
         config: ranges of the randomization.
         n_workers: number of workers in the scene.
-        rng: random generator of the environment's sensors, whose state is not changed.
+        rng: random generator of the environment's sensors; its state is not changed.
     """
     own = aside(rng, STREAM)
     low, high = config.light

@@ -182,7 +182,7 @@ def new_context(width_px: int, height_px: int, model: "mujoco.MjModel") -> Drawi
     Args:
         width_px: width of the context's pictures [px].
         height_px: height of the context's pictures [px].
-        model: drawing model, whose textures and meshes the context contains.
+        model: drawing model with the textures and meshes for the context.
 
     Raises:
         RenderingError: no context could be made; the error names the remedy.
@@ -286,7 +286,6 @@ def _renderer() -> str:
 
 
 def _has_library(name: str) -> bool:
-    """Return whether a shared library can be loaded."""
     """Return whether a shared library can be loaded."""
     if ctypes.util.find_library(name):
         return True

@@ -125,7 +125,7 @@ class LoadedArm(NamedTuple):
 
 
 def find_objects(spec: mujoco.MjSpec, first: int) -> Objects:
-    """Find the free bodies of a scene, whose coordinates follow those of `first` robot joints.
+    """Find the free bodies of a scene; their coordinates follow those of `first` robot joints.
 
     Raises:
         ConfigError: a body does not consist of boxes, or its boxes are not centred at its origin.

@@ -70,7 +70,8 @@ class SharedField(NamedTuple):
     alone: Floats
     """(B, ...) field in the simulations without workers."""
     beside: Floats
-    """(B, ...) the same entries in the simulations with workers, whose bodies come last."""
+    """(B, ...) the same entries in the simulations with workers, in which worker bodies come
+    last."""
 
 
 class Saved(NamedTuple):
@@ -219,8 +220,8 @@ class Physics:
         """Advance every environment by one control step.
 
         Args:
-            qd_command: (B, N) wanted joint velocities [rad/s], whose magnitude and slew are
-                limited, and which are reduced near the ends of the joints' ranges.
+            qd_command: (B, N) wanted joint velocities [rad/s]; their magnitude and slew are
+                limited, and they are reduced near the ends of the joints' ranges.
             workers: poses of the workers after every substep, arrays (B, T, W, S, ...); W may be 0.
             out_of_reach: (B,) whether no worker can touch the robot in this step, for which the
                 simulation without workers gives the same result faster; None if this is so for no
@@ -399,8 +400,8 @@ def _substep_commands(
         servos: (N,) limits and servos of the joints.
         sim_dt: duration of a substep [s].
         control: (B, T, 2 N) output [rad/s]: for the holding servos the mean velocity of each
-            substep, whose integral does not depend on the duration of a substep; then for the rate
-            servos the velocity at the end of each substep.
+            substep, because its integral does not depend on the duration of a substep; then for the
+            rate servos the velocity at the end of each substep.
     """
     n_substeps, n = control.shape[1], q.shape[1]
     ctrl_dt = sim_dt * n_substeps

@@ -1,4 +1,4 @@
-"""Scenes by name: cameras, floor plan and workplaces (`assets/scenes/NAME.toml`), and obstacles."""
+"""Cameras, floor plans and workplaces of scenes (`assets/scenes/NAME.toml`), and obstacles."""
 
 import math
 from dataclasses import dataclass, replace
@@ -52,7 +52,7 @@ Footprint = tuple[float, float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Room:
-    """Description of a scene, whose MJCF is `NAME.xml` or, without clutter, `NAME_bare.xml`."""
+    """Description of a scene with the MJCF `NAME.xml` or, without clutter, `NAME_bare.xml`."""
 
     mount_world: tuple[float, float, float]
     """Position of the robot's base [m]."""

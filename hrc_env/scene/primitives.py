@@ -30,7 +30,7 @@ class RodPose(NamedTuple):
     centre: Points3
     """(3,) midpoint between the two points [m]."""
     quaternion_wxyz: QuaternionsWxyz
-    """(4,) rotation of the rod, whose axis is z."""
+    """(4,) rotation of the rod, with its axis along z."""
     half_length: float
     """Half of the distance between the two points [m]."""
 

@@ -205,8 +205,8 @@ class PictureRenderer(Canvas):
         Args:
             q: (N,) joint angles of the robot [rad].
             motion: poses of the workers of one environment, arrays (W, S, ...).
-            viewpoint: name in `VIEWPOINTS`, name of a camera of the rig, or any camera, whose
-                horizontal field of view the picture has.
+            viewpoint: name in `VIEWPOINTS`, name of a camera of the rig, or any camera; the picture
+                has the horizontal field of view of that camera.
             depth: whether to return distances instead of colours.
             shadows: whether lamps cast shadows; rendering in software is several times faster
                 without shadows.

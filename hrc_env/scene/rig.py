@@ -87,7 +87,7 @@ def _make_camera(camera: CameraConfig) -> PinholeCamera:
 
 
 def glcam_axes(camera: PinholeCamera) -> Rotations:
-    """Return R_world_from_glcam, whose columns are a pinhole camera's axes right, up and back."""
+    """Return R_world_from_glcam, with a pinhole camera's axes right, up and back as columns."""
     return camera.T_world_from_cam[:3, :3] @ OPENCV_FROM_OPENGL
 
 

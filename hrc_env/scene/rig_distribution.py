@@ -168,7 +168,7 @@ def _draw_camera(
 
 
 def _move(camera: CameraConfig, by_m: Floats, turn_rad: Floats, focal: float) -> CameraConfig:
-    """Return a camera whose pose and focal length are changed.
+    """Return a camera with another pose and focal length.
 
     Args:
         camera: the nominal camera.

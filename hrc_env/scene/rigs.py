@@ -82,7 +82,7 @@ def coverage_of(
 
 
 def common_views(cameras: tuple[PinholeCamera, ...]) -> Coverage:
-    """Determine the sets of two or more cameras whose views overlap within `FAR_M`.
+    """Determine the sets of two or more cameras with overlapping views within `FAR_M`.
 
     The result contains no patches of floor, and contains one empty set if no views overlap.
     """

@@ -43,7 +43,7 @@ DEFAULT = "ur10e_like"
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class Hand:
-    """A gripper at the end of an arm, whose joints and motor follow the arm's in the MJCF."""
+    """A gripper at the end of an arm; in the MJCF, its joints and motor follow the arm's."""
 
     joints: tuple[str, ...]
     """Slides of the fingers; at 0 the gripper is closed, and all fingers open by the same
@@ -96,7 +96,7 @@ class Robot:
     capsules: tuple[str, ...]
     """Capsule geoms that represent the surface in contacts, distances and occlusion."""
     watched_capsules: tuple[str, ...]
-    """Capsules whose distal ends workers watch."""
+    """Capsules with distal ends that workers watch."""
     tool_site: str
     """Site at the tool point."""
     home_q: tuple[float, ...]
@@ -157,7 +157,7 @@ class Grip:
 
 
 def _read_robot(path: Path) -> Robot:
-    """Read a built-in robot, whose record is in a TOML file beside its MJCF."""
+    """Read a built-in robot from the TOML file beside its MJCF."""
     names = {"name": path.stem, "mjcf": str(path.with_suffix(".xml"))}
     return from_mapping(Robot, read_toml(path) | names)
 
@@ -168,7 +168,7 @@ ROBOTS: Registry[Robot] = Registry(
 )
 """Robots by name: those in `assets/robots`, and registered ones."""
 BUILT_IN = frozenset(ROBOTS.data.values())
-"""Robots in `assets/robots`, none of whose capsules extends beyond the visual geoms by `BARE_M`."""
+"""Robots in `assets/robots`, with no capsule that extends beyond the visual geoms by `BARE_M`."""
 
 
 def find_robot(robot: str | Robot | Mapping[str, Any]) -> Robot:

@@ -150,7 +150,7 @@ def _pose(pos: Sequence[float] | Floats, rotation: Floats) -> Transforms:
 
 
 def _joint_frame(model: mujoco.MjModel, data: mujoco.MjData, joint: int) -> Transforms:
-    """Return the frame (4, 4) of a joint in the world, whose z axis is the joint's axis."""
+    """Return the frame (4, 4) of a joint in the world, with the joint's axis along z."""
     quaternion, turn = np.zeros(4), np.zeros(9)
     mujoco.mju_quatZ2Vec(quaternion, model.jnt_axis[joint])
     mujoco.mju_quat2Mat(turn, quaternion)

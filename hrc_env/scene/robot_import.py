@@ -4,9 +4,9 @@ robot = robot_from_mjcf("ur5e/robot.xml", home_q=(0, -1.6, 1.9, -1.9, -1.6, 0))
 env = gymnasium.make("HRCReach-v0", robot=robot)
 
 The actuators are replaced by two servos per joint with a common velocity command (`scene.robot`),
-whose gains are proportional to the inertia that the joint moves; gravity is compensated, as by
-robot controllers. Visual geoms are kept, collision geoms are removed from links that have visual
-ones, and capsules are fitted to the remaining geoms of each link.
+and with gains proportional to the inertia that the joint moves; gravity is compensated, as by robot
+controllers. Visual geoms are kept, collision geoms are removed from links that have visual ones,
+and capsules are fitted to the remaining geoms of each link.
 """
 
 from collections import Counter

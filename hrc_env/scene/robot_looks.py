@@ -58,7 +58,7 @@ def bare_capsules(robot: "Robot") -> frozenset[str]:
 
 
 def compare_looks(robot: "Robot", spacing_m: float = SPACING_M) -> dict[str, Mismatch]:
-    """Compare each capsule with the visual geoms on its and adjacent links, in the home pose.
+    """Compare each capsule with the visual geoms on its own and adjacent links, in the home pose.
 
     Args:
         robot: the robot.
@@ -143,7 +143,7 @@ class Solid(NamedTuple):
     position_world: Points3
     """(3,) centre of the geom [m]."""
     rotation: Floats
-    """(3, 3) world_from_geom."""
+    """(3, 3) rotation world_from_geom."""
     bounding_radius_m: float
     """Radius of a sphere around the centre that contains the geom [m]."""
     sides: Floats

@@ -179,7 +179,7 @@ def _check_terms(task: AnyTask) -> None:
 
 
 def _check_state(task: AnyTask) -> None:
-    """Raise `ConfigError` if the state has not a row per environment, or its info is invalid."""
+    """Raise `ConfigError` if the state lacks a row per environment, or its info is invalid."""
     state = task.make_state(2)
     if is_dataclass(state) and not isinstance(state, type):
         parts = {f"state.{each.name}": getattr(state, each.name) for each in fields(state)}
@@ -222,7 +222,7 @@ def _check_info(task: AnyTask, info: Mapping[str, Any], batch: int) -> None:
 
 
 def check_counts(task: AnyTask, info: Mapping[str, Any]) -> None:
-    """Raise `ConfigError` if numbers of attempts or the success in the info of a step are invalid.
+    """Raise `ConfigError` if the info of a step has invalid numbers of attempts or success.
 
     `achieved` and `failed` are non-negative numbers of attempts. `is_success` is 1 if the episode
     would be a success if it ended now, and otherwise 0. These are different measures, and tables

@@ -1,4 +1,4 @@
-"""Delivery: a mobile base transports material across a site, among the people who work there.
+"""Delivery: a mobile base transports material across a site on which people work.
 
 Zones are areas of free floor away from workplaces. In an episode, the base starts in one zone and
 drives to another. The material is on the bed from the start, and is delivered when the base stands
@@ -43,7 +43,7 @@ HALF_WIDTH_M = 0.40
 TURNING_RADIUS_M = 0.66
 """Distance from an obstacle beyond which the base may have any heading [m]."""
 NARROW_COST = 3.0
-"""Cost of a metre of the path closer to an obstacle than `TURNING_RADIUS_M`; elsewhere it is 1."""
+"""Cost of a metre of the path within `TURNING_RADIUS_M` of an obstacle; elsewhere it is 1."""
 ZONE_CLEARANCE_M = 0.75
 """Minimum distance of a zone's centre from an obstacle [m]."""
 ZONE_FROM_WORK_M = 1.6
@@ -129,7 +129,7 @@ class DeliveryState:
     people: bool
     """Whether the base touches a worker."""
     hits: Annotated[Ints, (2,)]
-    """Numbers of times the base began to touch an obstacle and a worker."""
+    """Numbers of times that the base began to touch an obstacle, and a worker."""
     delivered: bool
     """Whether the material has been delivered."""
 
@@ -163,7 +163,7 @@ class DeliveryView:
 
 
 def _has_valid_length(site: Site, config: DeliveryConfig) -> Bools:
-    """Return a mask (Z, Z) of the pairs of zones whose path length is within `config.way_m`."""
+    """Return a mask (Z, Z) of the pairs of zones with a path length within `config.way_m`."""
     low, high = config.way_m
     return (site.lengths >= low) & (site.lengths <= high)
 

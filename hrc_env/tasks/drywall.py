@@ -61,7 +61,7 @@ MOVED_M = 0.02
 TURNED_RAD = 0.06
 """Largest initial rotation of the board on the stack [rad]."""
 RADIAN_M = 0.3
-"""Distance to which a radian of the board's rotation is equivalent in the progress [m]."""
+"""Distance that is equivalent to a rotation of the board by 1 rad in the progress [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -372,7 +372,7 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
         return (state["pressed_s"] == 0.0)[:, None]
 
     def allowed_contact(self, belief: Belief) -> Bools:
-        """Return the arms whose hand is near the screws, while the board is held at its target."""
+        """Return a mask (B, W, S) of arms near the screws, while the board is held in position."""
         board = needed(belief.objects, "A board")
         is_held_there = board.held[:, 0] & (measure_offset(board).distance_m < AT_PLACE_M)
         screws = np.array([(x, WALL_Y_M, z) for x, z in (SCREWS_M[0], SCREWS_M[-1])])
@@ -389,9 +389,9 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
         return DrywallView(FOOT_WORLD + PLACE_M, state["driven"][ids].copy())
 
     def info(self, state: Records1[DrywallState]) -> dict[str, Floats]:
-        """Return numbers of screws and largest deviations of the board, (B,) by name.
+        """Return numbers of screws and largest deviations of the board (B,) by name.
 
-        An episode is a success if the board is fixed in place and let go.
+        An episode is a success if the board is fixed in position and released.
         """
         begun = (state["driven"] > 0) | state["boring"]
         return {

@@ -33,7 +33,7 @@ like those of a vector environment; None for an empty info."""
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """A goal that is kept apart from the observation, as hindsight replay (HER) needs it.
+    """A goal that is separate from the observation, for hindsight experience replay (HER).
 
         import numpy as np
         from hrc_env import Goal
@@ -47,11 +47,11 @@ class Goal:
             doc="Minus the distance of the tool from the goal [m].",
         )
 
-    In a task with the attribute `goal` observations are dictionaries of `observation`,
-    `achieved_goal` and `desired_goal`, `reward` is a term of the reward, and `compute_reward` and
-    `train --algorithm sac` reward transitions for other goals. Functions are over batches (B, ...).
-    The observation must not hold the goal: a transition that is relabelled with another goal would
-    still hold the old one.
+    If a task has the attribute `goal`, its observations are dictionaries of `observation`,
+    `achieved_goal` and `desired_goal`, and `reward` is a term of the reward. `compute_reward` and
+    `train --algorithm sac` can then reward transitions for other goals. All functions work on
+    batches (B, ...). The observation must not contain the goal, because a transition that is
+    relabelled with another goal would still contain the old one.
     """
 
     size: int

@@ -1,4 +1,4 @@
-"""Handover: the robot brings a tool to a worker, who approaches, extends a hand and takes it."""
+"""Handover: the robot brings a tool; a worker approaches, extends a hand and takes it."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -260,7 +260,7 @@ def _measure_fingers_gap(tool_world: Points3, tool_middle: Points3) -> Floats:
 
 
 class Handover(Task[HandoverConfig, Records1[HandoverState]]):
-    """Bring a tool to a worker, who puts out a hand and takes it; be gentle."""
+    """Bring a tool to a worker that extends a hand and takes it, with a limited force."""
 
     id = "HRCHandover-v0"
     config_type = HandoverConfig
@@ -386,7 +386,7 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
         return Effects({}, state["push"][:, None].copy())
 
     def signal(self, state: Records1[HandoverState]) -> WorkerSignal:
-        """Return the stages: the worker approaches when the tool is lifted, and then takes it."""
+        """Return the stages and the positions of lifted tools, at which workers may take them."""
         stage = np.where(state["taken"], 2, np.where(state["lifted"], 1, 0))
         return WorkerSignal(
             stage, np.where(state["lifted"][:, None], state["handle_world"], np.nan)
@@ -415,7 +415,7 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
         return HandoverView(FOOT_WORLD + MEET_M, state["taken"][ids].copy())
 
     def info(self, state: Records1[HandoverState]) -> dict[str, Floats]:
-        """Return whether the tool was handed over or dropped, and the maximum force, (B,) by name.
+        """Return whether the tool was handed over or dropped, and the maximum force (B,) by name.
 
         An episode is a success if the worker has the tool, the robot has released and left it, and
         the force on the hand has never exceeded `gentle_n`.

@@ -30,11 +30,11 @@ class Sizes:
 
 
 Check = Callable[[str, object, Sizes], None]
-"""Type of checks (name for errors, result of a hook, sizes), which raise `ConfigError`."""
+"""Type of checks, which take (name for errors, result of a hook, sizes) and raise `ConfigError`."""
 
 
 def add_checks(task: AnyTask, sizes: Sizes) -> AnyTask:
-    """Return a copy of a task whose hooks check their results.
+    """Return a copy of a task with hooks that check their results.
 
     The hooks raise `ConfigError` if a result has a wrong type or shape, or is not numeric.
     """
@@ -143,7 +143,7 @@ CHECKS: dict[str, Check] = {
 WRITERS = ("reset", "set_goal", "advance")
 """Hooks that write to their first argument, the state; all others only read it."""
 UNPROTECTED = ("make_state", "make_scene", "reach_targets", "counts")
-"""Hooks whose arguments contain no shared arrays."""
+"""Hooks without shared arrays in their arguments."""
 
 
 def protect_arrays(task: AnyTask) -> AnyTask:

@@ -21,7 +21,7 @@ def find_partner_arms(
     """Return a mask (B, W, S) of the partner's forearms and hands that are near a line segment.
 
     The partner is the tracked worker at the task's workplace; if there are several, it is the one
-    whose hand is nearest to the segment.
+    with the hand nearest to the segment.
 
     Args:
         estimate: estimate of the workers.

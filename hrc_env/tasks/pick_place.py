@@ -129,7 +129,7 @@ def _measure_ways(studs_world: Points3, tool_world: Points3, placed: Bools) -> F
 
     Args:
         studs_world: (B, 3, 3) centres of the pieces [m].
-        tool_world: (B, 3) tool points of the robots [m], whose target is the first unplaced piece.
+        tool_world: (B, 3) tool points of the robots [m]; their target is the first unplaced piece.
         placed: (B, 3) whether each piece is placed.
     """
     away_m = np.linalg.norm(studs_world - PLACES_WORLD, axis=-1)
@@ -140,7 +140,7 @@ def _measure_ways(studs_world: Points3, tool_world: Points3, placed: Bools) -> F
 
 
 class PickPlace(Task[PlacedConfig, Records1[PickPlaceState]]):
-    """Take pieces of studs from a table that a worker also uses, and lay them into a rack."""
+    """Take pieces of studs from a table that a worker also uses, and place them in a rack."""
 
     id = "HRCPickPlace-v0"
     config_type = PickPlaceConfig
@@ -259,7 +259,7 @@ class PickPlace(Task[PlacedConfig, Records1[PickPlaceState]]):
         return PickPlaceView(state["placed"][ids].copy(), PLACES_WORLD)
 
     def info(self, state: Records1[PickPlaceState]) -> dict[str, Floats]:
-        """Return the numbers (B,) of pieces that are placed and that remain by name.
+        """Return the numbers (B,) of placed and remaining pieces by name.
 
         An episode is a success if all pieces are placed.
         """

@@ -19,7 +19,7 @@ from hrc_env.world import FOOT_M, World
 
 @dataclass(frozen=True, slots=True)
 class TargetConfig:
-    """Volume of the goals, and radius within which one is reached."""
+    """Volume of the goals, and radius within which a goal is reached."""
 
     radius_m: float = 0.05
     """Distance of the tool point from a goal below which the goal is reached [m]."""
@@ -106,7 +106,7 @@ def _judge_goals(
     states: Records1[ReachState],
     steps: Records1[ReachStep],
 ) -> bool:
-    """Advance the goals by one control step, and return whether any of them is reached or missed.
+    """Advance the goals by one control step, and return whether any was reached or missed.
 
     Args:
         tool_world: (B, 3) tool points of the robots [m].
@@ -306,7 +306,7 @@ class Reach(Task[ReachConfig, Records1[ReachState]]):
         )
 
     def info(self, state: Records1[ReachState]) -> dict[str, Floats]:
-        """Return the numbers (B,) of goals that were reached and missed by name.
+        """Return the numbers (B,) of reached and missed goals by name.
 
         An episode is a success if at least one goal was reached and none was missed.
         """

@@ -50,9 +50,9 @@ class Task(Generic[ConfigT, StateT]):
     """Frozen dataclass of the task's settings, all with defaults; set by `config={"task":
     {...}}`."""
     observations: ClassVar[tuple[ObservationTerm, ...]] = ()
-    """Observation terms of the task, whose functions can read `Belief.task`."""
+    """Observation terms of the task; their functions can read `Belief.task`."""
     rewards: ClassVar[tuple[RewardTerm, ...]] = ()
-    """Reward terms of the task, whose functions receive the task's settings as weights."""
+    """Reward terms of the task; their functions receive the task's settings as weights."""
     achieved: ClassVar[str] = ""
     """Name in `info` of the number of successful attempts; "success" in tables is their
     proportion."""
@@ -147,7 +147,7 @@ class Task(Generic[ConfigT, StateT]):
         raise NotImplementedError
 
     def is_terminal(self, step: Any) -> Bools | bool:
-        """Return a mask (B,) of the environments whose episode ends after a step; none by default.
+        """Return a mask (B,) of environments in which the task ends the episode; none by default.
 
         Args:
             step: result of the step, as returned by `advance`.
@@ -164,7 +164,7 @@ class Task(Generic[ConfigT, StateT]):
         The method is called once, when the environment is made.
 
         Raises:
-            ConfigError: the scene has not enough space for the task.
+            ConfigError: the scene lacks the space for the task.
         """
         return None
 
@@ -375,7 +375,7 @@ def with_rewards(task: str | TaskType, *terms: RewardTerm, id: str) -> TaskType:
 
 
 def ancestor_of(task: str, ids: Collection[str]) -> str:
-    """Return the ID of the task whose agents can act in a given task.
+    """Return the ID of a task with agents that can also act in a given task.
 
     It is the task itself or its closest base class with the same observations and goals, as of
     tasks made by `with_rewards`. If there is none among `ids`, return the ID of the task itself.
