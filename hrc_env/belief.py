@@ -169,8 +169,8 @@ def _find_nearest_floor(
     """Compute the gaps between robots and the space above the nearest patch of each state.
 
     Args:
-        capsules: (B, K, 2, 3) the robots' capsules [m].
-        radius: (K,) their radii [m].
+        capsules: (B, K, 2, 3) capsules of the robots [m].
+        radius: (K,) radii of the capsules [m].
         floor: (N, 3) centres of the patches of floor [m].
         piece_m: distance between the centre of a patch and its corners [m].
         level: (B, N) state of each patch.

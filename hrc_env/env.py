@@ -139,8 +139,8 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
     """A Gymnasium environment in which a robot observes the people beside it only by cameras.
 
     Args:
-        task: the robot's task, an id or a subclass of `Task`.
-        arguments: the other fields of `EnvConfig`, where all of them are documented.
+        task: the robot's task, an ID or a subclass of `Task`.
+        arguments: the other fields of `EnvConfig`, which documents all arguments.
 
     Raises:
         ConfigError: a name, index or value is invalid; the error names the valid ones.
@@ -290,7 +290,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
 
         Args:
             options: options of `reset`.
-            lasting: whether they are meant for `set_options`.
+            lasting: whether the options are for `set_options` rather than for `reset`.
 
         Raises:
             ConfigError: an option is invalid.

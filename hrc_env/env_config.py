@@ -15,7 +15,7 @@ from hrc_env.core.mapping import answer_unknown_fields, for_json, read_toml, to_
 from hrc_env.core.results import write_whole
 from hrc_env.tasks import DEFAULT
 
-if TYPE_CHECKING:  # at run time they would import the simulator, which `--help` does without
+if TYPE_CHECKING:  # importing them would load the simulator, which `--help` does not need
     from hrc_env.config import HRCConfig
     from hrc_env.motion.clip import Clip
     from hrc_env.motion.config import PeopleConfig
@@ -47,7 +47,7 @@ class EnvConfig:
     """
 
     task: "str | TaskType" = DEFAULT
-    """Task of the robot: an id ("HRCReach-v0") or a subclass of `Task`
+    """Task of the robot: an ID ("HRCReach-v0") or a subclass of `Task`
     (docs/bring_your_own/task.md)."""
     perception: str = "pixels"
     """Perception of people: "pixels" (rendered images, processed by MediaPipe Pose), "keypoints"

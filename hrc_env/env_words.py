@@ -24,7 +24,7 @@ def read_cameras(words: Sequence[str]) -> Any:
     if len(words) == 1:
         from hrc_env.scene.rig_distribution import (
             RigDistribution,
-        )  # here, as it imports the simulator
+        )  # here, because it imports the simulator
         from hrc_env.scene.rigs import RIGS
 
         if words[0].endswith(".toml") or words[0] in RIGS:

@@ -72,7 +72,7 @@ def reset_info(
 def incident_info(
     happened: Records2[Incident], monitor: IncidentMonitor, robot: RobotState
 ) -> Info:
-    """Return the incidents of a step.
+    """Return infos about the incidents of a step.
 
     Args:
         happened: (B, W) incidents of the step, `incidents.INCIDENT`.

@@ -66,7 +66,7 @@ class Sizes:
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class ObservationTerm:
-    """One block of the flat observation: clip(function, -bound, bound) / scale."""
+    """One block of the flat observation, computed as clip(function, -bound, bound) / scale."""
 
     name: str
     """Name of the term in `split_observation` and on the environment's page."""

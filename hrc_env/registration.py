@@ -45,7 +45,7 @@ def register_task(task: "TaskType") -> None:
     Raises:
         ConfigError: the ID is already in use, or a part of the task is missing or invalid.
     """
-    from hrc_env.rehearsal import play_briefly  # here, as kernels take time to import
+    from hrc_env.rehearsal import play_briefly  # here, because importing kernels takes time
     from hrc_env.settings import settle
     from hrc_env.tasks.check import check_task
     from hrc_env.tasks.task import TASKS

@@ -340,7 +340,7 @@ def _rig(cameras: Any, room: Room) -> ChosenRig:
         rigs = restored(RigDistribution, cameras, "cameras")
         rig = rigs.rig or room.scene.rig
         rigs.counts(len(rig))
-        if room.level in CAMERA_LEVELS:  # to raise its errors here
+        if room.level in CAMERA_LEVELS:  # to raise its errors early
             draw_rig(rigs, with_rig(room.scene, rig), np.random.default_rng(0))
     else:
         own = rig_of(cameras)
@@ -378,7 +378,7 @@ def _appearance(given: Options, room: Room) -> AppearanceConfig | None:
 def faults_of(
     faults: Sequence[FaultConfig], names: Sequence[str], rig: Sequence[CameraConfig]
 ) -> tuple[FaultConfig, ...]:
-    """Return the faults of the cameras in an episode's rig.
+    """Return the faults that affect cameras in an episode's rig.
 
     Args:
         faults: faults of the environment's cameras.

@@ -301,7 +301,7 @@ def _make_spec(recipe: Recipe) -> mujoco.MjSpec:
     spec.option.timestep = config.sim_dt
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.memory = ARENA_BYTES + PAIR_BYTES * n_workers**2
-    # The velocity command in force, the body of each worker, and the hand's command or load.
+    # The present velocity command, the body of each worker, and the hand's command or load.
     spec.nuserdata = len(robot.joints) + n_workers + robot.grips
     foot_world = _foot_world(robot, recipe.name)
     add_robot(spec, robot, foot_world)

@@ -235,7 +235,7 @@ class Canvas:
         Args:
             axes: (3, 3) matrix with the directions right, down and along the rays as columns.
             middle_world: (3,) centre of the square in the near plane [m].
-            half_m: half side of that square [m].
+            half_m: half the side length of the square [m].
             far_m: distance of the far plane from the near plane [m].
         """
         _, down, direction = axes.T

@@ -89,7 +89,7 @@ class Objects:
     capsules: Capsules
     """(O, n, 2, 3) capsules that represent each object [m]; unused rows are NaN."""
     capsule_radius_m: Floats
-    """(O, n) radii of these capsules [m]."""
+    """(O, n) radii of the capsules [m]; 0 in unused rows."""
 
     def poses(self, qpos: Floats) -> Floats:
         """Return position [m] and quaternion (..., O, 7) of each object, from qpos (..., nq)."""

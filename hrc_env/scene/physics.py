@@ -117,27 +117,27 @@ class Physics:
 
     @property
     def q(self) -> JointAngles:
-        """(B, N) joint angles of the robots [rad], a copy."""
+        """Copy of the joint angles (B, N) of the robots [rad]."""
         return self._qpos[:, : self._n].copy()
 
     @property
     def qd(self) -> JointVelocities:
-        """(B, N) joint velocities of the robots [rad/s], a copy."""
+        """Copy of the joint velocities (B, N) of the robots [rad/s]."""
         return self._qvel[:, : self._n].copy()
 
     @property
     def command(self) -> JointVelocities:
-        """(B, N) commanded joint velocities [rad/s], a copy."""
+        """Copy of the commanded joint velocities (B, N) [rad/s]."""
         return self._command.copy()
 
     @property
     def qpos(self) -> Floats:
-        """(B, nq) joint angles [rad], fingers' displacements [m] and objects' poses, a copy."""
+        """Copy of the generalized positions (B, nq) of robot [rad], fingers [m] and objects."""
         return self._qpos.copy()
 
     @property
     def qvel(self) -> Floats:
-        """(B, nv) velocities of joints, fingers and objects, a copy."""
+        """Copy of the generalized velocities (B, nv) of robot, fingers and objects."""
         return self._qvel.copy()
 
     def hand_state(self, ids: Ints) -> HandState | None:

@@ -114,7 +114,7 @@ def find_visible(cameras: tuple[PinholeCamera, ...], still: Floats, points_world
     Args:
         cameras: the cameras.
         still: (G, `shapes.WIDTH`) obstacles.
-        points_world: (P, 3) the points [m].
+        points_world: (P, 3) points [m].
     """
     eyes_world = np.stack([camera.eye_world for camera in cameras])
     seen = ~find_hidden(replace(no_surroundings(1), still=still), eyes_world, points_world[None])[0]

@@ -258,7 +258,7 @@ def check_robot(robot: Robot) -> None:
         )
     if robot.slew and min(robot.slew) <= 0:
         raise ConfigError(f"{robot.name}: slew must be positive [rad/s^2], got {robot.slew}.")
-    spec = parse_mjcf(robot)  # its bodies do not keep it alive
+    spec = parse_mjcf(robot)  # kept in a variable, because its bodies do not keep it alive
     for body in spec.bodies[1:]:
         if body.joints and not body.explicitinertial:
             raise ConfigError(f"{robot.name}: link {body.name!r} needs an <inertial>.")

@@ -222,7 +222,7 @@ def _replace_servos(
 
     Args:
         spec: the specification, which is changed.
-        model: its compiled model.
+        model: compiled model of the specification.
         joints: names of the joints.
         fastest: maximum speed of each joint [rad/s].
     """

@@ -32,7 +32,7 @@ class Viewer:
         self._data = mujoco.MjData(self._model)
         self._visuals = find_visuals(scene)
         try:
-            gl.require_display()  # without a display launch_passive waits for ever
+            gl.require_display()  # without a display, launch_passive never returns
             gl.load_triton_first()
             from mujoco import viewer
 

@@ -397,7 +397,7 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
         return ~(state["offered"] | state["taken"])[:, None]
 
     def allowed_contact(self, belief: Belief) -> Bools:
-        """Return the arms whose hand is near the handle, while the robot holds the lifted tool."""
+        """Return a mask (B, W, S) of arms near the handle, while the gripper holds the tool up."""
         tool = needed(belief.objects, "A tool")
         middle, handle = tool.position_world[:, 0], _find_handle(tool).position_world
         away_m = _measure_fingers_gap(belief.robot.tool_world, middle)
