@@ -30,8 +30,7 @@ RIGS: dict[str, tuple[CameraConfig, ...]] = {
     ),
     "site": SITE_CAMERAS,
 }
-"""Rigs by their names in `cameras=`: those of the scenes, and that of the lab with the paper's
-lens."""
+"""Rigs by their names in `cameras=`: those of the scenes, and the lab's with the paper's lens."""
 POOR_SHARE = 0.1
 """Fraction of the workspace in a camera's view below which its pose counts as poor."""
 HEIGHTS_M = (0.2, 0.6, 1.0, 1.4, 1.8)
