@@ -55,9 +55,9 @@ class HRCConfig:
     """Horizons of the forecast of the workers' joints in the observation, each in (0, 1] [s]; none
     by default. (0.2, 0.4) adds 120 entries per worker."""
     uncertainty: tuple[str, ...] = ()
-    """Further entries of the observation that describe the covariance of each joint, beside its
-    root mean: "towards_robot", the standard deviation along the line to the robot; "factor", the
-    six entries of its Cholesky factor; or both."""
+    """Further entries of the observation that describe the covariance of each joint, in addition to
+    its root mean: "towards_robot", the standard deviation along the line to the robot; "factor",
+    the six entries of its Cholesky factor; or both."""
     observe_shield: bool = False
     """Whether the observation contains the shield's change of the last command."""
     worker: str | tuple[str, ...] = "worker_1"

@@ -33,8 +33,7 @@ PICTURE_SIZE = (960, 720)
 MANY = {"many": True}
 """Metadata of a field that takes several values on the command line."""
 NO_WORD = {"words": False}
-"""Metadata of a field that is not available on the command line, which has other options for
-films."""
+"""Metadata of a field without a counterpart on the command line."""
 
 
 @answer_unknown_fields

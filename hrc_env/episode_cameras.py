@@ -1,4 +1,4 @@
-"""The cameras of each environment's episode, and the drawing of rigs, faults and appearances.
+"""The cameras of each environment's episode, and random draws of rigs, faults and appearances.
 
 Usually all environments share one perception pipeline; an environment with different cameras has a
 separate pipeline (`pipeline.episodic`).

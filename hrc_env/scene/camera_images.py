@@ -47,7 +47,7 @@ KEPT_BYTES = 2**28
 @answer_unknown_fields
 @dataclass(frozen=True, slots=True)
 class ImageConfig:
-    """Settings of the camera images in an observation (`observe_images`), beside the belief.
+    """Settings of the camera images that an observation also contains (`observe_images`).
 
     Each image is the present view of a camera of the rig, with its lens and the episode's
     appearance, but without faults, delays and shadows. It is the camera's whole image, scaled to

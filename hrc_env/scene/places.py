@@ -63,7 +63,7 @@ class Room:
     cameras: tuple[CameraConfig, ...]
     """Default cameras of the scene."""
     places: tuple[Workplace, ...]
-    """Workplaces with and without clutter."""
+    """Workplaces that exist both with and without clutter."""
     clutter_places: tuple[Workplace, ...]
     """Further workplaces that exist only with clutter."""
     ceiling_m: float | None = None
