@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hrc_env.core.batching import flat
-from hrc_env.core.errors import ConfigError, check_fields, check_shape, unknown
+from hrc_env.core.errors import ConfigError, check_fields, check_shape, make_unknown_name_error
 from hrc_env.core.kernels import kernel
 from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.typing import Floats, JointAngles, JointVelocities, Velocities3
@@ -75,7 +75,7 @@ def n_actions(control: str, chain: SerialChain, grips: bool = False) -> int:
         ConfigError: an unknown control, or one that needs a robot without slides.
     """
     if control not in CONTROLS:
-        raise unknown("control", control, CONTROLS)
+        raise make_unknown_name_error("control", control, CONTROLS)
     if control != "joint" and chain.slides.any():
         raise ConfigError(
             f"control={control!r} moves the tool of an arm of hinges; this robot has slides, as "

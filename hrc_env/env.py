@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from hrc_env import observations, rewards
 from hrc_env.control import check_action
 from hrc_env.core.batching import Stateful, one
-from hrc_env.core.errors import ConfigError, NoAttributeError, unknown, whole
+from hrc_env.core.errors import ConfigError, NoAttributeError, make_unknown_name_error, whole
 from hrc_env.core.infos import Words, worded
 from hrc_env.core.registry import share
 from hrc_env.core.typing import Floats
@@ -406,7 +406,7 @@ def check_render_mode(render_mode: str | None, valid: Sequence[str] = RENDER_MOD
             "gymnasium.wrappers.HumanRendering does, round one with render_mode='rgb_array'."
         )
     if render_mode is not None and render_mode not in valid:
-        raise unknown("render_mode", render_mode, valid)
+        raise make_unknown_name_error("render_mode", render_mode, valid)
 
 
 def parse_overlays(markers: object, overlay: object) -> dict[str, bool]:
@@ -418,7 +418,7 @@ def parse_overlays(markers: object, overlay: object) -> dict[str, bool]:
     if not isinstance(markers, bool):
         raise ConfigError(f"render_markers must be True or False, got {markers!r}.")
     if overlay is not None and overlay not in OVERLAYS:
-        raise unknown("overlay", overlay, OVERLAYS)
+        raise make_unknown_name_error("overlay", overlay, OVERLAYS)
     return {"markers": markers, "capsules": overlay == "capsules"}
 
 

@@ -9,7 +9,13 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hrc_env.core.errors import ConfigError, check_names, check_shape, unknown, whole
+from hrc_env.core.errors import (
+    ConfigError,
+    check_names,
+    check_shape,
+    make_unknown_name_error,
+    whole,
+)
 from hrc_env.core.mapping import restored
 from hrc_env.core.typing import Floats, JointAngles
 from hrc_env.geometry.camera_config import CameraConfig
@@ -97,9 +103,9 @@ def named_options(options: Options | ResetOptions | None, *more: str) -> dict[st
     given, valid = dict(options or {}), tuple(dict.fromkeys((*NAMES, *more)))
     for name in given:
         if name in OF_SEVERAL and name not in valid:
-            raise unknown("reset option of one environment", name, valid)
+            raise make_unknown_name_error("reset option of one environment", name, valid)
         if name not in valid:
-            raise unknown("reset option", name, valid)
+            raise make_unknown_name_error("reset option", name, valid)
     return {name: value for name, value in given.items() if value is not None}
 
 

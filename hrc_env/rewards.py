@@ -140,7 +140,7 @@ SHARED_TERMS: tuple[RewardTerm, ...] = (
         "proximity",
         "Minus `proximity` times clip((d0 - d) / d0, 0, 1.5)^2, where d is the distance of the "
         "robot's surface from the nearest estimated body and d0 is `proximity_reach_m`; the square "
-        "counts as at least `unknown` while a worker is unknown.",
+        "counts as at least `unknown_closeness` while a worker is unknown.",
         _proximity,
     ),
 )

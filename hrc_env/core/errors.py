@@ -76,7 +76,7 @@ REGISTERED = ("task", "environment", "robot", "estimator", "detector", "shield")
 OWN = "One of your own is known once its file is imported: --import FILE, hrc_env.import_files."
 
 
-def unknown(what: str, got: object, valid: Iterable[str]) -> ConfigError:
+def make_unknown_name_error(what: str, got: object, valid: Iterable[str]) -> ConfigError:
     """Return the error for an unknown name, with the nearest valid one.
 
     Args:
@@ -95,7 +95,7 @@ def check_names(what: str, names: Iterable[object], valid: Collection[str]) -> N
     """Raise `ConfigError` for the first of the names that is not valid, if there is one."""
     for name in names:
         if name not in valid:
-            raise unknown(what, name, valid)
+            raise make_unknown_name_error(what, name, valid)
 
 
 _MUST: dict[str, Callable[[float], bool]] = {

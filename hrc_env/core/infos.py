@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.core.brought import described
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, make_unknown_name_error
 from hrc_env.core.typing import Ints, is_sequence_of_text
 
 Info = dict[str, NDArray[Any]]
@@ -332,7 +332,7 @@ def matching(patterns: str | Sequence[str], names: Sequence[str]) -> tuple[str, 
             raise ConfigError(_describe_renaming(each))
         if not any(fnmatch.fnmatchcase(name, each) for name in names):
             folders = dict.fromkeys(f"{name.rpartition('/')[0]}/*" for name in names if "/" in name)
-            raise unknown("info", each, [*folders, *names])
+            raise make_unknown_name_error("info", each, [*folders, *names])
     return tuple(name for name in names if any(fnmatch.fnmatchcase(name, each) for each in given))
 
 

@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, make_unknown_name_error
 from hrc_env.core.typing import is_array, is_list_or_tuple, is_mapping, is_numpy_scalar
 
 RecordT = TypeVar("RecordT")
@@ -87,14 +87,14 @@ def _unknown_field(record: type, what: str, path: str, name: str) -> ConfigError
     if name in renamed:
         return ConfigError(f"The {what} {path}{name} is called {path}{renamed[name]} now.")
     names = [f"{path}{each.name}" for each in dataclasses.fields(record)]
-    return unknown(what, f"{path}{name}", names)
+    return make_unknown_name_error(what, f"{path}{name}", names)
 
 
 def restored(hint: Any, value: Any, where: str) -> Any:
     """Return a value converted to a type hint, or raise `ConfigError` with the path `where`."""
     if isinstance(value, str) and (presets := PRESETS.get(hint, {})):
         if value not in presets:
-            raise unknown(where, value, presets)
+            raise make_unknown_name_error(where, value, presets)
         return presets[value]
     if dataclasses.is_dataclass(hint):
         if is_mapping(value):

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError, check_names, unknown
+from hrc_env.core.errors import ConfigError, check_names, make_unknown_name_error
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Ints
 from hrc_env.engines.files import carried
@@ -236,7 +236,7 @@ class Study:
         """
         for each in beginnings:
             if not any(name.startswith(each) for name in self.rows):
-                raise unknown(f"row of {self.name!r}", each, self.rows)
+                raise make_unknown_name_error(f"row of {self.name!r}", each, self.rows)
         kept = {name for name in self.rows if name.startswith(tuple(beginnings))}
         kept |= {baseline for name in kept if (baseline := self.rows[name].baseline) is not None}
         return replace(self, rows={name: row for name, row in self.rows.items() if name in kept})

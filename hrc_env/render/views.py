@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.core.batching import one, rows
-from hrc_env.core.errors import unknown, whole
+from hrc_env.core.errors import make_unknown_name_error, whole
 from hrc_env.core.records import Keypoints, PoseEstimate, Roi, WorkerMotion
 from hrc_env.core.typing import Floats, Image, Points3
 from hrc_env.env_config import PICTURE_SIZE
@@ -367,7 +367,7 @@ def _choose(choice: CameraChoice, cameras: Sequence[PinholeCamera]) -> str | Pin
         return make_cameras([choice])[0]
     if isinstance(choice, str):
         if choice not in rig and choice not in VIEWPOINTS:
-            raise unknown("camera or viewpoint", choice, [*rig, *VIEWPOINTS])
+            raise make_unknown_name_error("camera or viewpoint", choice, [*rig, *VIEWPOINTS])
         return rig.get(choice, choice)
     return cameras[whole(f"camera (of {', '.join(rig)})", choice, 0, len(rig) - 1)]
 

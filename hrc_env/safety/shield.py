@@ -9,7 +9,7 @@ import numpy as np
 
 from hrc_env.belief import Belief, lend_belief
 from hrc_env.core.brought import check_arguments, described, numbers_of
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, make_unknown_name_error
 from hrc_env.core.lending import called, is_of_user
 from hrc_env.core.mapping import from_mapping
 from hrc_env.core.registry import Registry
@@ -48,7 +48,7 @@ def find_shield(shield: ShieldChoice) -> Shield | None:
     """
     if isinstance(shield, str):
         if shield not in SHIELDS:
-            raise unknown("shield", shield, SHIELDS)
+            raise make_unknown_name_error("shield", shield, SHIELDS)
         return SHIELDS[shield]
     if is_mapping(shield):
         shield = from_mapping(ShieldConfig, shield, "shield.")

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.core.errors import unknown, whole
+from hrc_env.core.errors import make_unknown_name_error, whole
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import Roi, WorkerMotion
 from hrc_env.core.typing import Image, JointAngles
@@ -231,5 +231,5 @@ class PictureRenderer(Canvas):
         if viewpoint in rig:
             return rig[viewpoint]
         if viewpoint not in VIEWPOINTS:
-            raise unknown("viewpoint", viewpoint, [*VIEWPOINTS, *rig])
+            raise make_unknown_name_error("viewpoint", viewpoint, [*VIEWPOINTS, *rig])
         return viewpoint_camera(viewpoint, self.width_px, self.height_px)

@@ -20,7 +20,7 @@ import numpy as np
 
 from hrc_env.core.batching import copied, rows
 from hrc_env.core.brought import check_arguments, check_kind, described
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, make_unknown_name_error
 from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.registry import Registry
@@ -136,7 +136,7 @@ def find_estimator(estimator: EstimatorChoice) -> EstimatorSpec:
             f"{estimator!r} needs the future: call {OFFLINE[estimator]} for a whole clip."
         )
     if estimator not in ESTIMATORS:
-        raise unknown("estimator", estimator, ESTIMATORS)
+        raise make_unknown_name_error("estimator", estimator, ESTIMATORS)
     return ESTIMATORS[estimator]
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hrc_env import observations
 from hrc_env.core.batching import copied, one
-from hrc_env.core.errors import ConfigError, NoAttributeError, unknown
+from hrc_env.core.errors import ConfigError, NoAttributeError, make_unknown_name_error
 from hrc_env.core.infos import InfoDict
 from hrc_env.core.mapping import plain
 from hrc_env.core.typing import Floats
@@ -175,7 +175,9 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
         if name not in self._vector.notes[self._k]:
             valid = [each for each in dir(self) if not each.startswith("_")]
             valid += [each for each in (*ALIKE, *TOGETHER) if each not in valid]
-            raise NoAttributeError(str(unknown("attribute of one environment", name, valid)))
+            raise NoAttributeError(
+                str(make_unknown_name_error("attribute of one environment", name, valid))
+            )
         return self._vector.notes[self._k][name]
 
     def __setattr__(self, name: str, value: Any) -> None:

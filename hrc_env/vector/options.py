@@ -8,7 +8,13 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from hrc_env.core.errors import ConfigError, check_names, check_shape, unknown, whole
+from hrc_env.core.errors import (
+    ConfigError,
+    check_names,
+    check_shape,
+    make_unknown_name_error,
+    whole,
+)
 from hrc_env.core.machine import n_cores
 from hrc_env.core.typing import Bools, Ints
 from hrc_env.env import ENDLESS
@@ -36,7 +42,9 @@ def parse_autoreset(mode: str | AutoresetMode) -> AutoresetMode:
     try:
         return AutoresetMode(mode)
     except ValueError as error:
-        raise unknown("autoreset_mode", mode, [each.value for each in AutoresetMode]) from error
+        raise make_unknown_name_error(
+            "autoreset_mode", mode, [each.value for each in AutoresetMode]
+        ) from error
 
 
 def parse_threads(num_threads: int | None) -> int:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hrc_env.core.batching import flat
-from hrc_env.core.errors import ConfigError, check_shape, unknown
+from hrc_env.core.errors import ConfigError, check_shape, make_unknown_name_error
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import WorkerMotion, WorkerPath, WorkerTruth
 from hrc_env.core.typing import Capsules, Floats, Ints, Points3, QuaternionsWxyz, Velocities3
@@ -112,7 +112,7 @@ def select_bodies(worker: str | tuple[str, ...]) -> tuple[str, ...]:
         )
     for name in names:
         if name not in worker_names():
-            raise unknown("worker", name, valid)
+            raise make_unknown_name_error("worker", name, valid)
     return names
 
 
@@ -265,7 +265,7 @@ def _write_capsules(
 def find_baked(name: str) -> Path:
     """Return the file of a worker; `ConfigError` if none of that name was baked."""
     if name not in worker_names():
-        raise unknown("worker", name, worker_names())
+        raise make_unknown_name_error("worker", name, worker_names())
     return assets_dir() / "workers" / f"{name}.npz"
 
 
