@@ -17,7 +17,7 @@ from hrc_env.belief import Belief, drop_distant_unknown, estimated_separation, f
 from hrc_env.control import joint_command, max_command, n_actions
 from hrc_env.core.batching import State, Stateful, picked, rows, write_rows
 from hrc_env.core.declared import Records2
-from hrc_env.core.errors import ConfigError, check_shape, needed
+from hrc_env.core.errors import ConfigError, check_shape, require
 from hrc_env.core.infos import Info
 from hrc_env.core.records import PoseEstimate, WorkerMotion, WorkerTruth
 from hrc_env.core.streams import children
@@ -519,7 +519,7 @@ class Simulation(Stateful):
 
     def _judge(self, command: Command, truth: Truth, belief: Belief) -> StepResult:
         """Compute cost and metrics from the truth, reward and observation from the belief."""
-        config, paths = self.config, needed(truth.paths, "A step's paths")
+        config, paths = self.config, require(truth.paths, "A step's paths")
         cost = measure_cost(paths.gaps_m, config.cost)
         happened = self.monitor.step(truth.world, paths)
         terms = self._reward_terms(command, truth, belief)

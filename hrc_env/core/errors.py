@@ -122,7 +122,7 @@ def check_fields(record: object, must: str, *names: str) -> None:
             raise ConfigError(f"{name} must {must}, got {value}.")
 
 
-def needed(value: T | None, what: str) -> T:
+def require(value: T | None, what: str) -> T:
     """Return a value that must not be None, or raise `ConfigError`."""
     if value is None:
         raise ConfigError(f"{what} is asked for, and there is none here.")

@@ -12,7 +12,7 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 import numpy as np
 
 from hrc_env.core.batching import mapped, one, rows, write_rows
-from hrc_env.core.errors import needed
+from hrc_env.core.errors import require
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.typing import Bools, Floats, Image, Ints
 from hrc_env.core.vacancy import Coverage, Vacancy
@@ -187,7 +187,7 @@ class EpisodicPipeline(PerceptionPipeline):
             seen, columns = own.pipeline.measurements, self._columns(own)
             seen = replace(seen, time_s=self._times_s(own.pipeline, seen))
             whole.px[b], whole.confidence[b], whole.sigma_px[b] = np.nan, 0.0, np.inf
-            needed(whole.time_s, "Times of frames")[b] = np.nan
+            require(whole.time_s, "Times of frames")[b] = np.nan
             write_rows(one(whole, b), columns, one(seen, 0))
         return whole
 

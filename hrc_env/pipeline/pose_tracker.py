@@ -19,7 +19,7 @@ from hrc_env.core.brought import (
     points_of,
     positive,
 )
-from hrc_env.core.errors import needed, whole
+from hrc_env.core.errors import require, whole
 from hrc_env.core.records import PoseEstimate, Roi
 from hrc_env.core.typing import Bools, Capsules, Floats, Image, Ints, Points3
 from hrc_env.geometry.camera_config import CameraConfig
@@ -77,7 +77,7 @@ class _Films(ImageSensor):
 
     def crop(self, camera_index: int, window: Roi) -> Image:
         """Return a window of the source's image, (256, 256, 3)."""
-        crop = crop_image(needed(self.source, "The image source"), camera_index, window)
+        crop = crop_image(require(self.source, "The image source"), camera_index, window)
         new, key = zlib.crc32(crop.tobytes()), (camera_index, window)
         if key in self.sums:
             same = self.sums[key] == new
