@@ -18,7 +18,12 @@ from numpy.typing import NDArray
 from hrc_env import observations, rewards
 from hrc_env.control import check_action
 from hrc_env.core.batching import Stateful, one
-from hrc_env.core.errors import ConfigError, NoAttributeError, make_unknown_name_error, whole
+from hrc_env.core.errors import (
+    ConfigError,
+    NoAttributeError,
+    check_integer,
+    make_unknown_name_error,
+)
 from hrc_env.core.infos import Words, worded
 from hrc_env.core.registry import share
 from hrc_env.core.typing import Floats
@@ -394,7 +399,7 @@ def _named(options: Mapping[str, Any] | ResetOptions | None) -> dict[str, Any]:
 
 def _steps_left(options: Mapping[str, Any]) -> int:
     """Return the number of remaining steps in the options of a reset."""
-    return whole('options["steps_left"]', options.get("steps_left", ENDLESS), 1, ENDLESS)
+    return check_integer('options["steps_left"]', options.get("steps_left", ENDLESS), 1, ENDLESS)
 
 
 def check_render_mode(render_mode: str | None, valid: Sequence[str] = RENDER_MODES) -> None:

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike
 
 from hrc_env.core.errors import (
     ConfigError,
+    check_integer,
     check_names,
     check_shape,
     make_unknown_name_error,
-    whole,
 )
 from hrc_env.core.mapping import restored
 from hrc_env.core.typing import Floats, JointAngles
@@ -279,7 +279,7 @@ def _cast(given: Options, room: Room) -> Cast | None:
     most, n = room.scene.n_workers, None
     if "n_workers" in given:
         try:
-            n = whole('options["n_workers"]', given["n_workers"], 0, most)
+            n = check_integer('options["n_workers"]', given["n_workers"], 0, most)
         except ConfigError as error:
             raise ConfigError(
                 f"{error} The environment was made for {most}: make it with "

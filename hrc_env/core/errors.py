@@ -142,7 +142,7 @@ def check_shape(what: str, got: tuple[int, ...], expected: tuple[int, ...], mean
         raise ConfigError(f"{what} must have shape {expected} ({meaning}), got {tuple(got)}.")
 
 
-def whole(what: str, value: Any, low: int, high: int) -> int:
+def check_integer(what: str, value: Any, low: int, high: int) -> int:
     """Return an integer from `low` to `high`, or raise `ConfigError`."""
     is_bool = isinstance(value, bool)
     if is_bool or not isinstance(value, numbers.Integral) or not low <= int(value) <= high:

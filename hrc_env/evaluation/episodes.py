@@ -12,7 +12,7 @@ import numpy as np
 
 from hrc_env.agents.env_info import Agent, AgentFactory, EnvInfo, env_info
 from hrc_env.core.brought import check_arguments, described
-from hrc_env.core.errors import ConfigError, whole
+from hrc_env.core.errors import ConfigError, check_integer
 from hrc_env.core.machine import n_cores
 from hrc_env.core.results import Metric
 from hrc_env.engines.engine import Engine, Tick, engine_called
@@ -116,7 +116,7 @@ def evaluate_episodes(
     Raises:
         ConfigError: the agent or the engine does not exist, or there is no episode.
     """
-    whole("n_episodes", n_episodes, 1, 10**9)
+    check_integer("n_episodes", n_episodes, 1, 10**9)
     if isinstance(engine, str):
         engine = engine_called(engine)
     if isinstance(make, str):

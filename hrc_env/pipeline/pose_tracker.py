@@ -19,7 +19,7 @@ from hrc_env.core.brought import (
     points_of,
     positive,
 )
-from hrc_env.core.errors import require, whole
+from hrc_env.core.errors import check_integer, require
 from hrc_env.core.records import PoseEstimate, Roi
 from hrc_env.core.typing import Bools, Capsules, Floats, Image, Ints, Points3
 from hrc_env.geometry.camera_config import CameraConfig
@@ -126,7 +126,7 @@ class PoseTracker:
         check_kinds("cameras", cameras, CameraConfig, PinholeCamera)
         check_kind("tracker", tracker, TrackerConfig, None)
         check_kind("detector", detector, DetectorConfig, None)
-        n_workers = whole("n_workers", n_workers, 1, MOST_WORKERS)
+        n_workers = check_integer("n_workers", n_workers, 1, MOST_WORKERS)
         dt_s = positive("dt_s", dt_s, "s")
         if floor_world is not None:
             floor_world = points_of("floor_world [m]", floor_world)

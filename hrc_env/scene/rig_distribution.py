@@ -8,7 +8,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from hrc_env.core.brought import check_kinds
-from hrc_env.core.errors import ConfigError, check_fields, make_unknown_name_error, whole
+from hrc_env.core.errors import ConfigError, check_fields, check_integer, make_unknown_name_error
 from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.streams import children
 from hrc_env.core.typing import Floats
@@ -75,7 +75,9 @@ class RigDistribution:
             check_kinds("RigDistribution.lenses", self.lenses, Lens)
         if self.n_cameras is not None:
             ends = self.n_cameras if isinstance(self.n_cameras, tuple) else (self.n_cameras,) * 2
-            low, high = (whole("RigDistribution.n_cameras", k, 1, MOST_CAMERAS) for k in ends)
+            low, high = (
+                check_integer("RigDistribution.n_cameras", k, 1, MOST_CAMERAS) for k in ends
+            )
             if low > high:
                 raise ConfigError(
                     f"RigDistribution.n_cameras must be (fewest, most), got {self.n_cameras}."

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from hrc_env.control import check_action
 from hrc_env.core.batching import State, copied, mapped, one, write_rows
-from hrc_env.core.errors import ConfigError, check_shape, whole
+from hrc_env.core.errors import ConfigError, check_integer, check_shape
 from hrc_env.core.infos import InfoDict
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.env import RENDER_MODES, EnvBase, make_spaces
@@ -102,7 +102,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
             self.metadata["render_modes"].append(self.render_mode)
         self.arguments = arguments if self.render_mode else _without_pictures(arguments)
         """Arguments of `HRCEnv`, as they were given."""
-        self.num_envs = whole("num_envs", num_envs, 1, MAX_ENVS)
+        self.num_envs = check_integer("num_envs", num_envs, 1, MAX_ENVS)
         self.autoreset_mode = parse_autoreset(autoreset_mode)
         self.metadata["autoreset_mode"] = self.autoreset_mode
         rehearse(settings)

@@ -11,7 +11,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError, make_unknown_name_error, whole
+from hrc_env.core.errors import ConfigError, check_integer, make_unknown_name_error
 from hrc_env.core.mapping import answer_unknown_fields
 
 FOREVER_S = 1e9
@@ -159,7 +159,7 @@ def check_cameras(faults: Sequence[FaultConfig], names: Sequence[str]) -> None:
         for camera in fault.cameras:
             if not isinstance(camera, str):
                 label = f"Camera index of fault {fault.kind!r} (of {', '.join(names)})"
-                whole(label, camera, 0, len(names) - 1)
+                check_integer(label, camera, 0, len(names) - 1)
             elif camera not in (*names, ALL):
                 raise make_unknown_name_error(
                     f"camera of fault {fault.kind!r}:", camera, (*names, ALL)
