@@ -14,7 +14,7 @@ import numpy as np
 from rich.console import Console
 
 from hrc_env.core.errors import CheckpointError, RenderingError, learner
-from hrc_env.core.mapping import restored
+from hrc_env.core.mapping import convert_to_hint
 from hrc_env.core.progress import Meter, progress_bar
 from hrc_env.core.results import provenance, write_whole
 from hrc_env.evaluation.episodes import Score, describe_contradiction, evaluate
@@ -189,7 +189,9 @@ def read_arguments(folder: Path) -> TrainingRequest:
     left = {*ONLY_OF_A_RUN} - {"timesteps"}
     known, hints = {each.name for each in fields(TrainingRequest)}, get_type_hints(TrainingRequest)
     names = [name for name in saved if name in known - left]
-    return TrainingRequest(**{name: restored(hints[name], saved[name], name) for name in names})
+    return TrainingRequest(
+        **{name: convert_to_hint(hints[name], saved[name], name) for name in names}
+    )
 
 
 def train(arguments: Run, folder: Path, console: Console) -> TrainingResult:

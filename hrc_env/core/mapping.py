@@ -70,7 +70,7 @@ def from_mapping(
         where = f"{path}{name}"
         if where not in names:
             raise _unknown_field(kind, "config field", path, name)
-        values[name] = restored(hints[name], value, where)
+        values[name] = convert_to_hint(hints[name], value, where)
     for each in fields:
         nothing = each.default is each.default_factory is dataclasses.MISSING
         if nothing and each.name not in values:
@@ -90,7 +90,7 @@ def _unknown_field(record: type, what: str, path: str, name: str) -> ConfigError
     return make_unknown_name_error(what, f"{path}{name}", names)
 
 
-def restored(hint: Any, value: Any, where: str) -> Any:
+def convert_to_hint(hint: Any, value: Any, where: str) -> Any:
     """Return a value converted to a type hint, or raise `ConfigError` with the path `where`."""
     if isinstance(value, str) and (presets := PRESETS.get(hint, {})):
         if value not in presets:
@@ -134,7 +134,7 @@ def _one_of(hints: tuple[Any, ...], value: Any, where: str) -> Any:
     refused: list[str] = []
     for hint in hints:
         try:
-            return restored(hint, value, where)
+            return convert_to_hint(hint, value, where)
         except ConfigError as error:
             refused.append(str(error))
     raise ConfigError(" Or: ".join(refused))
@@ -147,7 +147,7 @@ def _tuple(hint: Any, value: Any, where: str) -> tuple[Any, ...]:
     hints = [inner[0]] * len(value) if inner[-1] is Ellipsis else list(inner)
     _checked(len(value) == len(hints), f"{len(hints)} values", value, where)
     return tuple(
-        restored(hint, part, f"{where}[{k}]")
+        convert_to_hint(hint, part, f"{where}[{k}]")
         for k, (hint, part) in enumerate(zip(hints, value, strict=True))
     )
 
