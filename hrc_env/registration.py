@@ -277,12 +277,12 @@ class Spec(EnvSpec):
 
 def make_spec(spec: EnvSpec) -> Spec:
     """Return a spec with plain arguments, in which names stand for registered objects."""
-    from hrc_env.core.mapping import plain
+    from hrc_env.core.mapping import convert_to_plain
     from hrc_env.safety.shield import SHIELDS
     from hrc_env.tasks.task import TASKS
     from hrc_env.tracking.estimators import ESTIMATORS
 
-    given = plain(spec.kwargs)
+    given = convert_to_plain(spec.kwargs)
     tables = {"task": TASKS, "estimator": ESTIMATORS, "shield": SHIELDS}
     for name in tables.keys() & given.keys():
         given[name] = tables[name].name_of(given[name]) or given[name]

@@ -50,8 +50,8 @@ class List(EnvironmentArguments):
         return 0
 
     def _show_config(self) -> int:
-        from hrc_env.core.mapping import plain, to_toml
+        from hrc_env.core.mapping import convert_to_plain, to_toml
         from hrc_env.settings import settle
 
-        print(to_toml(plain(asdict(settle(**self.keywords()).config))), end="")
+        print(to_toml(convert_to_plain(asdict(settle(**self.keywords()).config))), end="")
         return 0

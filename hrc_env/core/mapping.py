@@ -161,16 +161,16 @@ def merge(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
     return both
 
 
-def plain(value: Any) -> Any:
+def convert_to_plain(value: Any) -> Any:
     """Return a value in JSON's types where it has such a form.
 
     Paths become text, NumPy's numbers and enumerations their values. Others (a recorded clip, a
     function) are returned as they are; `for_json` refuses them.
     """
     if is_mapping(value):
-        return {name: plain(each) for name, each in value.items()}
+        return {name: convert_to_plain(each) for name, each in value.items()}
     if is_list_or_tuple(value):
-        return type(value)(map(plain, value))
+        return type(value)(map(convert_to_plain, value))
     if is_array(value) or is_numpy_scalar(value):
         return value.tolist()
     if isinstance(value, enum.Enum):
@@ -185,7 +185,7 @@ def for_json(value: Any, where: str) -> Any:
         ConfigError: a part has no such form: a function, a class, a recording; the message has its
             path.
     """
-    value = plain(value)
+    value = convert_to_plain(value)
     if is_mapping(value):
         return {name: for_json(each, f"{where}.{name}") for name, each in value.items()}
     if is_list_or_tuple(value):

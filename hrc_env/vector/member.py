@@ -14,7 +14,7 @@ from hrc_env import observations
 from hrc_env.core.batching import copied, one
 from hrc_env.core.errors import ConfigError, NoAttributeError, make_unknown_name_error
 from hrc_env.core.infos import InfoDict
-from hrc_env.core.mapping import plain
+from hrc_env.core.mapping import convert_to_plain
 from hrc_env.core.typing import Floats
 from hrc_env.env import ENDLESS, HRCEnv
 from hrc_env.geometry.camera_config import CameraConfig
@@ -151,7 +151,7 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
             return None
         limit = None if vector.max_episode_steps == ENDLESS else vector.max_episode_steps
         kwargs = {**vector.arguments, "task": vector.task.id}
-        return replace(known, max_episode_steps=limit, kwargs=plain(kwargs))
+        return replace(known, max_episode_steps=limit, kwargs=convert_to_plain(kwargs))
 
     @property
     def np_random(self) -> np.random.Generator:

@@ -8,7 +8,7 @@ import pytest
 from gymnasium.vector import AutoresetMode
 
 from hrc_env.core.errors import ConfigError
-from hrc_env.core.mapping import from_mapping, plain
+from hrc_env.core.mapping import convert_to_plain, from_mapping
 from hrc_env.settings import settle
 
 EYE = [2.0, 2.0, 2.0]
@@ -93,6 +93,6 @@ def test_numbers_of_numpy_are_numbers():
 
 def test_plain_values_are_what_json_has():
     value = {"a": (np.int64(1), [Path("b.toml")]), "mode": AutoresetMode.SAME_STEP}
-    assert plain(value) == {"a": (1, ["b.toml"]), "mode": AutoresetMode.SAME_STEP.value}
-    assert plain(np.eye(2)) == [[1.0, 0.0], [0.0, 1.0]]
-    assert plain(len) is len
+    assert convert_to_plain(value) == {"a": (1, ["b.toml"]), "mode": AutoresetMode.SAME_STEP.value}
+    assert convert_to_plain(np.eye(2)) == [[1.0, 0.0], [0.0, 1.0]]
+    assert convert_to_plain(len) is len
