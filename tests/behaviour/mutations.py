@@ -13,7 +13,7 @@ from functools import lru_cache
 from itertools import pairwise
 
 _MESSAGES = {
-    "warn", "print", "make_unknown_name_error", "needed", "check_shape", "check_fields",
+    "warn", "print", "make_unknown_name_error", "require", "check_shape", "check_fields",
     "check_names", "info", "say", "isinstance", "debug", "warning", "dtype", "perf_counter",
     "import_module",
 }  # fmt: skip
