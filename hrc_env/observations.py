@@ -21,7 +21,7 @@ from hrc_env.belief import (
 from hrc_env.core.brought import check_arguments
 from hrc_env.core.errors import check_shape, require
 from hrc_env.core.kernels import kernel
-from hrc_env.core.lending import called, is_of_user
+from hrc_env.core.lending import call_user_function, is_of_user
 from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.records import HandState, ObjectState
 from hrc_env.core.skeleton import N_JOINTS
@@ -495,7 +495,9 @@ def observe(
 def _value(term: ObservationTerm, belief: Belief) -> Floats:
     """Return the value (B, ...) of a term; functions of users get a read-only belief."""
     if is_of_user(term.function):
-        return called(f"Observation term {term.name!r}", term.function, lend_belief(belief))
+        return call_user_function(
+            f"Observation term {term.name!r}", term.function, lend_belief(belief)
+        )
     return term.function(belief)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from hrc_env.belief import Belief, lend_belief
 from hrc_env.core.brought import check_arguments, described, numbers_of
 from hrc_env.core.errors import ConfigError, make_unknown_name_error
-from hrc_env.core.lending import called, is_of_user
+from hrc_env.core.lending import call_user_function, is_of_user
 from hrc_env.core.mapping import from_mapping
 from hrc_env.core.registry import Registry
 from hrc_env.core.typing import Floats, JointVelocities, is_list_or_tuple, is_mapping
@@ -96,7 +96,7 @@ def apply_shield(
         return ShieldOutput(command, {})
     output: Any
     if is_of_user(shield):
-        output = called("A shield", shield, lend_belief(belief), command.copy(), dt_s)
+        output = call_user_function("A shield", shield, lend_belief(belief), command.copy(), dt_s)
     else:
         output = shield(belief, command.copy(), dt_s)
     pair = output if is_list_or_tuple(output) else ()

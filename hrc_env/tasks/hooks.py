@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hrc_env.core.brought import check_kind, described, flags_of, numbers_of
 from hrc_env.core.errors import ConfigError, check_shape
-from hrc_env.core.lending import called, is_of_user, read_only
+from hrc_env.core.lending import call_user_function, is_of_user, read_only
 from hrc_env.core.skeleton import SEGMENT_RADIUS_M
 from hrc_env.geometry.reach import ReachTarget
 from hrc_env.tasks.task import HOOKS, AnyTask, TaskType
@@ -169,6 +169,6 @@ def _pass_read_only(task: AnyTask, name: str) -> Callable[..., Any]:
             arg if isinstance(arg, list) else read_only(arg)  # a list is of generators
             for arg in args[n_written:]
         ]
-        return called(f"{task.id}: {name}", hook, *args[:n_written], *rest)
+        return call_user_function(f"{task.id}: {name}", hook, *args[:n_written], *rest)
 
     return function
