@@ -21,12 +21,12 @@ State = dict[str, Any]
 
 def rows(record: RecordT, ids: Ints | Bools) -> RecordT:
     """Return rows `ids` of every array of a (nested) record, as copies."""
-    return mapped(record, lambda array: array[ids])
+    return map_arrays(record, lambda array: array[ids])
 
 
 def one(record: RecordT, b: int) -> RecordT:
     """Return environment `b` of a record without the batch axis; its arrays are views."""
-    return mapped(record, lambda array: array[b])
+    return map_arrays(record, lambda array: array[b])
 
 
 def write_rows(record: object, ids: Any, part: object) -> None:
@@ -46,15 +46,15 @@ def write_rows(record: object, ids: Any, part: object) -> None:
         write_rows(getattr(record, name), ids, getattr(part, name))
 
 
-def mapped(record: RecordT, change: Callable[[Any], Any]) -> RecordT:
+def map_arrays(record: RecordT, change: Callable[[Any], Any]) -> RecordT:
     """Return a (nested) record of the same kind with `change` applied to every array."""
     if is_array(record):
         return change(record)
     if is_dict(record):
-        changed: Any = type(record)((k, mapped(part, change)) for k, part in record.items())
+        changed: Any = type(record)((k, map_arrays(part, change)) for k, part in record.items())
         return changed
     names = names_of(type(record))
-    values = [mapped(getattr(record, name), change) for name in names]
+    values = [map_arrays(getattr(record, name), change) for name in names]
     return type(record)(*values) if names else record
 
 

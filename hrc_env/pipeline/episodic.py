@@ -11,7 +11,7 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-from hrc_env.core.batching import mapped, one, rows, write_rows
+from hrc_env.core.batching import map_arrays, one, rows, write_rows
 from hrc_env.core.errors import require
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.typing import Bools, Floats, Image, Ints
@@ -182,7 +182,7 @@ class EpisodicPipeline(PerceptionPipeline):
         A camera that is not in an episode's rig has neither keypoints nor a time.
         """
         shared = self.shared.measurements
-        whole = replace(mapped(shared, np.copy), time_s=self._times_s(self.shared, shared))
+        whole = replace(map_arrays(shared, np.copy), time_s=self._times_s(self.shared, shared))
         for b, own in self._own.items():
             seen, columns = own.pipeline.measurements, self._columns(own)
             seen = replace(seen, time_s=self._times_s(own.pipeline, seen))
@@ -332,7 +332,7 @@ def _join(n: int, parts: list[_PartRecord[RecordT]]) -> RecordT:
     first = parts[0].record
     if len(parts) == 1 and len(parts[0].part.rows) == n:
         return first
-    whole = mapped(first, lambda array: np.empty((n, *array.shape[1:]), array.dtype))
+    whole = map_arrays(first, lambda array: np.empty((n, *array.shape[1:]), array.dtype))
     for each in parts:
         write_rows(whole, each.part.rows, each.record)
     return whole

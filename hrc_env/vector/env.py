@@ -18,7 +18,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from hrc_env.control import check_action
-from hrc_env.core.batching import State, copied, mapped, one, write_rows
+from hrc_env.core.batching import State, copied, map_arrays, one, write_rows
 from hrc_env.core.errors import ConfigError, check_integer, check_shape
 from hrc_env.core.infos import InfoDict
 from hrc_env.core.typing import Bools, Floats, Ints
@@ -165,7 +165,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         fresh = self._begin(ids, fixed)
         self._steps[ids] = elapsed_steps[ids]
         if self._observation is None:
-            self._observation = mapped(fresh.observation, np.empty_like)
+            self._observation = map_arrays(fresh.observation, np.empty_like)
         write_rows(self._observation, ids, fresh.observation)
         self._ended = self._ended & ~mask
         self.pictures.take(mask, mask)

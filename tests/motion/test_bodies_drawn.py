@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from assets.workers.poses import rest_motion
-from hrc_env.core.batching import mapped, one
+from hrc_env.core.batching import map_arrays, one
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.infos import ABSENT, ACTIVITY, BODY
 from hrc_env.core.records import Roi, WorkerPath
@@ -160,7 +160,7 @@ def test_a_picture_shows_the_body_that_is_there():
     some, window = ("worker_1", "worker_5", "worker_8"), Roi((950.0, 540.0), 520.0, 0.0)
     drawn, seen = CropRenderer(build(n_workers=1, bodies=some)), []
     for row, name in enumerate(some):
-        rest = mapped(rest_motion(load_body(name)), lambda array: array[None])
+        rest = map_arrays(rest_motion(load_body(name)), lambda array: array[None])
         place = rest.position_world + np.array([0.9, 0.3, 0.0])
         motion = dataclasses.replace(rest, position_world=place, body=np.array([row]))
         alone = CropRenderer(build(n_workers=1, bodies=name))
