@@ -58,15 +58,15 @@ def map_arrays(record: RecordT, change: Callable[[Any], Any]) -> RecordT:
     return type(record)(*values) if names else record
 
 
-def copied(value: Any) -> Any:
+def copy_arrays(value: Any) -> Any:
     """Return a deep copy of records, lists and generators; read-only arrays are shared."""
     if is_array(value):
         return value.copy() if value.flags.writeable else value
     kind = cast(type[Any], type(value))
     if names := names_of(kind):
-        return kind(*[copied(getattr(value, name)) for name in names])
+        return kind(*[copy_arrays(getattr(value, name)) for name in names])
     if is_list_or_tuple(value):
-        return type(value)(copied(each) for each in value)
+        return type(value)(copy_arrays(each) for each in value)
     return copy.deepcopy(value)
 
 
@@ -93,7 +93,7 @@ class Stateful:
         """Return a copy of everything that changes; `set_state` restores it bit for bit."""
         parts = {name: getattr(self, name) for name in self.CHANGES}
         return {
-            name: part.get_state() if hasattr(part, "get_state") else copied(part)
+            name: part.get_state() if hasattr(part, "get_state") else copy_arrays(part)
             for name, part in parts.items()
         }
 
@@ -104,7 +104,7 @@ class Stateful:
             if hasattr(part, "set_state"):
                 part.set_state(state[name])
             else:
-                setattr(self, name, copied(state[name]))
+                setattr(self, name, copy_arrays(state[name]))
 
 
 @functools.cache

@@ -7,7 +7,7 @@ from typing import Any, Generic, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.core.batching import copied
+from hrc_env.core.batching import copy_arrays
 from hrc_env.core.brought import check_arguments, described, flags_of, numbers_of
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Keypoints, PoseEstimate
@@ -83,7 +83,7 @@ class CheckedEstimator(Generic[State]):
 
     def update(self, state: State, keypoints: Keypoints, rngs: Rngs) -> None:
         """Update with one set of frames, of which the estimator receives a copy."""
-        self.inner.update(state, copied(keypoints), rngs)
+        self.inner.update(state, copy_arrays(keypoints), rngs)
 
     def estimate(self, state: State) -> PoseEstimate:
         """Return the present estimate, checked."""

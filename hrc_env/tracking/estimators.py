@@ -18,7 +18,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from hrc_env.core.batching import copied, rows
+from hrc_env.core.batching import copy_arrays, rows
 from hrc_env.core.brought import check_arguments, check_kind, described
 from hrc_env.core.errors import ConfigError, make_unknown_name_error
 from hrc_env.core.mapping import answer_unknown_fields
@@ -260,7 +260,7 @@ def _track_people(spec: EstimatorSpec, seeds: Sequence[int]) -> list[PoseEstimat
 
     estimates: list[PoseEstimate] = []
     for k in range(6):
-        detected, before = detect(), (copied(state), copied(rngs))
+        detected, before = detect(), (copy_arrays(state), copy_arrays(rngs))
         made.predict(state, _DT_S, rngs)
         made.update(state, detected, rngs)
         estimates.append(made.estimate(state))

@@ -11,7 +11,7 @@ from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
 from hrc_env import observations
-from hrc_env.core.batching import copied, one
+from hrc_env.core.batching import copy_arrays, one
 from hrc_env.core.errors import ConfigError, NoAttributeError, make_unknown_name_error
 from hrc_env.core.infos import InfoDict
 from hrc_env.core.mapping import convert_to_plain
@@ -69,7 +69,7 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
             seed=[seed if each else None for each in alone],
             options={"reset_mask": alone, "each": [options if each else None for each in alone]},
         )
-        return copied(one(observation, self._k)), info_of(infos, self._k)
+        return copy_arrays(one(observation, self._k)), info_of(infos, self._k)
 
     def step(self, action: Any) -> NoReturn:
         """Raise `ConfigError`, as environments step together."""
