@@ -70,7 +70,7 @@ def copy_arrays(value: Any) -> Any:
     return copy.deepcopy(value)
 
 
-def flat(array: Floats, n_last: int) -> Floats:
+def flatten_axes(array: Floats, n_last: int) -> Floats:
     """Return an array (..., *last) as (count, *last), contiguous; `last` has `n_last` axes."""
     last = array.shape[-n_last:]
     return np.ascontiguousarray(array).reshape(math.prod(array.shape[:-n_last]), *last)
