@@ -76,7 +76,7 @@ def flatten_axes(array: Floats, n_last: int) -> Floats:
     return np.ascontiguousarray(array).reshape(math.prod(array.shape[:-n_last]), *last)
 
 
-def picked(streams: Sequence[np.random.Generator], ids: Ints) -> list[np.random.Generator]:
+def select_streams(streams: Sequence[np.random.Generator], ids: Ints) -> list[np.random.Generator]:
     """Return the generators of environments `ids`."""
     return [streams[b] for b in ids]
 
