@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.core.brought import described
+from hrc_env.core.brought import describe
 from hrc_env.core.errors import ConfigError, make_unknown_name_error
 from hrc_env.core.typing import Ints, is_sequence_of_text
 
@@ -325,7 +325,7 @@ def matching(patterns: str | Sequence[str], names: Sequence[str]) -> tuple[str, 
     if not is_sequence_of_text(given):
         raise ConfigError(
             'infos must be names or patterns of names, as ("cost", "safety/*"), got '
-            f"{described(patterns)}."
+            f"{describe(patterns)}."
         )
     for each in given:
         if each in RENAMED:

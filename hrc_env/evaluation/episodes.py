@@ -11,7 +11,7 @@ import gymnasium
 import numpy as np
 
 from hrc_env.agents.env_info import Agent, AgentFactory, EnvInfo, env_info
-from hrc_env.core.brought import check_arguments, described
+from hrc_env.core.brought import check_arguments, describe
 from hrc_env.core.errors import ConfigError, check_integer
 from hrc_env.core.machine import n_cores
 from hrc_env.core.results import Metric
@@ -234,9 +234,7 @@ def _make_agent(make: AgentFactory, info: EnvInfo) -> Agent:
     check_arguments("The function that makes an agent", make, "env_info")
     agent = make(info)
     if not callable(getattr(agent, "act", None)):
-        raise ConfigError(
-            f"An agent must have act(observation) -> actions, got {described(agent)}."
-        )
+        raise ConfigError(f"An agent must have act(observation) -> actions, got {describe(agent)}.")
     check_arguments("act", agent.act, "observation")
     return agent
 

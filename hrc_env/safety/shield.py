@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 
 from hrc_env.belief import Belief, lend_belief
-from hrc_env.core.brought import check_arguments, described, numbers_of
+from hrc_env.core.brought import check_arguments, describe, numbers_of
 from hrc_env.core.errors import ConfigError, make_unknown_name_error
 from hrc_env.core.lending import call_user_function, is_of_user
 from hrc_env.core.mapping import from_mapping
@@ -103,7 +103,7 @@ def apply_shield(
     if not isinstance(output, tuple) or len(pair) != 2 or not is_mapping(pair[1]):
         raise ConfigError(
             "A shield must return two things, the velocities that it allows (B, joints) and a "
-            f"mapping of values (B,) by name, {{}} for none; got {described(cast(object, output))}."
+            f"mapping of values (B,) by name, {{}} for none; got {describe(cast(object, output))}."
         )
     allowed = numbers_of("A shield's velocities", pair[0], command.shape, "B, joints")
     values = _check_values(pair[1], len(command))

@@ -19,7 +19,7 @@ from typing import Any, cast
 import numpy as np
 
 from hrc_env.core.batching import copy_arrays, rows
-from hrc_env.core.brought import check_arguments, check_kind, described
+from hrc_env.core.brought import check_arguments, check_kind, describe
 from hrc_env.core.errors import ConfigError, make_unknown_name_error
 from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.records import Keypoints, PoseEstimate
@@ -129,7 +129,7 @@ def find_estimator(estimator: EstimatorChoice) -> EstimatorSpec:
     if not isinstance(given, str):
         raise ConfigError(
             "estimator must be a name, an EstimatorSpec or a function of (P, ctrl_dt, config), got "
-            f"{described(estimator)}."
+            f"{describe(estimator)}."
         )
     if estimator in OFFLINE:
         raise ConfigError(
