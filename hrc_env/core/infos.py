@@ -291,7 +291,7 @@ def entry_of(name: str) -> Entry:
     return OWN._replace(flag=f"{name}_measured")
 
 
-def published(info: Info) -> Info:
+def publish(info: Info) -> Info:
     """Return numbers (B,) without NaN, with the keys that state whether they were measured."""
     told: Info = {}
     for name, values in info.items():

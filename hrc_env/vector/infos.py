@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.core.infos import InfoDict, matching, published, worded
+from hrc_env.core.infos import InfoDict, matching, publish, worded
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.env_config import EnvConfig
 from hrc_env.infos import words_of
@@ -36,7 +36,7 @@ class InfoTable:
     def arrays(self, mask: Bools) -> InfoDict:
         """Return values and masks by name; environments outside of the mask (B,) have none."""
         infos = InfoDict()
-        for name, values in published(self.values).items():
+        for name, values in publish(self.values).items():
             infos[name] = np.where(mask, values, np.zeros_like(values))
             infos[f"_{name}"] = mask.copy()
         return infos
