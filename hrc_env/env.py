@@ -24,7 +24,7 @@ from hrc_env.core.errors import (
     check_integer,
     make_unknown_name_error,
 )
-from hrc_env.core.infos import Words, worded
+from hrc_env.core.infos import Words, name_indices
 from hrc_env.core.registry import share
 from hrc_env.core.typing import Floats
 from hrc_env.env_config import signature_of_env
@@ -237,7 +237,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
         Args:
             info: an info of `reset` or `step`.
         """
-        return worded(info, words_of(self.body_names))
+        return name_indices(info, words_of(self.body_names))
 
     @property
     def body_names(self) -> tuple[str, ...]:

@@ -345,7 +345,7 @@ def of_workers(**parts: Ints) -> Info:
     }
 
 
-def worded(info: Mapping[str, Any], words: Mapping[str, Sequence[str]]) -> Words:
+def name_indices(info: Mapping[str, Any], words: Mapping[str, Sequence[str]]) -> Words:
     """Return the words for the indices in the info of one environment.
 
     Args:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.core.infos import InfoDict, matching, publish, worded
+from hrc_env.core.infos import InfoDict, matching, name_indices, publish
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.env_config import EnvConfig
 from hrc_env.infos import words_of
@@ -100,7 +100,7 @@ def words_of_infos(
     words = words_of(bodies)
     numbers = {name: infos[name] for name in infos if not name.startswith(("_", "final_"))}
     worded_infos = [
-        worded({name: values[b] for name, values in numbers.items()}, words)
+        name_indices({name: values[b] for name, values in numbers.items()}, words)
         for b in range(num_envs)
     ]
     return {
