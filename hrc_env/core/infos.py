@@ -311,7 +311,7 @@ def is_of_belief(name: str) -> bool:
     return name.startswith(OF_BELIEF)
 
 
-def matching(patterns: str | Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
+def match_keys(patterns: str | Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
     """Return the keys of infos that match patterns, in the order of the infos.
 
     Args:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.core.infos import InfoDict, matching, name_indices, publish
+from hrc_env.core.infos import InfoDict, match_keys, name_indices, publish
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.env_config import EnvConfig
 from hrc_env.infos import words_of
@@ -81,7 +81,7 @@ def choose_infos(patterns: str | Sequence[str], arguments: Mapping[str, Any]) ->
         first = small.reset(np.arange(1), [np.random.default_rng(0)])
     finally:
         small.close()
-    return matching(patterns, list(first.info_of(0)))
+    return match_keys(patterns, list(first.info_of(0)))
 
 
 def words_of_infos(
