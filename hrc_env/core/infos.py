@@ -2,7 +2,7 @@
 
 Internally NaN stands where there was nothing to measure. Users receive infos with the same keys
 from the reset on and without NaN: the distance to an absent worker is infinite, and beside a finite
-stand-in a key states whether the number was measured. Words are encoded as indices; `worded`
+stand-in a key states whether the number was measured. Words are encoded as indices; `name_indices`
 translates them.
 """
 
@@ -31,7 +31,7 @@ WORDS = {
     CONTACT_KIND: "contact_kind",
     CONTACT_REGION: "contact_region",
 }
-"""Keys of `worded`, with the names in `OF_WORKERS` of the indices behind them."""
+"""Keys of `name_indices`, with the names in `OF_WORKERS` of the indices behind them."""
 PEOPLE = ("activity", "body")
 """Words that there are for each worker."""
 Words = dict[str, tuple[str, ...]]
