@@ -20,7 +20,7 @@ from hrc_env.core.results import provenance, write_whole
 from hrc_env.evaluation.episodes import Score, describe_contradiction, evaluate
 from hrc_env.pipeline.ready import make_ready
 from hrc_env.sb3 import HRCVecEnv
-from hrc_env.settings import settle
+from hrc_env.settings import resolve_settings
 
 from . import checkpoints, ppo, sac
 from .callbacks import (
@@ -108,7 +108,7 @@ def run(arguments: TrainingRequest) -> int:
         return STOPPED
     score = judge(mine, folder, console)
     _write(folder / "score.json", {**asdict(score), **times})
-    config = settle(task=mine.task, config=mine.keywords()["config"]).config
+    config = resolve_settings(task=mine.task, config=mine.keywords()["config"]).config
     title = f"{mine.algorithm.upper()}, {mine.perception}"
     title += f", {describe_weight(curve, config.reward.proximity)}"
     title += f", shield {mine.shield}" if mine.shield else ""

@@ -37,7 +37,7 @@ from hrc_env.render.marks import OVERLAYS
 from hrc_env.render.views import CameraChoice, Views, check_size
 from hrc_env.reset_options import ResetOptions, lasting_options, named_options
 from hrc_env.rewards import RewardConfig
-from hrc_env.settings import Settings, settle
+from hrc_env.settings import Settings, resolve_settings
 from hrc_env.simulation import Simulation
 from hrc_env.step_result import Observation
 from hrc_env.tasks import DEFAULT, goal
@@ -167,7 +167,7 @@ class HRCEnv(  # type: ignore[override]  # a property is `spec`, too
     )
 
     def __init__(self, task: str | TaskType = DEFAULT, **arguments: Any) -> None:
-        settings = settle(task=task, **arguments)
+        settings = resolve_settings(task=task, **arguments)
         self._open(settings)
         rehearse(settings)
         self.simulation = Simulation(1, settings)

@@ -47,13 +47,13 @@ def register_task(task: "TaskType") -> None:
         ConfigError: the id is taken, or a part of the task is missing or wrong.
     """
     from hrc_env.rehearsal import play_briefly  # here, as kernels take time to import
-    from hrc_env.settings import settle
+    from hrc_env.settings import resolve_settings
     from hrc_env.tasks.check import check_task
     from hrc_env.tasks.task import TASKS
     from hrc_env.together import check_rows
 
     check_task(task)
-    settings = settle(task=task, perception="none")
+    settings = resolve_settings(task=task, perception="none")
     play_briefly(settings)
     check_rows(settings)
     _add(TASKS, task.id, task)

@@ -93,7 +93,7 @@ class Settings:
         }
 
 
-def settle(**arguments: Any) -> Settings:
+def resolve_settings(**arguments: Any) -> Settings:
     """Return settings from keyword arguments of an environment; see `make_settings`."""
     return make_settings(EnvConfig(**arguments))
 

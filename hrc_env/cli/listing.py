@@ -51,7 +51,7 @@ class List(EnvironmentArguments):
 
     def _show_config(self) -> int:
         from hrc_env.core.mapping import convert_to_plain, to_toml
-        from hrc_env.settings import settle
+        from hrc_env.settings import resolve_settings
 
-        print(to_toml(convert_to_plain(asdict(settle(**self.keywords()).config))), end="")
+        print(to_toml(convert_to_plain(asdict(resolve_settings(**self.keywords()).config))), end="")
         return 0

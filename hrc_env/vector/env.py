@@ -28,7 +28,7 @@ from hrc_env.rehearsal import rehearse
 from hrc_env.render.views import CameraChoice
 from hrc_env.reset_options import Fixed, ResetOptions, lasting_options, named_options
 from hrc_env.rewards import RewardConfig
-from hrc_env.settings import settle
+from hrc_env.settings import resolve_settings
 from hrc_env.simulation import Simulation
 from hrc_env.step_result import Observation, StepResult
 from hrc_env.tasks.task import AnyTask
@@ -96,7 +96,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
                 "process for each environment, and SB3's make_vec_env with vec_env_cls="
                 'hrc_env.HRCSubprocVecEnv. perception="keypoints" emulates it, batched.'
             )
-        settings = settle(**arguments)
+        settings = resolve_settings(**arguments)
         self._open(settings)
         if self.render_mode in LISTS:
             self.metadata["render_modes"].append(self.render_mode)

@@ -16,7 +16,7 @@ from hrc_env.core.infos import InfoDict, match_keys, name_indices, publish
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.env_config import EnvConfig
 from hrc_env.infos import words_of
-from hrc_env.settings import settle
+from hrc_env.settings import resolve_settings
 from hrc_env.simulation import Simulation
 from hrc_env.step_result import StepResult
 
@@ -76,7 +76,7 @@ def choose_infos(patterns: str | Sequence[str], arguments: Mapping[str, Any]) ->
     given = {name: value for name, value in arguments.items() if name in known}
     with warnings.catch_warnings():  # the environment itself repeats them
         warnings.simplefilter("ignore")
-        small = Simulation(1, settle(**{"perception": "keypoints", **given}))
+        small = Simulation(1, resolve_settings(**{"perception": "keypoints", **given}))
     try:
         first = small.reset(np.arange(1), [np.random.default_rng(0)])
     finally:

@@ -16,7 +16,7 @@ from hrc_env.motion import generator
 from hrc_env.scene.build import build
 from hrc_env.scene.physics import Physics
 from hrc_env.scene.render import CropRenderer
-from hrc_env.settings import settle
+from hrc_env.settings import resolve_settings
 from hrc_env.vector.env import HRCVectorEnv
 from hrc_env.worker.body import SEGMENT, load_body, worker_names
 
@@ -191,4 +191,4 @@ def rest_of(motion):
 )
 def test_bodies_that_there_are_not_are_refused_with_those_that_there_are(worker, words):
     with pytest.raises(ConfigError, match=words):
-        settle(config={"worker": worker})
+        resolve_settings(config={"worker": worker})
