@@ -1,5 +1,4 @@
-"""Checkpoints for acting: their environment and their policy, without executing code of the
-file."""
+"""Checkpoints for acting: environment and policy, without executing code of the file."""
 
 import json
 import zipfile
@@ -22,8 +21,9 @@ Size = int | dict[str, int]
 
 
 def load(path: Path, env_info: EnvInfo, trust: bool = False) -> sb3_files.SB3Agent:
-    """Return the policy of a checkpoint of this package or of Stable-Baselines3, from its weights
-    alone.
+    """Return the policy of a checkpoint of this package or of Stable-Baselines3.
+
+    Only its weights are read.
 
     Raises:
         CheckpointError: it was made for another version or environment, or it fails in
@@ -78,8 +78,7 @@ def check_made_for(path: Path, meta: dict[str, Any], env_info: EnvInfo) -> None:
 
 
 def check_fits(path: Path, meta: dict[str, Any], observation: Size, action: Size) -> None:
-    """Raise `CheckpointError` if a checkpoint of this package is of another version or of other
-    sizes."""
+    """Raise `CheckpointError` if a checkpoint is of another version or has other sizes."""
     made_with = meta["hrc_env"]
     if made_with.split(".")[:2] != __version__.split(".")[:2]:
         raise CheckpointError(

@@ -53,8 +53,7 @@ class Curriculum(BaseCallback):
     """Sets the proximity term's weight, and the limit in force, before every rollout.
 
     A resumed run continues it. With the whole weight from the start a learner first learns to stay
-    away, and finds its goals about nine times later; its final policy is more careful
-    (docs/learning.md has both).
+    away, and finds its goals about nine times later; its final policy is more careful.
     """
 
     def __init__(self, ramp: Ramp, env: HRCVecEnv) -> None:
@@ -108,8 +107,10 @@ class ProximityRamp(Curriculum):
 
 
 class Interrupt:
-    """Handler of Ctrl-C: after `listen` the first one sets `asked`, and the second one
-    interrupts."""
+    """Handler of Ctrl-C, active after `listen`.
+
+    The first Ctrl-C sets `asked`, and the second one interrupts.
+    """
 
     def __init__(self) -> None:
         self.asked = False

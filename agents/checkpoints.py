@@ -91,8 +91,9 @@ def resume(path: Path, env: HRCVecEnv, tensorboard: Path | None = None) -> Learn
 
 
 def load(path: Path, env_info: EnvInfo) -> "TrainedAgent":
-    """Return a trained policy for acting, with its learner, which is unpickled: for the user's own
-    runs.
+    """Return a trained policy for acting, with its learner.
+
+    The learner is unpickled, so this is for runs of the user's own.
 
     Raises:
         CheckpointError: it was made for another version or another environment.
@@ -110,8 +111,10 @@ class TrainedAgent:
         self.learner = learner
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
-        """Return deterministic actions (..., A); only the observation's parts used in training
-        count."""
+        """Return deterministic actions (..., A).
+
+        Only the observation's parts used in training count.
+        """
         space = self.learner.observation_space
         if isinstance(observation, Mapping):
             parts = space.spaces if isinstance(space, spaces.Dict) else None

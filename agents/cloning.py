@@ -67,8 +67,9 @@ def clone(
     seed: int,
     tick: Callable[[float], None] = lambda share: None,
 ) -> list[float]:
-    """Train a policy to imitate the task's scripted agent without yielding; returns errors per
-    round.
+    """Train a policy to imitate the task's scripted agent; return the errors per round.
+
+    The scripted agent does not yield.
 
     Args:
         policy: policy of a learner of Stable-Baselines3; its mean action is trained.

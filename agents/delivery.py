@@ -233,8 +233,7 @@ def _read_people(terms: dict[str, Array]) -> People:
 
 
 def _predict_shifts(speed: Array, window: Array) -> Array:
-    """Return the displacements (n, C, T, 2) of velocities that the base reaches at its slew
-    rate."""
+    """Return displacements (n, C, T, 2) of velocities that the base reaches at its slew rate."""
     change = window - speed
     ramp = np.abs(change) / BRAKE_M_S2
     t, ramp, change = TIMES_S[:, None], ramp[:, :, None], change[:, :, None]

@@ -27,8 +27,10 @@ def make_learner(
     tensorboard: Path | None = None,
     kind: Callable[..., PPO] = PPO,
 ) -> PPO:
-    """Return a new PPO on `env`; a running estimate scales rewards, observations stay as they
-    are."""
+    """Return a new PPO on `env`.
+
+    Rewards are scaled by a running estimate; observations stay as they are.
+    """
     normalised = VecNormalize(env, norm_obs=False, norm_reward=True, gamma=settings.gamma)
     log = None if tensorboard is None else str(tensorboard)
     network = "MultiInputPolicy" if isinstance(env.observation_space, Dict) else "MlpPolicy"

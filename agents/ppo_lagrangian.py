@@ -118,8 +118,10 @@ class PPOLagrangian(PPO):
         rollout_buffer: RolloutBuffer,
         n_rollout_steps: int,
     ) -> bool:
-        """Collect a rollout as PPO does, update multiplier and critic, and include the cost in
-        advantages."""
+        """Collect a rollout as PPO does, then update the multiplier and the critic of costs.
+
+        The cost is included in the advantages.
+        """
         self._costs: list[Floats] = []
         self._beyond: list[Floats] = []
         if not super().collect_rollouts(env, callback, rollout_buffer, n_rollout_steps):
@@ -138,8 +140,10 @@ class PPOLagrangian(PPO):
         return True
 
     def _update_info_buffer(self, infos: list[dict[str, Any]], dones: Any = None) -> None:
-        """Store the costs of a step, and the critic's value beyond a time limit; called in every
-        step."""
+        """Store the costs of a step, and the critic's value beyond a time limit.
+
+        It is called in every step.
+        """
         super()._update_info_buffer(infos, dones)
         beyond = np.zeros(len(infos))
         for k, info in enumerate(infos):

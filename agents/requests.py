@@ -30,7 +30,7 @@ class TrainingRequest(EnvironmentArguments):
     demonstrations: int | None = None
     """Number of episodes of the scripted agent that the policy imitates before it is trained."""
     timesteps: int | None = None
-    """Environment steps in total (with --resume: counted from the start); 0: it only imitates."""
+    """Environment steps in total (with --resume: counted from the start); 0: imitation only."""
     num_envs: int = 64
     """Number of environments that step together; with --engine ray, in each worker."""
     engine: str = "sb3"

@@ -1,5 +1,7 @@
-"""The command python -m benchmarks: measure estimators, detector, speed and workers; draw
-workers."""
+"""The command `python -m benchmarks`.
+
+It measures estimators, detector, speed and workers, and draws workers.
+"""
 
 import sys
 from collections.abc import Sequence

@@ -1,4 +1,6 @@
-"""Scores of simple agents and PPO at every perception level: python -m benchmarks.baselines
+"""Scores of simple agents and PPO at every perception level.
+
+    python -m benchmarks.baselines
 
 Random actions, the scripted reacher without and with yielding, and PPO without and with the safety
 term are compared by return, goals a minute, cost and contacts on the same seeds. PPO is trained at
@@ -34,11 +36,10 @@ TRAINED_ON = ("env", "tracker", "emulator", "motion", "agents")
 LEVELS = ("truth", "keypoints", "none", "pixels")
 """Perception levels."""
 NOTE = """\
-Means of {n[truth.random.return]} episodes of 10 s ({n[pixels.random.return]} at `pixels`, where \
-only rows of that level are comparable); 95 % intervals are exact for contacts, else bootstraps \
-over episodes. The return depends on the robot's belief: compare it within a level only. Cost and \
-contacts are computed from the truth. PPO: one policy each; at `none` all workers are always \
-unknown, so the safety term is constant, and the same policy is in both rows."""
+Means over {n[truth.random.return]} episodes of 10 s ({n[pixels.random.return]} at `pixels`). Cost \
+and contacts are per episode and computed from the truth; the return depends on the robot's \
+belief, so compare it within one perception level only. 95 % intervals are exact for contacts and \
+bootstraps over episodes otherwise. PPO: one trained policy per row."""
 COLUMNS = (
     mean("r", "return", "return"),
     per_minute(ACHIEVED, "goals [1/min]", "goals_per_minute"),

@@ -1,4 +1,4 @@
-"""Speed of other environments in steps a second: python baselines_speed.py
+"""Speed of other environments in steps a second.
 
 It does not import hrc_env, as gymnasium-robotics and robosuite need other versions of MuJoCo and
 NumPy. It runs in a virtual environment of its own:

@@ -14,7 +14,7 @@ from contextlib import closing, contextmanager
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from urllib.request import urlopen
 
 import cloudpickle
@@ -49,7 +49,7 @@ Played = Mapping[str, list[float]]
 
 TABLE = Table(
     name="cluster",
-    title="Steps a second of training, by workers of one core each",
+    title="Training speed by number of rollout workers, one core each",
     rows={
         "sb3": ("none", "Stable-Baselines3, measured"),
         "1": ("1", "measured"),
@@ -57,17 +57,18 @@ TABLE = Table(
         "2_predicted": ("2", "predicted from one"),
         **{str(n): (f"{n:,}", "model") for n in MODELLED},
     },
-    heads=("workers", ""),
+    heads=("workers", "source"),
     columns=(
         Column("sampling_s.{}", "sampling [s]", digits=2),
         Column("learning_s.{}", "learning [s]", digits=2),
         Column("steps_per_s.{}", "steps/s", digits=0),
-        Column("speedup.{}", "times one worker", digits=2),
+        Column("speedup.{}", "speedup over one worker", digits=2),
     ),
-    note="Stable-Baselines3 steps its environments on all cores. {n[update_s.1]} rounds in turns "
-    "of 64 environments, 64 steps each, a worker. One step of 64 environments on one thread takes "
-    "{step_ms} ms. A step is {bytes} bytes, so that 1 Gbit/s carries the steps of {carried} "
-    "workers.",
+    note="Every worker collects 64 steps of 64 environments per update; {n[update_s.1]} updates, "
+    "in turns. Stable-Baselines3 steps its environments on all cores. The model assumes parallel "
+    "sampling and serial learning. One step of 64 environments on one thread takes {step_ms} "
+    "ms. One environment step is {bytes} bytes, so that a network of 1 Gbit/s carries the steps of "
+    "{carried} workers.",
     numbers={
         "step_ms": Column("step_s", digits=1, scale=1e3, plain=True),
         "bytes": Column("bytes_per_step", digits=0, plain=True),
@@ -121,12 +122,13 @@ class ClusterBench:
             found: dict[str, list[float]] = {}
             for k in range(-1, self.n_rounds):  # the first one warms up
                 for n, learner in learners.items():
-                    sampled_s, updated_s, n_steps, n_bytes = _turn(learner)
+                    turn = _measure_turn(learner)
                     if k >= 0:
-                        found.setdefault(f"sample_s.{n}", []).append(sampled_s)
-                        found.setdefault(f"update_s.{n}", []).append(updated_s)
-                        found.setdefault(f"steps.{n}", []).append(n_steps)
-                        found.setdefault("bytes_per_step", []).append(n_bytes / n_steps)
+                        found.setdefault(f"sample_s.{n}", []).append(turn.sampled_s)
+                        found.setdefault(f"update_s.{n}", []).append(turn.updated_s)
+                        found.setdefault(f"steps.{n}", []).append(turn.n_steps)
+                        share = turn.n_bytes / turn.n_steps
+                        found.setdefault("bytes_per_step", []).append(share)
                 if k >= 0:
                     found.setdefault("sb3_steps_per_s", []).append(alone())
                 found.setdefault("step_s", []).append(_step_s())
@@ -217,9 +219,21 @@ def _alone() -> Iterator[Callable[[], float]]:
         yield turn
 
 
-def _turn(learner: Any) -> tuple[float, float, int, int]:
-    """Return times of a rollout alone and with learning [s], and steps and bytes of a rollout of
-    all workers."""
+class _Turn(NamedTuple):
+    """Times and sizes of a rollout of all workers."""
+
+    sampled_s: float
+    """Time of the rollout alone [s]."""
+    updated_s: float
+    """Time of another rollout with learning from it [s]."""
+    n_steps: int
+    """Number of steps of the rollout."""
+    n_bytes: int
+    """Size of the rollout as it is sent."""
+
+
+def _measure_turn(learner: Any) -> _Turn:
+    """Sample once alone, and once with learning."""
     group = learner.algorithm.env_runner_group
     started_s = time.monotonic()
     samples = group.foreach_env_runner(lambda runner: runner.sample(), local_env_runner=False)
@@ -228,7 +242,7 @@ def _turn(learner: Any) -> tuple[float, float, int, int]:
     n_steps = sum(len(episode) for episodes in samples for episode in episodes)
     started_s = time.monotonic()
     learner.update(1.0)
-    return sampled_s, time.monotonic() - started_s, n_steps, n_bytes
+    return _Turn(sampled_s, time.monotonic() - started_s, n_steps, n_bytes)
 
 
 def _exported() -> dict[str, float]:

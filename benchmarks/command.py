@@ -1,5 +1,7 @@
-"""The command line of the studies in this folder: python -m benchmarks.NAME [--quick] [--out
-DIR]."""
+"""The command line of the studies in this folder.
+
+It is `python -m benchmarks.NAME [--quick] [--out DIR]`.
+"""
 
 import sys
 from collections.abc import Callable

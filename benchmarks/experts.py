@@ -1,4 +1,6 @@
-"""Scores of the scripted agents in all tasks: python -m benchmarks.experts
+"""Scores of the scripted agents in all tasks.
+
+    python -m benchmarks.experts
 
 Success, time, cost and contacts on the same seeds: without workers, and beside attentive ones at
 several perception levels. Episodes at `pixels` are played one by one.
@@ -68,16 +70,18 @@ STUDY = Study(
                 Column("{}.alone.success", "no worker [%]", scale=100),
                 Column("{}.truth.success", "`truth` [%]", scale=100),
                 Column("{}.keypoints.success", "`keypoints` [%]", scale=100),
-                Column("{}.slowed.success", "`keypoints`, slowed [%]", scale=100),
                 Column("{}.pixels.success", "`pixels` [%]", 0, 100),
-                Column("{}.keypoints.cost", "cost, `keypoints`"),
-                Column("{}.slowed.cost", "slowed"),
-                Column("{}.keypoints.seconds", "time, `keypoints` [s]", plain=True),
+                Column("{}.slowed.success", "`scripted_slowed` [%]", scale=100),
+                Column("{}.keypoints.cost", "cost"),
+                Column("{}.slowed.cost", "cost, `scripted_slowed`"),
+                Column("{}.keypoints.seconds", "duration [s]", plain=True),
             ),
             ("task",),
-            "Successful episodes of {n[HRCReach-v0.alone.success]} "
-            "({n[HRCReach-v0.pixels.success]} at `pixels`) beside attentive workers, and alone; "
-            "cost per episode. 95 % intervals.",
+            "Share of {n[HRCReach-v0.alone.success]} episodes "
+            "({n[HRCReach-v0.pixels.success]} at `pixels`) in which `scripted` completed the task "
+            "without workers, and beside attentive workers with each perception; the columns of "
+            "`scripted_slowed`, the cost per episode and the duration are at `keypoints`. 95 % "
+            "intervals.",
         ),
     ),
     n_quick=2,

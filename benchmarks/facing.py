@@ -1,4 +1,6 @@
-"""Accuracy of one camera by the direction in which the worker faces: python -m benchmarks.facing
+"""Accuracy of one camera by the direction in which the worker faces.
+
+    python -m benchmarks.facing
 
 The paper concludes that a single camera gives an accurate 3D pose only of people who face it. Here
 workers of all bodies work in view of the four cameras of the laboratory, which see every moment at
@@ -255,19 +257,19 @@ TABLE = Table(
         for yaw, words in YAWS.items()
     },
     (
-        Column("off_share.{}.median", "in the image [% of stature]", 2, 100),
+        Column("off_share.{}.median", "image error [% of stature]", 2, 100),
         Column("missed.{}", "missed [%]", 1, 100),
-        Column("error_m.{}.particle.median", "`particle` [mm]", 0, 1000),
+        Column("error_m.{}.particle.median", "`particle`, median [mm]", 0, 1000),
         Column("error_m.{}.particle.p95", "95 % [mm]", 0, 1000),
-        Column("across_m.{}.particle.median", "across the ray [mm]", 0, 1000),
-        Column("error_m.{}.paper.median", "`paper` [mm]", 0, 1000),
+        Column("across_m.{}.particle.median", "across the ray, median [mm]", 0, 1000),
+        Column("error_m.{}.paper.median", "`paper`, median [mm]", 0, 1000),
     ),
     ("level", "worker"),
-    "Medians, and a 95th percentile, of joints that nothing but the body itself hides. "
-    "{n[missed.keypoints.0]} episodes of 10 s at `keypoints`, {n[missed.pixels.0]} at "
-    "`pixels`, with 95 % intervals over episodes. In the image: four cameras are used. The rest: "
-    "one of four remains after the first second. Missed: low confidence, or more than 5 % of the "
-    "stature away.",
+    "{n[missed.keypoints.0]} episodes of 10 s at `keypoints` and {n[missed.pixels.0]} at `pixels`; "
+    "95 % intervals over episodes. Joints count if only the body itself hides them from the "
+    "camera. Image error and missed joints are those of detections while all four cameras work; a "
+    "joint is missed if its confidence is low or its image error exceeds 5 % of the stature. The "
+    "other columns are errors in space while one of the four cameras works.",
 )  # fmt: skip
 
 

@@ -1,4 +1,6 @@
-"""Scores of the package's policies: python -m benchmarks.kept
+"""Scores of the package's policies.
+
+    python -m benchmarks.kept
 
 Policies that `python -m benchmarks.learners` and `python -m benchmarks.limited` made are part of
 the package, one or more for every task. Each is evaluated as it was trained and with the shield
@@ -43,11 +45,15 @@ def make_study() -> Study:
             per_minute(ACHIEVED, "goals [1/min]", "goals_per_minute"),
             mean("cost", "cost"),
             rate("contacts", "contacts", digits=2),
-            rate("contacts_towards", "towards [in 1,000]", "towards", "1000 episodes"),
+            rate(
+                "contacts_towards",
+                "contacts towards [per 1,000 episodes]",
+                "towards",
+                "1000 episodes",
+            ),
         ),
-        note="Beside attentive workers at `keypoints`, 48 episodes. Contacts per episode, and "
-        "towards the worker per 1,000. 95 % intervals: exact for success and contacts, else "
-        "bootstraps.",
+        note="48 episodes per row beside attentive workers at `keypoints`; cost and contacts per "
+        "episode. 95 % intervals are exact for success and contacts and bootstraps otherwise.",
     )
 
 

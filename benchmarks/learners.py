@@ -1,4 +1,6 @@
-"""Scores of policies that are trained for every task: python -m benchmarks.learners
+"""Scores of policies that are trained for every task.
+
+    python -m benchmarks.learners
 
 Each id is trained by the command on its page, `python -m hrc_env train --task ID`, with three
 seeds, and evaluated beside its scripted agent on the same fixed seeds: success, cost, contacts, and
@@ -142,10 +144,11 @@ def main() -> int:
 
 TITLE = "Learnt policies in every task"
 NOTE = (
-    "Beside attentive workers at `keypoints`, {n[HRCReach-v0.scripted.success]} episodes, means "
-    "per episode. Success is the share of an episode's goals, studs, screws or loads that were "
-    "achieved. Median of three seeds (lowest to highest, for contacts the ends of exact 95 % "
-    "intervals), each trained by `python -m hrc_env train --task ID`."
+    "Means over {n[HRCReach-v0.scripted.success]} episodes beside attentive workers at "
+    "`keypoints`. Success: share of an episode's goals, studs, screws or loads that were achieved; "
+    "cost and contacts per episode. Learnt: median of three policies of different seeds (lowest to "
+    "highest; for contacts the ends of exact 95 % intervals), each trained by `python -m hrc_env "
+    "train --task ID`. Scripted: the agent `scripted`."
 )
 COLUMNS = (
     Column("{}.learnt.success", "success", 2),

@@ -1,5 +1,7 @@
-"""Policies that studies evaluate: trained by `python -m hrc_env train`, stored in the study's
-folder."""
+"""Policies that studies evaluate.
+
+They are trained by `python -m hrc_env train` and stored in the study's folder.
+"""
 
 import json
 import os

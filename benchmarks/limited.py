@@ -1,4 +1,6 @@
-"""Training with a cost limit, or without care and then with a shield: python -m benchmarks.limited
+"""Training with a cost limit, or without one and then with a shield.
+
+    python -m benchmarks.limited
 
 For each seed PPO-Lagrangian is trained with a cost limit, and PPO without any safety term. For the
 first the table shows when it reached its limit and how well it kept it: the cost of its noisy
@@ -50,8 +52,8 @@ class Variant(NamedTuple):
 
 WORDS = {
     "limited": Variant("PPO-Lagrangian, limit 30", None),
-    "fast": Variant("PPO without care, then `qp`", "qp"),
-    "bare": Variant("the same without a shield", None),
+    "fast": Variant("PPO without a safety term, evaluated with `qp`", "qp"),
+    "bare": Variant("the same policies, evaluated without a shield", None),
 }
 """Rows of a seed by name."""
 TITLE = "Cost limit or shield"
@@ -72,7 +74,7 @@ class LimitedArguments(StudyArguments):
     timesteps: int = 3_000_000
     """Environment steps of a training with the limit (quick: 8192)."""
     fast_timesteps: int = 1_000_000
-    """Environment steps of a training without care (quick: 8192)."""
+    """Environment steps of a training without a cost limit (quick: 8192)."""
 
 
 def make_trainings(arguments: LimitedArguments) -> Trainings:
@@ -183,9 +185,9 @@ def main() -> int:
 
 
 NOTE = (
-    "HRCReach-v0 at `keypoints`; mean actions, 1,000 episodes, with 95 % intervals, exact for "
-    "contacts. In training: noisy actions, the last two windows of 1,000 episodes, and the "
-    "greatest deviation of one of them from the limit. "
+    "`HRCReach-v0` at `keypoints`; 1,000 episodes with the policy's mean actions, 95 % intervals, "
+    "exact for contacts. Cost in training: of exploring actions, over the last two windows of "
+    "1,000 episodes. Greatest deviation: of one of these windows from the limit."
 )
 MEASURED = (
     per_minute(ACHIEVED, "goals [1/min]", "goals_per_minute"),

@@ -99,7 +99,7 @@ def _replay_trueness(given: ReplayInput) -> None:
     from hrc_env.config import HRCConfig
     from hrc_env.perception.emulator import EmulatorConfig
 
-    path = holdout.calibration_of(given.out, holdout.ROUNDS)
+    path = holdout.find_calibration(given.out, holdout.ROUNDS)
     if path.exists():
         emulator = EmulatorConfig(calibration=str(path))
         config = replace(HRCConfig(), emulator=emulator)

@@ -1,4 +1,4 @@
-"""Regenerate every number and picture of the documentation: python -m benchmarks.results
+"""Regenerate every number and picture of the documentation.
 
 Runs the studies that are older than the subsystems they depend on (`behaviour.toml`), one after the
 other; writes their numbers into `docs/results/whole/`, their pictures into `docs/pictures/`, both
@@ -216,8 +216,10 @@ def run(name: str, until_s: float) -> bool:
 
 
 def call(command: Command, out: Path, more: str, until_s: float = float("inf")) -> int | None:
-    """Call a study's command; return its status, or None if it was stopped because the time was
-    up."""
+    """Call a study's command; return its status.
+
+    It is None if the time was up and the study was stopped.
+    """
     words = [sys.executable, *command.command.split()[1:], *more.split()]
     words += ["--out", str(out)] if command.tables else []
     release_folder(out)  # settings may have changed; parts have their keys
@@ -281,8 +283,10 @@ def format_results(content: Mapping[str, Any]) -> str:
 
 
 def try_out(console: Console, name: str) -> int:
-    """Run a study's quick form; return 0 if it makes all metrics and pictures of the
-    documentation."""
+    """Run a study's quick form; return 0 if it makes all that the documentation needs.
+
+    That is every metric and every picture.
+    """
     command, out, started_s = COMMANDS[name], QUICK_OUT / name, time.monotonic()
     if status := call(command, out, command.quick):
         console.print(f"{name}: ended with status {status}")

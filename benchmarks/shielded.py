@@ -1,4 +1,6 @@
-"""Throughput and safety with the shield: python -m benchmarks.shielded
+"""Throughput and safety with the shield.
+
+    python -m benchmarks.shielded
 
 Goals, contacts and cost of the scripted reacher, which drives to its goals and ignores people,
 beside people who ignore it: without a shield, and with `qp` and the perception of each row.
@@ -61,15 +63,16 @@ STUDY = Study(
     columns=(
         Column("{}.share", "episodes", 0, shows="n"),
         share_of_baseline(ACHIEVED, "throughput [%]", scale=100),
-        *(rate(f"contacts_{kind}", f"{kind} [per 1,000]", kind, "1000 episodes")
+        *(rate(f"contacts_{kind}", f"contacts {kind} [per 1,000]", kind, "1000 episodes")
           for kind in ("towards", "standing", "fleeing")),
         mean("cost", "cost"),
         per_minute(ACHIEVED, name="goals_per_minute"),
         rate([f"contacts_{kind}" for kind in KINDS], name="all", per="1000 episodes"),
     ),
-    note="The scripted reacher beside people of one body who ignore it, with `shield=\"qp\"`: "
-    "throughput relative to an unshielded robot on the same seeds; contacts per 1,000 episodes of "
-    "10 s by the robot's motion; cost per episode. 95 % intervals, exact for contacts. ",
+    note="The agent `scripted` beside workers of one body who ignore it, with `shield=\"qp\"` "
+    "unless stated otherwise. Throughput: goals relative to an unshielded robot on the same seeds. "
+    "Contacts per 1,000 episodes of 10 s, by the motion of the robot; cost per episode. 95 % "
+    "intervals, exact for contacts.",
 )  # fmt: skip
 
 if __name__ == "__main__":

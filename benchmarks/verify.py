@@ -1,4 +1,4 @@
-"""Check that recorded numbers are reproduced: python -m benchmarks.verify --share .02
+"""Check that recorded numbers are reproduced.
 
 Replays a share of all recorded parts, drawn at random, and at least one of every row of parts
 (parts with labels that begin with the same words: a scene, a task, a perception setup), and

@@ -13,6 +13,7 @@ sys.path.insert(0, str(ROOT))
 
 import hrc_env  # noqa: E402
 from docs import declared, rst  # noqa: E402
+from hrc_env.core.docstrings import get_own_doc  # noqa: E402
 
 project = "hrc_env"
 author = copyright = "The hrc_env authors"
@@ -70,8 +71,9 @@ def link_to_repository(app: Any, name: str, source: list[str]) -> None:
 
 
 def write_rst(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:
-    """Turn a docstring into reStructuredText."""
-    lines[:] = rst.from_docstring("\n".join(lines)).splitlines()
+    """Turn a docstring into reStructuredText, of a class without its list of attributes."""
+    own = get_own_doc(obj) if inspect.isclass(obj) else ""
+    lines[:] = rst.from_docstring(own or "\n".join(lines)).splitlines()
 
 
 def add_fields(app: Any, what: str, name: str, obj: Any, options: Any, lines: list[str]) -> None:

@@ -7,12 +7,13 @@ shows the name instead.
 import ast
 import dataclasses
 import inspect
-import itertools
 import textwrap
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
+
+from hrc_env.core.docstrings import list_attributes
 
 SHORT = 40
 """Length up to which a default is shown by its value [characters]."""
@@ -31,22 +32,10 @@ class Field:
 
 def fields(kind: type) -> list[Field]:
     """Return the documented attributes of a class, those of its bases in this package first."""
-    found: dict[str, Field] = {}
-    for base in reversed(kind.__mro__):
-        if base.__module__.partition(".")[0] == "hrc_env":
-            found |= {each.name: each for each in _own_fields(base)}
-    return list(found.values())
-
-
-def _own_fields(kind: type) -> Iterator[Field]:
-    (tree,) = ast.parse(textwrap.dedent(inspect.getsource(kind))).body
-    for node, after in itertools.pairwise(getattr(tree, "body", ())):
-        if not (isinstance(node, ast.AnnAssign) and isinstance(after, ast.Expr)):
-            continue
-        name = ast.unparse(node.target)
-        if not name.startswith("_"):
-            doc = inspect.cleandoc(ast.literal_eval(after.value))
-            yield Field(name, _annotation(node.annotation), _default(kind, name, node.value), doc)
+    return [
+        Field(each.name, each.annotation, _default(kind, each.name, each.node.value), each.doc)
+        for each in list_attributes(kind)
+    ]
 
 
 def signature(function: Callable[..., Any]) -> tuple[str, str | None]:

@@ -12,11 +12,15 @@ from pathlib import Path
 
 sys.path.append(str(Path(__file__).resolve().parent.parent))  # where benchmarks/ and docs/ are
 
-from docs import leaderboard, names, reference, tables
+from docs import leaderboard, names, records, reference, tables
 from hrc_env.tasks import BUILT_IN
 
 DOCS = Path(__file__).resolve().parent
-PAGES = (DOCS.parent / "README.md", *sorted(DOCS.glob("*.md")))
+PAGES = (
+    DOCS.parent / "README.md",
+    *sorted(DOCS.glob("*.md")),
+    *sorted(DOCS.glob("bring_your_own/*.md")),
+)
 """Written by hand, with tables that are filled in."""
 REFERENCE: dict[Path, Callable[[], str]] = {
     DOCS / "reference" / "environment.md": reference.environment,
@@ -30,6 +34,7 @@ REFERENCE: dict[Path, Callable[[], str]] = {
     DOCS / "reference" / "leaderboard.md": leaderboard.page,
     DOCS / "reference" / "declarations.md": reference.declarations,
     DOCS / "reference" / "names.md": names.index,
+    DOCS / "reference" / "records.md": records.page,
     **{
         DOCS / "reference" / "api" / names.page_name(each): partial(names.page, each)
         for each in names.groups()

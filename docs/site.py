@@ -33,7 +33,7 @@ class Page(HTMLParser):
         self.feed(text)
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """Note an element."""
+        """Record the anchor, the link and the loaded file of an element."""
         values = {name: value or "" for name, value in attrs}
         self.anchors.add(values.get("id", ""))
         if tag == "a" and "href" in values:
@@ -43,7 +43,7 @@ class Page(HTMLParser):
 
 
 def main(words: Sequence[str] = ()) -> int:
-    """Build and check; return the exit status.
+    """Build and check the site; return the exit status.
 
     Args:
         words: the folder, if it is not out/docs.
@@ -76,7 +76,7 @@ def build(out: Path) -> int:
 
 
 def broken_links(out: Path) -> list[str]:
-    """Return what is wrong with the links of a site: no target, or a file from elsewhere."""
+    """Return messages about links without a target, and about files from other sites."""
     pages = {path: Page(path.read_text()) for path in out.rglob("*.html")}
     wrong = []
     for path, page in pages.items():
@@ -98,7 +98,7 @@ def broken_links(out: Path) -> list[str]:
 
 
 def _has_section(page: Page | None, anchor: str) -> bool:
-    """Return whether a page has an anchor; files that are no pages, and "", always have."""
+    """Return whether a page has an anchor; True for "", and for files that are no pages."""
     return not anchor or page is None or anchor in page.anchors
 
 

@@ -1,12 +1,13 @@
-"""Tables and numbers that were measured, in the pages that ask for them.
+"""Measured tables and numbers in the pages of the documentation.
 
 Studies declare their tables (`hrc_env.experiments.report.Table`); the numbers are those that their
-commands found last, `docs/results/whole/COMMAND.json`. A page asks with `<!-- results: NAME -->`,
-or `<!-- results: NAME without intervals -->`, and the table stands between that and
-`<!-- end of results -->`; for one of its numbers in a sentence with `<!-- number: NAME.WHICH -->`,
-and it stands between that and `<!-- end -->`. Where all this comes from stands once a page, between
-`<!-- provenance -->` and `<!-- end of provenance -->`. A file of `examples/` stands between
-`<!-- example: PATH -->` and `<!-- end of example -->`.
+commands found last, `docs/results/whole/COMMAND.json`. A page marks the place of a table with
+`<!-- results: NAME -->` and `<!-- end of results -->`. After the name it can choose rows by the
+text below one of the table's headings, and leave out intervals:
+`<!-- results: baselines where perception is keypoints without intervals -->`. A single number in a
+sentence is between `<!-- number: NAME.WHICH -->` and `<!-- end -->`, the provenance of all tables
+of a page between `<!-- provenance -->` and `<!-- end of provenance -->`, and a file of `examples/`
+between `<!-- example: PATH -->` and `<!-- end of example -->`.
 """
 
 import json
@@ -19,12 +20,13 @@ from typing import Any
 
 from benchmarks.studies import COMMANDS
 from hrc_env.core.results import Metric
-from hrc_env.experiments.report import Metrics, Table
+from hrc_env.experiments.report import Metrics, Table, format_table
 from hrc_env.experiments.versions import SUBSYSTEMS
 
 RESULTS = Path(__file__).parent / "results"
 BLOCK = re.compile(
-    r"<!-- results: (?P<name>\w+)(?P<plain> without intervals)? -->\n.*?<!-- end of results -->",
+    r"<!-- results: (?P<name>\w+)(?: where (?P<head>[\w ]+?) is (?P<cell>[^>]+?))?"
+    r"(?P<plain> without intervals)? -->\n.*?<!-- end of results -->",
     re.S,
 )
 NUMBER = re.compile(r"<!-- number: (?P<name>\w+)\.(?P<which>\w+) -->.*?<!-- end -->", re.S)
@@ -98,8 +100,11 @@ def filled(page: str) -> str:
 
 def _block(found: re.Match[str]) -> str:
     first, result = found[0].split("\n", 1)[0], read(found["name"])
-    table = result.table.to_markdown(result.metrics, intervals=not found["plain"])
-    return f"{first}\n{table}\n<!-- end of results -->"
+    table = result.table
+    if found["head"]:
+        table = table.select_rows(found["head"], found["cell"])
+    text = table.to_markdown(result.metrics, intervals=not found["plain"])
+    return f"{first}\n{text}\n<!-- end of results -->"
 
 
 def _number(found: re.Match[str]) -> str:
@@ -114,21 +119,26 @@ def _example(found: re.Match[str]) -> str:
 
 
 def provenance(names: list[str]) -> str:
-    """Return one line: by which commands, at which versions, when and on what tables were made."""
+    """Return by which commands, at which versions, when and on which machines tables were made.
+
+    Args:
+        names: names of the tables.
+
+    Returns:
+        A sentence if one command made all of them, else a table with a row for each command.
+    """
     found = [read(name) for name in dict.fromkeys(names)]
-    stated = {pair for each in found for pair in (("", each.version), *each.depends.items())}
-    is_same = len(dict(stated)) == len(stated)
-    sources: dict[str, list[str]] = {}
+    sources: dict[tuple[str, ...], list[str]] = {}
     for each in found:
-        at = "" if is_same else f" at {_versions(each.version, each.depends)}"
-        source = f"`{each.command}`{at} ({each.date})"
-        sources.setdefault(source, []).append(f'"{each.table.title}"')
-    parts = [f"{', '.join(titles)} by {source}" for source, titles in sources.items()]
+        source = (f"`{each.command}`", _versions(each.version, each.depends), each.date)
+        sources.setdefault(source, []).append(each.table.title)
     machines = ", ".join(dict.fromkeys(each.machine for each in found))
-    if is_same and found:
-        depends = {name: number for each in found for name, number in each.depends.items()}
-        machines += f", at {_versions(found[0].version, depends)}"
-    return f"*Measured on {machines}: {'; '.join(parts)}.*"
+    if len(sources) == 1:
+        command, version, date = next(iter(sources))
+        return f"*Measured by {command} on {machines}; version {version}, {date}.*"
+    lines = [("; ".join(titles), *source) for source, titles in sources.items()]
+    heads = ("tables", "command", "version (of parts)", "date")
+    return f"Measured on {machines}:\n\n{format_table(heads, lines, len(heads))}"
 
 
 def _versions(version: str, depends: Mapping[str, int]) -> str:

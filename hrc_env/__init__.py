@@ -2,7 +2,7 @@
 
 Importing this package registers the environments; `gymnasium.make("hrc_env:HRCReach-v0")`
 does both. `PUBLIC` lists the names for users, with the modules that define them; they are imported
-when they are first asked for. Everything else may change without notice.
+when they are first used. Everything else may change without notice.
 """
 
 import difflib
@@ -252,7 +252,7 @@ EXTRAS = dict.fromkeys(("HRCSubprocVecEnv", "HRCVecEnv", "ProximityRamp"), "stab
 
 
 def __getattr__(name: str) -> Any:
-    """Import a public name when it is first asked for (PEP 562).
+    """Import a public name when it is first used (PEP 562); `help` of a class shows its fields.
 
     Raises:
         AttributeError: there is no such name, with the nearest one, or it is a former one, with the
@@ -260,6 +260,8 @@ def __getattr__(name: str) -> Any:
     """
     if name in PUBLIC:
         value = globals()[name] = getattr(import_module(PUBLIC[name]), name)
+        if isinstance(value, type):
+            import_module("hrc_env.core.docstrings").show_attributes(value)
         return value
     if name in RENAMED:
         raise AttributeError(_said_of(name))

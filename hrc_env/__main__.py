@@ -22,7 +22,8 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     ),
     "demo": (
         "hrc_env.cli.play", "Demo",
-        "Film the scripted reacher, slowed by the separation that it estimates from pixels.",
+        "Film a scripted robot that slows down near a person, whom it detects in rendered"
+        " images.",
     ),
     "check": (
         "hrc_env.cli.check", "Check",
@@ -30,8 +31,7 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     ),
     "list": (
         "hrc_env.cli.listing", "List",
-        "List environments, perception levels, estimators, scenes, cameras, shields and agents by"
-        " name.",
+        "List the names that arguments take: tasks, perception levels, robots, agents and others.",
     ),
     "play": (
         "hrc_env.cli.play", "Play",
@@ -76,9 +76,14 @@ MOVED = {
 
 
 def main(words: Sequence[str] | None = None) -> int:
-    """Run a command, of the process's words if none are given; errors that explain themselves are
-    shown without a traceback. Returns the exit status: 2 for what was asked wrongly, 130 for what
-    was stopped by Ctrl-C."""
+    """Run a command, and show errors of the package without a traceback.
+
+    Args:
+        words: the command and its options; None for those of this process.
+
+    Returns:
+        The exit status: 2 for a wrong command or option, 130 after Ctrl-C.
+    """
     given = list(sys.argv[1:] if words is None else words)
     if not given or given[0] in ("-h", "--help"):
         print(overview())
@@ -92,17 +97,17 @@ def main(words: Sequence[str] | None = None) -> int:
 def overview() -> str:
     """Return the help of the program: its commands by name."""
     commands = "\n".join(
-        textwrap.fill(f"  {name:21s}{says}", 80, subsequent_indent=" " * 23)
-        for name, (_, _, says) in COMMANDS.items()
+        textwrap.fill(f"  {name:21s}{purpose}", 80, subsequent_indent=" " * 23)
+        for name, (_, _, purpose) in COMMANDS.items()
     )
     return f"""usage: {PROGRAM} [--help] [--version] COMMAND ...
 
-A robot, a worker, and the cameras between them.
+Reinforcement learning of robots that observe people only through cameras.
 
 {commands}
 
-{PROGRAM} COMMAND --help says what a command takes. Every command takes
---import FILE, too: a Python file that registers a task, an estimator or more."""
+{PROGRAM} COMMAND --help lists the options of a command. Every command also
+takes --import FILE, a Python file that registers parts of your own."""
 
 
 def versions() -> str:

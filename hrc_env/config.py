@@ -71,7 +71,7 @@ class HRCConfig:
     emulator: EmulatorConfig = field(default_factory=EmulatorConfig)
     """Emulator of the pose detector (`perception="keypoints"`)."""
     faults: tuple[FaultConfig, ...] = ()
-    """Faults of the cameras, and their times (docs/perception_and_estimators.md)."""
+    """Faults of the cameras, and their times (docs/cameras.md)."""
     appearance: AppearanceConfig = field(default_factory=AppearanceConfig)
     """Appearance of scene and workers, drawn for every episode (`perception="pixels"`)."""
     tracker: TrackerConfig = field(default_factory=ParticleConfig)

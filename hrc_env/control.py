@@ -1,5 +1,4 @@
-"""Actions to commands of an arm: joint velocities directly, or by resolved-rate control of the
-tool.
+"""Actions to commands of an arm: joint velocities, or resolved-rate control of the tool.
 
 Resolved-rate control is the damped least-squares solution of J qd = v (Wampler 1986,
 DOI 10.1109/TSMC.1986.289285; Nakamura and Hanafusa 1986, DOI 10.1115/1.3143764). The remaining

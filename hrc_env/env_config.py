@@ -46,7 +46,8 @@ class EnvConfig:
     """
 
     task: "str | TaskType" = DEFAULT
-    """Task of the robot: an id ("HRCReach-v0") or a subclass of `Task` (docs/bring_your_own.md)."""
+    """Task of the robot: an id ("HRCReach-v0") or a subclass of `Task`
+    (docs/bring_your_own/task.md)."""
     perception: str = "pixels"
     """Perception of people: "pixels" (rendered images through MediaPipe Pose), "keypoints" (an
     emulator of that), "truth" (the workers' true poses) or "none". The default of `HRCVectorEnv`
@@ -55,7 +56,7 @@ class EnvConfig:
     """Estimator of poses from keypoints: "particle", "kalman" (the same with one hypothesis),
     "paper" (Algorithm 1 as printed), "paper_restarts" (Algorithm 1 with restarts), "triangulation"
     or "ransac"; the name of a registered one, an `EstimatorSpec`, or a function that makes an
-    estimator (docs/bring_your_own.md)."""
+    estimator (docs/bring_your_own/estimator.md)."""
     cameras: "str | Path | Sequence[Any] | RigDistribution | Mapping[str, Any] | None" = field(
         default=None, metadata=MANY
     )
@@ -77,10 +78,10 @@ class EnvConfig:
     `PeopleConfig` or a mapping; None for the value in `config` (attentive)."""
     motions: "Sequence[str | Path | Clip] | None" = field(default=None, metadata=MANY)
     """Clips of recorded motion that workers also play, or paths of such clips
-    (docs/people_and_scenes.md); None for the value in `config` (no clips)."""
+    (docs/motion_capture.md); None for the value in `config` (no clips)."""
     faults: "Sequence[FaultConfig | Mapping[str, Any]] | None" = field(default=None, metadata=MANY)
     """Faults of cameras: `FaultConfig`s or mappings, such as
-    {"kind": "late", "cameras": ["camera_1"], "amount": 0.2} (docs/perception_and_estimators.md);
+    {"kind": "late", "cameras": ["camera_1"], "amount": 0.2} (docs/cameras.md);
     None for the value in `config` (no faults)."""
     appearance: "str | AppearanceConfig | Mapping[str, Any] | None" = None
     """Appearance of scene and workers, drawn for every episode: "as_built", "varied", "lights",
@@ -107,7 +108,7 @@ class EnvConfig:
     the defaults, or the path of a TOML file with such changes."""
     render_mode: str | None = field(default=None, metadata=NO_WORD)
     """Kind of pictures that `render` returns: "rgb_array", "depth_array" or None; `gymnasium.make`
-    also takes "human", a window (docs/start.md)."""
+    also takes "human", a window (docs/pictures.md)."""
     width: int = field(default=PICTURE_SIZE[0], metadata=NO_WORD)
     """Width of a picture that `render` returns [px]."""
     height: int = field(default=PICTURE_SIZE[1], metadata=NO_WORD)
@@ -116,7 +117,7 @@ class EnvConfig:
     """Whether `render` shows the markers of the task, such as goals."""
     overlay: str | None = field(default=None, metadata=NO_WORD)
     """Overlay of `render`: "capsules", the shapes of robot and people from which distances are
-    computed (docs/start.md); None for no overlay."""
+    computed (docs/pictures.md); None for no overlay."""
 
     def arguments(self) -> dict[str, Any]:
         """Return the fields that differ from the defaults, by name."""

@@ -5,8 +5,9 @@
     python -m tests.language --lower      # lower the limits to the present counts
 
 Counted are docstrings, among them the sentences below fields and constants, of the folders in
-`FOLDERS`, and the prose of README.md and docs/*.md outside of code, tables and generated blocks.
-Limits in `language.toml` are occurrences per 1,000 words, `half` their number. They only fall.
+`FOLDERS`, and the prose of README.md and docs/*.md, docs/bring_your_own/*.md outside of code,
+tables and generated blocks. Limits in `language.toml` are occurrences per 1,000 words, `half` their
+number. They only fall.
 """
 
 import argparse
@@ -25,7 +26,7 @@ LIMITS = Path(__file__).with_name("language.toml")
 FOLDERS = ("hrc_env", "agents", "benchmarks")
 """Folders whose docstrings are counted, each with limits of its own."""
 PAGES = "pages"
-"""Name of the limits of README.md and docs/*.md."""
+"""Name of the limits of README.md and the pages that are written by hand."""
 
 IDIOM = {
     "what": r"what",
@@ -123,7 +124,11 @@ def read_texts(root: Path) -> dict[str, list[Text]]:
         ]
         for folder in FOLDERS
     }
-    pages = [root / "README.md", *sorted((root / "docs").glob("*.md"))]
+    pages = [
+        root / "README.md",
+        *sorted((root / "docs").glob("*.md")),
+        *sorted((root / "docs").glob("bring_your_own/*.md")),
+    ]
     return texts | {PAGES: [text for page in pages for text in read_paragraphs(page)]}
 
 

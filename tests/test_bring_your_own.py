@@ -462,4 +462,4 @@ def test_a_study_is_played_and_reported(tmp_path):
     found = hrc_env.run_experiment(short, tmp_path / "out")
     assert found["bare.share"].value == 1.0
     assert found["qp.contacts_towards"].n == 2
-    assert "What the shield costs" in (tmp_path / "out" / "report.md").read_text()
+    assert "Cost and benefit of a shield" in (tmp_path / "out" / "report.md").read_text()

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import hrc_env
-from docs import declared, names, rst, site
+from docs import declared, names, records, rst, site
 from hrc_env import PUBLIC
 from hrc_env.tasks import BUILT_IN
 
@@ -84,6 +84,19 @@ def test_fields_are_shown_as_they_are_declared():
     assert {field.name for field in declared.fields(hrc_env.Task)} >= {"id", "config_type"}
 
 
+def test_the_page_of_records_has_every_field_with_its_meaning():
+    text = records.page()
+    kinds = [kind for several in records.list_records().values() for kind in several]
+    used = (hrc_env.Belief, hrc_env.EnvInfo, hrc_env.EstimatorSpec, hrc_env.Keypoints,
+            hrc_env.PoseEstimate, hrc_env.ResetOptions, hrc_env.Robot, hrc_env.Task)  # fmt: skip
+    assert set(used) <= set(kinds)
+    for kind in kinds:
+        _, _, section = text.partition(f"### {kind.__name__}\n")
+        section = section.partition("\n#")[0]
+        for field in declared.fields(kind):
+            assert re.search(rf"^\| `{field.name}` \| `.+` \|.*\| \S.* \|$", section, re.M), field
+
+
 def test_signatures_name_arrays_by_their_aliases():
     arguments, returns = declared.signature(hrc_env.forecast)
     assert (arguments.split(":")[0], returns) == ("(now", "PoseEstimate")
@@ -142,4 +155,5 @@ def test_the_site_is_built_without_a_warning(tmp_path):
     for name in PUBLIC:
         assert f'id="hrc_env.{name}"' in entries or name in rst.MODULES, name
     assert 'id="hrc_env.EnvConfig.perception"' in entries
+    assert "Attributes:" not in entries, "fields are shown twice"
     assert not re.findall(r"@import|url\(['\"]?http", (DOCS / "_static" / "site.css").read_text())

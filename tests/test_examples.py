@@ -9,6 +9,8 @@ import pytest
 import torch
 from commands import ROOT, called
 
+import hrc_env
+
 SMALL = ("--num-envs", "8", "--n-steps", "32", "--timesteps", "3000", "--perception", "truth")
 
 
@@ -22,6 +24,17 @@ def test_the_plain_ppo_runs_and_says_how_many_goals_it_reached():
     said = run("ppo_cleanrl_style.py", *SMALL)
     assert re.search(r"3072 steps in \d+ s", said)
     assert re.search(r"goals reached in the last \d+ episodes: \d+%", said)
+
+
+def test_the_first_policy_is_trained_compared_and_can_be_played(tmp_path):
+    words = ("--timesteps", "1024", "--num-envs", "16", "--episodes", "2", "--perception", "truth")
+    printed = run("first_policy.py", *words, "--out", str(tmp_path / "first"))
+    interval = r"-?[\d.]+ \(-?[\d.]+ to -?[\d.]+\)"
+    rows = re.findall(rf"^(\w[\w, ]+?) {{2,}}{interval} +{interval} +{interval}$", printed, re.M)
+    assert rows == ["scripted", "policy", "policy, shield qp"]
+    assert len(re.findall(rf"^cost of \(.+\) minus \(.+\): {interval}$", printed, re.M)) == 2
+    policy = str(tmp_path / "first" / "policy.zip")
+    assert hrc_env.evaluate(policy, 1, perception="truth").episodes == 1
 
 
 @pytest.mark.parametrize("pretrain", ["0", "256"])
@@ -48,6 +61,30 @@ def test_fsrl_learns_with_our_cost_and_is_judged_as_ours_are():
     (value,) = re.findall(r"2000 steps in \d+ s, lambda ([\d.]+)", said)
     assert float(value) > 0
     assert len(re.findall(r"^\w+: cost [\d.]+, goals/min [\d.]+$", said, re.M)) == 2
+
+
+@pytest.mark.usefixtures("brought")  # so that the estimator is gone afterwards
+def test_an_estimator_is_compared_in_accuracy_and_in_safety(tmp_path):
+    words = ("--episodes", "3", "--safety-episodes", "2", "--out", str(tmp_path / "report"))
+    text = run("compare_estimator.py", *words)
+    number = r"(-?[\d.]+) \(-?[\d.]+ to -?[\d.]+\)"
+    scores = {name: [float(value) for value in values] for name, *values in re.findall(
+        rf"^(\w+) +{number} +{number} +([\d.]+)$", text, re.M)}  # fmt: skip
+    assert list(scores) == ["dlt_kalman", "triangulation", "particle"]
+    for error_mm, coverage, tracked in scores.values():
+        assert 10 < error_mm < 60
+        assert 70 < coverage < 100
+        assert tracked > 95
+    ((error_mm, coverage),) = re.findall(rf"^first - last +{number} +{number}$", text, re.M)
+    assert float(error_mm) == pytest.approx(
+        scores["dlt_kalman"][0] - scores["particle"][0], abs=0.11
+    )
+    assert float(coverage) == pytest.approx(
+        scores["dlt_kalman"][1] - scores["particle"][1], abs=0.11
+    )
+    assert (
+        len(re.findall(r"^\| (?:dlt_kalman|triangulation|particle) \| [\d.]+ \(", text, re.M)) == 3
+    )
 
 
 def load(name: str):

@@ -158,8 +158,10 @@ class RLlibPPO:
             raise
 
     def push(self) -> None:
-        """Copy the policy's network, Adam's moments and the scale of rewards to learner and
-        runners."""
+        """Copy the policy's network, Adam's moments and the scale of rewards.
+
+        Learner and runners get them.
+        """
         known = self.policy.policy
         weights, moments = known.state_dict(), known.optimizer.state_dict()
 

@@ -47,8 +47,10 @@ def try_environment(keywords: Mapping[str, Any]) -> None:
 
 @contextmanager
 def reported_errors(report: Callable[[str], object]) -> Iterator[None]:
-    """Report the error of a block in words, also of a user's own task or estimator; it is raised
-    again."""
+    """Report the error of a block in words, and raise it again.
+
+    The error may be of a user's own task or estimator.
+    """
     try:
         yield
     except Exception as error:

@@ -95,30 +95,30 @@ class Staged:
     """Motion of the worker, (T, 1, ...)."""
 
 
-def family_of(motion: str) -> str:
+def find_family(motion: str) -> str:
     """Return the family of a scene of the repertoire, or "recorded"."""
     families = (family for family, motions in FAMILIES.items() if motion in motions)
     return next(families, "recorded")
 
 
-def fit_clips(rounds: int, seed: int) -> list[Clip]:
-    """Return the clips that the emulator is fitted to (`clips_of`)."""
-    return clips_of(rounds, seed, FIT_RIGS)
+def list_fit_clips(rounds: int, seed: int) -> list[Clip]:
+    """Return the clips that the emulator is fitted to (`list_clips`)."""
+    return list_clips(rounds, seed, FIT_RIGS)
 
 
-def unseen_clips(rounds: int, seed: int) -> list[Clip]:
+def list_unseen_clips(rounds: int, seed: int) -> list[Clip]:
     """Return as many clips again with other seeds, other pairs of motion and body, and displaced
     cameras."""
-    return clips_of(rounds, seed + UNSEEN_SEEDS, (UNSEEN_RIG,))
+    return list_clips(rounds, seed + UNSEEN_SEEDS, (UNSEEN_RIG,))
 
 
-def recorded_clips(role: Role, rounds: int, seed: int, rigs: Sequence[Moved]) -> list[Clip]:
-    """Return the clips of recordings of people with a role, in both scenes (`clips_of`)."""
+def list_recorded_clips(role: Role, rounds: int, seed: int, rigs: Sequence[Moved]) -> list[Clip]:
+    """Return the clips of recordings of people with a role, in both scenes (`list_clips`)."""
     names = [name for name, of in RECORDINGS.items() if of == role]
-    return clips_of(rounds, seed, rigs, motions=names)
+    return list_clips(rounds, seed, rigs, motions=names)
 
 
-def clips_of(
+def list_clips(
     rounds: int,
     seed: int,
     rigs: Sequence[Moved],
@@ -130,7 +130,7 @@ def clips_of(
     turn."""
     clips = []
     for k, motion in enumerate(motions):
-        for round_ in range(max(rounds, 1) * TIMES.get(family_of(motion), 1)):
+        for round_ in range(max(rounds, 1) * TIMES.get(find_family(motion), 1)):
             for i, scene in enumerate(scenes):
                 if rounds == 0 and i != (k + round_) % len(scenes):
                     continue
@@ -140,13 +140,13 @@ def clips_of(
     return sorted(clips, key=lambda clip: (clip.scene, clip.body, clip.rig))
 
 
-def scene_of(clip: Clip) -> Scene:
+def load_scene(clip: Clip) -> Scene:
     """Return the compiled scene of a clip."""
-    rig = () if clip.rig == AS_BUILT else moved(SCENES[clip.scene].cameras, clip.rig)
+    rig = () if clip.rig == AS_BUILT else displace(SCENES[clip.scene].cameras, clip.rig)
     return build(SceneConfig(cameras=rig), clip.scene, 1, clip.body)
 
 
-def moved(rig: tuple[CameraConfig, ...], how: Moved) -> tuple[CameraConfig, ...]:
+def displace(rig: tuple[CameraConfig, ...], how: Moved) -> tuple[CameraConfig, ...]:
     """Return the cameras of a rig after a displacement."""
     along, lower_m = how
     eyes = [camera.eye_world for camera in rig]
@@ -161,7 +161,7 @@ def moved(rig: tuple[CameraConfig, ...], how: Moved) -> tuple[CameraConfig, ...]
     )
 
 
-def number_of(clip: Clip) -> int:
+def make_number(clip: Clip) -> int:
     """Return a clip's number, which its draw of the errors does not change."""
     words = f"{clip.seed} {clip.scene} {clip.motion} {clip.body} {clip.rig}"
     return zlib.crc32(words.encode())
@@ -169,11 +169,11 @@ def number_of(clip: Clip) -> int:
 
 def stage(clip: Clip, scene: Scene) -> Staged:
     """Place the worker where there is room, at a moment of the motion that the seed chooses."""
-    rng = np.random.default_rng(number_of(clip))
+    rng = np.random.default_rng(make_number(clip))
     seed, body = int(rng.integers(2**31)), load_body(clip.body)
-    path = _played(clip.motion, body, seed).position_world[:, 0, 0, :2]
+    path = _play(clip.motion, body, seed).position_world[:, 0, 0, :2]
     xy_m, yaw_rad, first = _place(path, scene, rng)
-    motion = _played(clip.motion, body, seed, xy_m, yaw_rad)
+    motion = _play(clip.motion, body, seed, xy_m, yaw_rad)
     frames = np.minimum(first + np.arange(N_FRAMES), len(path) - 1)
     motion = rows(motion, frames)
     spread = np.array(scene.robot.spread_rad)
@@ -181,7 +181,7 @@ def stage(clip: Clip, scene: Scene) -> Staged:
     return Staged(q, body, motion)
 
 
-def _played(
+def _play(
     name: str, body: Body, seed: int, xy_m: tuple[float, float] = (0.0, 0.0), yaw_rad: float = 0.0
 ) -> WorkerMotion:
     """Return a complete scene of the repertoire, or a recording, (T, 1, ...), that begins at a
@@ -190,10 +190,10 @@ def _played(
         return perform_clip(recording(name), body, DT_S, xy_m, yaw_rad, N_FRAMES * DT_S)
     me = make_worker(body, xy_m, yaw_rad, right=seed % 5 > 0)
     films = perform(REPERTOIRE[name], me, np.random.default_rng(seed), DT_S)
-    return _joined(films)
+    return _join(films)
 
 
-def _joined(films: list[Film]) -> WorkerMotion:
+def _join(films: list[Film]) -> WorkerMotion:
     """Return several films as one motion, in their order."""
     motions = [film.motion for film in films]
     helds = [motion.held for motion in motions if motion.held is not None]

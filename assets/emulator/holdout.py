@@ -6,7 +6,7 @@ Two parts are fitted to detections of rendered workers: the positions of the joi
 (assets/workers/calibrate_joints.py), and the calibration, which comprises offsets, the deviations
 reported to the tracker, and all that the emulator draws. Here the calibration is fitted anew to six
 bodies, all motions but one of each family, and one scene. Pixels and emulator are then compared on
-the rest; the joints of the other bodies have the mean offsets of the six (`bodies.not_looked_at`).
+the rest; the joints of the other bodies have the mean offsets of the six (`bodies.make_unfitted`).
 Clips and fit are kept in the folder, so that an interrupted run can continue.
 """
 
@@ -19,22 +19,22 @@ from typing import Any
 import tyro
 from rich.console import Console
 
-from assets.emulator.bodies import apart, not_looked_at
-from assets.emulator.clips import FAMILIES, FIT_RIGS, UNSEEN_RIG, UNSEEN_SEEDS, Clip, clips_of
+from assets.emulator.bodies import compute_spread, make_unfitted
+from assets.emulator.clips import FAMILIES, FIT_RIGS, UNSEEN_RIG, UNSEEN_SEEDS, Clip, list_clips
 from assets.emulator.fit.fit import fit
 from assets.emulator.fit.novelty import poses_of
 from assets.emulator.matching import matched
 from assets.emulator.run import part_of
-from assets.emulator.samples import samples_of
-from assets.emulator.shelf import DEPENDS, kept
+from assets.emulator.samples import make_samples
+from assets.emulator.shelf import DEPENDS, watch_cached
 from assets.emulator.validate import (
     Compared,
     Say,
     accuracy,
     compared,
     in_space,
-    of_family,
     ratios_of,
+    select_family,
 )
 from assets.emulator.writing import write_calibration
 from hrc_env.config import HRCConfig
@@ -74,7 +74,7 @@ class Sample:
     def clips(self, most: int) -> list[Clip]:
         """Return clips with displaced cameras, of at most `most` rounds."""
         where = (self.bodies, self.motions, (self.scene,))
-        return clips_of(min(self.rounds, most), UNSEEN_SEEDS, (UNSEEN_RIG,), *where)
+        return list_clips(min(self.rounds, most), UNSEEN_SEEDS, (UNSEEN_RIG,), *where)
 
 
 SAMPLES = {
@@ -97,24 +97,24 @@ WORDS = {
 TABLES = (
     Table(
         "trueness",
-        "Trueness: what nothing was fitted on",
+        "Trueness on new bodies and motions",
         {name: (words,) for name, words in WORDS.items()},
         (
             Column("{}.joint.median.upright", "upright, median [mm]"),
             Column("{}.joint.p95.upright", "95 % [mm]", 0),
             Column("{}.joint.coverage.upright", "coverage", 3),
-            Column("{}.landmark.median.upright", "median from landmarks [mm]"),
-            Column("{}.emulator_error_ratio.upright", "emulator / pixels, median", 2),
-            Column("{}.emulator_coverage_difference.upright", "emulator less pixels, coverage", 3),
+            Column("{}.landmark.median.upright", "median to landmarks [mm]"),
+            Column("{}.emulator_error_ratio.upright", "median, emulator / pixels", 2),
+            Column("{}.emulator_coverage_difference.upright", "coverage, emulator - pixels", 3),
             Column("{}.joint.median.fold", "folded, median [mm]"),
             Column("{}.joint.coverage.fold", "coverage", 3),
         ),
         ("held out",),
-        "Errors of joints at `pixels` after the default tracker; upright: all motions but those of "
-        "folded bodies, of which the default workers do little. Fitted to six bodies, the lab and "
-        "all motions but one of each family; cameras and seeds are others in every row. From "
-        "landmarks: errors from anatomical (COCO) landmarks instead of where BlazePose means a "
-        "joint to be. Intervals are 95 % bootstraps over clips.",
+        "Errors of joints at `pixels` after the default estimator; 95 % bootstrap intervals over "
+        "clips. The fit has six bodies, the laboratory, and all motions but one of each family; "
+        "cameras and seeds differ from those of the fit in every row. Folded: bent, squatting or "
+        "kneeling bodies, which are rare with the default jobs; upright: all others. To landmarks: "
+        "distance to anatomical (COCO) landmarks instead of the points that BlazePose detects.",
     ),
 )
 """Tables of the documentation."""
@@ -129,7 +129,7 @@ def main(out: Path = Path("out/trueness"), rounds: int = ROUNDS) -> None:
     """
     console = Console()
     with progress_bar(console, "trueness") as say:
-        config = fitted(out, rounds, part_of(say, 0.5))
+        config = fit_config(out, rounds, part_of(say, 0.5))
         parts = PartCache(out / "parts", "", len(SAMPLES), part_of(say, 0.5))
         metrics = judged(parts, config, rounds, out)
     settings = {"rounds": rounds, "bodies": HELD_BODIES, "motions": HELD_MOTIONS}
@@ -156,47 +156,47 @@ def judged(
 
         def make(tick: PartProgress, sample: Sample = sample) -> dict[str, Any]:
             clips = sample.clips(rounds)
-            seen = compared(clips, lambda share, _: tick(share), config, store, joints_of)
-            return {each: asdict(metric) for each, metric in metrics_of(seen)}
+            seen = compared(clips, lambda share, _: tick(share), config, store, load_joints)
+            return {each: asdict(metric) for each, metric in compute_metrics(seen)}
 
         part = parts.make_part(name, make, key)
         metrics |= {f"{name}.{each}": Metric(**values) for each, values in part.items()}
     return metrics
 
 
-def calibration_of(out: Path, rounds: int) -> Path:
+def find_calibration(out: Path, rounds: int) -> Path:
     """Return the path of the calibration that is fitted to the clips that are not held out."""
     return out / f"keypoints-{make_key({'rounds': rounds}, DEPENDS)}.json"
 
 
-def joints_of(name: str) -> Body:
+def load_joints(name: str) -> Body:
     """Return a body; a held-out one without the offsets that were fitted to its detections."""
-    return not_looked_at(name, FITTED_BODIES) if name in HELD_BODIES else load_body(name)
+    return make_unfitted(name, FITTED_BODIES) if name in HELD_BODIES else load_body(name)
 
 
-def fitted(out: Path, rounds: int, say: Say) -> HRCConfig:
+def fit_config(out: Path, rounds: int, say: Say) -> HRCConfig:
     """Return settings with a calibration fitted to the clips that are not held out, made if
     necessary."""
-    path, config = calibration_of(out, rounds), HRCConfig()
+    path, config = find_calibration(out, rounds), HRCConfig()
     where = (FITTED_BODIES, FITTED_MOTIONS, (FITTED_SCENE,))
-    clips, pixels = clips_of(rounds, 0, FIT_RIGS, *where), []
-    for clip, watched in zip(clips, kept("pixels", clips, config, out), strict=True):
+    clips, pixels = list_clips(rounds, 0, FIT_RIGS, *where), []
+    for clip, watched in zip(clips, watch_cached("pixels", clips, config, out), strict=True):
         pixels.append(watched)
         say(0.7 / len(clips), f"fit: {clip.motion}")
     if not path.exists():
-        draft = fit(samples_of(pixels), poses_of(pixels), apart(FITTED_BODIES))
+        draft = fit(make_samples(pixels), poses_of(pixels), compute_spread(FITTED_BODIES))
         made = matched(draft, clips, pixels, path.with_suffix(".fit"), part_of(say, 0.3))
         write_calibration(path, made, {"clips": len(clips), "bodies": FITTED_BODIES})
     return replace(config, emulator=EmulatorConfig(calibration=str(path)))
 
 
-def metrics_of(seen: Compared) -> Iterator[tuple[str, Metric]]:
+def compute_metrics(seen: Compared) -> Iterator[tuple[str, Metric]]:
     """Return medians, 95th percentiles [mm] and coverage of pixels by group, for both references,
     and the differences of the emulator from them."""
     for word, truth in TRUTHS.items():
         each = [in_space([watched], truth) for watched in seen.pixels]
         for group in seen.outcomes:
-            mine = of_family(seen.clips, group)
+            mine = select_family(seen.clips, group)
             found = accuracy([each[k] for k in mine])
             for what, metric in zip(("median", "p95", "coverage"), found, strict=True):
                 yield f"{word}.{what}.{group}", metric

@@ -24,7 +24,7 @@ from assets.emulator.fit.cells import (
 )
 from assets.emulator.fit.lasting import LAGS, add_lagged
 from assets.emulator.fit.novelty import novel_of
-from assets.emulator.samples import Samples, postures_of, samples_of
+from assets.emulator.samples import Samples, make_samples, read_postures
 from assets.emulator.watch import Watched, watch
 from assets.emulator.writing import write_calibration
 from hrc_env.config import HRCConfig
@@ -70,22 +70,22 @@ def matched(
         path: temporary file of the drafts.
         say: callback of the progress; its shares sum to 1.
     """
-    wanted, n_rounds = samples_of(pixels), IN_THE_IMAGE + IN_SPACE + 1
+    wanted, n_rounds = make_samples(pixels), IN_THE_IMAGE + IN_SPACE + 1
     for k in range(n_rounds):
         write_calibration(path, draft, {})
         part = 1 / n_rounds / DRAWS / len(clips)
-        emulated = _emulated(clips, path, lambda part=part: say(part, "emulator"))
+        emulated = _emulate(clips, path, lambda part=part: say(part, "emulator"))
         if k < IN_THE_IMAGE:
-            draft = _as_in_the_image(draft, wanted, samples_of(emulated))
+            draft = _correct_image(draft, wanted, make_samples(emulated))
         elif k < IN_THE_IMAGE + IN_SPACE:
-            draft = _as_in_space(draft, pixels, emulated)
+            draft = _correct_space(draft, pixels, emulated)
         else:
-            draft = _scaled(draft, pixels, emulated)
+            draft = _scale(draft, pixels, emulated)
     path.unlink()
     return replace(draft, novel=novel_of(draft, pixels))
 
 
-def _emulated(clips: list[Clip], path: Path, tick: Callable[[], None]) -> list[Watched]:
+def _emulate(clips: list[Clip], path: Path, tick: Callable[[], None]) -> list[Watched]:
     """Play every clip `DRAWS` times with the emulator."""
     config = replace(HRCConfig(), emulator=EmulatorConfig(calibration=str(path)))
     seen = []
@@ -96,7 +96,7 @@ def _emulated(clips: list[Clip], path: Path, tick: Callable[[], None]) -> list[W
     return seen
 
 
-def _as_in_the_image(draft: Calibration, wanted: Samples, drawn: Samples) -> Calibration:
+def _correct_image(draft: Calibration, wanted: Samples, drawn: Samples) -> Calibration:
     """Correct the errors in the image.
 
     These are sizes by cell and their spread, factors of whole bodies, and the duration of errors.
@@ -111,11 +111,11 @@ def _as_in_the_image(draft: Calibration, wanted: Samples, drawn: Samples) -> Cal
     stays = _correlation(wanted, LONG_LAGS) - _correlation(drawn, LONG_LAGS)
     return replace(
         draft, size=size, spread=spread, body=body, slow_s=draft.slow_s * longer,
-        slow_m=draft.slow_m * longer, shares=_moved(draft.shares, float(stays.mean())),
+        slow_m=draft.slow_m * longer, shares=_shift(draft.shares, float(stays.mean())),
     )  # fmt: skip
 
 
-def _moved(shares: Floats, more: float) -> Floats:
+def _shift(shares: Floats, more: float) -> Floats:
     """Increase the constant share of shares (K, 3) of constant and lasting errors."""
     more_each = np.clip(more, -shares[:, 0], shares[:, 1])
     return shares + np.stack([more_each, -more_each, np.zeros(N_K)], -1)
@@ -162,7 +162,9 @@ def _limited(factor: Floats | float, trust: Floats | float = 1.0) -> Floats:
     return np.clip(factor, *STEP) ** trust
 
 
-def _as_in_space(draft: Calibration, pixels: list[Watched], emulated: list[Watched]) -> Calibration:
+def _correct_space(
+    draft: Calibration, pixels: list[Watched], emulated: list[Watched]
+) -> Calibration:
     """Correct the errors in space.
 
     All errors are scaled by the ratio of the tracker's median errors, posture by posture; the tails
@@ -180,7 +182,7 @@ def _as_in_space(draft: Calibration, pixels: list[Watched], emulated: list[Watch
     return replace(draft, size=size, wander_m=wander, tail=tail)
 
 
-def _scaled(draft: Calibration, pixels: list[Watched], emulated: list[Watched]) -> Calibration:
+def _scale(draft: Calibration, pixels: list[Watched], emulated: list[Watched]) -> Calibration:
     """Scale all errors by the ratio of the medians that remains after the growth of the tails."""
     size, wander = draft.size.copy(), draft.wander_m.copy()
     for posture, middle, _ in _off(pixels, emulated):
@@ -203,7 +205,7 @@ def _errors_in(watched: list[Watched], posture: int) -> Floats:
     """Return errors of the tracked joints while the body was of a posture, (N,) [m]."""
     errors = [np.zeros(0)]
     for each in watched:
-        mine = each.tracked & (class_of(postures_of(each)) == posture)
+        mine = each.tracked & (class_of(read_postures(each)) == posture)
         mine[:WARM_UP] = False
         errors.append(np.linalg.norm((each.mean_world - each.joints_world)[mine], axis=-1).ravel())
     return np.concatenate(errors)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from assets.emulator.clips import DT_S, WARM_UP, family_of
+from assets.emulator.clips import DT_S, WARM_UP, find_family
 from assets.emulator.validate import Compared, errors_in_image, lasting
 from assets.emulator.watch import Watched
 from hrc_env.core.typing import Floats
@@ -42,7 +42,7 @@ def plot_comparison(path: Path, seen: Compared) -> None:
     )
     sizes.legend(fontsize=8, loc="upper left")
     for family, style in (("stand", "-"), ("walk", "--")):
-        mine = [k for k, clip in enumerate(seen.clips) if family_of(clip.motion) == family]
+        mine = [k for k, clip in enumerate(seen.clips) if find_family(clip.motion) == family]
         for level, colour, name in (
             ([seen.pixels[k] for k in mine], PIXELS, "pixels"),
             ([each for k in mine for each in seen.emulated[k]], EMULATOR, "emulator"),

@@ -5,7 +5,7 @@ import functools
 import numpy as np
 
 from assets.recordings.clips import CLIPS, Role, clips_of
-from assets.recordings.synthetic import STYLES, made_of
+from assets.recordings.synthetic import STYLES, make_clips
 from hrc_env.core.records import WorkerMotion
 from hrc_env.core.typing import Floats
 from hrc_env.mocap.poses import pose_segments
@@ -34,7 +34,7 @@ def _of_people(role: Role) -> dict[str, Clip]:
 
 @functools.cache
 def _made(role: Role) -> dict[str, Clip]:
-    return {each.name: clip for each, clip, _ in made_of(role)}
+    return {each.name: clip for each, clip, _ in make_clips(role)}
 
 
 def perform_clip(

@@ -4,14 +4,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from assets.emulator.bodies import apart
-from assets.emulator.clips import FIT_RIGS, fit_clips, recorded_clips, unseen_clips
+from assets.emulator.bodies import compute_spread
+from assets.emulator.clips import FIT_RIGS, list_fit_clips, list_recorded_clips, list_unseen_clips
 from assets.emulator.fit.fit import fit
 from assets.emulator.fit.novelty import poses_of
 from assets.emulator.matching import matched
 from assets.emulator.plot import plot_comparison
-from assets.emulator.samples import samples_of
-from assets.emulator.shelf import kept
+from assets.emulator.samples import make_samples
+from assets.emulator.shelf import watch_cached
 from assets.emulator.validate import Compared, compared
 from assets.emulator.writing import write_calibration
 from hrc_env.config import HRCConfig
@@ -49,15 +49,17 @@ def calibrate(run: CalibrationRun, out: Path, say: Say) -> Calibration:
         out: the calibration file.
         say: callback of the progress; its shares sum to 1.
     """
-    clips, pixels = fit_clips(run.rounds, run.seed), []
+    clips, pixels = list_fit_clips(run.rounds, run.seed), []
     n_known = len(clips)
     if run.recordings:
-        clips += recorded_clips("fitted", 1, run.seed, FIT_RIGS)
-    for clip, seen in zip(clips, kept("pixels", clips, HRCConfig(), folder_of(out)), strict=True):
+        clips += list_recorded_clips("fitted", 1, run.seed, FIT_RIGS)
+    for clip, seen in zip(
+        clips, watch_cached("pixels", clips, HRCConfig(), folder_of(out)), strict=True
+    ):
         pixels.append(seen)
         say(0.85 / len(clips), f"{clip.scene}: {clip.motion}")
     known, rest = poses_of(pixels[:n_known]), part_of(say, 0.15)
-    draft = fit(samples_of(pixels), known, apart(worker_names()))
+    draft = fit(make_samples(pixels), known, compute_spread(worker_names()))
     calibration = matched(draft, clips, pixels, out.with_suffix(".fit"), rest)
     write_calibration(out, calibration, _made(run, out, len(clips)))
     return calibration
@@ -72,7 +74,7 @@ def compare(run: CalibrationRun, out: Path, say: Say) -> Compared:
     """Compare pixels and emulator with this file on clips that the fit has not used, with a
     plot."""
     config = replace(HRCConfig(), emulator=EmulatorConfig(calibration=str(out)))
-    clips = unseen_clips(run.rounds, run.seed)
+    clips = list_unseen_clips(run.rounds, run.seed)
     seen = compared(clips, say, config, folder_of(out))
     plot_comparison(out.with_suffix(".png"), seen)
     return seen

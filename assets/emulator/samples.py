@@ -70,7 +70,7 @@ class Samples:
     """True while the worker was tracked, so that the windows were in place, (L, T)."""
 
 
-def samples_of(clips: Sequence[Watched]) -> Samples:
+def make_samples(clips: Sequence[Watched]) -> Samples:
     """Return the samples of clips of one length and number of cameras, without their warm-up."""
     parts = [_samples(clip) for clip in clips]
     return Samples(*(np.stack([getattr(part, f.name) for part in parts]) for f in fields(Samples)))
@@ -80,7 +80,7 @@ def _samples(clip: Watched) -> Samples:
     late = slice(WARM_UP, None)
     look_of, sight = clip.look_of[late], clip.sight[late]
     px, true_px = clip.px[late], clip.true_px[late]
-    exchanged = exchanged_sides(px, true_px, look_of[..., SIDE])
+    exchanged = find_exchanges(px, true_px, look_of[..., SIDE])
     px = np.where(exchanged[..., 0, None, None], px[..., MIRROR, :], px)
     legs = exchanged[..., 1, None, None] & (np.arange(px.shape[2]) >= FIRST_OF_LEGS)[:, None]
     px = np.where(legs, px[..., MIRROR, :], px)
@@ -89,13 +89,13 @@ def _samples(clip: Watched) -> Samples:
     offset = _agreed(error, shown, sight, look_of[:, 0, FOLDING])
     pace_m = np.linalg.norm(np.diff(clip.joints_world, axis=0), axis=-1).mean(-1)
     return Samples(
-        error, clip.confidence[late], sight, look_of[..., VIEW], postures_of(clip)[late],
+        error, clip.confidence[late], sight, look_of[..., VIEW], read_postures(clip)[late],
         pace_m[WARM_UP - 1 :] / DT_S, np.isnan(clip.px[late, :, 0, 0]), exchanged, shown,
         offset, clip.tracked[late],
     )  # fmt: skip
 
 
-def postures_of(clip: Watched) -> Floats:
+def read_postures(clip: Watched) -> Floats:
     """Return the degree of membership of the body in each of `POSTURES`, (T, P)."""
     look_of = clip.look_of[:, 0]
     columns = look_of[:, [FOLDING, KNEELING, HANDLING, STEPPING]].T
@@ -111,7 +111,7 @@ def _in_window(vectors: Floats, look_of: Floats) -> Floats:
     return np.stack([cos * x + sin * y, cos * y - sin * x], 3) / side[..., None].swapaxes(3, -1)
 
 
-def exchanged_sides(px: Floats, true_px: Floats, side: Floats) -> Bools:
+def find_exchanges(px: Floats, true_px: Floats, side: Floats) -> Bools:
     """Return where left and right of the whole body, and of the legs alone, are exchanged, (T, C,
     2)."""
     here = np.linalg.norm(px - true_px, axis=-1)

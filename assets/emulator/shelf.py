@@ -17,7 +17,7 @@ DEPENDS = ("env", "tracker", "emulator", "detector", "motion")
 """Subsystems that decide the detections of clips."""
 
 
-def kept(
+def watch_cached(
     level: str,
     clips: Sequence[Clip],
     config: HRCConfig,

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from assets.emulator.clips import FAMILIES, WARM_UP, Clip, family_of, unseen_clips
-from assets.emulator.samples import exchanged_sides
-from assets.emulator.shelf import kept
+from assets.emulator.clips import FAMILIES, WARM_UP, Clip, find_family, list_unseen_clips
+from assets.emulator.samples import find_exchanges
+from assets.emulator.shelf import watch_cached
 from assets.emulator.watch import BodyOf, Watched, watch
 from hrc_env.config import HRCConfig
 from hrc_env.core.results import Metric
@@ -97,7 +97,7 @@ def error_ratios(
             saved.
         picture: file of a plot of both levels (PNG); None: no plot.
     """
-    seen = compared(unseen_clips(rounds, seed), say, config or HRCConfig(), store)
+    seen = compared(list_unseen_clips(rounds, seed), say, config or HRCConfig(), store)
     if picture is not None:
         from assets.emulator.plot import plot_comparison  # which imports this module
 
@@ -119,7 +119,7 @@ def ratios_of(seen: Compared) -> dict[str, Metric]:
     emulated = [in_space(each) for each in seen.emulated]
     metrics: dict[str, Metric] = {}
     for family, outcomes in seen.outcomes.items():
-        mine = of_family(seen.clips, family)
+        mine = select_family(seen.clips, family)
         metrics[f"emulator_clips.{family}"] = _exactly(len(mine), "", len(mine))
         for level, found in zip(("pixels", "keypoints"), outcomes, strict=True):
             for what, value, unit in (
@@ -188,7 +188,9 @@ def compared(
 ) -> Compared:
     """Compare pixels and emulator on clips; see `error_ratios` and `watch`."""
     pixels: list[Watched] = []
-    for clip, watched in zip(clips, kept("pixels", clips, config, store, body_of), strict=True):
+    for clip, watched in zip(
+        clips, watch_cached("pixels", clips, config, store, body_of), strict=True
+    ):
         pixels.append(watched)
         say(0.9 / len(clips), f"pixels: {clip.motion}")
     emulated: list[list[Watched]] = [[] for _ in clips]
@@ -207,16 +209,16 @@ def by_family(
     """Return results of both levels for each of `GROUPS` that occurs."""
     result = {}
     for family in GROUPS:
-        mine = of_family(clips, family)
+        mine = select_family(clips, family)
         if mine:
             parts = [[each for k in mine for each in level[k]] for level in (pixels, emulated)]
             result[family] = (outcome(parts[0]), outcome(parts[1]))
     return result
 
 
-def of_family(clips: Sequence[Clip], group: str) -> list[int]:
+def select_family(clips: Sequence[Clip], group: str) -> list[int]:
     """Return the indices of the clips of one of `GROUPS`."""
-    return [k for k, clip in enumerate(clips) if family_of(clip.motion) in GROUPS[group]]
+    return [k for k, clip in enumerate(clips) if find_family(clip.motion) in GROUPS[group]]
 
 
 def outcome(watched: Sequence[Watched]) -> StepResult:
@@ -278,7 +280,7 @@ def exchanging(watched: Sequence[Watched]) -> float:
     for each in watched:
         px, side = each.px[WARM_UP:], each.look_of[WARM_UP:, :, SIDE]
         mine = each.tracked[WARM_UP:, None] & np.isfinite(px[..., 0, 0])
-        sides = np.any(exchanged_sides(px, each.true_px[WARM_UP:], side), axis=-1)
+        sides = np.any(find_exchanges(px, each.true_px[WARM_UP:], side), axis=-1)
         exchanged += int(sides[mine].sum())
         looks += int(mine.sum())
     return exchanged / max(looks, 1)

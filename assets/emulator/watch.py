@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from assets.emulator.bodies import anatomical
-from assets.emulator.clips import DT_S, Clip, Staged, number_of, scene_of, stage
+from assets.emulator.bodies import make_anatomical
+from assets.emulator.clips import DT_S, Clip, Staged, load_scene, make_number, stage
 from hrc_env.config import HRCConfig
 from hrc_env.core.batching import rows
 from hrc_env.core.errors import ConfigError
@@ -86,7 +86,7 @@ def watch(
     pipeline, known = None, None
     try:
         for clip in clips:
-            scene = scene_of(clip)
+            scene = load_scene(clip)
             if pipeline is None or scene is not known:
                 if pipeline is not None:
                     pipeline.close()
@@ -94,7 +94,7 @@ def watch(
             if not isinstance(pipeline, PoseTracking):
                 raise ConfigError(f"Clips are for levels with cameras, not for {level!r}.")
             staged = replace(stage(clip, scene), body=body_of(clip.body))
-            yield _watched(pipeline, scene, staged, (number_of(clip), clip.draw))
+            yield _watched(pipeline, scene, staged, (make_number(clip), clip.draw))
     finally:
         if pipeline is not None:
             pipeline.close()
@@ -107,7 +107,7 @@ def _watched(
     pipeline.reset(np.arange(1), *rngs)
     P, frames, said = projections(scene.cameras), [], []
     _introduce(pipeline, worker_truth(staged.body, staged.motion).joints_world[:1], P, rngs[1])
-    landmarks_world = worker_truth(anatomical(staged.body), staged.motion).joints_world[:, 0]
+    landmarks_world = worker_truth(make_anatomical(staged.body), staged.motion).joints_world[:, 0]
     q = staged.q[None]
     for t in range(len(staged.motion.position_world)):
         motion = rows(staged.motion, np.array([t]))

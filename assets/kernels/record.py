@@ -82,7 +82,7 @@ def record(level: str) -> None:
     noted: set[tuple[str, str]] = set()
     for suffix, variant in VARIANTS.items():
         play(level, variant)
-        for name, types in called():
+        for name, types in list_called():
             args = [signatures.encode(each) for each in types]
             key = name, str(args)
             if key not in noted:
@@ -94,7 +94,7 @@ def record(level: str) -> None:
     signatures.write(list(known.values()))
 
 
-def called() -> Iterator[tuple[str, tuple[Any, ...]]]:
+def list_called() -> Iterator[tuple[str, tuple[Any, ...]]]:
     """Yield the kernels that Python has called, and their types."""
     for name, kernel in KERNELS.items():
         for types in kernel.overloads:

@@ -14,9 +14,9 @@ from typing import Literal
 import numpy as np
 
 from assets.recordings.archives import fetch
-from assets.recordings.foreign import READERS, joints_in
+from assets.recordings.foreign import READERS, read_joints
 from assets.recordings.sources import SOURCES
-from assets.recordings.synthetic import made_of
+from assets.recordings.synthetic import make_clips
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.typing import Points3
 from hrc_env.geometry.rotations import about_axis
@@ -77,15 +77,15 @@ def clips_of(
     body = body or load_body()
     for recorded in CLIPS:
         if role in (None, recorded.role):
-            capture = capture_of(recorded, fetch(SOURCES[recorded.source].archive, say, AGAIN))
+            capture = read_capture(recorded, fetch(SOURCES[recorded.source].archive, say, AGAIN))
             if recorded.times > 1:
-                joints = repeated(capture.joints_world, recorded.times, capture.fps)
+                joints = repeat(capture.joints_world, recorded.times, capture.fps)
                 capture = replace(capture, joints_world=joints)
             clip, error = retarget(capture, body)
             yield recorded, replace(clip, source=recorded.name), error
 
 
-def capture_of(recorded: Recorded, folder: Path) -> Capture:
+def read_capture(recorded: Recorded, folder: Path) -> Capture:
     """Read a piece of a recording in a folder with the project's importer.
 
     Raises:
@@ -95,7 +95,7 @@ def capture_of(recorded: Recorded, folder: Path) -> Capture:
     if not path.is_file():
         raise ConfigError(f"{path} is missing. Remove {folder}, then run: {AGAIN}")
     if path.suffix in READERS:
-        joints, fps = joints_in(path)
+        joints, fps = read_joints(path)
         with tempfile.TemporaryDirectory() as scratch:
             place = Path(scratch) / f"{recorded.name}.npz"
             np.savez(place, joints=joints[_rows(recorded, len(joints), fps)], fps=fps)
@@ -106,7 +106,7 @@ def capture_of(recorded: Recorded, folder: Path) -> Capture:
     return replace(whole, joints_world=whole.joints_world[rows])
 
 
-def repeated(joints: Points3, times: int, fps: float) -> Points3:
+def repeat(joints: Points3, times: int, fps: float) -> Points3:
     """Repeat a motion, each time from the position and heading at which the last repetition ended.
 
     Returns (T', 15, 3) joints; the difference of its end and beginning fades within `FADE_S`.
@@ -224,7 +224,7 @@ another), robots and animals. People on a box are put on the floor."""
 
 def main() -> None:
     """Download or make all clips, import them, and print their retargeting errors."""
-    for recorded, clip, error in (*clips_of(), *made_of()):
+    for recorded, clip, error in (*clips_of(), *make_clips()):
         mean_cm, p95_cm = 100 * error.mean_m.mean(), 100 * error.p95_m.max()
         print(
             f"{recorded.name:22} {recorded.role:10} {len(clip.controls) / clip.fps:5.2f} s  "

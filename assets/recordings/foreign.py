@@ -53,7 +53,7 @@ _TREE: tuple[tuple[str, int, tuple[float, float, float]], ...] = (
 their columns; knees and elbows are hinges about z, the rest are quaternions, tips have none."""
 
 
-def joints_in(path: Path) -> tuple[Points3, float]:
+def read_joints(path: Path) -> tuple[Points3, float]:
     """Read joints (T, 15, 3) and frame rate of a recording in a format that the importer does not
     read."""
     return READERS[path.suffix](path)

@@ -66,7 +66,7 @@ STYLES: tuple[Style, ...] = (
 """Eight styles to fit on and four, of other motions, to validate on."""
 
 
-def made_of(
+def make_clips(
     role: Literal["fitted", "validated"] | None = None, body: Body | None = None
 ) -> Iterator[tuple[Style, Clip, RetargetError]]:
     """Yield each clip of a role (None: both), made for a body (None: worker_1), as `clips_of`
@@ -90,9 +90,7 @@ def write(style: Style, folder: Path, number: int) -> Path:
     places = np.concatenate([motion.position_world[:, 0] for motion in motions])
     turns = np.concatenate([motion.quaternion_wxyz[:, 0] for motion in motions])
     n = min(len(places), int(LONGEST_S * FPS * style.pace))
-    position, rotation, person = restyled(
-        places[:n], matrix_from_quaternion(turns[:n]), body, style
-    )
+    position, rotation, person = restyle(places[:n], matrix_from_quaternion(turns[:n]), body, style)
     if number % 3 == 2:
         return write_acclaim(folder, position, rotation, person, style.name)
     unit_m, axes = (1.0, 0.01)[number % 2], (None, Y_UP)[number % 2]
@@ -101,7 +99,7 @@ def write(style: Style, folder: Path, number: int) -> Path:
     return write_bvh(path, position, rotation, fps, unit_m, axes, order, body=person)
 
 
-def restyled(
+def restyle(
     position: Points3, rotation: Rotations, body: Body, style: Style
 ) -> tuple[Points3, Rotations, Body]:
     """Apply a style to a body's motion; supporting feet remain on the floor.
@@ -120,7 +118,7 @@ def restyled(
     moving = np.repeat(offset[None], len(position), axis=0)
     moving[:, 0] = position[:, 0] * style.legs
     placed, turned = compose_tree(PARENT, moving, local)
-    rest = _summed(offset, body.rest_position[0] * style.legs)
+    rest = _sum_offsets(offset, body.rest_position[0] * style.legs)
     return placed, turned, replace(body, rest_position=rest)
 
 
@@ -133,7 +131,7 @@ def _lengths(style: Style) -> Floats:
     )  # fmt: skip
 
 
-def _summed(offset: Points3, root: Floats) -> Points3:
+def _sum_offsets(offset: Points3, root: Floats) -> Points3:
     """Return origins at rest, (22, 3)."""
     rest = offset.copy()
     rest[0] = root

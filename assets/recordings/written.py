@@ -24,7 +24,7 @@ ORDERS = tuple("".join(order) for order in itertools.permutations("XYZ"))
 BODY = load_body()
 
 
-def angles_of(rotation: Rotations, order: str) -> Floats:
+def compute_angles(rotation: Rotations, order: str) -> Floats:
     """Return angles about moving axes, (T, 3) [rad], in an order such as "zyx": R = Rz Ry Rx."""
     i, j, k = (AXES.index(axis) for axis in order)
     sign = 1.0 if (i, j, k) in ((0, 1, 2), (1, 2, 0), (2, 0, 1)) else -1.0
@@ -71,7 +71,7 @@ def write_bvh(
             columns.append(root)
         else:
             local = np.swapaxes(turned[:, PARENT[s]], -1, -2) @ local
-        columns.append(np.degrees(angles_of(local, order.lower())))
+        columns.append(np.degrees(compute_angles(local, order.lower())))
         lines.append(f"{pad}\tCHANNELS {len(named)} {' '.join(named)}")
         children = np.flatnonzero(s == PARENT).tolist()
         for child in children:
@@ -102,9 +102,8 @@ def write_acclaim(
     asf += [":root", "   order TX TY TZ RX RY RZ", "   axis XYZ", "   position 0 0 0"]
     asf += ["   orientation 0 0 0", ":bonedata"]
     turned = Y_UP @ rotation @ Y_UP.T
-    rows = {"root": np.concatenate(
-        [position[:, 0] @ Y_UP.T / unit_m, np.degrees(angles_of(turned[:, 0], "zyx"))[:, ::-1]], 1
-    )}  # fmt: skip
+    angles_deg = np.degrees(compute_angles(turned[:, 0], "zyx"))[:, ::-1]
+    rows = {"root": np.concatenate([position[:, 0] @ Y_UP.T / unit_m, angles_deg], 1)}
     for k, (bone, above, segment, along) in enumerate(bones):
         length = max(np.linalg.norm(along), 1e-9)
         axis = np.array([10.0 * k, -7.0 * k, 3.0 * k])
@@ -116,7 +115,7 @@ def write_acclaim(
         if segment != parent_segment:
             asf += ["     dof rx ry rz", "     limits (-180.0 180.0)", "   (-180.0 180.0)"]
             local = np.swapaxes(turned[:, parent_segment], -1, -2) @ turned[:, segment]
-            rows[bone] = np.degrees(angles_of(c.T @ local @ c, "zyx"))[:, ::-1]
+            rows[bone] = np.degrees(compute_angles(c.T @ local @ c, "zyx"))[:, ::-1]
         asf += ["  end"]
     asf += [":hierarchy", "  begin"]
     for above in dict.fromkeys(above for _, above, _, _ in bones):

@@ -59,8 +59,7 @@ def portrait(body_name: str, seed: int = 1) -> Image:
 
 
 def views(scene_name: str, body_name: str) -> dict[str, Image]:
-    """Return pictures of a scene with people at work: one overview, then the view of each
-    camera."""
+    """Return pictures of a scene with people at work: an overview, then each camera's view."""
     cast = CASTS[scene_name]
     scene = build(name=scene_name, n_workers=len(cast), bodies=body_name)
     motion = _stack_workers([_move_at_work(scene, body_name, *role) for role in cast])

@@ -74,8 +74,10 @@ QUICK = MotionBench(n_seeds=2, bodies=("worker_1",))
 
 
 def _measure(scene: str, config: MotionBench) -> dict[str, Metric]:
-    """Return a scene's statistics: the median over its films, the smallest and the largest
-    body's."""
+    """Return a scene's statistics over its films.
+
+    Each is the median over bodies, with the least and the greatest.
+    """
     by_body: list[dict[str, float]] = []
     for name in config.bodies:
         body = load_body(name)

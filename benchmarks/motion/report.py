@@ -24,12 +24,12 @@ def report(metrics: Metrics) -> Report:
     """Return the report."""
     scenes = [name.rsplit(".", 1)[0] for name in metrics if name.endswith(".seconds")]
     lead = (
-        "Medians over bodies, smallest and largest in brackets; the first table has the targets of "
-        "single scenes, the second what all scenes have (speeds in m/s)."
+        "Medians over bodies, with the smallest and the largest value in brackets. The first table "
+        "compares single scenes with targets, the second lists all scenes (speeds in m/s)."
     )
     asked = (f"`{each.statistic}` <= {each.high:g} ({each.source})" for each in list_targets(ANY))
     return Report("Motion bench", lead, (
-        "## Beside what is known of people", _targets(scenes, metrics),
+        "## Comparison with measurements of people", _targets(scenes, metrics),
         "## Every scene",
         format_metrics("scene", {each: each for each in scenes}, COLUMNS, metrics),
         f"Everywhere: {'; '.join(asked)}.",

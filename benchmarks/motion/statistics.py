@@ -1,5 +1,7 @@
-"""Statistics of films: speeds, accelerations, slipping feet, missed targets of hands,
-self-contact."""
+"""Statistics of films: speeds, accelerations and errors of workers' motions.
+
+The errors are slipping feet, missed targets of hands, and self-contact.
+"""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -82,8 +84,7 @@ def compute_slips(film: Film) -> Floats:
 
 
 def compute_grips(film: Film) -> Floats:
-    """Return the positions (T, 2, 3) of the hands' grips, beyond the wrist along the forearm
-    [m]."""
+    """Return positions (T, 2, 3) of the hands' grips, beyond the wrist along the forearm [m]."""
     place = film.motion.position_world[:, 0]
     both = []
     for side in SIDES:
@@ -99,15 +100,19 @@ def find_arrivals(film: Film) -> Bools:
 
 
 def compute_misses(film: Film) -> Floats:
-    """Return the distances of hands from their targets, in all frames in which they have one
-    [m]."""
+    """Return distances of hands from their targets [m].
+
+    Frames in which a hand has no target are left out.
+    """
     wished = film.controls[:, c.HAND_TARGET : c.HAND_TARGET + 6].reshape(-1, 2, 3)
     return np.linalg.norm(compute_grips(film) - wished, axis=-1)[find_arrivals(film)]
 
 
 def compute_depths(film: Film, body: Body) -> Floats:
-    """Return the greatest depth (T,) to which limbs intersect other parts [m]; negative: the
-    clearance."""
+    """Return the greatest depth (T,) to which limbs intersect other parts [m].
+
+    It is negative where they do not: the clearance.
+    """
     truth = worker_truth(body, film.motion)
     capsules, radius = truth.capsules_world[:, 0], truth.capsule_radius_m[0, 0]
     deepest = np.full(len(film.time_s), -np.inf)

@@ -175,8 +175,10 @@ def make_tasks(config: PerceptionBench, figures: Path | None = None) -> Iterator
 
 
 def _speeds(config: PerceptionBench) -> Iterator[Task]:
-    """Yield speeds of the lab in all sizes, and its largest rig on the site and on the other
-    runtime."""
+    """Yield speeds of the lab in all sizes, and of its largest rig in other conditions.
+
+    The conditions are the site and the other runtime.
+    """
     most, fewest = max(config.cameras), min(config.workers)
     runtimes = (speed.LITERT, speed.OPENVINO) if vino.is_installed() else (speed.LITERT,)
     settings = [

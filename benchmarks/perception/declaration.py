@@ -41,7 +41,7 @@ def make_fault_columns(level: str) -> dict[str, Column]:
     return {
         "ratio": Column(f"{start}error_ratio.{{}}", f"{words}ratio", 2),
         **belief(start, words, "fault.{}"),
-        "seen": Column(f"{start}detected.fault.{{}}", f"{words}seen by it [%]", 0, 100),
+        "seen": Column(f"{start}detected.fault.{{}}", f"{words}detected by it [%]", 0, 100),
     }
 
 
@@ -49,9 +49,9 @@ def make_name_columns(level: str) -> tuple[Column, ...]:
     """Return the columns of a level's reports of miscalibrated cameras."""
     key, words = f"{LEVELS[level]}miscalibrated.{{}}.", f"`{level}`: "
     return (
-        Column(f"{key}named", f"{words}named", shows="count"),
+        Column(f"{key}named", f"{words}reported", shows="count"),
         Column(f"{key}after_s", f"{words}after [s]"),
-        Column(f"{key}others", f"{words}another named [%]", 1, 100),
+        Column(f"{key}others", f"{words}another reported [%]", 1, 100),
     )
 
 
@@ -64,8 +64,9 @@ ACCURACY = Table(
     {"lab": ("lab",), "site": ("site",)},
     (Column("lost_steps.{}", "episodes", shows="n"), belief()["median"], belief()["p95"]),
     ("scene",),
-    "Error of single joints without faults, 250 steps an episode: precision, not trueness, as true "
-    "joints are where the detector puts them, by offsets that were fitted on these same bodies.",
+    "Errors of single joints without camera faults, 250 steps per episode. This is precision, not "
+    "trueness: true joints are defined where the detector places them, by offsets that were fitted "
+    "to the same bodies.",
 )
 COST = Table(
     "faults",
@@ -79,8 +80,9 @@ COST = Table(
         )
     ],
     ("fault of one camera of four",),
-    "Error of single joints; ratio of medians with and without the fault on the same seeds; share "
-    "of joints within the reported 95 % region. Lab, one worker, arm at rest; "
+    "Errors of single joints. Ratio: median error with the fault over that without it, on the same "
+    "seeds. Coverage: share of joints within the reported 95 % region. Laboratory, one worker, arm "
+    "at rest; "
     "{n[error_ratio.lost]} episodes of 150 steps at `pixels`, {n[keypoints.error_ratio.lost]} of "
     "250 at `keypoints`.",
 )  # fmt: skip
@@ -90,9 +92,10 @@ NAMED = Table(
     {kind: FAULTS[kind] for kind in SHOWN},
     (*make_name_columns("pixels"), *make_name_columns("keypoints")),
     ("fault of one camera",),
-    "Episodes in which the camera was named, after how long, and the share of steps in which "
-    "another one was; lab, arm at rest, 6 s an episode at `pixels`, 10 s at `keypoints`. Other "
-    "faults name nobody in 98 % of steps.",
+    "Episodes in which the faulty camera was reported, the time until then, and the share of steps "
+    "in which another camera was reported. Laboratory, arm at rest; episodes of 6 s at `pixels` "
+    "and 10 s at `keypoints`. With faults that are not shown, no camera is reported in 98 % of "
+    "steps.",
 )
 APPEARANCE = Table(
     "appearance",
@@ -100,7 +103,7 @@ APPEARANCE = Table(
     {f"appearance.{name}": (f"`{name}`",) for name in APPEARANCES},
     (replace(DETECTED, heading="detected", shows="count"), ERROR_SHARE),
     ("appearance",),
-    "Crops with the whole worker in view; lab, `worker_1`.",
+    "Crops that show the whole worker; laboratory, `worker_1`.",
 )
 EMULATOR = Table(
     "emulator",
@@ -118,13 +121,13 @@ EMULATOR = Table(
         Column("emulator_coverage95.{}.keypoints", "emulator", 3),
     ),
     ("posture",),
-    "Errors of joints after the default tracker, on {n[emulator_clips.all]} clips of other seeds, "
-    "pairs of motion and body, and camera places than the fit's. Bodies, motions and scenes are "
-    "the fit's own: this does not show how the emulator does on others.",
+    "Errors of joints after the default estimator, on {n[emulator_clips.all]} clips. Their seeds, "
+    "camera positions and pairs of motion and body are not those of the fit; the bodies, motions "
+    "and scenes are.",
 )
 LASTING = Table(
     "emulator_lasting",
-    "What happens now and then, and lasts",
+    "Exchanged sides and correlation over time",
     POSTURES,
     (
         Column("emulator_exchanged.{}.pixels", "exchanged sides, pixels", 3),
@@ -133,12 +136,12 @@ LASTING = Table(
         Column("emulator_lasting.{}.keypoints", "emulator", 2),
     ),
     ("posture",),
-    "The same clips: share of looks that exchange left and right of the body or its legs; "
-    "correlation of errors in the image, without gross ones, with those 0.48 s later.",
+    "The same clips: share of detections that exchange left and right of the body or its legs, and "
+    "correlation of image errors, without gross errors, with those 0.48 s later.",
 )
 SPEED = Table(
     "speed_pixels",
-    "Steps a second at `pixels`, four cameras",
+    "Speed at `pixels` with four cameras",
     {
         ("4.1", "litert"): ("LiteRT, lab",),
         ("4.1.site", "litert"): ("LiteRT, site",),
@@ -150,8 +153,7 @@ SPEED = Table(
         Column("step_ms.{0}", "a step [ms]"),
         Column("network_ms.{1}", "the network alone [ms]"),
     ),
-    note="Median of 200 steps. The network alone: four crops on two threads without drawing "
-    "anything.",
+    note="Median of 200 steps. The network alone: four crops on two threads, without rendering.",
 )
 TABLES = (SPEED, ACCURACY, COST, NAMED, APPEARANCE, EMULATOR, LASTING)
 """Tables of the documentation."""

@@ -1,4 +1,6 @@
-"""Accuracy of the pose network on dark and dull pictures: python -m benchmarks.perception.dim
+"""Accuracy of the pose network on dark and dull pictures.
+
+    python -m benchmarks.perception.dim
 
 The same moments are rendered in normal light and with each of `PICTURES`, and every camera detects
 the worker without a former track. The deviations of `hrc_env.perception.exposure` were fitted to

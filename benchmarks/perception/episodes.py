@@ -39,8 +39,10 @@ class Episode:
     """Whether a camera was reported as miscalibrated (T, C)."""
 
     def to_json(self) -> dict[str, Any]:
-        """Return lists of numbers for JSON, lengths to a tenth of a millimetre; NaN for missing
-        values."""
+        """Return lists of numbers for JSON, lengths to a tenth of a millimetre.
+
+        Missing values are NaN.
+        """
         arrays = {each.name: np.asarray(getattr(self, each.name), float) for each in fields(self)}
         return {name: np.round(values, 4).tolist() for name, values in arrays.items()}
 
@@ -60,8 +62,10 @@ def select_steps(episode: Episode, steps: Bools | slice) -> Episode:
 def play(
     seeds: Sequence[int], n_steps: int, tick: Callable[[float], None], **arguments: Any
 ) -> list[Episode]:
-    """Return one episode per seed of an environment with the given arguments, with a resting
-    arm."""
+    """Return one episode per seed of an environment with the given arguments.
+
+    The arm rests.
+    """
     env = HRCEnv(n_workers=1, **arguments)
     try:
         episodes = []

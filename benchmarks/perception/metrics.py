@@ -103,8 +103,10 @@ def _belief(name: str, episodes: list[Episode]) -> Metrics:
 
 
 def _faults(faults: dict[tuple[str, str], list[Episode]]) -> Metrics:
-    """Return metrics of faults relative to the same seeds without; cameras have the fault in
-    turns."""
+    """Return metrics of faults relative to the same seeds without faults.
+
+    Cameras have the fault in turns.
+    """
     metrics: Metrics = {}
     for (level, kind), episodes in faults.items():
         start = "" if level == PIXELS else f"{level}."
@@ -122,8 +124,10 @@ def _faults(faults: dict[tuple[str, str], list[Episode]]) -> Metrics:
 
 
 def _ratio(episodes: list[Episode], base: list[Episode]) -> Metric:
-    """Return the median error over that of the same seeds without the fault, by bootstrap over
-    seeds."""
+    """Return the median error relative to that of the same seeds without the fault.
+
+    The interval is a bootstrap over seeds.
+    """
     above, below = ([_select_tracked(each.error_m) for each in some] for some in (episodes, base))
 
     def ratio(weights: Ints) -> Floats:

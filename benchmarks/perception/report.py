@@ -24,21 +24,22 @@ from hrc_env.experiments.columns import Column
 from hrc_env.experiments.report import Metrics, Report, format_metrics
 
 _LEAD = """\
-Intervals of shares are exact. Level `pixels` unless it says otherwise; every camera looks in every
-step."""
+Intervals of shares are exact. The level is `pixels` unless stated otherwise; every camera takes an
+image in every step."""
 _ABOUT_SPEED = """\
-Steps a second are of the median step; the milliseconds of each stage were taken in steps of their
-own, on the thread that steps: `detect` is the network and waiting for it. On LiteRT unless
-something else stands there."""
+Steps per second are those of the median step. The times of the stages were measured in other steps,
+on the thread that steps: `detect` is the network and the wait for it. The runtime is LiteRT unless
+stated otherwise."""
 _ABOUT_ERRORS = """\
-The arm rests. Errors are of single joints in 3D while the worker is tracked; coverage is the share
-of joints inside the reported 95 % region, and the deviation that is reported is set beside the
-root mean square of the error. Rows by pose are of all scenes."""
+The arm rests. Errors are those of single joints in 3D while the worker is tracked. Coverage is the
+share of joints within the reported 95 % region; std/error is the reported standard deviation over
+the root mean square of the error. Rows of poses include all scenes."""
 _ABOUT_FAULTS = """\
-The cameras have the fault in turns, all the time. The ratio is that of median errors with and
-without it on the same seeds. `keypoints` knows no faults of images."""
+One camera has the fault during the whole episode; episodes rotate over the cameras. The ratio is
+the median error with the fault over that without it, on the same seeds. `keypoints` does not
+simulate faults of images."""
 _ABOUT_CROPS = """\
-Crops round the true joints with the whole worker in view, looked at as if for the first time.
+Crops around the true joints that show the whole worker, each detected without a previous track.
 Errors are mean distances of a crop's joints from the truth in the image, in % of stature."""
 _ABOUT_THE_EMULATOR = """\
 Error of the estimate at `keypoints` over that at `pixels`, on clips and viewpoints that the

@@ -29,10 +29,10 @@ from hrc_env.tracking.config import TrackerConfig
 _DETECTING = 0.5
 """Share of the progress for detection."""
 _LEAD = """\
-Leave-one-camera-out reprojection [px]; `renamed`: where it fits better, the held-out detector is
-taken to have exchanged left and right. Coverage: share of held-out detections within the 95 %
-region of belief and detector. Bones and jerk with all cameras. The smoother is offline: it sees the
-whole recording at once."""
+Leave-one-camera-out reprojection [px]; best of both sides: where it fits better, left and right of
+the held-out detections are exchanged. Coverage: share of held-out detections within the 95 % region
+of estimate and detector. Bones and jerk are those with all cameras. The smoother is offline: it
+uses the whole recording."""
 FOOTAGE = Table(
     "footage",
     "Recorded footage",
@@ -40,18 +40,19 @@ FOOTAGE = Table(
     (
         Column("real_reprojection_px.{}.median", "held-out camera, median [px]"),
         Column("real_reprojection_px.{}.p95", "95 % [px]", 0),
-        Column("real_reprojection_either_px.{}.median", "sides renamed, median [px]"),
+        Column("real_reprojection_either_px.{}.median", "best of both sides, median [px]"),
         Column("real_reprojection_either_px.{}.p95", "95 % [px]", 0),
         Column("real_coverage95.{}", "coverage", 3),
-        Column("real_bone_std_m.{}", "bone spread [cm]", 2, 100),
+        Column("real_bone_std_m.{}", "std of bones [cm]", 2, 100),
         Column("real_jerk.{}", "jerk [m/s³]", 0),
     ),
     ("estimator",),
-    "One camera of four is held out and predicted from the others: median and 95th percentile of "
-    "the distance to its detections, also with left and right exchanged where that fits better; "
-    "share within the 95 % region; standard deviation of bone lengths; root mean square of the "
-    "third derivative. 100 frames at 60 Hz of one person (`Demo_SinglePerson` of Pose2Sim), "
-    f"detections the same for all. `{SMOOTHER}` is offline.",
+    "100 frames at 60 Hz of one person (`Demo_SinglePerson` of Pose2Sim); all estimators receive "
+    "the same detections. Each of the four cameras in turn is held out, and its detections are "
+    "compared with the estimate from the other three: median and 95th percentile of the distance, "
+    "also with left and right exchanged where that fits better, and coverage of the 95 % region. "
+    "Standard deviation of bone lengths and jerk (root mean square of the third derivative) are of "
+    f"the estimate from all cameras. `{SMOOTHER}` is offline.",
 )
 
 

@@ -127,16 +127,20 @@ def summarize_foretold(foretold: Foretold) -> dict[str, Metric]:
 
 
 def bone_std(track: Track) -> Metric:
-    """Return the standard deviation of bone lengths over time [m]: mean, least and largest over
-    bones."""
+    """Return the standard deviation of bone lengths over time [m].
+
+    Over bones: the mean, the least and the greatest.
+    """
     joints = track.mean_world[track.tracked]
     lengths = np.linalg.norm(joints[:, BONES[:, 0]] - joints[:, BONES[:, 1]], axis=-1)
     return _over(lengths.std(0), float(lengths.std(0).mean()), "m")
 
 
 def jerk(track: Track, dt_s: float) -> Metric:
-    """Return the root mean squared third difference [m/s^3]: of all joints, the least and the
-    greatest."""
+    """Return the root mean squared third difference of positions [m/s^3].
+
+    Over joints: all together, the least and the greatest.
+    """
     squared = (np.diff(track.mean_world[track.tracked], 3, axis=0) ** 2).sum(-1) / dt_s**6
     return _over(np.sqrt(squared.mean(0)), float(np.sqrt(squared.mean())), "m/s^3")
 

@@ -1,2 +1,1 @@
-"""The speed benchmark: steps a second of whole environments, and the share of each part of a
-step."""
+"""The speed benchmark: steps a second of whole environments, and shares of their parts."""

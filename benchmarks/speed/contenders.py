@@ -1,5 +1,7 @@
-"""The contenders, by public interfaces: the environment in all sizes, Gymnasium's Reacher,
-resets."""
+"""The contenders of the speed benchmark, by public interfaces.
+
+They are the environment in all sizes, Gymnasium's Reacher, and resets.
+"""
 
 import time
 from collections.abc import Mapping

@@ -7,7 +7,7 @@ from hrc_env.experiments.columns import Column
 from hrc_env.experiments.report import Table
 from hrc_env.tasks import BUILT_IN, DEFAULT
 
-ASKED = "What does a step of an environment cost, alone and beside others, and where does it go?"
+ASKED = "How long does a step take, alone and in a batch, and which parts take the time?"
 SINGLE = "single"
 """The environment of `gymnasium.make`, unlike a vector of one."""
 REACHER = "reacher"
@@ -27,8 +27,8 @@ TASKS = Table(
         Column("task_share.{}", f"of `{DEFAULT}` [%]", 0, 100),
     ),
     ("task",),
-    "`keypoints`, one worker, 64 environments on 2 threads, random actions; all take turns of 20 "
-    "steps. Median, smallest and largest of the rounds.",
+    "`keypoints`, one worker, 64 environments on 2 threads, random actions; tasks take turns of 20 "
+    "steps. Median, smallest and largest value of the rounds.",
 )
 
 
@@ -54,13 +54,15 @@ def make_steps_table(levels: Sequence[str], configurations: Iterable[str]) -> Ta
     own = [Column(f"env_steps_per_s.{each}.{{}}", f"`{each}` [1/s]", 0) for each in levels]
     return Table(
         "speed",
-        "Environment steps a second",
+        "Environment steps per second",
         {each: (title(each),) for each in configurations},
         (Column(f"env_steps_per_s.{REACHER}.{{}}", "Gymnasium's Reacher-v5 [1/s]", 0), *own),
         ("environments",),
-        "Random actions for whole episodes, resets included, every info read; median, smallest and "
-        f"largest of {{n[env_steps_per_s.{REACHER}.{SINGLE}]}} rounds in which all take turns. "
-        f"`{SINGLE}` is `gymnasium.make`. Compare ratios: the machine is shared.",
+        "Random actions over whole episodes; resets are included and every info is read. Median, "
+        "smallest and largest value of "
+        f"{{n[env_steps_per_s.{REACHER}.{SINGLE}]}} rounds in which configurations take turns. "
+        f"`{SINGLE}` is an environment of `gymnasium.make`, the others are batches. The machine is "
+        "shared: compare ratios.",
     )
 
 
@@ -72,12 +74,12 @@ def make_organs_table(configurations: Iterable[str]) -> Table:
     """
     return Table(
         "speed_organs",
-        "Time of a step by organ, `keypoints`",
+        "Time of the parts of a step, `keypoints`",
         {each: (each,) for each in (*ORGANS, REST, TOTAL)},
         [Column(f"us_per_env_step.{{}}.{each}", f"{title(each)} [us]") for each in configurations],
-        ("organ",),
-        "Per environment and step. With two threads an organ's time is divided by two, so that "
-        "columns are time on the wall. A reset takes {reset_one} ms, of 8 of 64 environments "
-        "{reset_some} ms.",
+        ("part",),
+        "Per environment and step. With two threads the time of a part is divided by two, so that "
+        "every column is wall-clock time. A reset takes {reset_one} ms; that of 8 of 64 "
+        "environments takes {reset_some} ms.",
         RESETS,
     )

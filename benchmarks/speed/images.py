@@ -1,4 +1,6 @@
-"""Time of camera images in observations: python -m benchmarks.speed.images
+"""Time of camera images in observations.
+
+    python -m benchmarks.speed.images
 
 All contenders take turns, so that noise of the machine affects all alike: a step without images,
 the same with one and with all images, `render()`, and the rig rendered as for people. Results are

@@ -23,11 +23,12 @@ _COLOURS = (*(f"C{k}" for k in range(7)), "gold", "C9", "0.75")
 """Colours of the parts, of resets and of the rest."""
 SPREAD = "the smallest and the largest of all rounds"
 _ABOUT_THE_ORGANS = """\
-Taken in runs of their own with a stopwatch round each organ's functions, which itself costs about
-half a microsecond a call. With two threads an organ's time is divided by two: columns are time on
-the wall, and half of the column for one thread would be perfect. Time in which a thread waits is
-the waiting organ's, or the rest's. `physics` includes the controller, `distances` the robot's own
-bodies, `reward` the task, `reset` all organs' work in resets, `rest` everything else."""
+Measured in separate runs with timers around the functions of each part, which cost about half a
+microsecond per call. With two threads the time of a part is divided by two, so that every column is
+wall-clock time and half of the column for one thread would be ideal. Waiting time of a thread
+belongs to the part that waits, or to the rest. `physics` includes the controller, `distances` the
+robot's own bodies, `reward` the task, `reset` the work of all parts in resets, and `rest`
+everything else."""
 
 
 def report(metrics: Metrics, figures: Path) -> Report:

@@ -103,8 +103,10 @@ def spin(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points
 def circle(
     walk_m: tuple[float, float], seeds: list[int], n_frames: int, radius_m: float, speed_m_s: float
 ) -> Points3:
-    """Return joints (T, S, J, 3) [m] of people running in a circle near the middle, in either
-    direction."""
+    """Return joints (T, S, J, 3) [m] of people running in a circle near the middle.
+
+    They run in either direction.
+    """
     rngs = [np.random.default_rng([seed, 22]) for seed in seeds]
     way = np.array([rng.choice([-1.0, 1.0]) for rng in rngs])
     begin = np.array([rng.uniform(-np.pi, np.pi) for rng in rngs])

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,30 +29,47 @@ _AT_ONCE = 10
 frame."""
 
 
-def beliefs(
-    name: str, rig: Rig, sequences: Sequences, seeds: list[int]
-) -> Iterator[tuple[Points3, Covariances3 | None]]:
-    """Yield mean (S, W, J, 3) and covariance (S, W, J, 3, 3) after each frame; DLT has none."""
+class Belief(NamedTuple):
+    """The estimate after a frame."""
+
+    mean_world: Points3
+    """(S, W, J, 3) positions of joints [m]."""
+    cov_world: Covariances3 | None
+    """(S, W, J, 3, 3) their covariances [m^2]; None for an estimator without."""
+
+
+class TrackedFrame(NamedTuple):
+    """One frame of an estimator that runs as in an environment."""
+
+    keypoints: Keypoints
+    """Detections after association with the tracks."""
+    estimate: PoseEstimate
+    """Estimate after the update."""
+
+
+def beliefs(name: str, rig: Rig, sequences: Sequences, seeds: list[int]) -> Iterator[Belief]:
+    """Yield the belief of an estimator after each frame."""
     if name == DLT:
         yield from _triangulate(rig, sequences)
     elif name == SMOOTHER:
         yield from _smooth(rig, sequences, seeds)
     else:
-        for _, belief in _estimate(name, rig, sequences, seeds):
-            yield belief.mean_world, belief.cov_world
+        for frame in _estimate(name, rig, sequences, seeds):
+            yield Belief(frame.estimate.mean_world, frame.estimate.cov_world)
 
 
-def _triangulate(rig: Rig, sequences: Sequences) -> Iterator[tuple[Points3, None]]:
+def _triangulate(rig: Rig, sequences: Sequences) -> Iterator[Belief]:
+    """Yield triangulations of each frame; a joint without two views stays at its last place."""
     shape = sequences.joints.shape[1:]
     last = np.tile(sequences.config.prior_mean_world, (shape[0], shape[1] * shape[2], 1))
     for px in sequences.px:
         last = triangulate_frame(rig.P, px.reshape(*px.shape[:2], -1, 2), last)
-        yield last.reshape(shape), None
+        yield Belief(last.reshape(shape), None)
 
 
 def _estimate(
     name: str, rig: Rig, sequences: Sequences, seeds: list[int]
-) -> Iterator[tuple[Keypoints, PoseEstimate]]:
+) -> Iterator[TrackedFrame]:
     """Yield the input and the estimate of an estimator that runs as in an environment.
 
     With several people, poses are assigned to the tracks with predictions that they fit.
@@ -70,14 +87,11 @@ def _estimate(
         if not sequences.has_bones:
             _forget_bones(state)
         estimator.update(state, keypoints, rngs)
-        yield keypoints, estimator.estimate(state)
+        yield TrackedFrame(keypoints, estimator.estimate(state))
 
 
-def _smooth(
-    rig: Rig, sequences: Sequences, seeds: list[int]
-) -> Iterator[tuple[Points3, Covariances3]]:
-    """Yield the results of the smoother, some sequences at once; late frames are used at their
-    time.
+def _smooth(rig: Rig, sequences: Sequences, seeds: list[int]) -> Iterator[Belief]:
+    """Yield the results of the smoother, which uses late frames at their own time.
 
     With several people it smooths the tracks to which `kalman` assigned the poses.
     """
@@ -88,14 +102,14 @@ def _smooth(
     if sequences.order is None:
         clip = [sequences.keypoints(t) for t in range(len(sequences.px))]
     else:
-        clip = [given for given, _ in _estimate("kalman", rig, sequences, seeds)]
+        clip = [frame.keypoints for frame in _estimate("kalman", rig, sequences, seeds)]
     parts = []
     for begin in range(0, len(seeds), _AT_ONCE):
         some = np.arange(begin, min(begin + _AT_ONCE, len(seeds)))
         frames = [rows(keypoints, some) for keypoints in clip]
         parts.append(smooth(rig.P, frames, DT_S, sequences.config))
     for t in range(len(clip)):
-        yield (
+        yield Belief(
             np.concatenate([part.mean_world[t] for part in parts]),
             np.concatenate([part.cov_world[t] for part in parts]),
         )

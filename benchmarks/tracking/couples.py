@@ -21,8 +21,10 @@ _SURE_M = 0.3
 
 
 def walk_couples(seeds: list[int], n_frames: int) -> Points3:
-    """Return joints (T, S, 2, J, 3) [m] of two walkers on parallel lines, in opposite
-    directions."""
+    """Return joints (T, S, 2, J, 3) [m] of two walkers on parallel lines.
+
+    They walk in opposite directions.
+    """
     rngs = [np.random.default_rng([seed, 6]) for seed in seeds]
     along = np.stack([rng.uniform(0, 2 * np.pi) for rng in rngs])
     middle = np.stack([rng.uniform(-0.2, 0.2, 2) for rng in rngs])

@@ -56,7 +56,7 @@ WORDS = {
     "one_camera": "one camera, 4 s",
 }
 """Descriptions of windows with names that are not plain."""
-BATCHES = {"64": "batch of 64 [us]", "hard_64": "the same, `hard` walks [us]", "1": "alone [us]"}
+BATCHES = {"64": "batch of 64 [us]", "hard_64": "batch of 64, `hard` [us]", "1": "alone [us]"}
 
 
 def describe_rows(selection: Selection) -> dict[str, Cells]:
@@ -92,14 +92,14 @@ def times(names: Sequence[str]) -> Table:
         {name: (f"`{name}`",) for name in names},
         [Column(f"update_us.{{}}.{batch}", words) for batch, words in BATCHES.items()],
         ("estimator",),
-        "Per worker and update, four cameras, one core. `paper_restarts` has 1,000 particles a "
-        "joint.",
+        "Per worker and update, with four cameras on one core. `paper` and `paper_restarts` have "
+        "1,000 particles per joint.",
     )
 
 
 BENCH = Table(
     "tracking",
-    "Tracking bench",
+    "Estimators on simulated sequences",
     {
         row: words
         for row, words in describe_rows(EVERYTHING).items()
@@ -107,11 +107,13 @@ BENCH = Table(
     },
     [KINDS[metric].column(metric, name, heading) for metric, name, heading in SHOWN],
     ("sequence",),
-    "RMSE of a joint, share of joints within the reported 95 % region, reported standard deviation "
-    f"over RMSE. {{n[coverage95.env.after_return.{DEFAULT}]}} sequences a row that nothing was "
-    f"chosen on (smoother, which is offline: {{n[coverage95.env.after_return.{SMOOTHER}]}}). `lab` "
-    "and `site`: the bench's walkers, white detection errors of 3 px; `env`: the environment's "
-    "worker through its emulator. `hard`: occlusion, 10 % gross errors, exchanged sides; "
-    "`drifting`: errors that last half a second; `late`: frames 40 to 200 ms old; `one camera`: "
-    "four cameras for 1 s, then one for 4 s. DLT: plain triangulation of each frame.",
+    "RMSE of joint positions [cm]; coverage: share of joints within the reported 95 % region; "
+    "std/RMSE: reported standard deviation over RMSE. "
+    f"{{n[coverage95.env.after_return.{DEFAULT}]}} sequences per row, none of which was used to "
+    f"choose settings ({{n[coverage95.env.after_return.{SMOOTHER}]}} for `{SMOOTHER}`, which is "
+    "offline). `lab` and `site`: simulated walkers, independent detection errors of 3 px; `env`: "
+    "the environment's worker through the emulator. `hard`: occlusion, 10 % gross errors and "
+    "exchanged sides; `drifting`: errors that last half a second; `late`: images that arrive 40 "
+    "to 220 ms late, with some lost; `one camera`: one camera for 4 s, after 1 s of four. DLT: "
+    "linear triangulation of each frame.",
 )

@@ -1,5 +1,7 @@
-"""Simulated detections of walkers: noise, lasting errors, occlusion, gross errors, exchanged
-sides."""
+"""Simulated detections of walkers.
+
+They have noise, lasting errors, occlusion, gross errors and exchanged sides.
+"""
 
 from dataclasses import dataclass
 
@@ -113,8 +115,10 @@ def _damage(exact: Points2, in_view: Bools, damage: Damage, seed: int) -> Points
 
 
 def _drift(rng: np.random.Generator, shape: tuple[int, ...]) -> Floats:
-    """Return stationary noise (T, ...) of unit variance with correlation exp(-t / 0.5 s) over
-    time."""
+    """Return stationary noise (T, ...) of unit variance.
+
+    Its correlation over time is exp(-t / 0.5 s).
+    """
     keep = np.exp(-DT_S / _DRIFT_TAU_S)
     drift = rng.standard_normal(shape)
     for t in range(1, len(drift)):

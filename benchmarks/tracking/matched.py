@@ -87,8 +87,10 @@ def draw(model: MatchedModel, seeds: list[int], n_frames: int) -> Points3:
 
 
 def _centre(state: Floats) -> Floats:
-    """Return the state with the root over the origin and at rest; f allows to shift all joints
-    alike."""
+    """Return the state with the root over the origin and at rest.
+
+    f allows to shift all joints alike.
+    """
     body = state.reshape(len(state), 2, N_JOINTS, 3)
     root = body[:, :, TORSO].mean(2, keepdims=True)
     root[:, 0, :, 2] -= 1.0

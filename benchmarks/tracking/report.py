@@ -11,14 +11,14 @@ from benchmarks.tracking.sequences import MATCHED, TWO_WORKERS
 from hrc_env.experiments.report import Metrics, Report, format_table
 
 _LEAD = f"""\
-Numbers in brackets are 95 % bootstrap intervals over sequences. `lab` and `site` are the bench's
-walkers and white detections of 3 px; `{ENV}` is the environment's worker seen through its
-emulator of the detector. `hard` is occlusion, gross errors and exchanged sides; in `drifting`
-detections err in the same way for half a second, of which nobody is told; in `late` cameras are 40
-to 220 ms late, one has half the rate, one frame in twenty is lost. `one_camera_...` are
-the first half second, second and two seconds of the four in which one camera is left,
-`after_return` is what comes a second later. `{DLT}` is plain triangulation of every frame by
-itself; `{SMOOTHER}` knows the whole clip and is no rival."""
+Numbers in brackets are 95 % bootstrap intervals over sequences. `lab` and `site` are
+simulated walkers with independent detection errors of 3 px; `{ENV}` is the environment's worker
+through the emulator. `hard` has occlusion, gross errors and exchanged sides. In `drifting`,
+detection errors last half a second, and estimators do not know it. In `late`, images arrive 40 to
+220 ms late, one camera has half the frame rate, and one image in twenty is lost. `one_camera_...`
+are the first half second, second and two seconds of the four in which one camera remains;
+`after_return` begins a second after the other cameras have returned. `{DLT}` is linear
+triangulation of each frame; `{SMOOTHER}` knows the whole clip and is not compared."""
 _ABOUT_THE_BOUND = """\
 `matched` bodies move as the estimators' motion model says, without bones; estimators are told so
 (no outliers, no exchanged sides, detections as good as they say, nothing known of bone lengths),
@@ -43,7 +43,9 @@ def report(metrics: Metrics, selection: Selection = EVERYTHING) -> Report:
     for each in (BENCH, *(table_of_kind(kind, names, selection) for kind in KINDS)):
         shown.append(each.to_markdown(metrics, intervals=False))
     spread = "95 % intervals over seeds, times with the smallest and the largest"
-    return Report("Tracking bench", _LEAD, [*parts, *filter(None, shown)], spread)
+    return Report(
+        "Estimators on simulated sequences", _LEAD, [*parts, *filter(None, shown)], spread
+    )
 
 
 def _lead(metrics: Metrics, selection: Selection) -> str:

@@ -152,8 +152,10 @@ class Sequences:
 
 
 def make_sequences(rig: Rig, condition: str, seeds: list[int]) -> Sequences:
-    """Return sequences of a rig and a condition, one per seed, each depending on its own seed
-    only."""
+    """Return sequences of a rig and a condition, one per seed.
+
+    Each depends on its own seed only.
+    """
     if rig.name == ENV:
         joints, seen = record(condition, seeds)
         given = (seen.confidence, seen.sigma_px)

@@ -122,8 +122,10 @@ def steer(
 
 
 def _smooth(rng: np.random.Generator, n_steps: int, dt: float) -> Floats:
-    """Return white noise (5, n) smoothed by Gaussian windows of `_NOISE_TAU_S`, of unit
-    variance."""
+    """Return white noise (5, n) smoothed by Gaussian windows, of unit variance.
+
+    The windows are `_NOISE_TAU_S` wide.
+    """
     width = np.array(_NOISE_TAU_S) / dt
     padded = n_steps + int(8 * width.max())
     spectrum = np.fft.rfft(rng.standard_normal((len(width), padded)))
@@ -173,8 +175,10 @@ def _leg(swing: Floats, sign: float, gait: Gait) -> tuple[Points3, ...]:
 def _arm(
     shoulder: Points3, swing: Floats, gesture: Floats, sign: float, time_s: Floats, gait: Gait
 ) -> tuple[Points3, ...]:
-    """Return shoulder, elbow and wrist of one side; a gesture raises, spreads and shakes the
-    arm."""
+    """Return shoulder, elbow and wrist of one side.
+
+    A gesture raises, spreads and shakes the arm.
+    """
     pace = 2 * np.pi * (0.7 if sign > 0 else 0.95)
     start = 0.0 if sign > 0 else 1.0
     shake = gesture * (0.9 + 0.75 * np.sin(pace * time_s + start))

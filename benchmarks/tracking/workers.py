@@ -21,8 +21,10 @@ _FASTEST_M_S, _WALK_M_S, _LIES_S, _WAY_M = 3.5, 1.3, (2.0, 4.0), 4.0
 
 
 def run_to_and_fro(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points3:
-    """Return joints (T, S, J, 3) [m] of workers that run from corner to corner as fast as they
-    can."""
+    """Return joints (T, S, J, 3) [m] of workers that run from corner to corner.
+
+    They run as fast as they can.
+    """
 
     def run(draws: Floats, height_m: float, me: Worker) -> float:
         yaw = _plan_across(me)

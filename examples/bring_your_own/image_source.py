@@ -1,4 +1,4 @@
-"""An image source of your own: films of any rig, or live cameras, instead of the renderer.
+"""An image source of your own: films or live images of any rig, instead of the renderer.
 
 python examples/bring_your_own/image_source.py rig.toml camera_1.mp4 camera_2.mp4 ...
 """
@@ -38,4 +38,4 @@ def poses(rig, films):
 
 if __name__ == "__main__":
     for n, found in enumerate(poses(Path(sys.argv[1]), sys.argv[2:])):
-        print(n, "nobody" if found is None else "{} m, +- {:.3f} m".format(*found))
+        print(n, "no person" if found is None else "{} m, +- {:.3f} m".format(*found))

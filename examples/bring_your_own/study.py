@@ -12,8 +12,8 @@ from hrc_env import Row, Study, columns, run_experiment
 UNAWARE = {"people": "unaware"}
 STUDY = Study(
     name="my_study",
-    title="What the shield costs",
-    about="A scripted robot beside people who do not look, with and without a shield.",
+    title="Cost and benefit of a shield",
+    about="A scripted robot beside people who do not avoid it, with and without a shield.",
     depends=("env", "tracker", "emulator", "motion", "shield", "agents"),
     first_seed=20_000_000,
     rows={

@@ -1,4 +1,4 @@
-"""A task of your own: to and fro between two stations.
+"""A task of your own: the tool goes back and forth between two stations.
 
 python -m hrc_env --import examples/bring_your_own/task.py play HRCTend-v0 --agent random
 """
@@ -21,7 +21,7 @@ class TendConfig:
 
 
 class Tend(Task):
-    """Go to and fro between two stations."""
+    """Go back and forth between two stations."""
 
     id = "HRCTend-v0"
     config_type = TendConfig

@@ -32,8 +32,10 @@ def show_errors(run: Callable[[], int]) -> int:
 
 
 def import_first(words: Sequence[str], program: str) -> list[str]:
-    """Import the files of `--import FILE`, and those of the parent process; return the other
-    words."""
+    """Import the files of `--import FILE`; return the other words.
+
+    Files of the parent process are imported, too.
+    """
     words = list(words)
     while "--import" in words:
         at = words.index("--import")

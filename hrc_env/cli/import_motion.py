@@ -42,7 +42,7 @@ class ImportMotion:
     Unit, upward axis, a T-pose in the first frame, short gaps and exchanged axes are detected,
     repaired and reported; a recording that cannot be repaired is refused with the reason. The
     joints are fitted by a worker's body, standing feet are locked, and the error of each joint is
-    printed. docs/people_and_scenes.md lists the joint names that are recognized.
+    printed. docs/motion_capture.md lists the joint names that are recognized.
     """
 
     file: tyro.conf.Positional[Path]
@@ -70,8 +70,7 @@ class ImportMotion:
     """Also draw a film strip of the clip into this PNG file (needs OpenGL)."""
 
     def run(self) -> int:
-        """Read and fit the recording, print the errors and write the clip; return the exit
-        status."""
+        """Read and fit the recording, print the errors and write the clip; return the status."""
         check_writable_file(self.out, ".npz")
         if self.out.resolve() == self.file.resolve():
             raise ConfigError("--out is the recording itself; give the clip another name.")

@@ -93,7 +93,7 @@ class Play(EnvironmentArguments):
 
 @dataclass(frozen=True, kw_only=True)
 class Demo(EnvironmentArguments):
-    """Film the scripted reacher, slowed by the separation that it estimates from pixels."""
+    """Film a scripted robot that slows down near a person, whom it detects in rendered images."""
 
     out: Path = Path("out/demo.mp4")
     """The film to write; a still PNG is written beside it."""

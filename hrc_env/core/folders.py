@@ -11,8 +11,10 @@ from pathlib import Path
 
 
 def usual_cache() -> Path | None:
-    """Return the folder `hrc_env` in the user's caches, which need not exist; None without a
-    home."""
+    """Return the folder `hrc_env` in the user's caches; None without a home.
+
+    It need not exist.
+    """
     chosen = os.environ.get("XDG_CACHE_HOME")
     if sys.platform == "win32":
         chosen = chosen or os.environ.get("LOCALAPPDATA")

@@ -133,8 +133,7 @@ class WorkerPath:
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """Objects in the workers' hands, and then objects that lie ready for them; see
-    `props.PROPS`."""
+    """Objects in the workers' hands, and then objects that lie ready; see `props.PROPS`."""
 
     kind: Ints
     """Kind of each object (B, W + L), as an index into `props.PROPS`; 0: none."""

@@ -44,8 +44,7 @@ def over(values: Sequence[float], unit: str) -> Metric:
 
 
 def provenance() -> dict[str, Any]:
-    """Return the origin of a result: versions, the checkout's commit if there is one, the
-    machine."""
+    """Return the origin of a result: versions, machine, and the checkout's commit if any."""
     return {
         "hrc_env": _version("hrc_env"),
         "git": _commit(),
@@ -100,8 +99,10 @@ def _version(package: str) -> str | None:
 
 
 def _commit() -> str | None:
-    """Return the commit, with "+changes" if files outside of docs differ; None outside a
-    checkout."""
+    """Return the commit; None outside a checkout.
+
+    It ends in "+changes" if files outside of docs differ.
+    """
     root = Path(__file__).resolve().parents[2]
     if not (root / ".git").exists():
         return None

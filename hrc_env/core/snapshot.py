@@ -24,8 +24,10 @@ _LOCK = threading.RLock()
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """The form in which a registered object reaches another process: pickled, as a file, or
-    none."""
+    """The form in which a registered object reaches another process.
+
+    It is pickled, a file, or none.
+    """
 
     pickled: bytes = b""
     """The object by value; empty: not pickled."""

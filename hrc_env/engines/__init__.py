@@ -1,2 +1,1 @@
-"""Engines: places where the parts of an experiment are computed: this process, other processes,
-Ray."""
+"""Engines, which compute the parts of an experiment: this process, others, or Ray."""

@@ -10,7 +10,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 from hrc_env.core.errors import HRCError
 from hrc_env.core.machine import CORES, n_cores
@@ -101,13 +101,22 @@ def end_with_parent() -> None:
     threading.Thread(target=wait_for_end, daemon=True, name="hrc_env-parent").start()
 
 
-def call_pickled(call: bytes) -> tuple[Any, float]:
-    """Return the result of a pickled call and its duration [s]."""
+class TimedResult(NamedTuple):
+    """The result of a call."""
+
+    result: Any
+    """Return value of the call."""
+    seconds: float
+    """Duration of the call [s]."""
+
+
+def call_pickled(call: bytes) -> TimedResult:
+    """Return the result of a pickled call, with its duration."""
     import cloudpickle
 
     started_s = time.monotonic()
     result = cloudpickle.loads(call)(ignore)
-    return result, time.monotonic() - started_s
+    return TimedResult(result, time.monotonic() - started_s)
 
 
 def ignore(share: float) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 from hrc_env.core.errors import DownloadError, HRCError, RenderingError
 from hrc_env.engines import cluster  # first: it says how Ray is installed where it is missing
 from hrc_env.engines.engine import Call, Done
-from hrc_env.engines.local import ATTEMPTS, call_pickled, pickled
+from hrc_env.engines.local import ATTEMPTS, TimedResult, call_pickled, pickled
 from hrc_env.engines.registrations import Registrations, pack
 
 import ray  # isort: skip
@@ -47,13 +47,13 @@ class RayTasks:
                 finished, _ = ray.wait([*running])
                 for each in finished:
                     k = running.pop(each)
-                    result, seconds = _got(each, k)
+                    done = Done(k, *_fetch(each, k))
                     tick(k, 1.0)
-                    yield Done(k, result, seconds)
+                    yield done
 
 
-def _compute(registrations: Registrations, call: bytes) -> tuple[Any, float]:
-    """Return the result of a pickled call and its duration [s]."""
+def _compute(registrations: Registrations, call: bytes) -> TimedResult:
+    """Return the result of a pickled call, with its duration."""
     cluster.one_core()
     with cluster.plain_errors():
         registrations.unpack()
@@ -64,7 +64,7 @@ def _compute(registrations: Registrations, call: bytes) -> tuple[Any, float]:
             raise type(error)(f"Machine {address} cannot work: {error}") from error
 
 
-def _got(answer: Any, k: int) -> tuple[Any, float]:
+def _fetch(answer: Any, k: int) -> TimedResult:
     """Return the result of a call; an `HRCError` of the call is raised again."""
     try:
         return ray.get(answer)

@@ -107,7 +107,13 @@ def evaluate_episodes(
         compare_means([e["cost"] for e in ours], [e["cost"] for e in theirs])
 
     Args:
-        make, n_episodes, seed, engine, tick, trust, kwargs: as in `evaluate`.
+        make: the agent, as in `evaluate`.
+        n_episodes: number of episodes.
+        seed: seed of the first episode.
+        engine: where episodes are played, as in `evaluate`.
+        tick: is called with the share that was completed since the last call.
+        trust: whether pickles in a checkpoint may be loaded.
+        kwargs: arguments of the environment, as in `evaluate`.
 
     Returns:
         One record per episode, with its return `r`, `cost`, `contacts`, `goals_reached`,
@@ -274,8 +280,10 @@ def describe_contradiction(score: Score) -> str:
 
 
 def measure(episodes: list[dict[str, float]]) -> dict[str, Metric]:
-    """Return means over episodes with 95 % intervals: exact for contacts, bootstrap for the
-    others."""
+    """Return means over episodes with 95 % intervals.
+
+    Intervals are exact for contacts, and by bootstrap for the others.
+    """
     column = {name: [row[name] for row in episodes] for name in episodes[0]}
     minutes = [seconds / 60 for seconds in column["seconds"]]
     return {

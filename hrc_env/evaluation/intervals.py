@@ -99,8 +99,10 @@ def compare_rates(
 
 
 def bootstrap(statistic: Statistic, n: int, unit: str, n_draws: int = 4000) -> Metric:
-    """Return a statistic of n seeds with its percentile interval; draws without a value do not
-    count."""
+    """Return a statistic of n seeds with its percentile interval.
+
+    Draws without a value do not count.
+    """
     if n == 0:
         return Metric(np.nan, np.nan, np.nan, unit, 0)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -183,8 +185,10 @@ def make_binned_quantile(bins: Bins, counts: Any, q: float) -> Statistic:
 
 
 def estimate_ratio(above: Numbers, below: Numbers, unit: str) -> Metric:
-    """Return the sum of one number per seed over the sum of another: a rate, share or ratio of
-    rows."""
+    """Return the sum of one number per seed over the sum of another.
+
+    This is a rate, a share or a ratio of rows.
+    """
     x, y = _keep_finite(above, below)
     return bootstrap(make_ratio(x, y), len(x), unit)
 
@@ -249,8 +253,9 @@ def estimate_share(outcomes: Sequence[bool] | Bools) -> Metric:
 
 
 def estimate_goal_rate(goals: Numbers, minutes: Numbers) -> Metric:
-    """Return goals per minute, with a bootstrap interval if any goal was reached, else an exact
-    one.
+    """Return goals per minute with an interval.
+
+    The interval is by bootstrap if any goal was reached, else exact.
 
     Goals are more regular than a Poisson process, so the bootstrap's interval is narrower.
     """

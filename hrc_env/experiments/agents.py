@@ -17,8 +17,7 @@ AgentChoice = str | AgentFactory
 
 
 def check_choice(agent: AgentChoice) -> None:
-    """Raise `ConfigError` for an agent that is neither a name nor an existing file nor a
-    function."""
+    """Raise `ConfigError` unless an agent is a name, an existing file or a function."""
     if not isinstance(agent, str):
         return
     check_agent(agent)

@@ -109,8 +109,12 @@ def per_minute(
     """Return the column of a sum over episodes, divided by their duration in minutes.
 
     Args:
-        statistic, heading, name, unit, shown: as in `mean`. For the achievements of a task
+        statistic: one of `STATISTICS`. For the achievements of a task
             (`hrc_env.evaluation.sums.ACHIEVED`) a rate of zero has an exact interval.
+        heading: heading of the column, as in `mean`.
+        name: name of the metric (default: `STATISTIC_per_minute`).
+        unit: unit of the metric (default: that of the statistic, per minute).
+        shown: fields of `Column`.
     """
     check_names("statistic", [statistic], STATISTICS)
     over = intervals.estimate_goal_rate if statistic == ACHIEVED else None
@@ -136,8 +140,10 @@ def rate(
 
     Args:
         statistics: one of `STATISTICS`, or several that are added.
-        heading, name, shown: as in `mean`.
+        heading: heading of the column, as in `mean`.
+        name: name of the metric (default: that of the first statistic).
         per: the exposure, a name in `EXPOSURES`.
+        shown: fields of `Column`.
     """
     names = (statistics,) if isinstance(statistics, str) else tuple(statistics)
     check_names("statistic", names, STATISTICS)
@@ -172,7 +178,9 @@ def share_of_episodes(statistic: str, heading: str = "", **shown: Unpack[Shown])
     """Return the column of the share of episodes in which a statistic is not zero.
 
     Args:
-        statistic, heading, shown: as in `mean`.
+        statistic: one of `STATISTICS`.
+        heading: heading of the column, as in `mean`.
+        shown: fields of `Column`.
     """
     check_names("statistic", [statistic], STATISTICS)
 
@@ -186,9 +194,10 @@ def share_of_tries(heading: str = "", clustered: bool = True, **shown: Unpack[Sh
     """Return the column "success": the share of a task's attempts that succeeded.
 
     Args:
-        heading, shown: as in `mean`.
+        heading: heading of the column, as in `mean`.
         clustered: whether attempts in one episode are dependent, so that the interval is over
             episodes; otherwise every attempt counts as a trial.
+        shown: fields of `Column`.
     """
 
     def measure(own: Episodes, _: Episodes) -> Metric:
@@ -206,7 +215,10 @@ def share_of_baseline(
     """Return the column of a sum as a share of the baseline's on the same seeds.
 
     Args:
-        statistic, heading, name, shown: as in `mean`.
+        statistic: one of `STATISTICS`.
+        heading: heading of the column, as in `mean`.
+        name: name of the metric.
+        shown: fields of `Column`.
     """
     check_names("statistic", [statistic], STATISTICS)
 
@@ -224,8 +236,11 @@ def difference_from_baseline(
     """Return the column of the mean difference from the baseline, seed by seed.
 
     Args:
-        statistic, heading, unit, shown: as in `mean`.
+        statistic: one of `STATISTICS`.
+        heading: heading of the column, as in `mean`.
         name: name of the metric (default: `difference.STATISTIC`).
+        unit: unit of the metric.
+        shown: fields of `Column`.
     """
     check_names("statistic", [statistic], STATISTICS)
 

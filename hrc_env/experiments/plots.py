@@ -39,8 +39,7 @@ def stamp(path: Path, text: str) -> None:
 
 
 def compute_error_bars(metrics: Sequence[Metric], scale: float = 1.0) -> Floats:
-    """Return the distances (2, n) from the values to the lower and upper ends of their
-    intervals."""
+    """Return distances (2, n) from the values to both ends of their intervals, lower first."""
     return scale * np.abs([[m.value - m.low, m.high - m.value] for m in metrics]).T
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from markdown_it import MarkdownIt
 
-from hrc_env.core.errors import ConfigError
+from hrc_env.core.errors import ConfigError, check_names
 from hrc_env.core.results import Metric, provenance, write_results, write_whole
 from hrc_env.experiments.columns import Column, Key
 from hrc_env.experiments.plots import stamp
@@ -75,6 +75,23 @@ class Table:
                     f"Table {self.name!r}: no row has the metric {metric!r}; a row has "
                     f"{', '.join(sorted({name.rpartition('.')[2] for name in known}))}."
                 )
+
+    def select_rows(self, head: str, cell: str) -> "Table":
+        """Return the table with only the rows that have a text below one of the headings.
+
+        Args:
+            head: one of `heads`.
+            cell: the text, without the backticks of code.
+
+        Raises:
+            ConfigError: there is no such heading, or no row with the text.
+        """
+        check_names(f"heading of the table {self.name!r}", [head], self.heads)
+        position = self.heads.index(head)
+        texts = {row: cells[position].replace("`", "") for row, cells in self.rows.items()}
+        check_names(f"{head} of the table {self.name!r}", [cell], dict.fromkeys(texts.values()))
+        rows = {row: cells for row, cells in self.rows.items() if texts[row] == cell}
+        return replace(self, rows=rows)
 
     def list_metrics(self) -> set[str]:
         """Return the names of all metrics that the table can show."""

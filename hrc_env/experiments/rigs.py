@@ -48,8 +48,7 @@ def keep_cameras(rig: Sequence[CameraConfig], kept: Rig) -> Turn:
 
 
 def make_turns(scene: str, rigs: Sequence[Rig]) -> tuple[Turn, ...]:
-    """Return a turn with a scene's own four cameras for each choice that works after the
-    warm-up."""
+    """Return one turn per choice of cameras that work after the warm-up, in a scene's own rig."""
     return tuple(keep_cameras(RIGS[scene], rig) for rig in rigs)
 
 

@@ -54,7 +54,7 @@ def read_recording(
     """Read, repair and resample a recording of a person in motion.
 
     Args:
-        path: a .bvh, .amc or .npz file (docs/people_and_scenes.md).
+        path: a .bvh, .amc or .npz file (docs/motion_capture.md).
         fps: frame rate of the result [Hz]; None for the file's.
         source_fps: true frame rate of the file [Hz], if it has none or a wrong one.
         skeleton: the .asf file of an .amc file; None to look for it beside that.

@@ -89,7 +89,7 @@ def find_joints(moving: Moving, source: str, joints: Mapping[str, str] | None = 
             f"{source}: an unknown skeleton. Missed: {', '.join(missed)}. Found: "
             f"{', '.join(there) or 'none'}. The file has: {', '.join(names)}. Say which is which "
             f"(--joint {missed[0]}=NAME, joints={{{missed[0]!r}: NAME}}), or rename them as in "
-            "docs/people_and_scenes.md."
+            "docs/motion_capture.md."
         )
     return JointNodes(nodes, head, tuple(notes))
 

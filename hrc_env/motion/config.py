@@ -175,10 +175,10 @@ class MotionConfig:
     """Jobs of the workers and their order; a name stands for a choice of jobs.
 
     "framing" is this default; with "low_work" some jobs are at the robot's foot: kneeling, on the
-    haunches, bent (docs/people_and_scenes.md).
+    haunches, bent (docs/workers_and_scenes.md).
     """
     motions: tuple[str | Clip, ...] = ()
-    """Clips that workers play, or paths of their files (docs/people_and_scenes.md)."""
+    """Clips that workers play, or paths of their files (docs/motion_capture.md)."""
     motions_probability: float = 0.5
     """Probability that a worker with empty hands plays a clip next, where there is room for it."""
 

@@ -172,8 +172,10 @@ def _log_progress(folder: Path, name: str, size_bytes: float) -> Iterator[None]:
 
 
 def _size(folder: Path) -> int:
-    """Return the size of all files below a folder, some of which may be deleted meanwhile
-    [bytes]."""
+    """Return the size of all files below a folder [bytes].
+
+    Some of them may be deleted meanwhile.
+    """
     total = 0
     for path in folder.rglob("*"):
         with contextlib.suppress(OSError):

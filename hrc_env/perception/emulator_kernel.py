@@ -110,8 +110,7 @@ class PostureTables:
 
 
 class Settings:
-    """The part of a calibration that does not depend on the posture, and the emulator's
-    settings."""
+    """The emulator's settings, and the calibration as far as it is independent of posture."""
 
     space_limb: Annotated[Floats, (N_KINDS, 3)]
     """Correlation of the reported position in space with the one of the `NEXT` joint."""

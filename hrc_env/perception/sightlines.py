@@ -182,8 +182,10 @@ def project_worker(camera: ImageCamera, joints: Points3, uv: Points2, depth: Flo
 
 @kernel
 def _distort_joints(camera: ImageCamera, uv: Points2, depth: Floats) -> float:
-    """Distort pinhole pixels (J, 2) in place, and return how many times longer the pinhole shows
-    the body."""
+    """Distort pinhole pixels (J, 2) in place; return the magnification.
+
+    That is how many times longer the pinhole shows the body.
+    """
     fx, fy = camera.focal_px[0], camera.focal_px[1]
     cx, cy = camera.centre_px[0], camera.centre_px[1]
     total, n = 0.0, 0

@@ -73,8 +73,10 @@ def _core() -> Any:
 
 
 def _openvino() -> Any:
-    """Return the package without its telemetry, which would keep usage counts in the home
-    folder."""
+    """Return the package without its telemetry.
+
+    Telemetry would keep usage counts in the home folder.
+    """
     check_installed()
     sys.modules.setdefault("openvino_telemetry", None)  # type: ignore[arg-type]
     return importlib.import_module("openvino")

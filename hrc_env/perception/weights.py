@@ -95,8 +95,10 @@ def cache_dir() -> Path:
 
 
 def find_weights(name: str) -> Path:
-    """Return the path of a weights file; `WeightsError` if it is missing or not the official
-    one."""
+    """Return the path of a weights file.
+
+    Raises `WeightsError` if it is missing or not the official one.
+    """
     if name not in WEIGHTS:
         raise make_unknown_name_error("weights", name, WEIGHTS)
     path = _path_of(name)

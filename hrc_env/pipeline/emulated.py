@@ -129,8 +129,10 @@ class EmulatedCameras(TrueState):
     def _emulate_frames(
         self, exposure: _Exposure, state: EmulatorState, rngs: Generators, history: History
     ) -> Keypoints:
-        """Return the keypoints of the images that have arrived: present ones, older ones or
-        none."""
+        """Return the keypoints of the images that have arrived.
+
+        They may be present, older, or none.
+        """
         rig, ids = self.scene.cameras, exposure.now.ids.tolist()
         actual = [
             history.schedule_of(b).actual_cameras(rig, history.seeds[b], history.begin_step(b))

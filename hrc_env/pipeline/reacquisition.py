@@ -1,5 +1,4 @@
-"""Searches of whole images: their schedule, and searches for workers with a track that has gone
-astray.
+"""Searches of whole images: their schedule, and searches for workers whose track is wrong.
 
 A camera rests for a while if no person was found in its image. If fewer than two cameras have shown
 a tracked worker for some steps, the images of the others are searched; if these agree on a person,

@@ -63,8 +63,7 @@ class RenderedCameras(ImageSensor):
         return robot_state(chain, q, np.zeros_like(q)).capsules_world
 
     def show(self, b: int) -> Floats:
-        """Make the images present that have arrived in environment b, and return their times
-        (C,)."""
+        """Make the images present that have arrived in environment b; return their times (C,)."""
         row, history = self.now.ids.tolist().index(b), self.history
         pose = ScenePose(self.now.qpos[row].copy(), copy_arrays(one(self.now.motion, row)))
         step = history.begin_step(b)

@@ -91,8 +91,10 @@ class PerceptionPipeline(Stateful):
 
     @property
     def now_s(self) -> Floats:
-        """(B,) present time by the clock of `Keypoints.time_s` [s]; `ConfigError` without
-        cameras."""
+        """Present time (B,) by the clock of `Keypoints.time_s` [s].
+
+        Raises `ConfigError` without cameras.
+        """
         raise ConfigError("Frames are of cameras, and this perception level has none.")
 
     def crops(self, b: int) -> list[Image | None]:

@@ -5,13 +5,13 @@ nearest velocities that the arm can reach in a step. A constraint that demands a
 two: one not to approach, with a weight that outweighs nearly everything, and one to retreat: with
 a single constraint, an arm that flees from a hand pushes its wrist into the other hand.
 
-A task may let parts of estimated bodies come to the robot's hand (`Task.allowed_contact`): forearms
-and hands of a worker who takes a tool, or who works at what the robot holds. As long as these come
-no faster than their region of the body bears in a touch of this arm with its load
-(`contact.permitted_contact_speed`), no link has to retreat from them, which would take away what is
-held for them; and the last link and its load may touch them, at `contact_speed_m_s` at most, both
-speeds together no faster than the region bears. For other people, for other parts of their bodies
-and for the approach of other links (but for `creep_m_s`) nothing changes.
+A task may allow parts of estimated bodies to touch the robot's hand (`Task.allowed_contact`), such
+as the forearms and hands of a worker who takes a tool. While these approach no faster than their
+region of the body tolerates in a contact with this arm and its load
+(`contact.permitted_contact_speed`), no link retreats from them, so that the held object stays in
+reach. The last link and its load may touch them: at `contact_speed_m_s` at most, and with a sum of
+both speeds that the region tolerates. Nothing changes for other people, for other parts of their
+bodies, and for the approach of other links, except that these may approach at `creep_m_s`.
 """
 
 import math
@@ -174,8 +174,10 @@ def build_constraints(
 
 
 def _describe_bodies(belief: Belief, pose: ArmPose, is_lost: Bools, config: ShieldConfig) -> Bodies:
-    """Return the estimated bodies, those of lost workers (B, W) at rest where they were seen
-    last."""
+    """Return the estimated bodies.
+
+    Lost workers (B, W) are at rest at their last estimate.
+    """
     estimate = belief.estimate
     mean, velocity, cov = estimate.mean_world, estimate.velocity_world, estimate.cov_world
     touches = _find_allowed_touches(belief, pose, config)
@@ -210,8 +212,7 @@ class AllowedTouches:
 
 
 def _find_allowed_touches(belief: Belief, pose: ArmPose, config: ShieldConfig) -> AllowedTouches:
-    """Return the touches that "pfl" allows everywhere, and other kinds where the task allows
-    them."""
+    """Return the touches that are allowed: by "pfl" everywhere, by others as the task permits."""
     model, links = pose.model, pose.links
     shape = (*belief.estimate.tracked.shape, len(SEGMENT_REGIONS))
     if config.kind == "pfl":

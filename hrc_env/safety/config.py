@@ -81,8 +81,8 @@ class ShieldConfig:
     of the body bears."""
     margin_m: float = 0.05
     """Distance subtracted from every gap, since bodies are not capsules [m]. With a negative value
-    the shield comes nearer than the estimate says is safe, as `experiment price` does to find an
-    equal rate of contacts."""
+    the shield allows less distance than the estimate requires, as `experiment price` does to find
+    an equal rate of contacts."""
     hand_margin_m: float = 0.13
     """Distance subtracted instead of `margin_m` for forearms and hands, which are involved in
     nearly all contacts [m]."""

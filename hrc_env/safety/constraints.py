@@ -386,8 +386,10 @@ def find_travel(speed_m_s: float, params: ShieldParams) -> float:
 
 @kernel
 def find_end_velocity(body: Body, s: int, end: int) -> Vector3:
-    """Return the velocity of an end of segment `s` [m/s]; the tip of a hand turns with its
-    forearm."""
+    """Return the velocity of an end of segment `s` [m/s].
+
+    The tip of a hand turns with its forearm.
+    """
     one, two = body.velocity[_JOINTS[s, end, 0]], body.velocity[_JOINTS[s, end, 1]]
     x, y, z = 0.5 * (one[0] + two[0]), 0.5 * (one[1] + two[1]), 0.5 * (one[2] + two[2])
     if s >= _N_LIMBS and end == 1:
@@ -507,8 +509,9 @@ def bound_touch(
     Args:
         near_m: gap - margin - Z_d [m].
         touch_m_s: speed of the robot that is allowed in the touch [m/s]; 0: it only keeps its
-        place. braking_m_s2: how fast the point can be slowed down [m/s^2]. params: the reaction
-        time, and the speed of corrections.
+            place.
+        braking_m_s2: greatest deceleration of the point [m/s^2].
+        params: the reaction time, and the speed of corrections.
     """
     if touch_m_s == 0.0:
         return params.creep_m_s

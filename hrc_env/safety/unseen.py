@@ -62,8 +62,9 @@ def _limit_near_lost(belief: Belief, lost: Bools, config: ShieldConfig) -> Float
 
 
 def _limit_near_floor(belief: Belief, never_seen: Bools, config: ShieldConfig) -> Floats:
-    """Return (B,) the limit near floor that one camera alone has seen empty; 0 before the first
-    image.
+    """Return the limit (B,) near floor that one camera alone has seen empty.
+
+    It is 0 before the first image.
 
     `constraints.add_floor_constraints` keeps the distance from floor that no camera has seen.
     """

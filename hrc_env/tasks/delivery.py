@@ -273,6 +273,7 @@ class Delivery(Task[DeliveryConfig, Records1[DeliveryState]]):
     }
 
     def make_state(self, batch: int) -> Records1[DeliveryState]:
+        """Return the state of `batch` environments, to be filled by `reset`."""
         return make_records(DeliveryState, batch)
 
     def survey(self, grounds: Grounds) -> Site:
@@ -353,9 +354,11 @@ class Delivery(Task[DeliveryConfig, Records1[DeliveryState]]):
         return step
 
     def is_terminal(self, step: Records1[DeliveryStep]) -> Bools:
+        """Return (B,) whether the load was delivered in this step."""
         return step["delivered"]
 
     def view(self, state: Records1[DeliveryState], ids: Ints) -> DeliveryView:
+        """Return zone, remaining way and ranges of the scanner of environments `ids`."""
         rows = state[ids]
         return DeliveryView(
             rows["goal_world"], rows["way_m"], rows["way_direction"], rows["ranges_m"]
@@ -377,4 +380,5 @@ class Delivery(Task[DeliveryConfig, Records1[DeliveryState]]):
         }
 
     def markers(self, view: DeliveryView) -> Points3:
+        """Return a point (B, 1, 3) above the zone of each environment [m]."""
         return np.insert(view.goal_world, 2, MARKER_HEIGHT_M, axis=1)[:, None]

@@ -271,6 +271,7 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
     }
 
     def make_state(self, batch: int) -> Records1[DrywallState]:
+        """Return the state of `batch` environments, to be filled by `reset`."""
         return make_records(DrywallState, batch)
 
     def make_scene(self) -> TaskScene:
@@ -309,6 +310,7 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
         )
 
     def object_poses(self, state: Records1[DrywallState], ids: Ints) -> Floats:
+        """Return the pose (n, 1, 7) of the board."""
         return state["pose"][ids][:, None]
 
     def advance(
@@ -355,11 +357,13 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
         return Effects({"board_fixed": state["driven"] == len(SCREWS_M)}, push[:, None])
 
     def signal(self, state: Records1[DrywallState]) -> WorkerSignal:
+        """Return the stages: the worker may begin while the board is in its place."""
         return WorkerSignal(
             (state["pressed_s"] > 0.0).astype(int), np.full((len(state), 3), np.nan)
         )
 
     def is_load(self, state: Records1[DrywallState]) -> Bools:
+        """Return (B, 1) whether the board counts as part of the robot: until it is in place."""
         return (state["pressed_s"] == 0.0)[:, None]
 
     def allowed_contact(self, belief: Belief) -> Bools:
@@ -372,9 +376,11 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
         return arms & is_held_there[:, None, None]
 
     def is_terminal(self, step: Records1[DrywallStep]) -> Bools:
+        """Return (B,) whether the fixed board was let go in this step."""
         return step["done"]
 
     def view(self, state: Records1[DrywallState], ids: Ints) -> DrywallView:
+        """Return the board's target and the driven screws of environments `ids`."""
         return DrywallView(FOOT_WORLD + PLACE_M, state["driven"][ids].copy())
 
     def info(self, state: Records1[DrywallState]) -> dict[str, Floats]:
@@ -392,4 +398,5 @@ class Drywall(Task[DrywallConfig, Records1[DrywallState]]):
         }
 
     def markers(self, view: DrywallView) -> Points3:
+        """Return the target (B, 1, 3) of the board's middle [m]."""
         return np.broadcast_to(view.place_world, (len(view.driven), 1, 3))

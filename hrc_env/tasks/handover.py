@@ -323,6 +323,7 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
     }
 
     def make_state(self, batch: int) -> Records1[HandoverState]:
+        """Return the state of `batch` environments, to be filled by `reset`."""
         return make_records(HandoverState, batch)
 
     def make_scene(self) -> TaskScene:
@@ -332,6 +333,7 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
         return TaskScene(mjcf, (), (place,))
 
     def reach_targets(self) -> list[ReachTarget]:
+        """Return the place to meet the worker."""
         return [ReachTarget("the place to meet", FOOT_WORLD + MEET_M)]
 
     def reset(self, state: Records1[HandoverState], ids: Ints, rngs: Rngs, world: World) -> None:
@@ -348,6 +350,7 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
         state["left_m"][ids] = _measure_ways(middle, handle, world.robot.tool_world, none, none)
 
     def object_poses(self, state: Records1[HandoverState], ids: Ints) -> Floats:
+        """Return the pose (n, 1, 7) of the tool."""
         return state["pose"][ids][:, None]
 
     def advance(
@@ -377,6 +380,7 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
         return step
 
     def effects(self, state: Records1[HandoverState]) -> Effects:
+        """Return the push of the worker's hand on the tool."""
         return Effects({}, state["push"][:, None].copy())
 
     def signal(self, state: Records1[HandoverState]) -> WorkerSignal:
@@ -387,6 +391,7 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
         )
 
     def is_load(self, state: Records1[HandoverState]) -> Bools:
+        """Return (B, 1) whether the held tool counts as part of the robot: until it is offered."""
         return ~(state["offered"] | state["taken"])[:, None]
 
     def allowed_contact(self, belief: Belief) -> Bools:
@@ -400,9 +405,11 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
         return arms & is_brought[:, None, None]
 
     def is_terminal(self, step: Records1[HandoverStep]) -> Bools:
+        """Return (B,) whether the tool was handed over in this step."""
         return step["done"]
 
     def view(self, state: Records1[HandoverState], ids: Ints) -> HandoverView:
+        """Return the place to meet and whether the worker has the tool, of environments `ids`."""
         return HandoverView(FOOT_WORLD + MEET_M, state["taken"][ids].copy())
 
     def info(self, state: Records1[HandoverState]) -> dict[str, Floats]:
@@ -420,4 +427,5 @@ class Handover(Task[HandoverConfig, Records1[HandoverState]]):
         }
 
     def markers(self, view: HandoverView) -> Points3:
+        """Return the place (B, 1, 3) to meet the worker [m]."""
         return np.broadcast_to(view.meet_world, (len(view.taken), 1, 3))

@@ -139,9 +139,7 @@ def _measure_ways(studs_world: Points3, tool_world: Points3, placed: Bools) -> F
 
 
 class PickPlace(Task[PlacedConfig, Records1[PickPlaceState]]):
-    """Take pieces of studs from a table and lay them into a rack, while a worker takes from the
-    same table.
-    """
+    """Take pieces of studs from a table that a worker also uses, and lay them into a rack."""
 
     id = "HRCPickPlace-v0"
     config_type = PickPlaceConfig
@@ -198,6 +196,7 @@ class PickPlace(Task[PlacedConfig, Records1[PickPlaceState]]):
     }
 
     def make_state(self, batch: int) -> Records1[PickPlaceState]:
+        """Return the state of `batch` environments, to be filled by `reset`."""
         return make_records(PickPlaceState, batch)
 
     def make_scene(self) -> TaskScene:
@@ -231,6 +230,7 @@ class PickPlace(Task[PlacedConfig, Records1[PickPlaceState]]):
         state["left_m"][ids] = _measure_ways(studs, world.robot.tool_world, none)
 
     def object_poses(self, state: Records1[PickPlaceState], ids: Ints) -> Floats:
+        """Return the poses (n, 3, 7) of the pieces."""
         return state["poses"][ids]
 
     def advance(
@@ -250,9 +250,11 @@ class PickPlace(Task[PlacedConfig, Records1[PickPlaceState]]):
         return step
 
     def is_terminal(self, step: Records1[PickPlaceStep]) -> Bools | bool:
+        """Return (B,) whether all pieces are placed."""
         return step["done"]
 
     def view(self, state: Records1[PickPlaceState], ids: Ints) -> PickPlaceView:
+        """Return the placed pieces and the places of all pieces of environments `ids`."""
         return PickPlaceView(state["placed"][ids].copy(), PLACES_WORLD)
 
     def info(self, state: Records1[PickPlaceState]) -> dict[str, Floats]:
@@ -266,4 +268,5 @@ class PickPlace(Task[PlacedConfig, Records1[PickPlaceState]]):
         }
 
     def markers(self, view: PickPlaceView) -> Points3:
+        """Return the places (B, 3, 3) of the pieces in the rack [m]."""
         return np.broadcast_to(view.places_world, (len(view.placed), STUDS, 3))

@@ -63,9 +63,7 @@ def _target_places(belief: Belief) -> Floats:
 
 
 class PickPlaceGoal(PickPlace):
-    """Bring pieces of studs from a table to their goals, while a worker takes from the same
-    table.
-    """
+    """Bring pieces of studs to their goals, from a table that a worker also uses."""
 
     id = "HRCPickPlaceGoal-v0"
     config_type = PickPlaceGoalConfig

@@ -266,9 +266,11 @@ class Reach(Task[ReachConfig, Records1[ReachState]]):
     ends = "Not before the time is up. A success: every goal so far, and at least one, was reached."
 
     def make_state(self, batch: int) -> Records1[ReachState]:
+        """Return the state of `batch` environments, to be filled by `reset`."""
         return make_records(ReachState, batch)
 
     def reach_targets(self) -> list[ReachTarget]:
+        """Return the places of the goal volume that the tool has to reach."""
         return list_targets(self.config)
 
     def goal_targets(self, goal: Floats) -> list[ReachTarget]:
@@ -276,6 +278,7 @@ class Reach(Task[ReachConfig, Records1[ReachState]]):
         return [make_target(goal, self.config)]
 
     def set_goal(self, state: Records1[ReachState], ids: Ints, goals: Floats, world: World) -> None:
+        """Replace the drawn goals of environments `ids` by given ones."""
         state["goal_world"][ids] = goals
         off_m = np.linalg.norm(goals - world.robot.tool_world, axis=-1)
         state["distance_m"][ids] = off_m
@@ -297,6 +300,7 @@ class Reach(Task[ReachConfig, Records1[ReachState]]):
         return step
 
     def view(self, state: Records1[ReachState], ids: Ints) -> ReachView:
+        """Return the goals of environments `ids` and the time left to reach them."""
         return ReachView(
             state["goal_world"][ids], self.config.time_limit_s - state["goal_age_s"][ids]
         )
@@ -314,4 +318,5 @@ class Reach(Task[ReachConfig, Records1[ReachState]]):
         }
 
     def markers(self, view: ReachView) -> Points3:
+        """Return the goal (B, 1, 3) [m]."""
         return view.goal_world[:, None]

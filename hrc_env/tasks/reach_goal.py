@@ -66,9 +66,11 @@ class ReachGoal(Task[ReachGoalConfig, Records1[ReachGoalState]]):
     )
 
     def make_state(self, batch: int) -> Records1[ReachGoalState]:
+        """Return the state of `batch` environments, to be filled by `reset`."""
         return make_records(ReachGoalState, batch)
 
     def reach_targets(self) -> list[ReachTarget]:
+        """Return the places of the goal volume that the tool has to reach."""
         return list_targets(self.config)
 
     def goal_targets(self, goal: Floats) -> list[ReachTarget]:
@@ -78,6 +80,7 @@ class ReachGoal(Task[ReachGoalConfig, Records1[ReachGoalState]]):
     def set_goal(
         self, state: Records1[ReachGoalState], ids: Ints, goals: Floats, world: World
     ) -> None:
+        """Replace the drawn goals of environments `ids` by given ones."""
         state["goal_world"][ids] = goals
         state["there"][ids] = self._is_there(world.robot.tool_world, goals)
 
@@ -100,6 +103,7 @@ class ReachGoal(Task[ReachGoalConfig, Records1[ReachGoalState]]):
         return reward_reaching(tool_world, goal_world, self.config) == 0.0
 
     def view(self, state: Records1[ReachGoalState], ids: Ints) -> ReachGoalView:
+        """Return the goals of environments `ids`."""
         return ReachGoalView(state["goal_world"][ids])
 
     def info(self, state: Records1[ReachGoalState]) -> dict[str, Floats]:
@@ -112,4 +116,5 @@ class ReachGoal(Task[ReachGoalConfig, Records1[ReachGoalState]]):
         }
 
     def markers(self, view: ReachGoalView) -> Points3:
+        """Return the goal (B, 1, 3) [m]."""
         return view.goal_world[:, None]

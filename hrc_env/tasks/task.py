@@ -84,11 +84,16 @@ class Task(Generic[ConfigT, StateT]):
     """Settings of the task."""
 
     def __new__(cls, *args: Any, **kwargs: Any) -> "Task[ConfigT, StateT]":
+        """Refuse to make an instance of the base class.
+
+        Raises:
+            ConfigError: the class is `Task` itself.
+        """
         if cls is Task:
             raise ConfigError(
                 "Task is a base class. Write class MyTask(hrc_env.Task) with the attributes and "
                 "methods that its documentation names, and register the class "
-                "(docs/bring_your_own.md)."
+                "(docs/bring_your_own/task.md)."
             )
         return super().__new__(cls)
 

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from assets.emulator.clips import FAMILIES, TIMES, fit_clips, unseen_clips
+from assets.emulator.clips import FAMILIES, TIMES, list_fit_clips, list_unseen_clips
 from assets.emulator.fit.fit import fit as fit_of
 from assets.emulator.fit.novelty import new_of, novel_of
 from assets.emulator.samples import Samples
@@ -201,11 +201,11 @@ def test_what_is_told_of_new_poses_is_as_large_as_their_errors():
 
 def test_every_motion_has_a_family_and_unseen_clips_are_others():
     assert sorted(sum(FAMILIES.values(), ())) == sorted(REPERTOIRE)
-    ours, others = fit_clips(2, 0), unseen_clips(2, 0)
+    ours, others = list_fit_clips(2, 0), list_unseen_clips(2, 0)
     once = sum(TIMES.get(family, 1) * len(motions) for family, motions in FAMILIES.items())
     assert len(ours) == len(others) == 4 * once
-    assert len(fit_clips(0, 0)) == once
-    assert {clip.motion for clip in fit_clips(0, 0)} == set(REPERTOIRE)
+    assert len(list_fit_clips(0, 0)) == once
+    assert {clip.motion for clip in list_fit_clips(0, 0)} == set(REPERTOIRE)
     played = {(clip.scene, clip.motion, clip.body) for clip in ours}
     assert sum((c.scene, c.motion, c.body) in played for c in others) < len(others) / 2
     assert not {clip.seed for clip in ours} & {clip.seed for clip in others}

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from assets.emulator import matching, validate
-from assets.emulator.clips import family_of, fit_clips
-from assets.emulator.samples import postures_of, samples_of
+from assets.emulator.clips import find_family, list_fit_clips
+from assets.emulator.samples import make_samples, read_postures
 from assets.emulator.validate import (
     Compared,
     by_family,
@@ -22,7 +22,9 @@ from hrc_env.config import HRCConfig
 from hrc_env.perception.calibration import POSTURES, read_calibration
 from hrc_env.perception.emulator import EmulatorConfig
 
-ALL = [clip for clip in fit_clips(0, 3) if family_of(clip.motion) in ("stand", "walk", "fold")]
+ALL = [
+    clip for clip in list_fit_clips(0, 3) if find_family(clip.motion) in ("stand", "walk", "fold")
+]
 MOTIONS = ("stand", "walk 1.1 m/s", "squat", "kneel")
 CLIPS = [next(clip for clip in ALL if clip.motion == motion) for motion in MOTIONS]
 
@@ -50,11 +52,11 @@ def test_every_clip_draws_errors_of_its_own(played):
 
 
 def test_postures_are_shares_and_the_clips_have_them_all(played):
-    shares = np.concatenate([postures_of(each) for each in played])
+    shares = np.concatenate([read_postures(each) for each in played])
     assert shares.shape[1] == len(POSTURES)
     np.testing.assert_allclose(shares.sum(1), 1.0)
     assert (shares.max(0) > 0.8).all()
-    np.testing.assert_array_equal(samples_of(played).posture[0], postures_of(played[0])[10:])
+    np.testing.assert_array_equal(make_samples(played).posture[0], read_postures(played[0])[10:])
 
 
 def test_a_file_that_is_written_anew_is_read_anew(tmp_path):

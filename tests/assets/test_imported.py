@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from assets.emulator.clips import DT_S, UNSEEN_RIG, family_of, recorded_clips
+from assets.emulator.clips import DT_S, UNSEEN_RIG, find_family, list_recorded_clips
 from assets.emulator.recorded import MADE, RECORDINGS, perform_clip, recording
 from hrc_env.motion.repertoire import SCENES
 from hrc_env.worker.body import load_body
@@ -13,13 +13,13 @@ BROAD, SHORT = "made-broad", "made-short"
 
 def test_no_recording_is_called_as_a_motion_of_the_repertoire():
     assert not RECORDINGS.keys() & SCENES.keys()
-    assert {family_of(name) for name in RECORDINGS} == {"recorded"}
+    assert {find_family(name) for name in RECORDINGS} == {"recorded"}
     people = [name for name, role in RECORDINGS.items() if role == "validated" and name not in MADE]
     assert len(people) >= 20
 
 
 def test_clips_of_recordings_are_of_one_role_in_both_scenes():
-    clips = recorded_clips("validated", 2, 0, (UNSEEN_RIG,))
+    clips = list_recorded_clips("validated", 2, 0, (UNSEEN_RIG,))
     assert {RECORDINGS[clip.motion] for clip in clips} == {"validated"}
     for name in {clip.motion for clip in clips}:
         assert (

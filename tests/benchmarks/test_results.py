@@ -88,8 +88,8 @@ def test_numbers_pictures_and_what_they_depend_on_reach_the_documentation(desk):
     assert result.depends == whole["depends"] == {"env": 1}
     assert (folder / "shown.png").read_bytes() == b"picture"
     assert tables.provenance(["found"]) == (
-        f'*Measured on 2 cores, no GPU, at 0.2.0 (env 1): "Found" by `{result.command}` '
-        f"({result.date}).*"
+        f"*Measured by `{result.command}` on 2 cores, no GPU; version 0.2.0 (env 1), "
+        f"{result.date}.*"
     )
 
 

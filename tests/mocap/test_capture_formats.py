@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from written import ORDERS, Y_UP, angles_of, cmu_name, write_acclaim, write_bvh
+from written import ORDERS, Y_UP, cmu_name, compute_angles, write_acclaim, write_bvh
 
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.skeleton import JOINTS
@@ -78,7 +78,7 @@ def test_angles_in_any_order_turn_as_they_were_taken(order):
     rotation = about_axis("z", rng.uniform(-3, 3, 20)) @ about_axis("y", rng.uniform(-1, 1, 20))
     rotation = rotation @ about_axis("x", rng.uniform(-3, 3, 20))
     again = np.eye(3)
-    for axis, angle in zip(order.lower(), angles_of(rotation, order.lower()).T, strict=True):
+    for axis, angle in zip(order.lower(), compute_angles(rotation, order.lower()).T, strict=True):
         again = again @ about_axis(axis, angle)
     assert np.allclose(again, rotation)
 
@@ -182,6 +182,6 @@ def test_an_npz_file_of_another_shape_is_refused_with_the_right_one(work, tmp_pa
 
 
 def test_the_page_has_every_name_that_is_understood():
-    page = (Path(__file__).parents[2] / "docs" / "people_and_scenes.md").read_text()
+    page = (Path(__file__).parents[2] / "docs" / "motion_capture.md").read_text()
     for names in (*SIDED.values(), HEAD):
         assert f"| {', '.join(names)} |" in page

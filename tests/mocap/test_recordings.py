@@ -15,9 +15,9 @@ from recorded import started, walk_straight
 
 from assets.recordings import foreign
 from assets.recordings.archives import Archive, fetch
-from assets.recordings.clips import CLIPS, Recorded, capture_of, clips_of, repeated
+from assets.recordings.clips import CLIPS, Recorded, clips_of, read_capture, repeat
 from assets.recordings.sources import SOURCES
-from assets.recordings.synthetic import STYLES, Style, made_of, write
+from assets.recordings.synthetic import STYLES, Style, make_clips, write
 from assets.rotations import quaternion_from_matrix
 from benchmarks.recorded.fetch import POSE2SIM
 from hrc_env.core.errors import ConfigError, DownloadError
@@ -113,7 +113,7 @@ def test_a_wheel_that_is_none_is_refused(cache, monkeypatch):
 
 def test_a_missing_file_says_what_to_do(tmp_path):
     with pytest.raises(ConfigError, match=r"climb_0\.npy is missing.*python -m assets"):
-        capture_of(CLIPS[0], tmp_path)
+        read_capture(CLIPS[0], tmp_path)
 
 
 def climbing(joints):
@@ -128,7 +128,7 @@ def climbing(joints):
 
 def test_a_climbing_recording_has_its_joints_and_a_nose_ahead(joints, tmp_path):
     np.save(tmp_path / "a.npy", climbing(joints).astype(np.float32))
-    read, fps = foreign.joints_in(tmp_path / "a.npy")
+    read, fps = foreign.read_joints(tmp_path / "a.npy")
     assert fps == 120.0
     assert np.allclose(read[:, 1:], joints[:, 1:], atol=1e-5)
     assert np.linalg.norm(read[:, 0] - joints[:, 0], axis=-1).max() < 0.15
@@ -144,7 +144,7 @@ def test_bodies_are_found_by_name_and_tips_turn_with_them(joints, tmp_path):
     turn = np.tile(quaternion_from_matrix(about_axis("z", np.pi / 2)), (2, len(names), 1))
     np.savez(tmp_path / "a.npz", body_names=names, body_positions=place, body_rotations=turn,
              fps=60)  # fmt: skip
-    read, fps = foreign.joints_in(tmp_path / "a.npz")
+    read, fps = foreign.read_joints(tmp_path / "a.npz")
     assert fps == 60.0
     assert np.allclose(read[:, KNEE], place[:, names.index("left_shin")])
     assert np.allclose(read[:, 0] - place[:, 0], [0.0, 0.11, 0.175])
@@ -157,7 +157,7 @@ def test_hinges_and_quaternions_bend_a_humanoid(tmp_path):
     straight += [*[1.0, 0.0, 0.0, 0.0] * 2, 0.0, 1.0, 0.0, 0.0, 0.0, -1.0]
     straight += [*[1.0, 0.0, 0.0, 0.0] * 2, 0.0]
     (tmp_path / "a.txt").write_text(json.dumps({"Frames": [straight, straight]}))
-    (read, _), fps = foreign.joints_in(tmp_path / "a.txt")
+    (read, _), fps = foreign.read_joints(tmp_path / "a.txt")
     assert fps == pytest.approx(50.0)
     right, left = (read[JOINT[f"{side}_ankle"]] for side in ("right", "left"))
     assert np.allclose(right, [1.0, 0.9 - 0.421546 - 0.409870, 0.084887])
@@ -167,17 +167,17 @@ def test_hinges_and_quaternions_bend_a_humanoid(tmp_path):
 def test_a_piece_is_cut_out_of_a_recording_and_imported(joints, tmp_path):
     np.save(tmp_path / "a.npy", climbing(joints))
     piece = Recorded("a", "climb", "a.npy", "walks", 0.5, 1.5)
-    capture = capture_of(piece, tmp_path)
+    capture = read_capture(piece, tmp_path)
     assert capture.fps == 60.0
     assert len(capture.joints_world) == 61
     assert np.allclose(capture.joints_world[10, 1:3], joints[80, 1:3], atol=0.01)
     with pytest.raises(ConfigError, match=r"a is 0\.5 to 90 s of it, but it lasts"):
-        capture_of(replace(piece, last_s=90.0), tmp_path)
+        read_capture(replace(piece, last_s=90.0), tmp_path)
 
 
 def test_a_motion_is_repeated_without_a_jump_and_goes_on_where_it_ended(joints):
     stride = joints[120:240]
-    twice = repeated(stride, 2, 120.0)
+    twice = repeat(stride, 2, 120.0)
     assert len(twice) == 2 * len(stride) - 1
     assert np.array_equal(twice[: len(stride)], stride)
     step = np.linalg.norm(np.diff(twice, axis=0), axis=-1)
@@ -240,7 +240,7 @@ def test_every_listed_clip_is_played(imported, k):
 
 
 def test_synthetic_clips_are_imported_with_their_proportions_and_played():
-    made = list(made_of())
+    made = list(make_clips())
     assert Counter(style.role for style, _, _ in made) == {"fitted": 8, "validated": 4}
     fitted, validated = (
         {style.motion for style in STYLES if style.role == role} for role in ("fitted", "validated")

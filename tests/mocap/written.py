@@ -12,8 +12,8 @@ from assets.recordings.written import (
     BODY,
     ORDERS,
     Y_UP,
-    angles_of,
     cmu_name,
+    compute_angles,
     write_acclaim,
     write_bvh,
 )
@@ -22,7 +22,7 @@ from hrc_env.core.records import WorkerMotion
 from hrc_env.mocap.poses import make_marks
 from hrc_env.worker.body import worker_truth
 
-__all__ = ["BODY", "ORDERS", "Y_UP", "angles_of", "cmu_name", "write_acclaim", "write_bvh"]
+__all__ = ["BODY", "ORDERS", "Y_UP", "cmu_name", "compute_angles", "write_acclaim", "write_bvh"]
 
 
 def filmed(motion, worker=0):

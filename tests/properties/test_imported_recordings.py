@@ -6,7 +6,7 @@ Each is imported by `hrc_env.mocap`, played by workers in both scenes, and track
 import pytest
 from figures import Figure
 
-from assets.emulator.clips import UNSEEN_RIG, UNSEEN_SEEDS, recorded_clips
+from assets.emulator.clips import UNSEEN_RIG, UNSEEN_SEEDS, list_recorded_clips
 from assets.emulator.recorded import MADE
 from assets.emulator.validate import accuracy, apart, compared, in_space
 from hrc_env.config import HRCConfig
@@ -18,7 +18,7 @@ FRESH_SEED = UNSEEN_SEEDS + 4900
 @pytest.mark.long
 def test_recordings_are_seen_as_the_repertoire_is(figures, pixels):
     """Intervals are bootstraps over clips, one of each recording in each scene."""
-    clips = recorded_clips("validated", 1, FRESH_SEED, (UNSEEN_RIG,))
+    clips = list_recorded_clips("validated", 1, FRESH_SEED, (UNSEEN_RIG,))
     assert len([clip for clip in clips if clip.motion not in MADE]) >= 40
     seen = compared(clips, lambda share, label: None, HRCConfig(), None)
     by_pixels = [in_space([each]) for each in seen.pixels]

@@ -201,7 +201,7 @@ def test_the_workers_walk_depends_on_what_the_robot_does_not_on_who_looks():
 
 @pytest.mark.parametrize("task", [ID, "HRCPickPlaceGoal-v0"])
 def test_who_works_otherwise_takes_none(task):
-    """Another mix of work, as docs/people_and_scenes.md has it."""
+    """Another mix of work, as docs/workers_and_scenes.md has it."""
     motion = {"jobs": "framing", "near_probability": 1.0, "near_radius_m": (1.0, 1.35)}
     env = gymnasium.make(task, perception="none", n_workers=1, config={"motion": motion})
     env.reset(seed=1)

@@ -30,7 +30,7 @@ def fit(samples: Samples, known: tuple[Floats, float], between_m: Floats) -> Cal
     Args:
         samples: detections of the network.
         known: poses of the fit and the median distance of others from them (`novelty.poses_of`).
-        between_m: deviations between the bodies (`bodies.apart`).
+        between_m: deviations between the bodies (`bodies.compute_spread`).
     """
     s, (poses, near_m) = Cells(samples), known
     offset = offsets_of(samples)

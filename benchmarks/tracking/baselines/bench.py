@@ -104,8 +104,9 @@ def is_installed(name: str) -> bool:
 
 
 def find_follow(name: str) -> Callable[[Floats, Points2, int], Points3]:
-    """Return the function of a library: joints (T, J, 3) [m] from P (C, 3, 4), px (T, C, J, 2), a
-    seed.
+    """Return the function of a library that estimates joints.
+
+    It returns joints (T, J, 3) [m] from P (C, 3, 4), px (T, C, J, 2) and a seed.
 
     Missing pixels are NaN.
     """

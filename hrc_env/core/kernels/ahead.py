@@ -33,8 +33,10 @@ def missing(level: str | None = None) -> list[Signature]:
 
 @lru_cache(maxsize=8)
 def ensure(level: str) -> None:
-    """Compile the kernels of a perception level unless they lie on disk; progress goes to the
-    log."""
+    """Compile the kernels of a perception level unless they lie on disk.
+
+    The progress goes to the log.
+    """
     if sum(each.seconds for each in missing(level)) > AT_ONCE_S:
         compile_missing(level, _logged())
 
@@ -55,8 +57,10 @@ def compile_missing(level: str | None, say: Say) -> int:
 
 
 def _serve(wanted: Iterator[Signature], total_s: float, say: Say) -> None:
-    """Let one process compile until none are left, beside others that take from the same
-    kernels."""
+    """Let one process compile until no kernels are left.
+
+    Other processes take from the same kernels.
+    """
     quiet = f"ignore:{UNTESTED}"  # said once, by the process that needs them
     command = [sys.executable, "-W", quiet, "-m", "hrc_env.core.kernels.ahead"]
     pipes: Any = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True, "bufsize": 1}
@@ -96,8 +100,10 @@ def _logged() -> Say:
 
 
 def main() -> None:
-    """Compile the kernels that lines of JSON [kernel, args] name, and answer each; `_serve` starts
-    it."""
+    """Compile the kernels that lines of JSON [kernel, args] name, and answer each.
+
+    `_serve` starts this function.
+    """
     for line in sys.stdin:
         name, args = json.loads(line)
         try:

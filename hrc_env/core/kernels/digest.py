@@ -1,5 +1,7 @@
-"""The digest of a kernel: of its module, bytecode, options, constants and all kernels that it
-calls."""
+"""The digest of a kernel.
+
+It covers the module, bytecode, options and constants of the kernel, and all kernels that it calls.
+"""
 
 # numba's compiler, on whose inside this builds, has no types.
 # pyright: standard

@@ -25,8 +25,10 @@ from hrc_env.core.kernels.cache import KernelCache
 
 
 class LeanLibrary(codegen.JITCodeLibrary):
-    """The code of one function: that of a kernel is compiled, that of a callee is kept for its
-    callers."""
+    """The code of one function.
+
+    That of a kernel is compiled; that of a callee is kept for its callers.
+    """
 
     _is_callee = False
 

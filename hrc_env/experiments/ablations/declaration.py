@@ -75,9 +75,8 @@ def make_table(seconds: float) -> Table:
         },
         COLUMNS,
         ("study", "setting"),
-        "Level `keypoints`, estimator `particle` unless stated otherwise, "
-        f"{{n[error_m.cameras.n1.median]}} episodes of {seconds:g} s per setting on the same "
-        "walks.",
+        f"{{n[error_m.cameras.n1.median]}} episodes of {seconds:g} s per setting, with the same "
+        "walks in every setting; level `keypoints`, estimator `particle` unless stated otherwise.",
     )
 
 

@@ -83,8 +83,10 @@ class Ablations:
         return describe_quick_run(self.n_seeds, self.seconds) if is_short else ""
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings that all numbers depend on; the choice of questions changes none of
-        them."""
+        """Return the settings that all numbers depend on.
+
+        The choice of questions changes none of them.
+        """
         return {name: value for name, value in asdict(self).items() if name != "studies"}
 
     def play(self, cache: PartCache) -> Played:

@@ -27,8 +27,10 @@ _PARENT = np.where(np.arange(len(PARENT)) == ROOT, ROOT, PARENT)
 
 
 def compute_lengths_m(joints_world: Points3) -> Floats:
-    """Return the distance (B, W, J) from each joint to its parent in the tree [m]; 1 at the
-    root."""
+    """Return the distance (B, W, J) from each joint to its parent in the tree [m].
+
+    It is 1 at the root.
+    """
     lengths = np.linalg.norm(joints_world - joints_world[:, :, _PARENT], axis=-1)
     lengths[..., ROOT] = 1.0
     return lengths
@@ -56,8 +58,10 @@ def handicap(state: Any, bones: str, motion: str, lengths: Floats) -> None:
 
 
 def _forget_velocities(trees: Any) -> None:
-    """Reset velocities, and keep the marginal of all positions, which is again a Gaussian on the
-    tree."""
+    """Reset velocities, and keep the marginal of all positions.
+
+    The marginal is again a Gaussian on the tree.
+    """
     cov, slope = trees["cov"], trees["slope"]
     of_parent = cov[..., _PARENT, :, :]
     together = (slope @ of_parent)[..., :3, :3]  # of a joint's position and its parent's

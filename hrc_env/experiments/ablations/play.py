@@ -214,8 +214,7 @@ def make_scene(setting: Setting, turn: Turn) -> Scene:
 
 
 def match_tracks(mean_world: Points3, tracked: Bools, joints_world: Points3) -> Ints:
-    """Return the index of each worker's track (B, W) in the assignment with the least mean
-    distance.
+    """Return the index (B, W) of each worker's track, with the least sum of distances.
 
     Tracks that are not followed cost nothing, so they are assigned last.
 

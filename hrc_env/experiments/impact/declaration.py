@@ -18,10 +18,11 @@ estimator, one more camera or a shorter delay improve throughput and safety? Onl
 exchanged; robots, goals and workers, who ignore the robot, are the same in every row, bit for bit.
 
 All events are counted from the truth. *True cost*: steps closer than 0.15 m plus steps in contact,
-per episode; *of it moving towards*: while the robot moves towards the worker faster than
-{MOVING_M_S} m/s. The rest comes from workers who walk up to a robot at rest, and depends on where
-it rests. *Contacts* per minute, where touches within half a second count as one, are named by the
-motion of the robot in the step before: *towards* the worker, *standing arm pushed*, *moving away*.
+per episode; *while moving towards*: the part of it in steps in which the robot moves towards the
+worker faster than {MOVING_M_S} m/s. The rest comes from workers who walk up to a robot at rest, and
+depends on where it rests. *Contacts* per minute, where touches within half a second count as one,
+are classified by the motion of the robot in the step before: *towards* the worker, *standing arm
+pushed*, *moving away*.
 Per 1,000 steps, *near*: closer than {SLOW_M:g} m, the exposure; *approaches*: the robot moves
 towards a worker closer than {STOP_M:g} m; *missed stops*: the true separation is below {STOP_M:g} m
 and the estimated one is not; *false stops*: the reverse. *Z_d*: 95th percentile of the error of all
@@ -42,7 +43,7 @@ COLUMNS = (
     Column(_ROW + "false_stops", f"false stops {_STEPS}"),
     Column(_ROW + "z_d_m", "Z_d [m]", 3),
     Column(_ROW + "cost", "true cost [per episode]"),
-    Column(_ROW + "cost_towards", "of it moving towards [per episode]"),
+    Column(_ROW + "cost_towards", "true cost while moving towards [per episode]"),
 )
 """Columns of the documentation and of the report."""
 MORE = (
@@ -60,13 +61,13 @@ NUMBERS = {
     "goals_lost_with_one": Column(f"difference.{PPO}.{ONE}.goals_per_min", scale=-1),
 }
 NOTE = (
-    f"{{n[{SLOWED}.truth.cost]}} episodes per row, the same workers in every row. Approach: the "
-    f"robot moves at more than {100 * MOVING_M_S:g} cm/s towards a worker closer than {STOP_M:.2f} "
-    "m. Missed stop: the true separation requires a stop and the estimated one does not; false "
-    "stop: the reverse. Contacts (exact 95 % intervals) are counted if the robot moved towards the "
-    "worker in the step before, cost in steps in which it does. Z_d: 95th percentile of the error "
-    "of all joints. Fewer than four cameras: the others fail after the first second. None: the "
-    "robot has no track of any worker."
+    f"{{n[{SLOWED}.truth.cost]}} episodes per row, with the same workers in every row. Approach: a "
+    f"step in which the robot moves faster than {100 * MOVING_M_S:g} cm/s towards a worker closer "
+    f"than {STOP_M:.2f} m. Missed stop: a step in which the true separation is below {STOP_M:.2f} "
+    "m and the estimated one is not; false stop: the reverse. Contacts towards (exact 95 % "
+    "intervals): the robot moved towards the worker in the step before. Z_d: 95th percentile of "
+    "the error of all joints. Fewer than four cameras: the others fail after the first second. "
+    "None: the robot has no track of any worker."
 )
 LATENESS = Table(
     "lateness",
@@ -80,14 +81,17 @@ LATENESS = Table(
     (
         Column("lateness.{}.nominal_m", "nominal tax [m]", 3, plain=True),
         Column("lateness.{}.speeds_here_m", "tax with measured speeds [m]", 3, plain=True),
-        Column("lateness.{}.squares_m", "squares added [m]", 3, plain=True),
+        Column("lateness.{}.squares_m", "if independent [m]", 3, plain=True),
         Column("lateness.{}.belief_m", "measured in the belief [m]", 3),
         Column("lateness.{}.margin_m", "measured in the loop [m]", 3),
     ),
     ("latency",),
-    f"Nominal tax: latency x ({NOMINAL_MPS} m/s + robot speed), in addition to Z_d. Measured in "
-    "the belief: growth of the 95th percentile of the estimated minus the true separation. In the "
-    "loop: margin that `scripted_slowed` must add until its share of missed stops is that on time.",
+    f"Nominal tax: latency x ({NOMINAL_MPS} m/s + speed of the robot); with measured speeds: with "
+    "the speeds of workers and robot in these episodes; if independent: the growth that would "
+    "follow if latency and all other errors were independent. Measured in the belief: growth of "
+    "the 95th percentile of the estimated minus the true separation. Measured in the loop: margin "
+    "that `scripted_slowed` must add to have the share of missed stops that it has without "
+    "latency.",
 )
 
 
@@ -119,8 +123,9 @@ def make_differences_table(policy: str, setups: Sequence[str], marked: bool) -> 
 
 
 def make_documentation_table(setups: Sequence[str]) -> Table:
-    """Return the table of the documentation, without setups of rendered images, whose rows are
-    short.
+    """Return the documentation's table.
+
+    Setups of rendered images are left out, as their rows are short.
 
     Args:
         setups: names of setups.

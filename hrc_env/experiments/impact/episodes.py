@@ -88,7 +88,11 @@ def play_row(
     Args:
         setup: perception of the robot.
         env_arguments: other arguments of the environments.
-        seeds, n_steps, make_agent, margin_m, tick: as in `play`.
+        seeds: seeds, one per episode.
+        n_steps: control steps of an episode.
+        make_agent: makes the policy, which receives observations only.
+        margin_m: distance that the policy adds to its limits [m].
+        tick: is called with the growth of the completed share.
     """
     with closing(Stage(setup, setup.turns, env_arguments)) as stage:
         return play(stage, seeds, n_steps, make_agent, margin_m, tick)

@@ -47,8 +47,8 @@ ERRORS = Table(
     },
     COLUMNS,
     ("motion",),
-    f"{{n[missed.camera_1.standing]}} films of each of six motions, 15 joints, estimator "
-    f"`{ESTIMATORS[0]}` but in the last row.",
+    f"{{n[missed.camera_1.standing]}} films of each of six motions, 15 joints. The estimator is "
+    f"`{ESTIMATORS[0]}`, except in the last row.",
 )
 FAR = Table(
     "lab_far",

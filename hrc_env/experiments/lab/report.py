@@ -55,8 +55,9 @@ def make_report(figures: Path, take: Callable[[str], Recording], metrics: Metric
 
 
 def draw_poses(path: Path, take: Callable[[str], Recording]) -> None:
-    """Draw one row per motion: a crop with its detections, and the body from one camera and from
-    four.
+    """Draw one row per motion.
+
+    It shows a crop with its detections, and the body from one camera and from four.
 
     Args:
         path: file of the picture.

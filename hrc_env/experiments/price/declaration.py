@@ -27,13 +27,15 @@ other contacts are not equalized. With true joints the shield still has its own 
 around them. At a stricter level, or with another shield, the order may differ."""
 _ROW, _FRESH = "{0}.{1}.", "confirmed."
 """Prefixes of metrics: task and perception setup, and counts of fresh episodes."""
-PLAYED = Column(f"{_ROW}{_FRESH}margin_m", "margin played [m]", 4, plain=True)
-TOWARDS = Column(f"{_ROW}{_FRESH}towards", "contacts towards with it [per 1,000]", 0, counted=True)
+PLAYED = Column(f"{_ROW}{_FRESH}margin_m", "tested margin [m]", 4, plain=True)
+TOWARDS = Column(
+    f"{_ROW}{_FRESH}towards", "contacts towards at tested margin [per 1,000]", 0, counted=True
+)
 LEFT = (
     Column(_ROW + "margin_m", "margin [m]", 3),
     Column(_ROW + "goals_per_min", "goals [1/min]"),
-    Column(_ROW + "share", "share of unshielded [%]", 0, 100),
-    Column(_ROW + "of_truth", "share of true joints [%]", 0, 100),
+    Column(_ROW + "share", "throughput [% of unshielded]", 0, 100),
+    Column(_ROW + "of_truth", "throughput [% of true joints]", 0, 100),
 )
 """Columns of the metrics at the rate of contacts."""
 COLUMNS = (*LEFT, PLAYED, TOWARDS)
@@ -41,27 +43,27 @@ COLUMNS = (*LEFT, PLAYED, TOWARDS)
 MORE = (
     Column(f"{_ROW}{_FRESH}standing", "standing [per 1,000]", 0, counted=True),
     Column(f"{_ROW}{_FRESH}away", "fleeing [per 1,000]", 0, counted=True),
-    Column(f"{_ROW}{_FRESH}goals_per_min", "goals with it [1/min]"),
-    Column(f"{_ROW}{_FRESH}cost", "true cost with it"),
+    Column(f"{_ROW}{_FRESH}goals_per_min", "goals at tested margin [1/min]"),
+    Column(f"{_ROW}{_FRESH}cost", "true cost at tested margin"),
 )
 """Further columns of the report."""
 CONTRAST_LABELS = {
     "three_cameras": "the fourth camera", "two_cameras": "the third and the fourth camera",
-    "one_camera": "all cameras but one", "late_120ms": "images on time, not 120 ms late (known)",
-    "late_200ms": "images on time, not 200 ms late (known)",
+    "one_camera": "the second to the fourth camera",
+    "late_120ms": "images on time instead of 120 ms late, time-stamped",
+    "late_200ms": "images on time instead of 200 ms late, time-stamped",
     "telling_120ms": "time stamps of images 120 ms late",
-    "telling_200ms": "time stamps of images 200 ms late", "kalman": "particle rather than kalman",
-    "paper_restarts": "particle rather than paper_restarts",
-    "triangulation": "particle rather than triangulation",
-    "calibration": "cameras that are not turned by 1 degree",
-    "half_covariance": "covariances as estimated, not half as large",
-    "twice_covariance": "covariances as estimated, not twice as large",
-    "honesty_of_one": "with one camera: covariances as estimated, not half as large",
-    "truth": "true joints rather than four cameras",
-    "calibration_over_accuracy": "calibrated cameras more than a better estimator "
+    "telling_200ms": "time stamps of images 200 ms late", "kalman": "particle instead of kalman",
+    "paper_restarts": "particle instead of paper_restarts",
+    "triangulation": "particle instead of triangulation",
+    "calibration": "correct calibration instead of all cameras turned by 1 degree",
+    "half_covariance": "covariances as estimated instead of halved",
+    "twice_covariance": "covariances as estimated instead of doubled",
+    "honesty_of_one": "with one camera: covariances as estimated instead of halved",
+    "truth": "true joints instead of four cameras",
+    "calibration_over_accuracy": "correct calibration over a better estimator "
     "(triangulation minus cameras turned by 1 degree)",
 }  # fmt: skip
-"""Labels of `CONTRASTS`."""
 """Labels of `CONTRASTS`."""
 WORTH = Table(
     "worth",
@@ -69,9 +71,9 @@ WORTH = Table(
     {question: (label,) for question, label in CONTRAST_LABELS.items()},
     (Column("worth.{}", "gain [%]", 1, 100.0, signed=True),),
     ("improvement",),
-    "Throughput gained by the improvement at that rate of contacts and with this shield, in "
-    "percent of an unshielded robot's; the same seeds. A dot marks an interval that excludes zero. "
-    "Intervals are not corrected for the number of rows.",
+    "Throughput gained by the improvement at the same rate of contacts, in percentage points of "
+    "the throughput of an unshielded robot, on the same seeds. A dot marks an interval that "
+    "excludes zero; intervals are not corrected for the number of rows.",
 )
 
 
@@ -105,12 +107,13 @@ def make_price_table(
         (*COLUMNS, *more),
         ("perception",),
         f"Goals that {robot} reaches beside workers of one body who ignore it, with emulated "
-        f"detections, with the `{SHIELD}` shield and the margin at which it touches a worker while "
-        f"moving towards them {level:g} times in 1,000 episodes of 10 s, "
-        f"{count_per_hour(level):.1f} times an hour. Rates of other contacts are not equalized. "
-        "The margin is added to all protective distances; 0 is the shield with its defaults. True "
-        f"joints: the shield has its own body around them. Margins are found on {n_seeds} episodes "
-        f"and corrected by {{n[{task}.{eyes[0].name}.margin_m]}} others.",
+        f"detections and the `{SHIELD}` shield. Each setup has the margin with which the robot "
+        f"touches a worker while moving towards them {level:g} times in 1,000 episodes of 10 s, "
+        f"that is {count_per_hour(level):.1f} times an hour; other contacts are not equalized. "
+        "The margin is added to all protective distances; 0 is the default shield, and negative "
+        f"margins let the robot come closer. It is found on {n_seeds} episodes and corrected by "
+        f"{{n[{task}.{eyes[0].name}.margin_m]}} others, which are played with the tested margin. "
+        "True joints: the shield knows the joints and has its own model of the body around them.",
     )
 
 
@@ -130,11 +133,12 @@ def make_tasks_table(tasks: Sequence[str]) -> Table:
         {task: (f"`{task}`",) for task in tasks},
         (*shares, Column("{}.ranking", "ranking holds [%]", 0, 100, plain=True)),
         ("task",),
-        "Share of the throughput of an unshielded robot with true joints, at that rate of contacts "
-        "or, if it is not reached, at the least margin tried. Such rows have fewer and unequal "
-        "numbers of contacts; there the shield's speed limit near unseen areas, which the margin "
-        "does not change, slows the robot with one camera. Ranking: the share of draws in which "
-        "true joints keep at least as much as four cameras, and these as much as one.",
+        "Throughput as a share of that of an unshielded robot with true joints, at the same rate "
+        "of contacts or, where that rate is not reached, at the lowest margin that was tried. "
+        "Rows that do not reach the rate have fewer contacts; there the shield's speed limit near "
+        "unseen areas, which does not depend on the margin, slows the robot with one camera. "
+        "Ranking: share of bootstrap samples in which true joints give at least the throughput of "
+        "four cameras, and four cameras at least that of one.",
     )
 
 
@@ -144,7 +148,7 @@ def _make_rate_columns(prefix: str) -> list[Column]:
         replace(
             column,
             metric=prefix + column.metric.removeprefix(_ROW + _FRESH),
-            heading=column.heading.replace(" with it", ""),
+            heading=column.heading.replace(" at tested margin", ""),
         )
         for column in (TOWARDS, *MORE)
     ]

@@ -68,8 +68,10 @@ class Driver:
         return {} if control is None else {"control": control}
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings of the agent that episodes depend on, for JSON; empty for the
-        default."""
+        """Return the agent's settings that episodes depend on, for JSON.
+
+        They are empty for the default agent.
+        """
         settings = {} if self.agent == SCRIPTED else {"agent": describe_agent(self.agent)}
         return settings | self.env_arguments
 

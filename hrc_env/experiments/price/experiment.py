@@ -128,15 +128,19 @@ class Price:
         return self.list_seeds(self.task, self.n_seeds) + fresh
 
     def list_seeds(self, task: str, n: int, first: int = FIRST_SEED) -> list[int]:
-        """Return seeds of a task, one per episode, that take as long as `n` episodes of the default
-        task."""
+        """Return one seed per episode for a task.
+
+        They take as long as `n` episodes of the default task.
+        """
         share = find_task(DEFAULT).max_episode_steps / find_task(task).max_episode_steps
         return [first + k for k in range(max(round(n * share), 1))]
 
     @property
     def n_parts(self) -> int:
-        """Greatest number of search steps, plus episodes without a shield and with rendered
-        images."""
+        """Greatest number of search steps and of other episodes.
+
+        The others are those without a shield and those with rendered images.
+        """
         n_cases = sum(1 for _ in self.list_cases())
         n_levels = 2 if self.n_pixels and FOUR in self.eyes else 0
         n_each = self.n_search + 4 + len(BEYOND_M)

@@ -66,11 +66,13 @@ def _fail_each(kind: str, amount: float | None = None, start_s: float = 0.0) -> 
 
 def _make_late(latency_s: float, is_told: bool) -> Eyes:
     ms = round(1000 * latency_s)
-    known = "known" if is_told else "not known"
+    stamped = "time-stamped" if is_told else "not time-stamped"
     return Eyes(
-        f"late_{ms}ms{'' if is_told else '_untold'}", f"images {ms} ms late, {known}",
-        "latency", PerceptionSetup(latency_s=latency_s, is_told=is_told),
-    )  # fmt: skip
+        f"late_{ms}ms{'' if is_told else '_untold'}",
+        f"images {ms} ms late, {stamped}",
+        "latency",
+        PerceptionSetup(latency_s=latency_s, is_told=is_told),
+    )
 
 
 def list_eyes() -> dict[str, Eyes]:
@@ -84,7 +86,7 @@ def list_eyes() -> dict[str, Eyes]:
         ("all_turned_1deg", "all cameras turned by 1 degree", _fail_all("wrong_rotation", degree)),
         (
             "all_turned_0_3deg",
-            "all turned by .3 degrees",
+            "all turned by 0.3 degrees",
             _fail_all("wrong_rotation", 0.3 * degree),
         ),
         ("all_moved_10cm", "all cameras moved by 10 cm", _fail_all("wrong_translation", 0.1)),

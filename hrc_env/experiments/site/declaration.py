@@ -56,12 +56,11 @@ def make_errors_table(estimators: tuple[str, ...], seconds: float) -> Table:
         "Site: RMSE of the head",
         rows,
         COLUMNS,
-        note=f"{{n[rmse_m.{first}.{MULTI}]}} walks of {seconds:g} s, with 95 % bootstrap intervals "
-        "over walks. From the first frame: only the cameras of the column are ever used, as in "
-        "the paper; in other rows all four are used until the worker, who may begin out of sight, "
-        "has been seen for a second, which is evaluated in no row. Own crops: "
-        f"{{n[closed_rmse_m.{first}.{MULTI}]}} walks in which the crops follow the estimator's own "
-        "prediction.",
+        note=f"{{n[rmse_m.{first}.{MULTI}]}} walks of {seconds:g} s; 95 % bootstrap intervals over "
+        "walks. From the first frame: only the cameras of the column are used, as in the paper. In "
+        "other rows all four cameras are used until the worker, who may begin out of sight, has "
+        "been visible for a second. No row evaluates that second. Own crops: the crops follow the "
+        f"estimator's own prediction, in {{n[closed_rmse_m.{first}.{MULTI}]}} walks.",
         numbers=NUMBERS,
         printed={f"printed.{camera}": value for camera, value in PAPER_RMSE_M.items()},
     )

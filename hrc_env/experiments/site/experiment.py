@@ -169,8 +169,10 @@ def _find_first_detection(recording: Recording) -> int:
 def film_own_crops(
     config: Site, estimator: str, row: str, seed: int, tick: PartProgress
 ) -> dict[str, Any]:
-    """Return the estimates on a walk with crops that follow the estimator; some cameras fail
-    early."""
+    """Return the estimates on a walk with crops that follow the estimator.
+
+    Some cameras fail early.
+    """
     settings = replace(SETTINGS, faults=make_turns("site", [CHOICES[row]])[0].faults)
     motions = walk(make_site(), seed, round(config.seconds / DT_S), DT_S)
     recording = record(make_site(), motions, settings, estimator, seed, tick)

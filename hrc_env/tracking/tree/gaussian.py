@@ -134,7 +134,12 @@ def invert_half(a00: float, a10: float, a11: float, a20: float, a21: float, a22:
     Unlike cofactors it loses no digits where a matrix is nearly singular.
 
     Args:
-        a00, a10, a11, a20, a21, a22: the lower triangle of the matrix.
+        a00: element (0, 0) of the lower triangle.
+        a10: element (1, 0) of the lower triangle.
+        a11: element (1, 1) of the lower triangle.
+        a20: element (2, 0) of the lower triangle.
+        a21: element (2, 1) of the lower triangle.
+        a22: element (2, 2) of the lower triangle.
     """
     d0 = 1.0 / a00
     l10, l20 = a10 * d0, a20 * d0

@@ -72,8 +72,10 @@ _J = N_JOINTS
 
 
 class Pair:
-    """The relative calibration of two cameras that alone see a worker, as `pair_calibration`
-    learns it."""
+    """The relative calibration of two cameras that alone see a worker.
+
+    `pair_calibration` learns it.
+    """
 
     cameras: Annotated[Ints, (2,)]
     """Indices of the two cameras."""
