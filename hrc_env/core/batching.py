@@ -21,12 +21,12 @@ State = dict[str, Any]
 
 def rows(record: RecordT, ids: Ints | Bools) -> RecordT:
     """Return rows `ids` of every array of a (nested) record, as copies."""
-    return mapped(record, lambda array: array[ids])
+    return map_arrays(record, lambda array: array[ids])
 
 
 def one(record: RecordT, b: int) -> RecordT:
     """Return environment `b` of a record without the batch axis; its arrays are views."""
-    return mapped(record, lambda array: array[b])
+    return map_arrays(record, lambda array: array[b])
 
 
 def write_rows(record: object, ids: Any, part: object) -> None:
@@ -46,37 +46,37 @@ def write_rows(record: object, ids: Any, part: object) -> None:
         write_rows(getattr(record, name), ids, getattr(part, name))
 
 
-def mapped(record: RecordT, change: Callable[[Any], Any]) -> RecordT:
+def map_arrays(record: RecordT, change: Callable[[Any], Any]) -> RecordT:
     """Return a (nested) record of the same kind with `change` applied to every array."""
     if is_array(record):
         return change(record)
     if is_dict(record):
-        changed: Any = type(record)((k, mapped(part, change)) for k, part in record.items())
+        changed: Any = type(record)((k, map_arrays(part, change)) for k, part in record.items())
         return changed
     names = names_of(type(record))
-    values = [mapped(getattr(record, name), change) for name in names]
+    values = [map_arrays(getattr(record, name), change) for name in names]
     return type(record)(*values) if names else record
 
 
-def copied(value: Any) -> Any:
+def copy_arrays(value: Any) -> Any:
     """Return a deep copy of records, lists and generators; read-only arrays are shared."""
     if is_array(value):
         return value.copy() if value.flags.writeable else value
     kind = cast(type[Any], type(value))
     if names := names_of(kind):
-        return kind(*[copied(getattr(value, name)) for name in names])
+        return kind(*[copy_arrays(getattr(value, name)) for name in names])
     if is_list_or_tuple(value):
-        return type(value)(copied(each) for each in value)
+        return type(value)(copy_arrays(each) for each in value)
     return copy.deepcopy(value)
 
 
-def flat(array: Floats, n_last: int) -> Floats:
+def flatten_axes(array: Floats, n_last: int) -> Floats:
     """Return an array (..., *last) as (count, *last), contiguous; `last` has `n_last` axes."""
     last = array.shape[-n_last:]
     return np.ascontiguousarray(array).reshape(math.prod(array.shape[:-n_last]), *last)
 
 
-def picked(streams: Sequence[np.random.Generator], ids: Ints) -> list[np.random.Generator]:
+def select_streams(streams: Sequence[np.random.Generator], ids: Ints) -> list[np.random.Generator]:
     """Return the generators of environments `ids`."""
     return [streams[b] for b in ids]
 
@@ -93,7 +93,7 @@ class Stateful:
         """Return a copy of everything that changes; `set_state` restores it bit for bit."""
         parts = {name: getattr(self, name) for name in self.CHANGES}
         return {
-            name: part.get_state() if hasattr(part, "get_state") else copied(part)
+            name: part.get_state() if hasattr(part, "get_state") else copy_arrays(part)
             for name, part in parts.items()
         }
 
@@ -104,7 +104,7 @@ class Stateful:
             if hasattr(part, "set_state"):
                 part.set_state(state[name])
             else:
-                setattr(self, name, copied(state[name]))
+                setattr(self, name, copy_arrays(state[name]))
 
 
 @functools.cache

@@ -17,12 +17,12 @@ LONGEST = 80
 """Number of characters of a value that an error shows."""
 
 
-def described(value: object) -> str:
+def describe(value: object) -> str:
     """Describe a value in a few words, for errors."""
     if is_array(value):
         return f"an array of {value.dtype} with shape {value.shape}"
     if is_list_or_tuple(value):
-        parts = ", ".join(described(each) for each in value[:4])
+        parts = ", ".join(describe(each) for each in value[:4])
         more = ", ..." if len(value) > 4 else ""
         return f"a {type(value).__name__} of {len(value)} ({parts}{more})"
     text = repr(value)
@@ -98,10 +98,10 @@ def numbers_of(
     try:
         array = np.asarray(value)
     except (ValueError, TypeError) as error:  # lists of unlike lengths, broken __array__
-        raise ConfigError(f"{what} must be an array, got {described(value)}: {error}") from error
+        raise ConfigError(f"{what} must be an array, got {describe(value)}: {error}") from error
     if array.dtype.kind not in "fiub":
         raise ConfigError(
-            f"{what} must be real numbers of shape {shape} ({meaning}), got {described(value)}."
+            f"{what} must be real numbers of shape {shape} ({meaning}), got {describe(value)}."
         )
     check_shape(what, array.shape, shape, meaning)
     numbers = np.array(array, np.float64, order="C")
@@ -150,7 +150,7 @@ def positive(what: str, value: object, unit: str) -> float:
         plain = np.nan
     number = float(plain)
     if not 0 < number < np.inf:
-        raise ConfigError(f"{what} must be positive and finite [{unit}], got {described(value)}.")
+        raise ConfigError(f"{what} must be positive and finite [{unit}], got {describe(value)}.")
     return number
 
 
@@ -159,15 +159,13 @@ def check_kind(what: str, value: object, *kinds: type | None) -> None:
     if not any(value is None if kind is None else isinstance(value, kind) for kind in kinds):
         names = " or ".join("None" if kind is None else kind.__name__ for kind in kinds)
         article = "an" if names[0] in "AEIOaeio" else "a"
-        raise ConfigError(f"{what} must be {article} {names}, got {described(value)}.")
+        raise ConfigError(f"{what} must be {article} {names}, got {describe(value)}.")
 
 
 def check_kinds(what: str, values: object, *kinds: type) -> None:
     """Raise `ConfigError` unless there is a sequence of at least one value of these kinds."""
     if not is_list_or_tuple(values) or not values:
         names = " or ".join(kind.__name__ for kind in kinds)
-        raise ConfigError(
-            f"{what} must be a list of at least one {names}, got {described(values)}."
-        )
+        raise ConfigError(f"{what} must be a list of at least one {names}, got {describe(values)}.")
     for k, value in enumerate(values):
         check_kind(f"{what}[{k}]", value, *kinds)

@@ -76,7 +76,7 @@ REGISTERED = ("task", "environment", "robot", "estimator", "detector", "shield")
 OWN = "One of your own is known once its file is imported: --import FILE, hrc_env.import_files."
 
 
-def unknown(what: str, got: object, valid: Iterable[str]) -> ConfigError:
+def make_unknown_name_error(what: str, got: object, valid: Iterable[str]) -> ConfigError:
     """Return the error for an unknown name, with the nearest valid one.
 
     Args:
@@ -95,7 +95,7 @@ def check_names(what: str, names: Iterable[object], valid: Collection[str]) -> N
     """Raise `ConfigError` for the first of the names that is not valid, if there is one."""
     for name in names:
         if name not in valid:
-            raise unknown(what, name, valid)
+            raise make_unknown_name_error(what, name, valid)
 
 
 _MUST: dict[str, Callable[[float], bool]] = {
@@ -122,7 +122,7 @@ def check_fields(record: object, must: str, *names: str) -> None:
             raise ConfigError(f"{name} must {must}, got {value}.")
 
 
-def needed(value: T | None, what: str) -> T:
+def require(value: T | None, what: str) -> T:
     """Return a value that must not be None, or raise `ConfigError`."""
     if value is None:
         raise ConfigError(f"{what} is asked for, and there is none here.")
@@ -142,7 +142,7 @@ def check_shape(what: str, got: tuple[int, ...], expected: tuple[int, ...], mean
         raise ConfigError(f"{what} must have shape {expected} ({meaning}), got {tuple(got)}.")
 
 
-def whole(what: str, value: Any, low: int, high: int) -> int:
+def check_integer(what: str, value: Any, low: int, high: int) -> int:
     """Return an integer from `low` to `high`, or raise `ConfigError`."""
     is_bool = isinstance(value, bool)
     if is_bool or not isinstance(value, numbers.Integral) or not low <= int(value) <= high:

@@ -2,7 +2,7 @@
 
 Internally NaN stands where there was nothing to measure. Users receive infos with the same keys
 from the reset on and without NaN: the distance to an absent worker is infinite, and beside a finite
-stand-in a key states whether the number was measured. Words are encoded as indices; `worded`
+stand-in a key states whether the number was measured. Words are encoded as indices; `name_indices`
 translates them.
 """
 
@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.core.brought import described
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.brought import describe
+from hrc_env.core.errors import ConfigError, make_unknown_name_error
 from hrc_env.core.typing import Ints, is_sequence_of_text
 
 Info = dict[str, NDArray[Any]]
@@ -31,7 +31,7 @@ WORDS = {
     CONTACT_KIND: "contact_kind",
     CONTACT_REGION: "contact_region",
 }
-"""Keys of `worded`, with the names in `OF_WORKERS` of the indices behind them."""
+"""Keys of `name_indices`, with the names in `OF_WORKERS` of the indices behind them."""
 PEOPLE = ("activity", "body")
 """Words that there are for each worker."""
 Words = dict[str, tuple[str, ...]]
@@ -291,7 +291,7 @@ def entry_of(name: str) -> Entry:
     return OWN._replace(flag=f"{name}_measured")
 
 
-def published(info: Info) -> Info:
+def publish(info: Info) -> Info:
     """Return numbers (B,) without NaN, with the keys that state whether they were measured."""
     told: Info = {}
     for name, values in info.items():
@@ -311,7 +311,7 @@ def is_of_belief(name: str) -> bool:
     return name.startswith(OF_BELIEF)
 
 
-def matching(patterns: str | Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
+def match_keys(patterns: str | Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
     """Return the keys of infos that match patterns, in the order of the infos.
 
     Args:
@@ -325,14 +325,14 @@ def matching(patterns: str | Sequence[str], names: Sequence[str]) -> tuple[str, 
     if not is_sequence_of_text(given):
         raise ConfigError(
             'infos must be names or patterns of names, as ("cost", "safety/*"), got '
-            f"{described(patterns)}."
+            f"{describe(patterns)}."
         )
     for each in given:
         if each in RENAMED:
             raise ConfigError(_describe_renaming(each))
         if not any(fnmatch.fnmatchcase(name, each) for name in names):
             folders = dict.fromkeys(f"{name.rpartition('/')[0]}/*" for name in names if "/" in name)
-            raise unknown("info", each, [*folders, *names])
+            raise make_unknown_name_error("info", each, [*folders, *names])
     return tuple(name for name in names if any(fnmatch.fnmatchcase(name, each) for each in given))
 
 
@@ -345,7 +345,7 @@ def of_workers(**parts: Ints) -> Info:
     }
 
 
-def worded(info: Mapping[str, Any], words: Mapping[str, Sequence[str]]) -> Words:
+def name_indices(info: Mapping[str, Any], words: Mapping[str, Sequence[str]]) -> Words:
     """Return the words for the indices in the info of one environment.
 
     Args:

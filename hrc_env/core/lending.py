@@ -70,7 +70,7 @@ def _is_of_user(function: Any) -> bool:
     return str(getattr(function, "__module__", "")).partition(".")[0] != "hrc_env"
 
 
-def called(what: str, function: Callable[..., Any], *given: Any) -> Any:
+def call_user_function(what: str, function: Callable[..., Any], *given: Any) -> Any:
     """Call a function of a user with read-only arguments.
 
     Args:

@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, make_unknown_name_error
 from hrc_env.core.typing import is_array, is_list_or_tuple, is_mapping, is_numpy_scalar
 
 RecordT = TypeVar("RecordT")
@@ -70,7 +70,7 @@ def from_mapping(
         where = f"{path}{name}"
         if where not in names:
             raise _unknown_field(kind, "config field", path, name)
-        values[name] = restored(hints[name], value, where)
+        values[name] = convert_to_hint(hints[name], value, where)
     for each in fields:
         nothing = each.default is each.default_factory is dataclasses.MISSING
         if nothing and each.name not in values:
@@ -87,14 +87,14 @@ def _unknown_field(record: type, what: str, path: str, name: str) -> ConfigError
     if name in renamed:
         return ConfigError(f"The {what} {path}{name} is called {path}{renamed[name]} now.")
     names = [f"{path}{each.name}" for each in dataclasses.fields(record)]
-    return unknown(what, f"{path}{name}", names)
+    return make_unknown_name_error(what, f"{path}{name}", names)
 
 
-def restored(hint: Any, value: Any, where: str) -> Any:
+def convert_to_hint(hint: Any, value: Any, where: str) -> Any:
     """Return a value converted to a type hint, or raise `ConfigError` with the path `where`."""
     if isinstance(value, str) and (presets := PRESETS.get(hint, {})):
         if value not in presets:
-            raise unknown(where, value, presets)
+            raise make_unknown_name_error(where, value, presets)
         return presets[value]
     if dataclasses.is_dataclass(hint):
         if is_mapping(value):
@@ -134,7 +134,7 @@ def _one_of(hints: tuple[Any, ...], value: Any, where: str) -> Any:
     refused: list[str] = []
     for hint in hints:
         try:
-            return restored(hint, value, where)
+            return convert_to_hint(hint, value, where)
         except ConfigError as error:
             refused.append(str(error))
     raise ConfigError(" Or: ".join(refused))
@@ -147,7 +147,7 @@ def _tuple(hint: Any, value: Any, where: str) -> tuple[Any, ...]:
     hints = [inner[0]] * len(value) if inner[-1] is Ellipsis else list(inner)
     _checked(len(value) == len(hints), f"{len(hints)} values", value, where)
     return tuple(
-        restored(hint, part, f"{where}[{k}]")
+        convert_to_hint(hint, part, f"{where}[{k}]")
         for k, (hint, part) in enumerate(zip(hints, value, strict=True))
     )
 
@@ -161,16 +161,16 @@ def merge(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
     return both
 
 
-def plain(value: Any) -> Any:
+def convert_to_plain(value: Any) -> Any:
     """Return a value in JSON's types where it has such a form.
 
     Paths become text, NumPy's numbers and enumerations their values. Others (a recorded clip, a
     function) are returned as they are; `for_json` refuses them.
     """
     if is_mapping(value):
-        return {name: plain(each) for name, each in value.items()}
+        return {name: convert_to_plain(each) for name, each in value.items()}
     if is_list_or_tuple(value):
-        return type(value)(map(plain, value))
+        return type(value)(map(convert_to_plain, value))
     if is_array(value) or is_numpy_scalar(value):
         return value.tolist()
     if isinstance(value, enum.Enum):
@@ -185,7 +185,7 @@ def for_json(value: Any, where: str) -> Any:
         ConfigError: a part has no such form: a function, a class, a recording; the message has its
             path.
     """
-    value = plain(value)
+    value = convert_to_plain(value)
     if is_mapping(value):
         return {name: for_json(each, f"{where}.{name}") for name, each in value.items()}
     if is_list_or_tuple(value):

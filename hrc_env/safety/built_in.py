@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hrc_env.belief import Belief
-from hrc_env.core.errors import needed
+from hrc_env.core.errors import require
 from hrc_env.core.kernels import kernel
 from hrc_env.core.typing import Bools, Floats, Ints, JointVelocities, Transforms
 from hrc_env.core.vacancy import WALKING_M_S
@@ -111,7 +111,7 @@ def limit_command(
 
 def describe_pose(belief: Belief) -> ArmPose:
     """Return where links and capsules are; the last link carries the loads."""
-    model = needed(belief.model, "A robot's model (RobotModel), which a built-in shield needs,")
+    model = require(belief.model, "A robot's model (RobotModel), which a built-in shield needs,")
     n_loads = len(belief.robot.capsule_radius_m) - len(model.chain.capsule_link)
     carried = np.full(n_loads, model.chain.n_joints - 1)
     links = np.append(model.chain.capsule_link, carried)
@@ -142,7 +142,7 @@ def build_constraints(
     model, batch = pose.model, len(wanted)
     low, high = np.minimum(wanted, 0.0), np.maximum(wanted, 0.0)
     if config.kind != "ssm":
-        in_force = needed(belief.command, "The command in force, which a built-in shield needs,")
+        in_force = require(belief.command, "The command in force, which a built-in shield needs,")
         most, change = model.fastest_rad_s, model.slew_rad_s2 * dt_s
         low = np.minimum(np.maximum(-most, in_force - change), most)
         high = np.maximum(np.minimum(most, in_force + change), -most)

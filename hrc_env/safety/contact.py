@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, make_unknown_name_error
 from hrc_env.core.typing import Floats
 
 
@@ -74,7 +74,7 @@ has several, the one with the lowest limit."""
 def find_region(name: str) -> BodyRegion:
     """Return a region of the body by its name, or raise `ConfigError`."""
     if name not in REGIONS:
-        raise unknown("region of the body", name, REGIONS)
+        raise make_unknown_name_error("region of the body", name, REGIONS)
     return REGIONS[name]
 
 

@@ -8,9 +8,9 @@ from typing import Any, cast
 import numpy as np
 
 from hrc_env.belief import Belief, lend_belief
-from hrc_env.core.brought import check_arguments, described, numbers_of
-from hrc_env.core.errors import ConfigError, unknown
-from hrc_env.core.lending import called, is_of_user
+from hrc_env.core.brought import check_arguments, describe, numbers_of
+from hrc_env.core.errors import ConfigError, make_unknown_name_error
+from hrc_env.core.lending import call_user_function, is_of_user
 from hrc_env.core.mapping import from_mapping
 from hrc_env.core.registry import Registry
 from hrc_env.core.typing import Floats, JointVelocities, is_list_or_tuple, is_mapping
@@ -48,7 +48,7 @@ def find_shield(shield: ShieldChoice) -> Shield | None:
     """
     if isinstance(shield, str):
         if shield not in SHIELDS:
-            raise unknown("shield", shield, SHIELDS)
+            raise make_unknown_name_error("shield", shield, SHIELDS)
         return SHIELDS[shield]
     if is_mapping(shield):
         shield = from_mapping(ShieldConfig, shield, "shield.")
@@ -96,14 +96,14 @@ def apply_shield(
         return ShieldOutput(command, {})
     output: Any
     if is_of_user(shield):
-        output = called("A shield", shield, lend_belief(belief), command.copy(), dt_s)
+        output = call_user_function("A shield", shield, lend_belief(belief), command.copy(), dt_s)
     else:
         output = shield(belief, command.copy(), dt_s)
     pair = output if is_list_or_tuple(output) else ()
     if not isinstance(output, tuple) or len(pair) != 2 or not is_mapping(pair[1]):
         raise ConfigError(
             "A shield must return two things, the velocities that it allows (B, joints) and a "
-            f"mapping of values (B,) by name, {{}} for none; got {described(cast(object, output))}."
+            f"mapping of values (B,) by name, {{}} for none; got {describe(cast(object, output))}."
         )
     allowed = numbers_of("A shield's velocities", pair[0], command.shape, "B, joints")
     values = _check_values(pair[1], len(command))

@@ -16,7 +16,7 @@ from typing import Any, Generic, NamedTuple
 
 import numpy as np
 
-from hrc_env.core.batching import mapped, picked, rows, write_rows
+from hrc_env.core.batching import map_arrays, rows, select_streams, write_rows
 from hrc_env.core.errors import check_shape
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
@@ -104,7 +104,7 @@ class OutOfSequence(Generic[State]):
             n_kept=np.zeros(batch, np.int64),
             end_s=np.zeros((batch, n_slots)),
             step_s=np.zeros((batch, n_slots)),
-            kept=mapped(now, lambda array: np.repeat(array[:, None], n_slots, axis=1)),
+            kept=map_arrays(now, lambda array: np.repeat(array[:, None], n_slots, axis=1)),
             frames=make_frames(batch, self.n_cameras, 2 * n_slots, n_workers),
             ignored=np.zeros((batch, len(IGNORED)), np.int64),
         )
@@ -181,7 +181,7 @@ class OutOfSequence(Generic[State]):
             return
         part, used = self._select_states(state, ids), use[ids]
         frame_set = FrameSet(drop_cameras(rows(keypoints, ids), ~used), used, state.clock_s[ids])
-        self._use_frames(part, state, ids, frame_set, picked(rngs, ids))
+        self._use_frames(part, state, ids, frame_set, select_streams(rngs, ids))
         self._write(state, ids, part)
 
     def _repeat_step(self, state: LateState[State], ids: Ints, age: int, rngs: Rngs) -> None:
@@ -197,7 +197,7 @@ class OutOfSequence(Generic[State]):
         ends_s, steps_s = state.end_s[ids, slot], state.step_s[ids, slot]
         for members, step_s, frame_sets in group_frames(state.frames, ids, ends_s, steps_s):
             group, done_s = ids[members], 0.0
-            part, streams = self._select_states(state, group), picked(rngs, group)
+            part, streams = self._select_states(state, group), select_streams(rngs, group)
             for at_s, frame_set in frame_sets:
                 self.inner.predict(part, at_s - done_s, streams)
                 self._use_frames(part, state, group, frame_set, streams)
@@ -312,4 +312,4 @@ def _find_slots(state: LateState[Any], ids: Ints, age: int) -> Ints:
 
 def _flatten_slots(kept: State) -> State:
     """Return views (B K, ...) of the arrays (B, K, ...) of a state."""
-    return mapped(kept, lambda a: a.reshape(a.shape[0] * a.shape[1], *a.shape[2:]))
+    return map_arrays(kept, lambda a: a.reshape(a.shape[0] * a.shape[1], *a.shape[2:]))

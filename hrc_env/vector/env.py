@@ -18,8 +18,8 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from hrc_env.control import check_action
-from hrc_env.core.batching import State, copied, mapped, one, write_rows
-from hrc_env.core.errors import ConfigError, check_shape, whole
+from hrc_env.core.batching import State, copy_arrays, map_arrays, one, write_rows
+from hrc_env.core.errors import ConfigError, check_integer, check_shape
 from hrc_env.core.infos import InfoDict
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.env import RENDER_MODES, EnvBase, make_spaces
@@ -28,7 +28,7 @@ from hrc_env.rehearsal import rehearse
 from hrc_env.render.views import CameraChoice
 from hrc_env.reset_options import Fixed, ResetOptions, lasting_options, named_options
 from hrc_env.rewards import RewardConfig
-from hrc_env.settings import settle
+from hrc_env.settings import resolve_settings
 from hrc_env.simulation import Simulation
 from hrc_env.step_result import Observation, StepResult
 from hrc_env.tasks.task import AnyTask
@@ -96,13 +96,13 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
                 "process for each environment, and SB3's make_vec_env with vec_env_cls="
                 'hrc_env.HRCSubprocVecEnv. perception="keypoints" emulates it, batched.'
             )
-        settings = settle(**arguments)
+        settings = resolve_settings(**arguments)
         self._open(settings)
         if self.render_mode in LISTS:
             self.metadata["render_modes"].append(self.render_mode)
         self.arguments = arguments if self.render_mode else _without_pictures(arguments)
         """Arguments of `HRCEnv`, as they were given."""
-        self.num_envs = whole("num_envs", num_envs, 1, MAX_ENVS)
+        self.num_envs = check_integer("num_envs", num_envs, 1, MAX_ENVS)
         self.autoreset_mode = parse_autoreset(autoreset_mode)
         self.metadata["autoreset_mode"] = self.autoreset_mode
         rehearse(settings)
@@ -165,11 +165,11 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         fresh = self._begin(ids, fixed)
         self._steps[ids] = elapsed_steps[ids]
         if self._observation is None:
-            self._observation = mapped(fresh.observation, np.empty_like)
+            self._observation = map_arrays(fresh.observation, np.empty_like)
         write_rows(self._observation, ids, fresh.observation)
         self._ended = self._ended & ~mask
         self.pictures.take(mask, mask)
-        return copied(self._observation), make_table(fresh, ids, self.num_envs).arrays(mask)
+        return copy_arrays(self._observation), make_table(fresh, ids, self.num_envs).arrays(mask)
 
     def step(self, actions: NDArray[np.float32]) -> Step:
         """Advance every environment by one control step.
@@ -185,7 +185,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
             truncated, and infos: arrays (num_envs,), each with a mask "_name".
         """
         result = self.shards.step(self._check_actions(actions))
-        observation = copied(result.observation)
+        observation = copy_arrays(result.observation)
         info = make_table(result, slice(None), self.num_envs)
         reward, terminated, over = result.reward.copy(), result.terminated.copy(), self._ended
         self._steps += 1
@@ -201,7 +201,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         self._observation, self._ended = observation, ended
         self.pictures.take(np.ones_like(over), over)
         infos = InfoDict({**finals, **info.arrays(np.ones_like(ended))})
-        return copied(observation), reward, terminated, truncated, infos
+        return copy_arrays(observation), reward, terminated, truncated, infos
 
     def words(self, infos: Mapping[str, Any]) -> dict[str, NDArray[np.object_]]:
         """Return the indices of infos in words: activities, bodies, contacts and cameras.
@@ -233,12 +233,12 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
 
     def get_state(self) -> State:
         """Return a copy of the whole state, options of `set_options` included."""
-        return {**super().get_state(), "options": copied(self._options)}
+        return {**super().get_state(), "options": copy_arrays(self._options)}
 
     def set_state(self, state: State) -> None:
         """Restore a state that was taken with the same arguments, bit for bit."""
         super().set_state(state)
-        self.set_options({"each": copied(state["options"])})
+        self.set_options({"each": copy_arrays(state["options"])})
 
     def check_options(self, k: int, options: Mapping[str, Any] | ResetOptions | None) -> None:
         """Raise the `ConfigError` that a reset of environment `k` would raise for these options."""
@@ -428,6 +428,6 @@ def _finals(observation: Observation, info: InfoTable, ended: Bools) -> dict[str
     """Return the last observations and infos of the episodes that `ended` (B,)."""
     last = np.full(len(ended), None, object)
     for b in np.flatnonzero(ended):
-        last[b] = copied(one(observation, int(b)))
+        last[b] = copy_arrays(one(observation, int(b)))
     final_info = {"final_info": info.arrays(ended), "_final_info": ended.copy()}
     return {"final_obs": last, "_final_obs": ended.copy(), **final_info}

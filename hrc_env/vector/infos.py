@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.core.infos import InfoDict, matching, published, worded
+from hrc_env.core.infos import InfoDict, match_keys, name_indices, publish
 from hrc_env.core.typing import Bools, Floats, Ints
 from hrc_env.env_config import EnvConfig
 from hrc_env.infos import words_of
-from hrc_env.settings import settle
+from hrc_env.settings import resolve_settings
 from hrc_env.simulation import Simulation
 from hrc_env.step_result import StepResult
 
@@ -36,7 +36,7 @@ class InfoTable:
     def arrays(self, mask: Bools) -> InfoDict:
         """Return values and masks by name; environments outside of the mask (B,) have none."""
         infos = InfoDict()
-        for name, values in published(self.values).items():
+        for name, values in publish(self.values).items():
             infos[name] = np.where(mask, values, np.zeros_like(values))
             infos[f"_{name}"] = mask.copy()
         return infos
@@ -76,12 +76,12 @@ def choose_infos(patterns: str | Sequence[str], arguments: Mapping[str, Any]) ->
     given = {name: value for name, value in arguments.items() if name in known}
     with warnings.catch_warnings():  # the environment itself repeats them
         warnings.simplefilter("ignore")
-        small = Simulation(1, settle(**{"perception": "keypoints", **given}))
+        small = Simulation(1, resolve_settings(**{"perception": "keypoints", **given}))
     try:
         first = small.reset(np.arange(1), [np.random.default_rng(0)])
     finally:
         small.close()
-    return matching(patterns, list(first.info_of(0)))
+    return match_keys(patterns, list(first.info_of(0)))
 
 
 def words_of_infos(
@@ -100,7 +100,7 @@ def words_of_infos(
     words = words_of(bodies)
     numbers = {name: infos[name] for name in infos if not name.startswith(("_", "final_"))}
     worded_infos = [
-        worded({name: values[b] for name, values in numbers.items()}, words)
+        name_indices({name: values[b] for name, values in numbers.items()}, words)
         for b in range(num_envs)
     ]
     return {

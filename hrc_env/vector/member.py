@@ -11,10 +11,10 @@ from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
 from hrc_env import observations
-from hrc_env.core.batching import copied, one
-from hrc_env.core.errors import ConfigError, NoAttributeError, unknown
+from hrc_env.core.batching import copy_arrays, one
+from hrc_env.core.errors import ConfigError, NoAttributeError, make_unknown_name_error
 from hrc_env.core.infos import InfoDict
-from hrc_env.core.mapping import plain
+from hrc_env.core.mapping import convert_to_plain
 from hrc_env.core.typing import Floats
 from hrc_env.env import ENDLESS, HRCEnv
 from hrc_env.geometry.camera_config import CameraConfig
@@ -69,7 +69,7 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
             seed=[seed if each else None for each in alone],
             options={"reset_mask": alone, "each": [options if each else None for each in alone]},
         )
-        return copied(one(observation, self._k)), info_of(infos, self._k)
+        return copy_arrays(one(observation, self._k)), info_of(infos, self._k)
 
     def step(self, action: Any) -> NoReturn:
         """Raise `ConfigError`, as environments step together."""
@@ -151,7 +151,7 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
             return None
         limit = None if vector.max_episode_steps == ENDLESS else vector.max_episode_steps
         kwargs = {**vector.arguments, "task": vector.task.id}
-        return replace(known, max_episode_steps=limit, kwargs=plain(kwargs))
+        return replace(known, max_episode_steps=limit, kwargs=convert_to_plain(kwargs))
 
     @property
     def np_random(self) -> np.random.Generator:
@@ -175,7 +175,9 @@ class Member(gymnasium.Env[Observation, NDArray[np.float32]]):
         if name not in self._vector.notes[self._k]:
             valid = [each for each in dir(self) if not each.startswith("_")]
             valid += [each for each in (*ALIKE, *TOGETHER) if each not in valid]
-            raise NoAttributeError(str(unknown("attribute of one environment", name, valid)))
+            raise NoAttributeError(
+                str(make_unknown_name_error("attribute of one environment", name, valid))
+            )
         return self._vector.notes[self._k][name]
 
     def __setattr__(self, name: str, value: Any) -> None:

@@ -8,7 +8,13 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from hrc_env.core.errors import ConfigError, check_names, check_shape, unknown, whole
+from hrc_env.core.errors import (
+    ConfigError,
+    check_integer,
+    check_names,
+    check_shape,
+    make_unknown_name_error,
+)
 from hrc_env.core.machine import n_cores
 from hrc_env.core.typing import Bools, Ints
 from hrc_env.env import ENDLESS
@@ -28,7 +34,7 @@ def parse_time_limit(max_episode_steps: int) -> int:
     """Return the time limit of an episode [control steps]; -1 stands for none."""
     if max_episode_steps == -1:
         return ENDLESS
-    return whole("max_episode_steps", max_episode_steps, 1, ENDLESS)
+    return check_integer("max_episode_steps", max_episode_steps, 1, ENDLESS)
 
 
 def parse_autoreset(mode: str | AutoresetMode) -> AutoresetMode:
@@ -36,7 +42,9 @@ def parse_autoreset(mode: str | AutoresetMode) -> AutoresetMode:
     try:
         return AutoresetMode(mode)
     except ValueError as error:
-        raise unknown("autoreset_mode", mode, [each.value for each in AutoresetMode]) from error
+        raise make_unknown_name_error(
+            "autoreset_mode", mode, [each.value for each in AutoresetMode]
+        ) from error
 
 
 def parse_threads(num_threads: int | None) -> int:
@@ -44,7 +52,7 @@ def parse_threads(num_threads: int | None) -> int:
     cores = n_cores()
     if num_threads is None:
         return cores
-    n_threads = whole("num_threads", num_threads, 1, MAX_ENVS)
+    n_threads = check_integer("num_threads", num_threads, 1, MAX_ENVS)
     if n_threads > cores:
         warnings.warn(
             f"num_threads={n_threads} on {cores} cores: results are the same, and later.",
