@@ -279,7 +279,7 @@ def options_of(program: str, *words: str) -> set[str]:
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_options_that_a_page_names_exist(page):
-    calls = r"python -m (hrc_env|benchmarks) (?:--import \S+ )?([a-z-]+)([^`#\n]*)"
+    calls = r"python -m (hrc_env|benchmarks) (?:--import \S+ )?([a-z][a-z-]*)([^`#\n]*)"
     for program, command, line in re.findall(calls, page.read_text()):
         which = re.match(r" (\w+)", line) if command == "experiment" else None
         known = options_of(program, command, *which.groups() if which else ())
