@@ -60,8 +60,6 @@ def _describe(kind: type) -> Iterator[str]:
     yield get_own_doc(kind).split("\n\n")[0] + "\n"
     lines = ["| field | type | default | meaning |", "| --- | --- | --- | --- |"]
     for field in declared.fields(kind):
-        if field.name == "RENAMED":  # no field, but former names of some
-            continue
         type_text = re.sub(r"^ClassVar\[(.+)\]$", r"\1", field.annotation)
         default = f"`{field.default}`" if field.default else ""
         cells = (f"`{field.name}`", f"`{type_text}`", default, " ".join(field.doc.split()))

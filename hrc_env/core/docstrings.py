@@ -63,7 +63,8 @@ def list_attributes(kind: type) -> list[Attribute]:
     for base in reversed(kind.__mro__):
         if base.__module__.partition(".")[0] == "hrc_env":
             found |= {each.name: each for each in read_attributes(base)}
-    return [each for name, each in found.items() if not name.startswith("_")]
+    hidden = {"RENAMED"}  # former names of fields, for errors
+    return [each for name, each in found.items() if not name.startswith("_") and name not in hidden]
 
 
 class DocWithAttributes:
