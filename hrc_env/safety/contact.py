@@ -34,7 +34,7 @@ class BodyRegion:
 
     @property
     def transient_n(self) -> float:
-        """Greatest force of a transient contact [N]: twice the quasi-static one, or 0 for the head."""
+        """Greatest force of a transient contact [N]: twice the quasi-static one; 0 for the head."""
         return 2.0 * self.quasi_static_n * self.is_touched
 
 

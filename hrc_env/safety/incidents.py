@@ -418,5 +418,5 @@ class IncidentMonitor(Stateful):
         return detect_incidents(self.history, paths, self.regions, hits_kg, stop_s, self.dt_s)
 
     def find_stop_time(self, robot: RobotState) -> Floats:
-        """Return the time (B,) that robots need to stop [s], with commands changing at the limit."""
+        """Return the stopping time (B,) of robots [s], with commands that change at the limit."""
         return (np.abs(robot.qd) / self.model.slew_rad_s2).max(axis=1)
