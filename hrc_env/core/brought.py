@@ -40,7 +40,7 @@ def check_arguments(what: str, function: Callable[..., Any], *names: str) -> Non
     """
     try:
         signature = inspect.signature(function)
-    except (ValueError, TypeError) as error:  # of what is written in C there is none
+    except (ValueError, TypeError) as error:  # functions in C have no signature
         if isinstance(function, type):
             raise ConfigError(
                 f"{what} must be a function of ({', '.join(names)}), got the class "

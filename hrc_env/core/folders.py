@@ -21,7 +21,7 @@ def usual_cache() -> Path | None:
     usual = {"darwin": "~/Library/Caches", "win32": "~/AppData/Local"}.get(sys.platform, "~/.cache")
     try:
         return Path(chosen or usual).expanduser() / "hrc_env"
-    except RuntimeError:  # no HOME, and no user of that number
+    except RuntimeError:  # no HOME, and an unknown user ID
         return None
 
 
@@ -65,7 +65,7 @@ def alone(folder: Path, wait: Callable[[], object]) -> Generator[None]:
 
         name = hashlib.sha256(str(folder.absolute()).encode()).hexdigest()[:12]
         lock = (temporary_cache() / f"lock-{name}").open("w")
-    except (ImportError, OSError):  # no locks here, or no place for one: work is done twice
+    except (ImportError, OSError):  # no locks available: work is done twice
         yield
         return
     with lock:

@@ -206,7 +206,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
         return tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except OSError as error:
         raise ConfigError(f"The file {path} cannot be read: {error}.") from error
-    except ValueError as error:  # what tomllib and the decoder raise
+    except ValueError as error:  # from tomllib or the decoder
         raise ConfigError(f"{path} must be TOML; reading it ended with: {error}") from error
 
 

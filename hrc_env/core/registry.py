@@ -112,7 +112,7 @@ def _entry(thing: Any, file: str | None, own: set[int]) -> Entry:
         return Entry(file=file, max_episode_steps=limit)
     try:
         return Entry(_pickled(thing, own), max_episode_steps=limit)
-    except Exception as error:  # whatever objects of others raise
+    except Exception as error:  # users' objects may raise anything
         return Entry(refused=f"{type(error).__name__}: {error}", max_episode_steps=limit)
 
 

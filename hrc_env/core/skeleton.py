@@ -51,7 +51,7 @@ toes farther out than the anatomical ones). Trackers that learn bone lengths ref
 worker."""
 
 SEGMENT_ENDS: tuple[tuple[tuple[int, ...], tuple[int, ...], float], ...] = (
-    ((0,), (0,), 0.13),  # head, a sphere round the nose that reaches over the hat's front
+    ((0,), (0,), 0.13),  # head, a sphere around the nose that includes the hat's front
     ((1, 2), (7, 8), 0.16),  # trunk: mid-shoulder to mid-hip
     ((1,), (2,), 0.09),  # shoulder girdle
     ((7,), (8,), 0.13),  # pelvis

@@ -22,10 +22,7 @@ IS_FOREARM_OR_HAND: Bools = np.array(
 
 
 class ShieldParams(NamedTuple):
-    """Numbers of a `ShieldConfig` in the form that its kernels read.
-
-    The names are those of the fields of `ShieldConfig`.
-    """
+    """Numbers of a `ShieldConfig` in the form that kernels read."""
 
     margins_m: Floats
     """`margin_m` or `hand_margin_m` of each segment of a body (S,) [m]."""
@@ -83,8 +80,8 @@ class ShieldConfig:
 
     kind: str = "qp"
     """Method: "qp" takes the nearest joint velocities that keep all constraints; "ssm" scales all
-    joint velocities by one factor; "pfl" is "qp" that allows touches as slow as the touched region
-    of the body tolerates."""
+    joint velocities by one factor; "pfl" is "qp" that also allows touches, up to the speed that the
+    touched region of the body tolerates."""
     margin_m: float = 0.05
     """Distance subtracted from every gap, since bodies are not capsules [m]. With a negative value
     the shield permits less distance than the estimate requires, which `experiment price` uses to
@@ -177,4 +174,4 @@ PRESETS = {
     "qp": ShieldConfig("qp"),
     "pfl": ShieldConfig("pfl", max_retreat_m_s=0.0),
 }
-"""The built-in shields, by the names that `shield=` takes."""
+"""The built-in shields, by the names that `shield=` accepts."""

@@ -3,8 +3,9 @@
 import gymnasium, hrc_env
 envs = gymnasium.make_vec("HRCReach-v0", num_envs=64, perception="keypoints")
 
-Environment k is `gymnasium.make("HRCReach-v0", ...)`, bit for bit, for any number of environments
-and threads. Results have the form of gymnasium's `SyncVectorEnv` of the same environments.
+Environment k equals `gymnasium.make("HRCReach-v0", ...)`, bit for bit, for any number of
+environments and threads. Results have the form of gymnasium's `SyncVectorEnv` of the same
+environments.
 """
 
 from collections.abc import Mapping, Sequence
@@ -58,12 +59,12 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
 ):
     """A vector environment: robots that step together, each with its own workers.
 
-    Environment k after `reset(seed=s)` is the single environment after `reset(seed=s + k)`, bit for
-    bit. Actions are (num_envs, A), observations (num_envs, n).
+    Environment k after `reset(seed=s)` equals the single environment after `reset(seed=s + k)`, bit
+    for bit. Actions are (num_envs, A), observations (num_envs, n).
 
     Args:
         num_envs: number of environments.
-        max_episode_steps: time limit; None for the task's, -1 for none.
+        max_episode_steps: time limit [control steps]; None for the task's limit, -1 for no limit.
         autoreset_mode: when an environment is reset after the end of an episode: in the next step
             (default), in the same step, or never ("Disabled").
         num_threads: number of threads that share the environments; None for all cores.
@@ -139,11 +140,11 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
             seed: environment k gets `seed + k`, or the k-th of a list; with None its random stream
                 continues.
             options: options by name. "reset_mask", (num_envs,) bool, selects the environments that
-                start an episode. "steps_left", one or (num_envs,) int, is the number of steps after
-                which these episodes are truncated, if not before; or "elapsed_steps", (num_envs,)
-                int, is the number of steps of the time limit that have passed. The other fields of
-                `ResetOptions` fix parts of the episodes; "each" is a list of a mapping of fields
-                for each environment.
+                start an episode. "steps_left", an int or (num_envs,) int, is the number of steps
+                after which these episodes are truncated at the latest; alternatively,
+                "elapsed_steps", (num_envs,) int, is the number of steps of the time limit that have
+                passed. The other fields of `ResetOptions` fix parts of the episodes; "each" is a
+                list with a mapping of fields for each environment.
 
         Returns:
             Observations of all environments, and infos of those that started.
@@ -302,7 +303,7 @@ class HRCVectorEnv(  # type: ignore[override]  # a property is `spec`, too
         return self.call(name)
 
     def set_attr(self, name: str, values: Any) -> None:
-        """Set a user's attribute of every environment, as of `Member`.
+        """Set a user's attribute of every environment, as an attribute of `Member`.
 
         Args:
             name: name of the attribute.

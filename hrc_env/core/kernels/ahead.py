@@ -70,7 +70,7 @@ def _serve(wanted: Iterator[Signature], total_s: float, say: Say) -> None:
         log.warning("Kernels cannot be compiled ahead (%s); they are when called.", error)
         return
     for each in wanted:
-        with contextlib.suppress(OSError):  # of a process that has died
+        with contextlib.suppress(OSError):  # raised for a process that has died
             process.stdin.write(json.dumps([each.kernel, each.args]) + "\n")
         answer = process.stdout.readline()
         if answer != "done\n":
@@ -109,7 +109,7 @@ def main() -> None:
         try:
             kernel_named(name).compile(tuple(decode(each) for each in args))
             answer = "done"
-        except Exception as error:  # numba has many: it has other arguments, or another name, now
+        except Exception as error:  # of many kinds: the kernel's arguments or name have changed
             answer = f"failed: {error!r}".replace("\n", " ")
         sys.stdout.write(f"{answer}\n")
         sys.stdout.flush()

@@ -5,7 +5,7 @@ again, and a change of a callee in another file is missed. Here the file name co
 everything on which the kernel depends (`digest`); a file that is found is therefore always valid.
 """
 
-# numba's compiler, on whose inside this builds, has no types.
+# The internals of numba's compiler, which are used here, have no type annotations.
 # pyright: standard
 
 import contextlib

@@ -4,7 +4,7 @@ A digest covers the module, bytecode, options and constants of the kernel, and a
 calls.
 """
 
-# numba's compiler, on whose inside this builds, has no types.
+# The internals of numba's compiler, which are used here, have no type annotations.
 # pyright: standard
 
 import dis

@@ -9,7 +9,7 @@ unchanged. The base classes are internals of numba: releases other than the test
 (`LEAN_WITH`) use `plain`.
 """
 
-# numba's compiler, on whose inside this builds, has no types.
+# The internals of numba's compiler, which are used here, have no type annotations.
 # pyright: standard
 
 import copy
@@ -107,7 +107,7 @@ def _lean_context() -> LeanContext:
     context = LeanContext.__new__(LeanContext)
     context.__dict__.update(usual.__dict__)
     context._internal_codegen = generator
-    context.cached_internal_func = {}  # what is kept as a callee is not for numba's own functions
+    context.cached_internal_func = {}  # numba's own functions must not use callees
     return context
 
 

@@ -3,7 +3,7 @@
 `python -m assets.kernels.record` writes the file.
 """
 
-# numba's compiler, on whose inside this builds, has no types.
+# The internals of numba's compiler, which are used here, have no type annotations.
 # pyright: standard
 
 import importlib
