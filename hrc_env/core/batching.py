@@ -1,7 +1,7 @@
-"""States: records of arrays whose first axis is the environment, with access to their rows.
+"""Access to the rows of records of arrays whose first axis is the environment.
 
-A component that works on some environments only (a reset of 3 of 64) works on a record of their
-rows. As no result depends on the size of the batch, that is the same computation.
+A component that processes only some environments (a reset of 3 of 64) operates on a record of their
+rows. Since no result depends on the batch size, the computation is the same.
 """
 
 import copy
@@ -33,9 +33,9 @@ def write_rows(record: object, ids: Any, part: object) -> None:
     """Write a record of rows into a record of the same kind.
 
     Args:
-        record: the record, changed in place.
-        ids: the rows, as integers, a mask or `...`.
-        part: the values of these rows.
+        record: record that is changed in place.
+        ids: indices of the rows: integers, a mask or `...`.
+        part: record with the values of these rows.
     """
     if is_array(record):
         record[ids] = part
@@ -71,13 +71,16 @@ def copy_arrays(value: Any) -> Any:
 
 
 def flatten_axes(array: Floats, n_last: int) -> Floats:
-    """Return an array (..., *last) as (count, *last), contiguous; `last` has `n_last` axes."""
+    """Return an array (..., *last) reshaped to (count, *last), contiguous.
+
+    `last` stands for the last `n_last` axes.
+    """
     last = array.shape[-n_last:]
     return np.ascontiguousarray(array).reshape(math.prod(array.shape[:-n_last]), *last)
 
 
 def select_streams(streams: Sequence[np.random.Generator], ids: Ints) -> list[np.random.Generator]:
-    """Return the generators of environments `ids`."""
+    """Return the random generators of environments `ids`."""
     return [streams[b] for b in ids]
 
 
@@ -90,7 +93,7 @@ class Stateful:
     CHANGES: ClassVar[tuple[str, ...]] = ()
 
     def get_state(self) -> Any:
-        """Return a copy of everything that changes; `set_state` restores it bit for bit."""
+        """Return a copy of the changing attributes; `set_state` restores it bit for bit."""
         parts = {name: getattr(self, name) for name in self.CHANGES}
         return {
             name: part.get_state() if hasattr(part, "get_state") else copy_arrays(part)
@@ -98,7 +101,7 @@ class Stateful:
         }
 
     def set_state(self, state: Any) -> None:
-        """Continue from a state of an object with the same settings; the state is not changed."""
+        """Restore the state of an object with the same settings; the argument is not changed."""
         for name in self.CHANGES:
             part = getattr(self, name)
             if hasattr(part, "set_state"):
@@ -109,7 +112,7 @@ class Stateful:
 
 @functools.cache
 def names_of(kind: type[Any]) -> tuple[str, ...]:
-    """Return the field names of a dataclass or a named tuple; of any other class, none."""
+    """Return the field names of a dataclass or a named tuple; () for any other class."""
     if dataclasses.is_dataclass(kind):
         return tuple(each.name for each in dataclasses.fields(kind))
     return getattr(kind, "_fields", ())
