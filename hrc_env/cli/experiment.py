@@ -88,7 +88,7 @@ class ImpactExperiment(AnyExperiment):
     first): any of these, random, hrc://ID/NAME, files (.zip, .safetensors) or MODULE:FUNCTION, as
     in play."""
     control: str | None = None
-    """Control mode of policies whose files do not contain one: joint (default), tool or twist."""
+    """Control mode of policies without one in their files: joint (default), tool or twist."""
     trust: bool = False
     """Allow pickles in the agents' checkpoints, which can run arbitrary code, to be loaded (see
     play)."""

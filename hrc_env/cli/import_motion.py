@@ -57,16 +57,16 @@ class ImportMotion:
     skeleton: Path | None = None
     """The .asf file of an .amc file, if it is not in the same folder."""
     joint: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
-    """Joint whose name in the file is not recognized, as left_shoulder=lShldr, or a TOML file of
-    such lines. The option may be repeated."""
+    """Joint with an unknown name in the file, as left_shoulder=lShldr, or a TOML file with such
+    lines. The option may be repeated."""
     up: str | None = None
     """Upward axis of the file, if it is not recognized: --up=+x, -x, +y, -y, +z or -z."""
     allow_off_floor: bool = False
-    """Accept recordings whose feet are not on one level floor: on stairs or terrain, in the air for
-    long, or above the floor because the right .asf file is missing. The clip is played as if the
-    floor were level."""
+    """Accept recordings with feet that are not on one level floor: on stairs or terrain, in the air
+    for long, or above the floor because the right .asf file is missing. The clip is played as if
+    the floor were level."""
     worker: str = "worker_1"
-    """Worker whose body is fitted. Others can play the clip, too, scaled to their legs and arms."""
+    """Name of the body to fit. Others can play the clip, too, scaled to their legs and arms."""
     picture: Path | None = None
     """Also draw a film strip of the clip into this PNG file (needs OpenGL)."""
 

@@ -93,7 +93,7 @@ class Play(EnvironmentArguments):
 
 @dataclass(frozen=True, kw_only=True)
 class Demo(EnvironmentArguments):
-    """Film a scripted robot that slows down near a person, whom it detects in rendered images."""
+    """Film a scripted robot that detects a person in rendered images and slows down nearby."""
 
     out: Path = Path("out/demo.mp4")
     """Film to write (.mp4); a still image (.png) is written to the same folder."""

@@ -10,7 +10,7 @@ from hrc_env.core.errors import ConfigError, check_names, whole
 Tick = Callable[[float], None]
 """Callback that receives the increase of the completed share of a call."""
 Call = Callable[[Tick], Any]
-"""Function of a `Tick` whose result does not depend on the process that computes it."""
+"""Function of a `Tick`; its result does not depend on the process that computes it."""
 ENGINES = ("serial", "processes", "ray")
 """Names of engines. `serial` computes calls one after the other in this process, whose environments
 share all cores; `processes` computes as many calls in parallel as there are cores, each on one

@@ -53,7 +53,7 @@ class Processes:
         return nullcontext()
 
     def run(self, calls: Sequence[Call], tick: Callable[[int, float], None]) -> Iterator[Done]:
-        """Compute calls as described in `Engine.run`, and repeat those whose process died."""
+        """Compute calls as described in `Engine.run`, and repeat them if their process dies."""
         left, deaths = dict(enumerate(calls)), 0
         while left:
             try:

@@ -156,7 +156,7 @@ def read_arrays(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def select_folder(arrays: Arrays, folder: str) -> dict[str, NDArray[Any]]:
-    """Return the arrays whose names begin with "folder/", by the rest of their names."""
+    """Return the arrays with names "folder/...", by the rest of their names."""
     return {k[len(folder) + 1 :]: v for k, v in arrays.items() if k.startswith(f"{folder}/")}
 
 

@@ -53,7 +53,7 @@ def rollout(
 
     Args:
         env: a Gymnasium environment, a vector environment, or any object with their `step`.
-        agent: the agent, whose actions are passed to `env` unchanged.
+        agent: the agent; its actions are passed to `env` unchanged.
         observation: the observation that `env.reset` returned.
         n_steps: greatest number of steps (default: limited only by the environment).
 
