@@ -1,4 +1,4 @@
-"""Score a policy by the benchmark: goals, contacts and cost on fixed seeds."""
+"""Score a policy with the benchmark: goals, contacts and cost on fixed seeds."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -39,10 +39,10 @@ class Benchmark(EngineArguments):
     seeds: int = 64
     """Number of episodes per row."""
     enter: Path | None = None
-    """Write the numbers as an entry of the leaderboard, a JSON file of this name; in a clone,
+    """Also write an entry for the leaderboard to this JSON file; in a clone,
     docs/results/leaderboard/NAME.json."""
     overwrite: bool = False
-    """Delete earlier results in the folder that are of another run or other settings."""
+    """Delete results of another run or of other settings in the folder."""
 
     def run(self) -> int:
         """Run the benchmark and print its report; return the exit status."""

@@ -34,7 +34,7 @@ NAMES = (
     "python", "packages", "torch", "machine", "OpenGL", "triton", "kernels", "weights", "OpenVINO",
     "environment",
 )  # fmt: skip
-"""Names of the checks; each is the function `_check_NAME`."""
+"""Names of the checks, each of which is done by the function `_check_NAME`."""
 LITTLE_GB = 2.0
 """Memory that the level `pixels` and films need [GB]."""
 

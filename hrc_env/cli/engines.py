@@ -26,8 +26,8 @@ class EngineArguments:
         """Return the engine of the options, or None if none is named.
 
         Raises:
-            ConfigError: the engine does not exist, it takes no workers or address, or the command
-                takes no engine.
+            ConfigError: the engine does not exist, does not accept workers or an address, or is not
+                supported by the command.
         """
         if self.stays and self.engine not in (None, "serial"):
             raise ConfigError(

@@ -27,7 +27,7 @@ class AnyExperiment(EngineArguments):
     seeds: int | None = None
     """Number of seeds."""
     overwrite: bool = False
-    """Delete earlier results in the folder that are of another run or other settings."""
+    """Delete results of another run or of other settings in the folder."""
 
     def run(self) -> int:
         """Run the experiment and print its tables; return the exit status."""
@@ -52,7 +52,7 @@ class SiteExperiment(AnyExperiment):
     seeds: int | None = None
     """Number of walks (default: 9, quick: 2)."""
     estimator: tuple[str, ...] = ("particle", "paper")
-    """Estimators; python -m hrc_env list shows their names."""
+    """Estimators to compare; python -m hrc_env list shows their names."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class ImpactExperiment(AnyExperiment):
     name = "impact"
     out: Path = Path("out/impact")
     task: str = DEFAULT
-    """Task of the robots, by the environment's id."""
+    """Id of the environment."""
     shield: str | None = None
     """Shield that may change the robots' commands: qp, ssm, pfl, or a registered one (--import)."""
     seeds: int | None = None
@@ -104,7 +104,7 @@ class PriceExperiment(AnyExperiment):
     name = "price"
     out: Path = Path("out/price")
     task: str = DEFAULT
-    """Task of the robots, by the environment's id."""
+    """Id of the environment."""
     seeds: int | None = None
     """Number of episodes per step of the search for a margin (default: 300). Each margin found is
     confirmed by 10 episodes for every 3 of these (default: 1000; quick: 600)."""

@@ -1,4 +1,4 @@
-"""List the names that arguments take, or print the configuration that arguments make."""
+"""List the names that arguments take, or print the configuration that arguments describe."""
 
 from dataclasses import asdict, dataclass
 

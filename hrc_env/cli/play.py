@@ -100,7 +100,7 @@ class Demo(EnvironmentArguments):
     seed: int = 7
     """Seed of the episode."""
     seconds: float = 10.0
-    """Length of the film [s]."""
+    """Duration of the film [s]."""
 
     def run(self) -> int:
         """Write the film and print its scores; return the exit status."""
@@ -132,7 +132,7 @@ def film_agent(
         arguments: the command, with the environment and the seed.
         agent: name of the agent.
         path: the .mp4 file to write.
-        n_steps: length of the film in control steps (default: the whole episode).
+        n_steps: duration of the film in control steps (default: the whole episode).
         title: title of the printed table.
         trust: whether pickles in a checkpoint may be loaded.
     """

@@ -51,7 +51,7 @@ def connected(
     Args:
         address: address of a cluster: "auto" on one of its machines, "HOST:6379", or
             "ray://HOST:10001"; None: a cluster is started on this machine and stopped at the end.
-        note: receives messages about the cluster.
+        note: callback that receives messages about the cluster.
         dashboard: whether a cluster started on this machine runs Ray's dashboard.
 
     Raises:
@@ -84,7 +84,7 @@ def connected(
 
 
 def _check_answers(address: str) -> None:
-    """Raise `ConfigError` if nothing listens at an address; Ray itself would try for minutes."""
+    """Raise `ConfigError` if nothing listens at an address; Ray itself would retry for minutes."""
     host, _, port = address.removeprefix("ray://").rpartition(":")
     if not (host and port.isdigit()):
         raise ConfigError(f"--address must be auto, HOST:PORT or ray://HOST:PORT, got {address!r}.")
@@ -128,7 +128,7 @@ def share_of(workers: int, machines: list[Machine], note: Note = print) -> float
     Args:
         workers: number of workers.
         machines: machines of the cluster.
-        note: receives a warning if there are more workers than cores.
+        note: callback that receives a warning if there are more workers than cores.
     """
     n = sum(each.n_cores for each in machines)
     if workers <= n:
@@ -146,7 +146,7 @@ def check_machines(
     Args:
         machines: machines of the cluster.
         works: check to run on each machine; it raises an `HRCError` that names what is missing.
-        note: receives a message with the addresses of machines that are still compiling.
+        note: callback that receives the addresses of machines that are still compiling.
 
     Raises:
         ConfigError: a machine lacks the package or has another version of it, or `works` fails on
@@ -155,7 +155,7 @@ def check_machines(
     registrations = pack()
     asked = {
         _on(each).remote(registrations, works): each for each in machines
-    }  # one task a machine
+    }  # one task per machine
     waiting = [*asked]
     while waiting:
         done, waiting = ray.wait(waiting, timeout=20)

@@ -33,7 +33,7 @@ class Engine(Protocol):
 
     @property
     def is_parallel(self) -> bool:
-        """True if calls run in other processes, which must be able to unpickle them."""
+        """Whether calls run in other processes, which must be able to unpickle them."""
         ...
 
     def opened(self) -> AbstractContextManager[object]:
@@ -45,8 +45,8 @@ class Engine(Protocol):
 
         Args:
             calls: functions of a `Tick`.
-            tick: receives the index of a call and the increase of its completed share; for a call
-                in another process only once, at its end.
+            tick: callback that receives the index of a call and the increase of its completed
+                share; for a call in another process, it is called only once, at the end.
 
         Raises:
             HRCError: a call raised it, or a worker died repeatedly.

@@ -14,7 +14,7 @@ class CarriedFile(str):
     """
 
     def __reduce__(self) -> tuple[object, tuple[str, bytes]]:
-        """Return the function that restores the path, and the content of the file."""
+        """Return the function that restores the path, and its arguments: path and content."""
         return carried_to, (str(self), Path(self).read_bytes())
 
 

@@ -142,7 +142,7 @@ def get_draft_path(path: Path) -> Path:
 
 
 def format_file_name(k: int) -> str:
-    """Return the name of the k-th episode's file."""
+    """Return the file name of the k-th episode."""
     return f"episode_{k:05d}.npz"
 
 

@@ -41,9 +41,9 @@ class Score:
     episodes: int
     """Number of episodes."""
     success_rate: float
-    """Share of attempts that were achieved (`Task.achieved` and `Task.failed`)."""
+    """Share of attempts that succeeded (`Task.achieved` and `Task.failed`)."""
     is_success: float
-    """Share of episodes that end with `info["is_success"]` of 1."""
+    """Share of episodes that end with an `info["is_success"]` of 1."""
     goals_per_minute: float
     """Goals reached per minute over all episodes [1/min]."""
     contacts_per_episode: float
@@ -157,7 +157,7 @@ def play_shards(
         engine: engine that plays the shards; None: several processes at the level `pixels`,
             otherwise this process.
         tick: callback that receives the share of the work completed since its last call.
-        kwargs: as in `play_episodes`.
+        kwargs: arguments of the environment, as in `play_episodes`.
     """
     is_drawn = kwargs.get("perception") == "pixels"
     together = DRAWN_TOGETHER if is_drawn else TOGETHER

@@ -23,9 +23,9 @@ class Transition:
     """One control step of an environment, or of a batch of B environments."""
 
     action: Any
-    """Action of the agent (..., A)."""
+    """Action (..., A) of the agent."""
     observation: Observation
-    """Observation after the step (..., n)."""
+    """Observation (..., n) after the step."""
     reward: Any
     """Reward of the step, a number or (B,)."""
     terminated: Any

@@ -46,7 +46,7 @@ class EpisodeSums:
         self.sums["nearest_m"][ids] = np.inf
 
     def add(self, reward: Floats, infos: Mapping[str, Any]) -> Floats:
-        """Add one step of all environments and return its cost (num_envs,).
+        """Add one step of all environments and return the costs (num_envs,) of the step.
 
         Args:
             reward: rewards (num_envs,).

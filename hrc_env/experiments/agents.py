@@ -74,7 +74,7 @@ def label_agents(agents: Sequence[str], taken: Mapping[str, str]) -> dict[str, s
 
 
 def label_agent(agent: str, taken: Mapping[str, str]) -> str:
-    """Return a label for a user's agent, with - for all characters but letters, digits and _."""
+    """Return a label for a user's agent, in which - replaces all but letters, digits and _."""
     stem = agent.removesuffix(".zip").removesuffix(policies.SUFFIX)
     label = re.sub(r"\W+", "-", stem).strip("-")
     return f"own-{label}" if label in taken else label

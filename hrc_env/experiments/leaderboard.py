@@ -143,7 +143,7 @@ ENTRY_METRICS = {
 }
 """Metrics of each task and condition in an entry, with their headings on the leaderboard."""
 Scores = Mapping[str, Metric]
-"""Metrics by "ID.CONDITION.METRIC"."""
+"""Metrics by name, as "ID.CONDITION.METRIC"."""
 
 
 @dataclass(frozen=True, slots=True)

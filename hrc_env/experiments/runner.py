@@ -20,8 +20,8 @@ RecordT = TypeVar("RecordT")
 class Experiment(Protocol[PlayedT]):
     """Interface of an experiment for the runner; the fields of an experiment are its settings.
 
-    `hrc_env.experiments.study.Study` implements it for whole episodes; other experiments consist of
-    other parts.
+    `hrc_env.experiments.study.Study` implements it for studies of whole episodes; the parts of
+    other experiments are not whole episodes.
     """
 
     @property

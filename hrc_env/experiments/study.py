@@ -226,10 +226,10 @@ class Study:
         return {"first_seed": self.first_seed, "rows": rows}
 
     def select(self, beginnings: Sequence[str]) -> "Study":
-        """Return a study of the rows with names that have given beginnings, and their baselines.
+        """Return the study with only the rows of given name prefixes, and their baselines.
 
         Raises:
-            ConfigError: one of the beginnings matches no row.
+            ConfigError: one of the prefixes matches no row.
         """
         for each in beginnings:
             if not any(name.startswith(each) for name in self.rows):

@@ -48,7 +48,7 @@ class Ablations:
     seconds: float = 10.0
     """Duration of an episode, including the warm-up [s]."""
     studies: tuple[str, ...] = tuple(ABLATIONS)
-    """Names of the questions."""
+    """Names of the ablations to run."""
 
     def __post_init__(self) -> None:
         """Raise `ConfigError` if a setting is invalid."""

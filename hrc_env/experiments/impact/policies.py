@@ -80,7 +80,7 @@ def choose_control(policy: Policy, control: str | None) -> str | None:
 
 
 def get_maker(policy: Policy, checkpoint: Path, trust: bool = False) -> MakeAgent:
-    """Return a function that makes the agent for a simulation, also on other machines."""
+    """Return a function that makes the agent for a simulation and can be sent to any machine."""
     if policy.name == SLOWED:
         return partial(_make_slowed, policy.margin_m)
     name = str(checkpoint) if policy.name == PPO else policy.name

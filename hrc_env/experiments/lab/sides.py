@@ -11,7 +11,7 @@ from hrc_env.worker.body import load_body
 MISSED_CONFIDENCE = 0.5
 """Visibility below which a joint counts as missed (judgement); the network returns all joints."""
 MISSED_SHARE = 0.05
-"""Error above which a joint counts as missed, as a share of the stature in image or room."""
+"""Error above which a joint counts as missed, as a share of the stature in the image or in 3D."""
 TURNED_M = 0.08
 """Difference of distances above which a side of the body counts as turned away [m].
 

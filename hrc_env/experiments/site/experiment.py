@@ -35,7 +35,7 @@ CROPS = "particle"
 SETTINGS = HRCConfig(tracker=TrackerConfig(prior_std_m=3.0))
 """Configuration with a wide prior, as walks lead far from the centre of the workplaces."""
 ALONE = "alone."
-"""Prefix of the keys of results without other cameras from the first frame on, as in the paper."""
+"""Prefix of keys if only a row's cameras are used from the first frame on, as in the paper."""
 ROWS = tuple(CHOICES)
 """Names of the rigs: each camera alone, and all four."""
 

@@ -10,7 +10,7 @@ from hrc_env.perception.faults.fault import FaultConfig
 from hrc_env.scene.rigs import RIGS
 
 LATE_MS = (40, 80, 120, 200, 320)
-"""Latencies of images [ms]; as multiples of the control step, they include 320 instead of 300."""
+"""Latencies of images [ms], which are multiples of the control step (320 instead of 300)."""
 LATENCY = Ablation(
     "latency",
     "How late may images be?",
