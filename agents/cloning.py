@@ -1,8 +1,8 @@
 """Behaviour cloning: a policy learns the scripted agent's actions in states that it reaches itself.
 
-The scripted agents have no memory, so they can be queried for any observation: rounds of DAgger
-(Ross et al. 2011, arXiv:1011.0686), in which policy and expert act in turns, so that late parts of
-an episode are reached, too. In the first round the expert acts alone, with occasional disturbances.
+Scripted agents have no memory and can be queried for any observation, which permits rounds of
+DAgger (Ross et al. 2011, arXiv:1011.0686). Policy and expert take turns in acting, to also reach
+late parts of an episode. In the first round the expert acts alone, with occasional disturbances.
 Targets are always the expert's actions.
 """
 
@@ -69,15 +69,15 @@ def clone(
 ) -> list[float]:
     """Train a policy to imitate the task's scripted agent; return the errors per round.
 
-    The scripted agent does not yield.
+    The scripted agent does not slow down near people.
 
     Args:
         policy: policy of a learner of Stable-Baselines3; its mean action is trained.
-        env: environments for the demonstrations, which are seeded and reset.
-        n_episodes: number of episodes of the task's length, in all rounds together.
+        env: environments for the demonstrations; they are seeded and reset.
+        n_episodes: number of episodes of full length, over all rounds.
         settings: settings of the training.
         seed: seed of episodes, disturbances and batches.
-        tick: is called with the growth of the completed share.
+        tick: function that is called with each increase of the completed share.
 
     Returns:
         Mean error of actions after each round.

@@ -19,9 +19,9 @@ with learner():
 class NearAndFar(BaseFeaturesExtractor):
     """Features that hold every entry x and also sign(x) log(1 + NEAR |x|).
 
-    A network that sees metres and must place to millimetres has both at their own scale. Parts of
-    an observation are used in their order; if goals are separate, the difference between desired
-    and achieved goal is one more part.
+    They let a network with inputs in metres place objects to millimetres. Parts of an
+    observation are concatenated in their order; if goals are separate, the difference between
+    desired and achieved goal is appended.
     """
 
     def __init__(self, observation_space: spaces.Space[Any]) -> None:
