@@ -2,9 +2,9 @@
 
     python -m benchmarks.kept
 
-Policies that `python -m benchmarks.learners` and `python -m benchmarks.limited` made are part of
-the package, one or more for every task. Each is evaluated as it was trained and with the shield
-`qp`, on the same fixed seeds.
+The package contains policies that `python -m benchmarks.learners` and `python -m
+benchmarks.limited` trained, at least one for every task. Each is evaluated without a shield and
+with the shield `qp`, on the same fixed seeds.
 """
 
 import sys
