@@ -29,7 +29,7 @@ def _make_row(
     baseline: str = "bare",
     **env: Any,
 ) -> Row:
-    """Return a row of the study, with people who ignore the robot."""
+    """Return a row of the study, with workers that ignore the robot."""
     known = {"people": "unaware", "shield": shield, **env}
     return Row(words, n_episodes, "scripted", setup, known, baseline, is_shown=words != "")
 

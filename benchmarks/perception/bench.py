@@ -35,7 +35,7 @@ from hrc_env.scene.rigs import RIGS
 from hrc_env.worker.body import worker_names
 
 LENSES = {"pinhole": "lab", "fisheye": "lab_gopro"}
-"""Rigs whose cameras are at the same positions, by the rows of their crops."""
+"""Rigs with cameras at the same positions, by the rows of their crops."""
 FIRST_SEED = 500
 """Seed of the first episode, and of the crops."""
 BLOCK = 5
