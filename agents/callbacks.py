@@ -90,8 +90,8 @@ class ProximityRamp(Curriculum):
             `RewardConfig`; the option `--ramp` of `train`.
 
     Raises:
-        ConfigError: fewer than 0 steps; or, at the start of the training, the environment is not an
-            `HRCVecEnv`.
+        ConfigError: `n_steps` is negative or, at the start of the training, the environment is not
+            an `HRCVecEnv`.
     """
 
     def __init__(self, n_steps: int = 400_000) -> None:

@@ -1,4 +1,4 @@
-"""Checkpoints: a learner of Stable-Baselines3, and a description of its environment."""
+"""Checkpoints with a learner of Stable-Baselines3 and a description of its environment."""
 
 import json
 import os

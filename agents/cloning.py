@@ -26,13 +26,13 @@ with learner():
 
 Arrays = dict[str, NDArray[np.float32]]
 LEAST_SPREAD = 0.05
-"""Least standard deviation of a policy's actions after the cloning."""
+"""Minimum standard deviation of a policy's actions after cloning."""
 FLAT = ""
 """Name of an observation without parts."""
 
 
 class Demonstrations(NamedTuple):
-    """Observations with the expert's actions."""
+    """Observations, with the actions of the expert for them."""
 
     observations: Arrays
     """Observations (N, ...) by part."""
@@ -45,9 +45,9 @@ class CloningSettings:
     """Amount of demonstrations, and settings of the optimization."""
 
     rounds: int = 4
-    """Number of rounds of gathering and learning."""
+    """Number of rounds, each of collecting demonstrations and learning from them."""
     steps: int = 2000
-    """Gradient steps of each round, over all demonstrations; three times as many in the last."""
+    """Gradient steps per round on all demonstrations; the last round has three times as many."""
     batch_size: int = 256
     """Number of observations in a gradient step."""
     learning_rate: float = 1e-3
@@ -103,7 +103,7 @@ def clone(
             tick(1 / (settings.rounds * n_steps))
         n = settings.steps if k < settings.rounds - 1 else 3 * settings.steps
         errors.append(_learn(policy, _stack(shown), n, settings, rng))
-    if isinstance(policy, ActorCriticPolicy):  # exploration no larger than the error
+    if isinstance(policy, ActorCriticPolicy):  # exploration is no larger than the error
         policy.log_std.data.fill_(math.log(max(errors[-1], LEAST_SPREAD)))
     return errors
 

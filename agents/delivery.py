@@ -48,7 +48,7 @@ SPEEDS_M_S, HEADINGS = (0.25, 0.6, 1.0, 1.35), 24
 TIMES_S = np.array([0.2, 0.5, 0.8, 1.2, 1.6, 2.0])
 """Times after which candidate velocities are evaluated [s]."""
 NEAR_M, NEAR_GAIN_HZ, STOP_M = 1.0, 1.2, 0.15
-"""Distance from the zone's centre for a straight approach [m], its gain [1/s], and to stop [m]."""
+"""Distance below which the zone is approached straight [m], gain [1/s], stopping distance [m]."""
 GOOD_M, PEOPLE_PRICE, TOUCH_PRICE, FAST_PRICE, WALL_PRICE = 0.7, 6.0, 60.0, 20.0, 200.0
 """Clearance to people without a cost [m], and costs relative to a metre of the route."""
 BESIDE_M, NEAR_PRICE = 0.25, 4.0

@@ -28,7 +28,7 @@ Within the funnel, the height grows with the error, which keeps a policy that im
 from hesitating at one height.
 """
 PRESS_M = 0.02
-"""Depth below the board's surface of the target of the cups [m]."""
+"""Depth below the board's surface to which the cups are commanded [m]."""
 FLAT_Z_M, UPRIGHT_Z_M = -0.12, 0.34
 """Heights above the robot's base between which the board is set upright [m]."""
 NEAR_M, FAR_M = 0.72, 1.0
@@ -36,13 +36,13 @@ NEAR_M, FAR_M = 0.72, 1.0
 BEFORE_M, ALIGNED_M, ALIGNED_RAD = 0.13, 0.012, 0.03
 """Distance in front of its target at which the board is aligned, and maximum errors [m, rad]."""
 STAYS = 3.0
-"""Factor on these errors below which an aligned board remains aligned on the last part."""
+"""Factor on `ALIGNED_M` and `ALIGNED_RAD` below which a board remains aligned at the end."""
 THERE_M = np.array([0.003, 0.0, 0.003])
 """Errors along the axes below which the board is held still, to ignore noise [m]."""
 CORNER_M = 0.86
 """Distance of the board's farthest corner from the centre of the cups [m]."""
 LAST_RAD = 0.25
-"""Last part of the path around the robot, on which the board moves straight [rad]."""
+"""Last angle of the path around the robot, within which the board moves straight [rad]."""
 CARRY_M_S, PRESS_M_S, TURN_RAD_S = 0.40, 0.12, 0.9
 """Maximum speeds with the board and against the studs [m/s]; maximum turn rate [rad/s]."""
 STACK_RAD, PLACE_RAD = np.arctan2(-0.98, 0.26), np.arctan2(1.0, 0.29)

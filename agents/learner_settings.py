@@ -1,4 +1,4 @@
-"""Learning recipes of tasks and settings of learners, without imports of a learner."""
+"""Training recipes of tasks, and settings of learners; importing them needs no learner."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -32,9 +32,9 @@ class PPOSettings:
     gamma: float = 0.98
     """Discount per step; 0.98 is a horizon of about 2 s."""
     gae_lambda: float = 0.95
-    """Trade-off between bias and variance of the advantage."""
+    """Lambda of generalized advantage estimation, which trades bias for variance."""
     clip_range: float = 0.2
-    """Greatest relative change of the policy in an update."""
+    """Clipping range of the probability ratio of new and old policy."""
     hidden: tuple[int, ...] = (128, 128)
     """Hidden layers of policy and value network (tanh)."""
     log_std_init: float = -0.5

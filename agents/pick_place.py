@@ -85,7 +85,7 @@ class PickPlacer:
         return self.act_on(split(observation, self.env_info.layout))
 
     def act_on(self, terms: dict[str, Array]) -> NDArray[np.float32]:
-        """Return actions for an observation that is given by its terms."""
+        """Return actions (..., A) for the terms of an observation (`EnvInfo.split`)."""
         shape = terms["tool_position"].shape[:-1]
         terms = {name: np.atleast_2d(term) for name, term in terms.items()}
         velocity, turn, grip = self._plan(_read_view(terms))

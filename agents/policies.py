@@ -28,7 +28,7 @@ EXPORT = "python -m hrc_env export RUN --name NAME"
 
 @dataclass(frozen=True, slots=True)
 class TermSize:
-    """The size of a term of the observation."""
+    """Name, size and scale of a term of the observation."""
 
     name: str
     """Name of the term."""
@@ -98,7 +98,7 @@ def list_names() -> tuple[str, ...]:
 
 
 def find_path(policy: str) -> Path:
-    """Return the path of the file of a policy, which is given by an "hrc://" name or its path.
+    """Return the path of the policy with an "hrc://" name; a path is returned unchanged.
 
     Raises:
         ConfigError: the package has no such policy.

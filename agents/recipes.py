@@ -10,7 +10,7 @@ from .requests import TrainingRequest
 
 @dataclass(frozen=True, kw_only=True)
 class Run(TrainingRequest):
-    """Training arguments with all values that a recipe sets; the defaults suit most tasks."""
+    """Complete training arguments, with defaults that suit most tasks."""
 
     algorithm: str = "ppo"
     control: str = "joint"

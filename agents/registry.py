@@ -81,7 +81,7 @@ def check_agent(name: str) -> None:
 
 
 def is_policy(name: str) -> bool:
-    """Return whether a name is of a policy that executes no code (hrc://... or .safetensors)."""
+    """Return whether a name is that of a policy without code (hrc://... or .safetensors)."""
     return name.startswith(policies.PREFIX) or Path(name).suffix == policies.SUFFIX
 
 
@@ -123,7 +123,7 @@ def _is_checkpoint(name: str) -> bool:
 
 
 def _call_function(name: str, env_info: EnvInfo) -> Agent:
-    """Return the agent that a function makes."""
+    """Call the named function, and return the agent that it creates."""
     agent = find_function(name)(env_info)
     if not callable(getattr(agent, "act", None)):
         raise ConfigError(

@@ -45,7 +45,7 @@ class TrainingRequest(EnvironmentArguments):
     seed: int = 0
     """Seed of the environments and of the learner."""
     perception: str = "keypoints"
-    """Perception in the training: keypoints (camera emulator), truth or none; with --engine ray
+    """Perception during training: keypoints (camera emulator), truth or none; with --engine ray
     also pixels, which needs many machines."""
     proximity: float | None = None
     """Weight of proximity to the estimated body in the reward; 0 trains without it (default: 2, and
@@ -101,7 +101,7 @@ class RecordingRequest(EnvironmentArguments):
     infos: tuple[str, ...] = ("cost", "is_success")
     """Infos to record, as names or patterns, e.g. cost "safety/*" "reward/*"."""
     poses: bool = False
-    """Record the workers' joints, estimated and true."""
+    """Record the estimated and true joints of workers."""
     keypoints: bool = False
     """Record the keypoints that the estimator receives (needs --perception keypoints)."""
     perception: str = "keypoints"
@@ -117,7 +117,7 @@ class ExportRequest:
     run_folder: Path
     """Folder of a run of `train`."""
     name: str
-    """Name of the policy: small letters, digits and _."""
+    """Name of the policy, of lowercase letters, digits and _."""
     out: Path = Path("policies")
     """Folder for ID/NAME.safetensors and ID/NAME.json."""
     episodes: int = 256

@@ -53,7 +53,7 @@ def make_learner(
 
 
 def count_first_steps(env: HRCVecEnv) -> int:
-    """Return the number of random steps in a new buffer, an episode of every environment."""
+    """Return the number of random steps before learning, an episode of every environment."""
     return env.num_envs * (env.env.max_episode_steps + 1)
 
 

@@ -141,7 +141,7 @@ def make_spaces(env_info: EnvInfo, images: Sequence[str] = ()) -> Spaces:
     """Return the spaces of an environment's observations and actions.
 
     Args:
-        env_info: the environment.
+        env_info: information about the environment.
         images: names of the images that a policy uses; channels come first, as in
             Stable-Baselines3.
     """

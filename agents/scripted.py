@@ -30,7 +30,7 @@ class Yielding:
     stop_m: float = 0.10
     """Distance below which the robot stands still [m]."""
     full_speed_m: float = 0.60
-    """Distance above which it has full speed [m]."""
+    """Distance above which the robot moves at full speed [m]."""
     unknown_m_s: float = 0.25
     """Maximum speed of the tool and its load while an unseen worker may be present [m/s]; with 0
     the robot stops."""
@@ -40,11 +40,11 @@ class Yielding:
         return np.clip((gap_m - self.stop_m) / (self.full_speed_m - self.stop_m), 0.0, 1.0)
 
     def blind_share(self, terms: dict[str, Array], fastest_m_s: Array) -> Array:
-        """Return the factor in [0, 1] on actions while unseen workers may be present.
+        """Return the factor in [0, 1] on actions, less than 1 if unseen workers may be present.
 
         Args:
-            terms: terms of observations.
-            fastest_m_s: speed of the action's fastest point [m/s].
+            terms: terms of observations, by name.
+            fastest_m_s: speed (n,) of the fastest point of the tool and its load [m/s].
         """
         unknown = (terms["worker_unknown"] > 0.5).any(axis=-1)
         share = np.minimum(self.unknown_m_s / np.maximum(fastest_m_s, 1e-9), 1.0)
@@ -78,7 +78,7 @@ class Reacher:
         return self.act_on(split(observation, self.env_info.layout))
 
     def act_on(self, terms: dict[str, Array]) -> NDArray[np.float32]:
-        """Return actions for an observation that is given by its terms."""
+        """Return actions (..., A) for the terms of an observation (`EnvInfo.split`)."""
         velocity, blind = self._compute_tool_velocity(terms["goal_from_tool"]), np.ones(1)
         if self.yielding is not None:
             nearest_m = terms["worker_separation"].min(axis=-1, initial=np.inf)

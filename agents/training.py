@@ -58,7 +58,7 @@ SETTINGS = {
     "ppo_lagrangian": SettingsPair(PPOSettings(), IMITATOR),
     "sac": SettingsPair(SACSettings(), SACSettings(hidden=(256, 256))),
 }
-"""Settings by algorithm."""
+"""Settings of learners by algorithm."""
 DEMONSTRATION_SEED = 2_000_000
 """First seed of demonstrations, far from those of training and of evaluations."""
 ONLY_OF_A_RUN = (
@@ -93,11 +93,11 @@ class StartedLearner(NamedTuple):
 
 
 def run(arguments: TrainingRequest) -> int:
-    """Train, evaluate, draw and film a policy; return the exit status.
+    """Train and evaluate a policy, plot its learning curve, and film it; return the exit status.
 
     Raises:
         CheckpointError: the run cannot be resumed.
-        ConfigError: the environment cannot be made.
+        ConfigError: the environment cannot be created.
     """
     torch.set_num_threads(1)  # two are slower in networks as small as these
     console = Console()

@@ -186,7 +186,7 @@ def _workers(numbers: Sequence[int] = MEASURED) -> Iterator[dict[int, Any]]:
         try:
             for n in numbers:
                 policy = ppo.make_learner(HRCVecEnv(1, **KEYWORDS), PPOSettings(), 0)
-                share = 1 / len(numbers)  # all are there at once, and one of them works
+                share = 1 / len(numbers)  # all exist at once, and one of them works
                 runners = RunnerSettings(KEYWORDS, n, NUM_ENVS, 0, share, pack())
                 made[n] = RLlibPPO(policy, PPOSettings(), runners)
             yield made
@@ -314,7 +314,7 @@ def metrics_of(played: Played) -> dict[str, Metric]:
 
 
 def _exact(value: float, unit: str) -> Metric:
-    """Return the metric of a number of the model, which has no interval."""
+    """Return a metric without an interval, for a number of the model."""
     return Metric(value, value, value, unit, 1)
 
 

@@ -182,7 +182,7 @@ def iterate_frames(
 
 
 def find_yaw(joints_world: Points3, eyes_world: Points3) -> Ints:
-    """Return the index in `YAWS` (B, C) of bodies (B, J, 3) relative to cameras (C, 3)."""
+    """Return the index (B, C) in `YAWS` of bodies (B, J, 3) as seen from cameras (C, 3)."""
     to_eye = eyes_world - joints_world[:, None, TORSO].mean(2)
     turn = heading(joints_world)[:, None] - np.arctan2(to_eye[..., 1], to_eye[..., 0])
     return np.rint(np.abs((turn + np.pi) % (2 * np.pi) - np.pi) / np.radians(45)).astype(int)

@@ -18,7 +18,7 @@ from hrc_env.experiments.study import Row, Study
 
 
 def _make_row(address: str, shield: str | None) -> Row:
-    """Return the row of a policy with a shield."""
+    """Return the row of a policy with or without a shield."""
     card = policies.read(policies.find_path(address)).card
     env = {"task": card.task, "control": card.control, "shield": shield}
     return Row((f"`{address}`", f"`{shield}`" if shield else "none"), 48, address, env=env)

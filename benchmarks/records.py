@@ -48,7 +48,7 @@ class Record:
     parts: Mapping[str, Part] = field(default_factory=dict)
     """Parts by label."""
     spoiled: Mapping[str, str] = field(default_factory=dict)
-    """Labels of parts that differed in a replay, with descriptions of the differences."""
+    """Descriptions of the differences of parts in a replay, by label."""
 
 
 def get_path(study: str) -> Path:

@@ -40,9 +40,9 @@ from hrc_env.core.results import write_whole
 from hrc_env.experiments.cache import Part, PartCache, PartProgress
 
 CONFIDENCE = 0.95
-"""Probability with which a draw contains a spoiled part."""
+"""Probability with which a draw should contain a spoiled part."""
 LACKING = (DownloadError, MissingExtraError, RenderingError)
-"""Errors of an incomplete machine, which are not differences of a part."""
+"""Errors due to missing software or downloads, which do not count as differences of a part."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class Outcome:
     finds_scattered_share: float | None = None
     """The same share if the spoiled parts are scattered at random over all rows."""
     seconds: float = 0.0
-    """Time of the run [s]."""
+    """Duration of the run [s]."""
 
 
 class AllReplayed(Exception):  # noqa: N818  ends a replay, is not an error

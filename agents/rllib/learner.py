@@ -109,7 +109,7 @@ class RLlibPPO:
             .env_runners(
                 num_env_runners=n,
                 num_envs_per_env_runner=num_envs,
-                num_cpus_per_env_runner=runners.share,  # type: ignore[arg-type]  # a share is one, too
+                num_cpus_per_env_runner=runners.share,  # type: ignore[arg-type]  # fractions are allowed
                 gym_env_vectorize_mode="vector_entry_point",
                 rollout_fragment_length=settings.n_steps,
                 create_env_on_local_worker=False,

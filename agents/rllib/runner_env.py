@@ -60,11 +60,11 @@ def reported_errors(report: Callable[[str], object]) -> Iterator[None]:
 
 
 class RunnerEnv(VectorWrapper[Any, Any, Any, Any, Any]):
-    """Environments with scaled rewards and without infos, which keep finished episodes.
+    """Environments with scaled rewards and without infos, which summarize finished episodes.
 
     A running estimate of the discounted return's variance scales rewards, as `VecNormalize` of
-    Stable-Baselines3 does. First episodes end early at random times, so that a short rollout covers
-    all phases of an episode, if `env` is an `HRCVectorEnv`.
+    Stable-Baselines3 does. If `env` is an `HRCVectorEnv`, its first episodes end early at random
+    times, to cover all phases of an episode in a short rollout.
 
     Args:
         env: environments that restart in the step after an episode's end.

@@ -33,7 +33,7 @@ def learn(
     """Continue the training of a policy up to its number of steps or an interrupt.
 
     Args:
-        run: task, budget and workers.
+        run: training arguments with task, budget and number of workers.
         settings: settings of PPO; a rollout has `n_steps` of every worker's environments.
         whole: weight of the proximity term after the ramp.
         log: log of a PPO of Stable-Baselines3, which holds the network, Adam's moments and the

@@ -36,7 +36,7 @@ def compute_statistics(films: Sequence[Film], body: Body) -> dict[str, float]:
     for name, which in (("wrist", WRISTS), ("ankle", ANKLES), ("head", HEAD)):
         speeds = np.concatenate([_speeds(film, which) for film in films])
         alike = name == "ankle" or films[0].activity == st.WALK
-        speeds = speeds.ravel() if alike else speeds.max(1)  # at work the busier hand counts
+        speeds = speeds.ravel() if alike else speeds.max(1)  # at work the faster hand counts
         numbers[f"{name}_p95_m_s"] = float(np.percentile(speeds, 95))
         numbers[f"{name}_max_m_s"] = float(speeds.max())
         rates = np.concatenate([_accelerations(film, which) for film in films])

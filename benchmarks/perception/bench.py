@@ -75,9 +75,9 @@ class PerceptionBench:
     With 0, each is rendered once in one scene; with None, the emulator is left out.
     """
     cameras: tuple[int, ...] = (1, 2, 4)
-    """Numbers of cameras at which speed is measured."""
+    """Numbers of cameras with which speed is measured."""
     workers: tuple[int, ...] = (1, 2)
-    """Numbers of workers at which speed is measured."""
+    """Numbers of workers with which speed is measured."""
     speed_steps: int = 200
     """Number of steps in a measurement of speed."""
 
@@ -164,7 +164,7 @@ class Task(NamedTuple):
 
 
 def make_tasks(config: PerceptionBench, figures: Path | None = None) -> Iterator[Task]:
-    """Yield all parts, with time measurements last; that of the emulator saves a figure."""
+    """Yield all parts, time measurements last; the part of the emulator saves a figure."""
     yield from _crops(config)
     yield from _episodes(config)
     yield from _faults(config)

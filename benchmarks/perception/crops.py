@@ -35,7 +35,7 @@ from hrc_env.worker.body import load_body, worker_truth
 
 STEP_S = 0.04
 PAUSE_STEPS = (20, 80)
-"""Range of the number of steps between two moments (0.8 to 3.2 s), which then differ."""
+"""Range of the number of steps between two moments (0.8 to 3.2 s), to vary the activity."""
 PATIENCE = 200
 """Number of moments without the desired activity after which another one is accepted."""
 
@@ -114,7 +114,7 @@ class Looker:
         if not any(windows):
             return np.full_like(true_px, np.nan)
         self.renderer.pose(now.q, one(now.motion, 0))
-        self.detector.forget(0)  # as at a first look: the detector stage must agree
+        self.detector.forget(0)  # as without a track: the detector stage must agree
         px = self.detector.detect(self.source, windows).px
         return np.stack([pinhole_from_image(camera, px[c]) for c, camera in enumerate(cameras)])
 

@@ -27,16 +27,16 @@ class Episode:
     error_m: Floats
     """Errors of the estimate (T, J) [m]; NaN if the worker was not tracked."""
     std_m: Floats
-    """Root of the trace of the reported covariance (T, J) [m]; NaN if the worker was not
+    """Square root of the trace of the reported covariance (T, J) [m]; NaN if the worker was not
     tracked."""
     inside95: Ints
     """Number of joints within the reported 95 % region (T,)."""
     off_px: Floats
     """Mean error of a camera's keypoints (T, C) [px]; NaN without a detection."""
     family: Ints
-    """Activity of the worker (T,), as an index in `views.FAMILIES`."""
+    """Family of the worker's activity (T,), as an index in `views.FAMILIES`."""
     named: Bools
-    """Whether a camera was reported as miscalibrated (T, C)."""
+    """Mask (T, C) of cameras that were reported as miscalibrated."""
 
     def to_json(self) -> dict[str, Any]:
         """Return lists of numbers for JSON, rounded to four decimals.
@@ -54,7 +54,7 @@ def read_episode(content: dict[str, Any]) -> Episode:
 
 
 def select_steps(episode: Episode, steps: Bools | slice) -> Episode:
-    """Return some steps of an episode."""
+    """Return an episode reduced to some of its steps."""
     names = [each.name for each in fields(Episode)]
     return Episode(*(getattr(episode, name)[steps] for name in names))
 

@@ -80,7 +80,7 @@ def measure(
     from as many further steps, in which the stages are timed.
     """
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # that one camera is few is known
+        warnings.simplefilter("ignore")  # on the small number of cameras
         env = HRCEnv(
             scene=setting.scene,
             cameras=list(range(setting.cameras)),

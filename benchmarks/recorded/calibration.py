@@ -40,10 +40,11 @@ def find_meeting_point(cameras: list[PinholeCamera]) -> Points3:
 
 
 def tracker_config(cameras: list[PinholeCamera]) -> ParticleConfig:
-    """Return tracker settings for a rig: a prior around its point of view, and no floor.
+    """Return tracker settings for a rig, with a prior around the point that its cameras look at.
 
-    The standard deviation of the prior is half the mean distance of the cameras from the point that
-    is closest to their optical axes. There is no floor, since the file has no height of it.
+    This point is the closest to all optical axes. The standard deviation of the prior is half the
+    mean distance of the cameras from it. There is no floor, since the file does not have its
+    height.
     """
     point = find_meeting_point(cameras)
     distances_m = [float(np.linalg.norm(camera.eye_world - point)) for camera in cameras]

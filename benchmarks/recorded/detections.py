@@ -17,7 +17,7 @@ from hrc_env.perception.windows import window_from_joints
 from hrc_env.tracking.estimators import make_estimator
 
 FOLLOWER = "kalman"
-"""Estimator that predicts the crop windows; it is not the default, which gets no advantage."""
+"""Estimator that predicts the crop windows; the default would get an advantage from this."""
 SURE = 0.5
 """Minimum confidence of detections that are evaluated."""
 

@@ -96,7 +96,7 @@ class Starts:
         self.vector.reset(seed=0)
 
     def run(self, n_resets: int) -> dict[str, float]:
-        """Measure the mean time of resets of one environment, and of 8 of 64 by turns [ms]."""
+        """Measure the mean time of resets of one environment, and of 8 of 64 in turn [ms]."""
         started_s = time.perf_counter()
         for _ in range(n_resets):
             self.single.reset()
@@ -115,7 +115,7 @@ class Starts:
 
 
 Contender = Single | Vector
-"""A contender, which runs a number of episodes at each call."""
+"""A single or vector environment, which runs a number of episodes at each call."""
 
 
 def read(info: Mapping[str, Any]) -> None:

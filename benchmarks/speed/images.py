@@ -84,7 +84,7 @@ def measure(arguments: Arguments) -> dict[str, list[float]]:
             for name, turn in turns.items():
                 started_s = time.process_time()
                 turn()
-                if round_ >= 2:  # the first ones draw what stands still
+                if round_ >= 2:  # the first rounds render static objects
                     took[name].append(1e3 * (time.process_time() - started_s))
     return took
 

@@ -63,7 +63,7 @@ def fall(walk_m: tuple[float, float], seeds: list[int], n_frames: int) -> Points
     path = steer(walk_m, seeds, n_frames)
     time_s = DT_S * np.arange(n_frames, dtype=float)[:, None]
     lying = _ease((time_s - FALLS_S) / (LIES_S - FALLS_S))
-    walked = np.cumsum(1 - lying[:, 0]) - 1  # so many frames of their walk, then no further
+    walked = np.cumsum(1 - lying[:, 0]) - 1  # frames of the walk, until they lie
     path = replace(
         path,
         ground=_at(path.ground, walked),

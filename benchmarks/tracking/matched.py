@@ -47,7 +47,7 @@ def make_matched_model(damping: float, root_acceleration: float) -> MatchedModel
     F, own = discretise_joints(DT_S, damping, 0.0)
     average = np.zeros((N_JOINTS, N_JOINTS))
     average[:, TORSO] = 1 / len(TORSO)
-    # what of the root's (position, velocity) a joint takes along; the rest is its own
+    # share of the root's (position, velocity) that a joint follows
     along = np.array([[1, DT_S], [0, 1]]) - F
     linear = np.block(
         [[np.diag(F[:, i, k]) + along[:, i, k, None] * average for k in (0, 1)] for i in (0, 1)]

@@ -50,7 +50,7 @@ WALKING = Gait((0.9, 1.25, 1.5))
 
 @dataclass(frozen=True, slots=True)
 class Path:
-    """Walks of S people on the ground with the motion of limbs, in T frames of 0.04 s (T, S)."""
+    """Paths of S walkers and phases of their limbs, in T frames of 0.04 s; arrays (T, S)."""
 
     ground: Floats
     """Position on the ground (T, S, 2) [m]."""

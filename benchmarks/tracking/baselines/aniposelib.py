@@ -21,7 +21,7 @@ def follow(P: Floats, px: Points2, seed: int) -> Points3:
     del seed
     points = np.ascontiguousarray(np.moveaxis(px, 1, 0))
     with contextlib.redirect_stdout(io.StringIO()), warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of compilers, and of joints that nobody sees
+        warnings.simplefilter("ignore")  # of compilers, and of joints that no camera sees
         group = _group(P)
         return np.asarray(group.triangulate_optim(points, constraints=BONES.tolist()), float)
 

@@ -112,7 +112,7 @@ def find_follow(name: str) -> Callable[[Floats, Points2, int], Points3]:
 
 
 def names() -> list[str]:
-    """Return the names of the participants: our estimators and the installed libraries."""
+    """Return the names of all participants: those in `OURS` and the installed libraries."""
     return [*OURS, *filter(is_installed, LIBRARIES)]
 
 

@@ -36,7 +36,7 @@ def _one_joint(P: Floats, px: Points2, start: Points3) -> Points3:
             if near.any():
                 R = SIGMA_PX**2 * np.eye(2 * int(near.sum()))
                 ukf.update(frame[near].ravel(), R=R, P=P[near])
-        except np.linalg.LinAlgError:  # the covariance is no longer one: begin where we are
+        except np.linalg.LinAlgError:  # the covariance is not positive definite: restart here
             ukf, near = _filter(held), seen
         lost = lost + 1 if seen.sum() >= 2 and near.sum() < 2 else 0
         if lost == PATIENCE:
