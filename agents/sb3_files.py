@@ -381,7 +381,7 @@ def _unpickle(path: Path, name: str, saved: Mapping[str, Any], expected: type) -
 
     try:
         found = cloudpickle.loads(base64.b64decode(saved[PICKLED]))
-    except Exception as error:  # objects of others can raise anything
+    except Exception as error:  # custom objects can raise any exception
         raise CheckpointError(
             f"The {name} of {path} cannot be unpickled here ({type(error).__name__}: {error}). "
             "Its classes must be importable here."

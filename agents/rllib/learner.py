@@ -257,7 +257,7 @@ def make_runner_env(context: Mapping[str, Any]) -> RunnerEnv:
 
 def envs_of(runner: EnvRunner) -> RunnerEnv:
     """Return a runner's environments without RLlib's wrappers."""
-    env: Any = runner.env  # type: ignore[attr-defined]  # of every runner of ours
+    env: Any = runner.env  # type: ignore[attr-defined]  # of every `EnvRunner` here
     while not isinstance(env, RunnerEnv):
         env = env.env
     return env

@@ -68,8 +68,8 @@ class Arguments:
 class _Seen(NamedTuple):
     """The detection in one crop."""
 
-    error_px: Floats  # (J,) of each joint; NaN: missed
-    sigma_px: Floats  # (J,) as told
+    error_px: Floats  # (J,) of each joint; NaN if not detected
+    sigma_px: Floats  # (J,) as reported
 
 
 class _Spoilt:
