@@ -100,7 +100,7 @@ def _list_trunk_ends(body: Body, rest: Floats) -> Floats:
 
 
 def _make_rest_frame(along: Floats, pole: Floats) -> Floats:
-    """Return axes bone, hinge x bone and hinge of a bone whose joint bulges towards `pole`."""
+    """Return axes bone, hinge x bone and hinge of a bone with a joint that bulges to `pole`."""
     along = along / np.linalg.norm(along)
     hinge = np.cross(pole, along)
     hinge /= np.linalg.norm(hinge)

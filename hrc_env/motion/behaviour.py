@@ -1,7 +1,7 @@
 """Choice of a worker's next activity from uniform draws in [0, 1) when an activity has ended.
 
-The order of jobs at places is defined in `schedule`. A worker who has no free path to a place
-chooses another place of the same kind, or waits.
+The order of jobs at places is defined in `schedule`. A worker without a free path to a
+place chooses another place of the same kind, or waits.
 """
 
 import math

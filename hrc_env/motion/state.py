@@ -135,7 +135,7 @@ class Worker:
     undo_at: float
     """Time from which the steps are retraced in reverse order [s]; 0 for never."""
     total_s: float
-    """Duration of an activity whose second half mirrors the first [s]."""
+    """Duration of an activity with a second half that mirrors the first [s]."""
     load_prop: int
     """Prop that is carried from one activity to the next, an index into `PROPS`; 0 for nothing."""
     load_at: Annotated[Floats, (6,)]
@@ -371,13 +371,13 @@ ACTIVITY_NAMES = (
 )
 """Name of each activity, by its number."""
 GOING = (WALK, TURN, CARRY, STUMBLE, STEP_BACK)
-"""Activities whose motion is the closed form of a walk."""
+"""Activities that are computed by the closed form of a walk."""
 IDLE = (STAND, LOOK_ROUND)
 """Activities in which a load is merely held."""
 TAKING = (PICK_UP, RECEIVE)
-"""Activities whose motion is the closed form of picking up."""
+"""Activities that are computed by the closed form of picking up."""
 GIVING = (SET_DOWN, HAND_OVER)
-"""Activities whose motion is the closed form of picking up, reversed in time."""
+"""Activities that are computed by the closed form of picking up, reversed in time."""
 WAYS = (WALK, TURN, CARRY, PUSH, STUMBLE, CLIP, RUN, FALL)
 """Activities that a job cannot have."""
 NOWHERE = -1
