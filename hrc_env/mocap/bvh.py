@@ -152,7 +152,7 @@ def _read_frames(rows: Rows, width: int, announced: int) -> _Frames:
     Args:
         rows: lines of the file.
         width: number of channels.
-        announced: announced number of frames.
+        announced: number of frames that the file announces.
     """
     first, lines = rows.at, [separate_numbers(words, width) for words in rows.remaining()]
     if lines and len(lines[-1]) < width:

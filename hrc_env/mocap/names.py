@@ -104,7 +104,7 @@ OWN = frozenset(
 """Words that must not be omitted from a name, because they change its meaning."""
 WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
 CUT = 0.05
-"""Cost of each word that is omitted before a name; the k-th name of a joint costs k."""
+"""Cost of each word that is omitted before a name; a joint's name at index k costs k."""
 TAIL = 0.2
 """Cost of each word that is omitted after a name."""
 TURNED = 0.1
@@ -236,7 +236,7 @@ def find_nodes(joints: Mapping[str, str], names: Sequence[str], source: str) -> 
     Args:
         joints: names of the nodes, by joint.
         names: names of all nodes.
-        source: name of the file, for errors.
+        source: name of the file, for error messages.
 
     Raises:
         ConfigError: a node or joint is unknown, or two joints have the same node.

@@ -40,7 +40,7 @@ def measure_legs(joints: Points3) -> float:
 
 
 def measure_stature(joints: Points3) -> float:
-    """Return an estimate of the person's stature, in the unit of the joints (T, 15, 3)."""
+    """Estimate the person's stature, in the unit of the joints (T, 15, 3)."""
     trunk = np.linalg.norm(midpoint(joints, "shoulder") - midpoint(joints, "hip"), axis=-1)
     return (measure_legs(joints) + float(np.nanmedian(trunk))) / MEASURED_SHARE
 

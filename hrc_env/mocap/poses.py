@@ -21,7 +21,7 @@ STARTS = {
     "knee": "shank",
     "ankle": "foot",
 }
-"""Segment that begins at the centre of each joint."""
+"""Segment with its origin at the centre of each joint, by the joint's name without side."""
 
 
 @dataclass(frozen=True, slots=True)

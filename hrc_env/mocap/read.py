@@ -35,7 +35,7 @@ class _Content(NamedTuple):
     are_landmarks: bool
     """Whether the joints are BlazePose landmarks, as in `Capture`."""
     node_names: tuple[str, ...]
-    """Name in the file of each joint (15,)."""
+    """Names (15,) of the joints in the file."""
     notes: tuple[str, ...] = ()
     """A sentence for each guess and each repair."""
     rest_up: Floats | None = None
@@ -59,8 +59,8 @@ def read_recording(
         source_fps: true frame rate of the file [Hz], if the file states none or a wrong one.
         skeleton: the .asf file of an .amc file; None to search for it in the same folder.
         allow_off_floor: whether to accept a person that is not on one level floor (stairs, terrain,
-            long flights) and treat the motion as on one.
-        joints: names in the file of joints that are not recognized, as {"left_shoulder": "lShldr"}.
+            long jumps), and to treat the motion as if it were.
+        joints: names of nodes for joints that are not recognized, e.g. {"left_shoulder": "lShldr"}.
         up: upward axis of the file, such as "+y", if it is not recognized.
 
     Returns:

@@ -21,7 +21,7 @@ class Capture:
     are_landmarks: bool
     """Whether joints are BlazePose landmarks instead of centres of rotation of the bones."""
     node_names: tuple[str, ...]
-    """Name in the file of each joint (15,)."""
+    """Names (15,) of the joints in the file."""
     source: str
     """Name of the file."""
     notes: tuple[str, ...] = ()
@@ -75,7 +75,7 @@ def compose_tree(parent: Ints, offset: Floats, rotation: Rotations) -> TreePose:
     """Compose the poses of a tree's nodes from their poses in the parents' frames.
 
     Args:
-        parent: parent (N,) of each node, -1 for none; parents come first.
+        parent: parent (N,) of each node, -1 for none; parents come before their children.
         offset: origins (T, N, 3) or (1, N, 3) in the parents' frames.
         rotation: rotations (T, N, 3, 3) in the parents' frames.
     """

@@ -85,7 +85,7 @@ def repair_joints(
     Args:
         joints: joints (T, 15, 3) in the frame and unit of the file; missing joints are NaN.
         fps: frame rate [Hz].
-        source: name of the file, for errors.
+        source: name of the file, for error messages.
         at_zero: whether the file's floor is at 0 by convention, see `footing.put_on_floor`.
         off_floor: whether a person that is not on one level floor is accepted.
         upward: information on the upward axis.

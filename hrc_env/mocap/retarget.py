@@ -240,7 +240,7 @@ def fit_controls(
     """Fit the control vectors (T, N_CONTROLS) of a worker to given joints.
 
     Args:
-        joints: joints (T, 15, 3) that the worker should have [m].
+        joints: desired joints (T, 15, 3) of the worker [m].
         fps: frame rate [Hz].
         marks: joints of the worker's body.
         on_progress: called with each increase of the completed share of the work.
@@ -272,7 +272,7 @@ def _improve(
 
     Args:
         q: control vectors (n, N_CONTROLS), which are changed.
-        joints: joints (n, 15, 3) that the worker should have [m].
+        joints: desired joints (n, 15, 3) of the worker [m].
         usual: values (n, F) towards which the fitted columns are pulled.
         weight: weight (15, 1) of each joint.
         pull: strength (F,) of the pull.

@@ -59,7 +59,7 @@ def to_number(word: str) -> float:
 
 
 class Rows:
-    """Iterator over the non-empty lines of a text file; error messages contain the line."""
+    """Reader of the non-empty lines of a text file; its error messages contain the line."""
 
     def __init__(self, path: Path, comments: str = "") -> None:
         """Read a file and remove comments, which begin with a match of the pattern `comments`."""

@@ -41,12 +41,12 @@ class LockedFeet(NamedTuple):
 
 
 def lock_feet(q: Floats, fps: float, size: Floats) -> LockedFeet:
-    """Fix standing feet in control vectors.
+    """Fix the standing feet in control vectors, so that they do not slide.
 
     Args:
         q: control vectors (T, N_CONTROLS).
         fps: frame rate [Hz].
-        size: lengths (N_SIZES,) of the body [m].
+        size: dimensions (N_SIZES,) of the body [m].
     """
     out, stands = q.copy(), np.zeros((len(q), 2), bool)
     for side in range(2):

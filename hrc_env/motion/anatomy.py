@@ -13,16 +13,17 @@ CHEST, HEAD = 3, 5
 LEFT, SIDE_STRIDE = 6, 8
 """First segment of the left side, and number of segments of a side (order of `worker.body`)."""
 CLAVICLE, UPPER_ARM, FOREARM, HAND, THIGH, SHANK, FOOT, TOES = range(8)
-"""Segments of one side, counted from its first."""
+"""Segments of one side, relative to its first segment."""
 
 ARM, FOREARM_GRIP, LEG, THIGH_LENGTH, SHANK_LENGTH, ANKLE_Z, STAND_Z = range(7)
 ANKLE_X, BALL_X, BALL_Z, HEEL_X, UPPER_LENGTH = range(7, 12)
 N_SIZES = 12
 """Number of columns of `Anatomy.lengths`.
 
-Shoulder to grip, elbow to grip, hip to ankle, thigh, shank, heights of the ankle and of the
-standing pelvis, ankle ahead of the pelvis, ball ahead of and above the ankle, heel ahead of the
-ankle, upper arm [m].
+They are the lengths from shoulder to grip, elbow to grip, and hip to ankle; the lengths of thigh
+and shank; the heights of the ankle and of the standing pelvis; the positions of the ankle ahead of
+the pelvis, of the ball ahead of and above the ankle, and of the heel ahead of the ankle; and the
+length of the upper arm [m].
 """
 ROUND = ("pelvis", "abdomen", "torso", "chest", "left_shoulder", "right_shoulder")
 """Capsules on which a lying trunk rests."""
@@ -56,7 +57,7 @@ class Anatomy:
 
 
 def measure_bodies(bodies: Body) -> Anatomy:
-    """Return the constants (N, ...) of N bodies or of one; each row is as from `measure_body`."""
+    """Return the constants (N, ...) of N bodies, each as `measure_body` returns them."""
     rests = bodies.rest_position.reshape(-1, N_SEGMENTS, 3)
     ends = bodies.capsule_ends.reshape(len(rests), -1, 2, 3)
     radii = bodies.capsule_radius_m.reshape(len(rests), -1)
@@ -100,7 +101,7 @@ def _list_trunk_ends(body: Body, rest: Floats) -> Floats:
 
 
 def _make_rest_frame(along: Floats, pole: Floats) -> Floats:
-    """Return axes bone, hinge x bone and hinge of a bone with a joint that bulges to `pole`."""
+    """Return the axes (bone, hinge x bone, hinge) of a bone with a joint that bulges to `pole`."""
     along = along / np.linalg.norm(along)
     hinge = np.cross(pole, along)
     hinge /= np.linalg.norm(hinge)

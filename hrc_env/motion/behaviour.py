@@ -1,7 +1,7 @@
 """Choice of a worker's next activity from uniform draws in [0, 1) when an activity has ended.
 
-The order of jobs at places is defined in `schedule`. A worker without a free path to a
-place chooses another place of the same kind, or waits.
+The order of jobs at places is defined in `schedule`. A worker without a free path to a place
+chooses another place of the same kind, or waits.
 """
 
 import math
@@ -50,8 +50,8 @@ def begin_next_activity(state: MotionState, b: int, w: int, draws: Floats) -> No
 
     Args:
         state: state of all workers, which is changed.
-        b: environment.
-        w: worker.
+        b: index of the environment.
+        w: index of the worker.
         draws: uniform draws (N_DRAWS,) in [0, 1).
     """
     workers, frames = state.workers[b], state.mind.clips.frames
@@ -82,9 +82,9 @@ def begin_episode(
 
     Args:
         state: state of all workers, which is changed.
-        b: environment.
+        b: index of the environment.
         n_present: number of workers in the episode.
-        bodies: row of the body (W,) of each worker.
+        bodies: row (W,) of each worker's body in the pool.
         draws: uniform draws (W, 2, N_DRAWS) in [0, 1) for places and first activities.
         activities: first activities of the first workers, used if there is a place for them.
     """

@@ -75,7 +75,7 @@ def evaluate(t: float, clock_s: float, frames: Floats, worker: Worker) -> None:
 def stop(worker: Worker) -> float:
     """End an activity: stand where it ends, and release a load that was set down or handed over.
 
-    Returns the angle by which the heading was unwound, a multiple of a full turn [rad].
+    Return the angle by which the heading was unwound, a multiple of a full turn [rad].
     """
     if worker.activity in st.GIVING or worker.activity == st.PUSH:
         worker.load_prop = 0

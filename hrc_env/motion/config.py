@@ -137,9 +137,9 @@ class MotionConfig:
     near_probability: float = 0.85
     """Probability that the next errand is at the robot; judgement, for frequent encounters."""
     near_radius_m: Range = (1.0, 1.35)
-    """Distance from the base axis of workers at the robot [m]; its targets are within reach."""
+    """Distance of workers at the robot from its base axis [m]; its targets are within reach."""
     near_azimuth_rad: float = 0.785
-    """Greatest angle of workers at the robot from its front, at the base axis [rad]; judgement."""
+    """Greatest angle, at the robot's base axis, between its front and workers [rad]; judgement."""
     dwell_s: Range = (6.0, 16.0)
     """Duration of a stay at one workplace before the next errand [s]; judgement."""
     spacing_m: float = 1.1

@@ -120,7 +120,7 @@ def shift(q: Floats, at: int, yaw: float, ahead: float, left: float) -> None:
 
     Args:
         q: array that holds the point [m].
-        at: index of its x.
+        at: index of the point's x.
         yaw: heading [rad].
         ahead: displacement along the heading [m].
         left: displacement to the left of the heading [m].
@@ -133,7 +133,7 @@ def pivot_foot(pitch: float, pivot_x: float, pivot_z: float) -> SagittalShift:
     """Return the displacement of the ankle when the foot pitches about a pivot.
 
     Args:
-        pitch: pitch of the foot, the heel up [rad].
+        pitch: pitch of the foot, positive with the heel up [rad].
         pivot_x: distance of the pivot ahead of the ankle [m].
         pivot_z: height of the pivot relative to the ankle [m].
     """

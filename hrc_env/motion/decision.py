@@ -153,7 +153,7 @@ class Decision:
 def list_obstacles(decision: Decision) -> Floats:
     """Return discs (n, 3) that a path must avoid: x, y, radius [m].
 
-    They cover the locations where other workers will stand and work, the robot's arm, and loads.
+    They cover other workers at the ends of their activities, the robot's arm, and loads.
     """
     people, rows = decision.mind.config.people, []
     others = decision.workers[decision.find_others()]
@@ -178,7 +178,7 @@ def list_places(decision: Decision) -> Iterator[Place]:
 
 
 def list_stages(decision: Decision, starts: Floats) -> Iterator[Place]:
-    """Yield the nearest few of the poses (k, 3) for a clip, unless another worker is near."""
+    """Yield the `N_STAGES` nearest poses of (k, 3) for a clip, except those near another worker."""
     away = np.hypot(*(starts[:, :2] - decision.worker.place[:2]).T)
     nearest = starts[np.argsort(away, kind="stable")[:N_STAGES]].tolist()
     return _keep_free(decision, (Place(x, y, yaw, 0.0) for x, y, yaw in nearest))

@@ -144,7 +144,7 @@ def raise_heel(side: int, pitch: float, worker: Worker) -> None:
     Args:
         side: 0 left, 1 right.
         pitch: additional pitch, positive with the heel up [rad].
-        worker: record; its `q` is changed.
+        worker: record of the worker; its `q` is changed.
     """
     q = worker.q
     at = c.ANKLE + 6 * side

@@ -1,4 +1,4 @@
-"""Test of the scenes in which a clip of recorded motion has room."""
+"""Scenes that have room for a clip of recorded motion."""
 
 from collections.abc import Mapping
 

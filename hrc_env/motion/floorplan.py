@@ -36,11 +36,11 @@ class Floorplan:
     grid: FloorGrid
     """Slack on a grid over the floor."""
     grounds: Grounds
-    """The floor as the scene describes it."""
+    """Description of the floor by the scene."""
 
 
 def make_floorplan(grounds: Grounds) -> Floorplan:
-    """Measure the floor of a scene.
+    """Compute the free space on the floor of a scene.
 
     Args:
         grounds: walkable area, footprints of objects, places and the robot.
@@ -88,7 +88,7 @@ def _measure_slack(xs: Floats, ys: Floats, grounds: Grounds) -> Floats:
     Args:
         xs: world x (X, 1) of the grid points [m].
         ys: world y (Y,) of the grid points [m].
-        grounds: the floor.
+        grounds: floor of the scene.
     """
     robot_x, robot_y = grounds.robot_xy_m
     slack = np.hypot(xs - robot_x, ys - robot_y) - grounds.robot_clearance_m

@@ -133,7 +133,7 @@ class MindGroup(NamedTuple):
     mind: BehaviourParams
     """Constants of the behaviour."""
     parts: tuple[slice, ...]
-    """Slices of the environments."""
+    """Slices of the batch that contain the environments."""
 
 
 def make_state(
@@ -149,10 +149,10 @@ def make_state(
 
     Args:
         batch: number of environments.
-        n_workers: number of workers in each of them.
+        n_workers: greatest number of workers in each environment.
         body: the body of all workers, or a pool from which each worker's body is drawn per episode.
         config: settings of the motion.
-        grounds: the floor on which they walk.
+        grounds: floor of the scene.
         fewest: least number of workers in an episode, for a random number; None for `n_workers`.
         robot_girth_m: radius of a mobile robot around the points of it that workers watch [m];
             0 for an arm.
@@ -225,9 +225,9 @@ def _begin_cast_episode(
 
     Args:
         state: state of all workers, which is changed.
-        b: environment.
+        b: index of the environment.
         n_present: drawn number of workers.
-        bodies: drawn row of the body (W,) of each worker.
+        bodies: drawn row (W,) of each worker's body in the pool.
         draws: uniform draws (W, 2, N_DRAWS) in [0, 1).
         cast: prescribed parts of the episode.
         rng: generator of further draws.

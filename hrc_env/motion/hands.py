@@ -66,7 +66,7 @@ def reach(t: float, worker: Worker) -> None:
 
     Args:
         t: time since the reach began [s].
-        worker: record with the plan; its `q`, standing at ease, is changed.
+        worker: record with the plan; its `q`, a relaxed stance, is changed.
     """
     q = worker.q
     there = worker.out_at + worker.out_s
@@ -91,7 +91,7 @@ def lift(t: float, worker: Worker) -> None:
 
     Args:
         t: time since the lift began [s].
-        worker: record with the plan; its `q`, standing at ease, is changed.
+        worker: record with the plan; its `q`, a relaxed stance, is changed.
     """
     q = worker.q
     grip = worker.out_at + worker.out_s
@@ -158,7 +158,7 @@ def plan_reach(
         hold_s: time for which the hands work at the point [s].
         fidget_m: amplitude of small movements at the point [m].
         fidget_hz: frequency of small movements at the point [Hz].
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The duration [s].
@@ -197,7 +197,7 @@ def plan_lift(ahead: float, z: float, times: LiftTimes, worker: Worker) -> float
         ahead: distance of the load ahead of the feet [m].
         z: height of the load's grips [m].
         times: times to bend, raise and hold.
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The duration [s].

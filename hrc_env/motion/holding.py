@@ -47,7 +47,7 @@ def grip(side: int, gx: float, gy: float, gz: float, worker: Worker) -> None:
         gx: x of the point in the prop's frame [m].
         gy: y of the point in the prop's frame [m].
         gz: z of the point in the prop's frame [m].
-        worker: record; its `q` is changed.
+        worker: record of the worker; its `q` is changed.
     """
     q = worker.q
     yaw, pitch, roll = q[c.PROP_POSE + 3], q[c.PROP_POSE + 4], q[c.PROP_POSE + 5]
@@ -71,7 +71,7 @@ def hold_load(x: float, y: float, yaw: float, up: float, worker: Worker) -> None
         y: world y of the root [m].
         yaw: heading [rad].
         up: height of the load relative to its height when the worker stands [m].
-        worker: record; its `q` is changed.
+        worker: record of the worker; its `q` is changed.
     """
     place_load(x, y, yaw, up, worker)
     grip_load(1.0, worker)
@@ -86,7 +86,7 @@ def place_load(x: float, y: float, yaw: float, up: float, worker: Worker) -> Non
         y: world y of the root [m].
         yaw: heading [rad].
         up: height of the load relative to its height when the worker stands [m].
-        worker: record; its `q` is changed.
+        worker: record of the worker; its `q` is changed.
     """
     q, at = worker.q, worker.load_at
     q[c.PROP] = worker.load_prop

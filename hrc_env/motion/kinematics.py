@@ -44,7 +44,7 @@ def set_rotation(yaw: float, pitch: float, roll: float, segment: int, worker: Wo
         pitch: angle about y [rad].
         roll: angle about x [rad].
         segment: row of `r`.
-        worker: record; its `r` is written.
+        worker: record of the worker; its `r` is written.
     """
     r = worker.r
     cy, sy = math.cos(yaw), math.sin(yaw)
@@ -90,7 +90,7 @@ def aim(bone: int, end: int, length: float, worker: Worker) -> None:
         bone: row of the bone.
         end: row of `p` that the bone points to.
         length: length of the bone [m].
-        worker: record; its `r` is written.
+        worker: record of the worker; its `r` is written.
     """
     p, r = worker.p, worker.r
     inverse = 1.0 / length
@@ -121,7 +121,7 @@ def solve_two_bones(
         second: length of the second bone [m].
         knee: share of the chain's length beyond which the extension is compressed smoothly.
         limit: greatest extension of the chain, as a share of its length.
-        worker: record; its `p` is written.
+        worker: record of the worker; its `p` is written.
     """
     p = worker.p
     dx = p[TARGET, 0] - p[start, 0]
@@ -212,7 +212,7 @@ def _level_pole(side: int, segment: int, ahead: float, out: float, worker: Worke
         segment: row of the segment whose x axis is used.
         ahead: 1 for a knee, -1 for an elbow.
         out: weight of the outward direction.
-        worker: record; its p[POLE] is changed.
+        worker: record of the worker; its p[POLE] is changed.
     """
     p, r = worker.p, worker.r
     left = 1.0 - 2.0 * side
@@ -233,7 +233,7 @@ def pose_shoulder(side: int, cos: float, sin: float, worker: Worker) -> None:
         side: 0 left, 1 right.
         cos: cosine of the chest's heading.
         sin: sine of the chest's heading.
-        worker: record; its `p` and `r` are written.
+        worker: record of the worker; its `p` and `r` are written.
     """
     q, p, r = worker.q, worker.p, worker.r
     sign = 1.0 - 2.0 * side
@@ -271,7 +271,7 @@ def pose_arm(side: int, cos: float, sin: float, worker: Worker) -> None:
         side: 0 left, 1 right.
         cos: cosine of the chest's heading.
         sin: sine of the chest's heading.
-        worker: record; its `p` and `r` are written.
+        worker: record of the worker; its `p` and `r` are written.
     """
     p = worker.p
     pose_shoulder(side, cos, sin, worker)
@@ -351,7 +351,7 @@ def set_pitch(cos: float, sin: float, pitch: float, segment: int, worker: Worker
         sin: sine of the yaw.
         pitch: angle about y [rad].
         segment: row of `r`.
-        worker: record; its `r` is written.
+        worker: record of the worker; its `r` is written.
     """
     r = worker.r
     cp, sp = 1.0, 0.0

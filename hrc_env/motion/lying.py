@@ -196,13 +196,13 @@ def find_load_at_hand(loads: Records1[Load], kind: int, worker: Worker) -> int:
 
 
 def has_load_at(loads: Records1[Load], stand: Place) -> bool:
-    """Return whether there is a load that is picked up from a place."""
+    """Return whether any load is picked up from near the place `stand`."""
     away = np.hypot(*(loads["stand"][:, :2] - stand[:2]).T)
     return bool(((loads["shown"][:, 0] > 0) & (away < AT_HAND_M)).any())
 
 
 def has_load(loads: Records1[Load], kind: int) -> bool:
-    """Return whether any load is of a kind."""
+    """Return whether there is a load of a kind."""
     return bool((loads["shown"][:, 0] == kind).any())
 
 

@@ -30,7 +30,7 @@ def lay_path(start: Point, via: Floats, end: Point, worker: Worker) -> None:
         via: corners (n, 3): x, y, and the distance before the corner at which its arc may begin
             [m].
         end: last point of the path.
-        worker: record that the path is written into.
+        worker: record into which the path is written.
     """
     worker.end_x, worker.end_y = end.x, end.y
     n = min(via.shape[0], MAX_VIA)

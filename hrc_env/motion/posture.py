@@ -12,7 +12,7 @@ from hrc_env.motion.points import Point, Sides
 from hrc_env.motion.state import Worker
 
 STANCE_HALF_WIDTH_M = 0.10
-"""Half the distance of the ankles when standing [m]; shoulder width of the baked bodies."""
+"""Half the distance between the ankles in standing [m]; shoulder width of the baked bodies."""
 TOE_OUT_RAD = 0.12
 """Outward turn of the feet in standing and walking [rad]; about 7 degrees."""
 SWAY_HZ = (0.11, 0.17, 0.29, 0.41, 0.23)
@@ -61,7 +61,7 @@ def hang(side: int, pitch: float, elbow: float, worker: Worker) -> None:
         side: 0 left, 1 right.
         pitch: forward rotation of the upper arm from the vertical [rad].
         elbow: bend of the elbow [rad].
-        worker: record; its `q` is changed.
+        worker: record of the worker; its `q` is changed.
     """
     q = worker.q
     sign = 1.0 - 2.0 * side
@@ -84,7 +84,7 @@ def stand(x: float, y: float, yaw: float, clock_s: float, worker: Worker) -> Non
         y: world y of the root [m].
         yaw: heading [rad].
         clock_s: time since the episode began [s].
-        worker: record; its `q` is written.
+        worker: record of the worker; its `q` is written.
     """
     q = worker.q
     first, second, third = (
@@ -120,7 +120,7 @@ def lean(amount: float, squat: float, twist: float, worker: Worker) -> None:
         amount: lean; 1 is a deep bow.
         squat: share of the lean that is achieved by bending the knees.
         twist: twist of the trunk to the left [rad].
-        worker: record; its `q` is changed.
+        worker: record of the worker; its `q` is changed.
     """
     q = worker.q
     shift(q, c.ROOT_X, q[c.HEADING], -(0.07 + 0.10 * squat) * amount, 0.0)
@@ -163,7 +163,7 @@ def find_farthest(segment: int, goals: Floats, used: Sides, worker: Worker) -> f
 
 @kernel
 def locate_ahead(ahead: float, left: float, height: float, worker: Worker) -> Vector3:
-    """Convert a point relative to the pose at which the worker's activity begins to the world.
+    """Return the world position of a point relative to the worker's pose before the activity.
 
     Args:
         ahead: distance along the heading [m].
@@ -177,7 +177,7 @@ def locate_ahead(ahead: float, left: float, height: float, worker: Worker) -> Ve
 
 @kernel
 def locate_from_root(ahead: float, left: float, worker: Worker) -> Point:
-    """Convert a point on the floor relative to the root in the control vector to the world.
+    """Return the world position of a floor point relative to the root in the control vector.
 
     Args:
         ahead: distance along the heading [m].
@@ -197,7 +197,7 @@ def look_at(x: float, y: float, z: float, share: float, worker: Worker) -> None:
         y: world y of the point [m].
         z: world z of the point [m].
         share: share of the full turn.
-        worker: record; its `q` is changed.
+        worker: record of the worker; its `q` is changed.
     """
     q = worker.q
     if share <= 0.0:

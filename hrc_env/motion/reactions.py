@@ -129,7 +129,7 @@ def _move_hand(offered: Floats, dt_s: float, worker: Worker) -> None:
     Args:
         offered: point (3,) at which the tool is offered [m].
         dt_s: time since the last call [s].
-        worker: record; its target is changed.
+        worker: record of the worker; its target is changed.
     """
     goal, squared = worker.target[3 * worker.side : 3 * worker.side + 3], 0.0
     for i in range(3):

@@ -27,7 +27,7 @@ from hrc_env.motion.state import N_START, WORKER, Worker
 from hrc_env.worker.body import Body
 
 AWAY_M = 3.0
-"""Length of a path [m]."""
+"""Default length of a path [m]."""
 FAR_M = 8.0
 """Length of the walks and runs that are evaluated [m]."""
 OPEN = FloorGrid(np.full((401, 401), 9.0), np.full(2, -10.0))

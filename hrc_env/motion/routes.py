@@ -99,7 +99,7 @@ def find_route(
         bow: lateral bow of a straight path, in [-1, 1].
         discs: temporary obstacles (n, 3): x, y, radius [m]; they are shrunk to leave the ends free.
         grid: slack on the floor.
-        worker: record that the path is written into.
+        worker: record into which the path is written.
 
     Returns:
         Whether there is a path.

@@ -13,7 +13,7 @@ from hrc_env.world import WORKPLACE_KINDS
 HERE = "here"
 """Value of `Job.at` for a job that is done at the worker's current location."""
 ROUTES = ("walk", "push")
-"""Ways to go to the place of a job."""
+"""Values of `Job.by`, the way to go to the place of a job."""
 DONE_THERE = tuple(name for k, name in enumerate(ACTIVITY_NAMES) if k not in WAYS)
 """Activities that a job can have."""
 HIGHEST_M = 2.2
@@ -25,7 +25,7 @@ class Job:
     """A unit of work and the jobs that may follow; weights are relative to their sum."""
 
     name: str
-    """Name of the job, which other jobs refer to."""
+    """Name of the job, by which other jobs refer to it."""
     activity: str
     """Name of the activity, one of `DONE_THERE`."""
     at: str

@@ -1,4 +1,4 @@
-"""Start of an activity by its index, with the start function of its kind (`activities`)."""
+"""Start of activities by index, with the start functions of `activities`."""
 
 import math
 from collections.abc import Callable
@@ -62,7 +62,7 @@ def start_take(draws: Floats, height: float, worker: Worker) -> float:
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         height: height of the hand [m].
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The duration [s].
@@ -221,7 +221,7 @@ def start_reach(
         near: whether the target is in the robot's workspace instead of ahead of the worker.
         height: least height of a target ahead [m].
         others: places (n, 2) of the other workers [m].
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The duration [s].
@@ -249,7 +249,7 @@ def start_lift(draws: Floats, params: HandParams, worker: Worker) -> float:
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         params: settings of lifts.
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The duration [s].

@@ -107,7 +107,7 @@ class Worker:
     reaction_s: float
     """Duration of the next reaction [s], drawn when an activity begins."""
     signal: int
-    """Stage of the task's signal that the worker waits for, see `reactions.follow_signal`."""
+    """Current stage of the task's signal, see `reactions.follow_signal`."""
 
     # The plan of the activity: where it begins and ends, its steps, the load.
     start_x: float
@@ -221,11 +221,11 @@ class Worker:
     hands_used: Annotated[Floats, (2,)]
     """1 for each hand, left and right, that moves to its target, else 0."""
     gaze_yaw: float
-    """Turn of the head to the work [rad]; left is positive."""
+    """Yaw of the head towards the work [rad]; left is positive."""
     gaze_pitch: float
-    """Pitch of the head to the work [rad]; down is positive."""
+    """Pitch of the head towards the work [rad]; down is positive."""
     gaze: Annotated[Floats, (3,)]
-    """Point in the world that the worker looks at [m]."""
+    """Point in the world at which the worker looks [m]."""
     fidget_m: float
     """Amplitude of the small movements of hands at the target of a reach [m]."""
     fidget_hz: float
@@ -245,7 +245,7 @@ class Worker:
     ahead: float
     """Displacement of the root along the heading while the body is lowered [m]."""
     tool: int
-    """Prop of the work, an index into `PROPS`; 0 for empty hands."""
+    """Tool of the work, an index into `PROPS`; 0 for empty hands."""
     side: int
     """Hand that holds the tool: 0 left, 1 right."""
     take_s: float
@@ -369,7 +369,7 @@ ACTIVITY_NAMES = (
     "screw",
     "take",
 )
-"""Name of each activity, by its number."""
+"""Name of each activity, by its index."""
 GOING = (WALK, TURN, CARRY, STUMBLE, STEP_BACK)
 """Activities that are computed by the closed form of a walk."""
 IDLE = (STAND, LOOK_ROUND)

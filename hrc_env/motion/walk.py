@@ -180,7 +180,7 @@ def _lurch(t: float, trip: float, worker: Worker) -> None:
     Args:
         t: time since the foot was caught [s].
         trip: severity of the stumble in [0, 1].
-        worker: record; its `q` is changed.
+        worker: record of the worker; its `q` is changed.
     """
     q = worker.q
     scale = worker.lengths[LEG] / LEG_M
@@ -357,7 +357,7 @@ def write_footprint(
         yaw: heading [rad].
         half_width: lateral distance of the ankle from the root [m].
         out: footprint (5,), which is written except for column 3.
-        worker: record with the lengths of the body.
+        worker: record with the body dimensions.
     """
     sign = 1.0 - 2.0 * side
     out[0], out[1] = move_point(x, y, yaw, worker.lengths[ANKLE_X], sign * half_width)

@@ -1,6 +1,6 @@
 """The worker's body: 22 segments, 15 joints and the capsules around them.
 
-The numbers are from `assets/workers/<name>.npz`, which `assets/workers/bake.py` writes. In the rest
+The data are read from `assets/workers/<name>.npz`, written by `assets/workers/bake.py`. In the rest
 frame x is forward, y left, z up, with the origin on the floor below the pelvis; at rest all
 segments are aligned with it.
 """
@@ -210,7 +210,7 @@ class _Joints(NamedTuple):
 def _write_joints(
     segments: _Segments, rows: Ints, joint_segment: Ints, joint_offset: Floats, joints: _Joints
 ) -> None:  # pragma: no cover - compiled
-    """Compute the positions of joints and their velocities v + omega x r with their segments.
+    """Compute the positions of joints and their velocities v + omega x r on their segments.
 
     Args:
         segments: segments of N bodies.

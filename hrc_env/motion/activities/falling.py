@@ -185,7 +185,7 @@ def _fall_trunk(at: float, share: float, worker: Worker) -> None:
     Args:
         at: time in `POSES` [s].
         share: weight of the fall in the posture.
-        worker: record; its `q` is changed.
+        worker: record of the worker; its `q` is changed.
     """
     q, scale = worker.q, worker.lengths[LEG] / LEG_M
     side = 1.0 - 2.0 * worker.front
@@ -213,7 +213,7 @@ def _fall_foot(at: float, side: int, column: int, sign: float, worker: Worker) -
         side: 0 left, 1 right.
         column: first column of the foot in `POSES`.
         sign: 1 on the left, -1 on the right.
-        worker: record; its `q` is changed.
+        worker: record of the worker; its `q` is changed.
     """
     q, ankle = worker.q, c.ANKLE + 6 * side
     scale, length, low = worker.lengths[LEG] / LEG_M, worker.lengths[BALL_X], worker.lengths[BALL_Z]

@@ -67,7 +67,7 @@ def start_step_back(draws: Floats, height: float, worker: Worker) -> float:
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         height: height of the work [m].
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The duration [s].
@@ -115,7 +115,7 @@ def start_push(end_yaw: float, speed_m_s: float, prop: int, worker: Worker) -> f
     Args:
         end_yaw: heading at the end [rad].
         speed_m_s: top speed [m/s].
-        prop: the cart or wheelbarrow, an index into `PROPS`.
+        prop: kind of the cart or wheelbarrow, an index into `PROPS`.
         worker: record with the path; the plan is written into it.
 
     Returns:

@@ -64,7 +64,7 @@ def pick_up(t: float, worker: Worker) -> None:
 
     Args:
         t: time since the activity began [s].
-        worker: record with the plan; its `q`, standing at ease, is changed.
+        worker: record with the plan; its `q`, a relaxed stance, is changed.
     """
     q, yaw = worker.q, worker.start_yaw
     gripped = worker.out_at + worker.out_s
@@ -103,7 +103,7 @@ def plan_pick_up(
         height: height of the grips [m]; 0 to draw one.
         prop: kind of the load, an index into `PROPS`.
         on_shoulder: whether to carry a board on the shoulder.
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The time in which the load is raised by a metre [s].
@@ -121,7 +121,7 @@ def plan_receive(draws: Floats, height: float, worker: Worker) -> float:
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         height: height of the box [m]; 0 for the usual height.
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The time in which the load is raised by a metre [s].
@@ -139,7 +139,7 @@ def plan_set_down(draws: Floats, height: float, worker: Worker) -> float:
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         height: height of the grips at rest [m]; 0 to draw one.
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The time in which the load is raised by a metre [s].
@@ -156,7 +156,7 @@ def plan_hand_over(draws: Floats, height: float, worker: Worker) -> float:
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         height: height of the load [m]; 0 for the usual height.
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The time in which the load is raised by a metre [s].
@@ -181,7 +181,7 @@ def _plan_carrying(prop: int, on_shoulder: bool, side: int, worker: Worker) -> N
         prop: kind of the load, an index into `PROPS`.
         on_shoulder: whether the load is carried on a shoulder.
         side: side of the shoulder, 0 left, 1 right.
-        worker: record; its `load_...` fields are written.
+        worker: record of the worker; its `load_...` fields are written.
     """
     at = worker.load_at
     take_load(prop, worker)
@@ -229,7 +229,7 @@ def finish_lift(raise_s: float, worker: Worker) -> float:
 
     Args:
         raise_s: time in which the load is raised by a metre [s].
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The duration [s].

@@ -119,7 +119,7 @@ def plan_stance(z: float, knee: int, foot: int, ahead: float, worker: Worker) ->
         knee: side of the knee that is lowered, 0 left, 1 right.
         foot: side of the foot that steps ahead, 0 left, 1 right.
         ahead: length of the step [m].
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The offset of the hands to the left [m].
@@ -151,7 +151,7 @@ def measure_reach(share: float, one: float, other: float, worker: Worker) -> flo
         share: share of the arm's length that is used.
         one: distance of the target along the second axis [m].
         other: distance of the target along the third axis [m].
-        worker: record with the lengths of the body.
+        worker: record with the body dimensions.
     """
     reach = share * worker.lengths[an.ARM]
     return math.sqrt(max(reach * reach - one * one - other * other, 0.0))
@@ -166,7 +166,7 @@ def plan_tool(tool: int, side: int, at: Vector3, turn: Vector3, worker: Worker) 
         side: hand that holds the tool, 0 left, 1 right.
         at: position of the tool: ahead, to the left, height [m].
         turn: orientation of the tool: yaw from the heading, pitch, roll [rad].
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
     """
     worker.tool, worker.side = tool, side
     worker.take_s = TAKE_S if tool > 0 else 0.0
@@ -204,7 +204,7 @@ def plan_strokes(
         rate_hz: frequency of the strokes [Hz].
         burst_s: duration of a burst [s].
         n: number of bursts.
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
     """
     worker.stroke, worker.stroke_m, worker.stroke_hz = kind, size_m, rate_hz
     worker.burst_s, worker.hold_s = burst_s, n * (burst_s + PAUSE_S)
@@ -228,7 +228,7 @@ def finish_plan(peak_m_s: float, worker: Worker) -> float:
 
     Args:
         peak_m_s: peak speed of the hands on their way to the work [m/s].
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The duration [s].

@@ -45,7 +45,7 @@ def start_clip(piece: int, turn_rad: float, clips: Clips, worker: Worker) -> flo
         piece: index of the piece.
         turn_rad: heading of the clip relative to the worker's heading [rad].
         clips: pieces of all clips.
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The duration [s].
@@ -149,7 +149,7 @@ def _play_body(f: float, share: float, frames: Floats, worker: Worker) -> None:
         f: time in frames of the clip.
         share: weight of the clip.
         frames: frames of all clips.
-        worker: record; its `q` is changed.
+        worker: record of the worker; its `q` is changed.
     """
     q = worker.q
     ahead, left = (
@@ -173,7 +173,7 @@ def _play_foot(f: float, side: int, frames: Floats, worker: Worker) -> None:
         f: time in frames of the clip.
         side: 0 left, 1 right.
         frames: frames of all clips.
-        worker: record; its `q` is written.
+        worker: record of the worker; its `q` is written.
     """
     q, at, column = worker.q, c.ANKLE + 6 * side, c.N_BLENDED + 6 * side
     ahead, left = (

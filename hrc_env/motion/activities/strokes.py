@@ -1,4 +1,4 @@
-"""Movements of hands and tools at work: bursts of strokes, with moves along the work between."""
+"""Movements of hands and tools at work: bursts of strokes, and moves along the work."""
 
 import math
 from typing import NamedTuple
@@ -74,7 +74,7 @@ def _wander(n: int, u: float, other: int, worker: Worker) -> None:
         n: index of the burst.
         u: time since the burst began [s].
         other: column of the other hand's target.
-        worker: record; its `q` is changed.
+        worker: record of the worker; its `q` is changed.
     """
     q = worker.q
     on = min_jerk((u - worker.burst_s) / PAUSE_S)
@@ -122,7 +122,7 @@ def _strike(ease: float, turn: float, worker: Worker) -> None:
     Args:
         ease: weight of the stroke.
         turn: phase of the stroke [rad].
-        worker: record; its `q` is changed.
+        worker: record of the worker; its `q` is changed.
     """
     q, size = worker.q, worker.stroke_m
     skew = min(1.5 * size, 0.35)
@@ -141,7 +141,7 @@ def _fetch(u: float, other: int, worker: Worker) -> None:
     Args:
         u: time since the burst began [s].
         other: column of the other hand's target.
-        worker: record; its `q` is changed.
+        worker: record of the worker; its `q` is changed.
     """
     q = worker.q
     late = u - worker.burst_s + 0.05 + FETCH_S
@@ -164,7 +164,7 @@ def _fidget(ease: float, turn: float, other: int, worker: Worker) -> None:
         ease: weight of the movement.
         turn: phase of the movement [rad].
         other: column of the other hand's target.
-        worker: record; its `q` is changed.
+        worker: record of the worker; its `q` is changed.
     """
     q, size = worker.q, ease * worker.stroke_m
     if worker.stroke == JAB:

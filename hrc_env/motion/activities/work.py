@@ -93,7 +93,7 @@ def step_into(first: int, ahead: float, other: float, out: float, worker: Worker
         ahead: length of the first step [m].
         other: length of the other foot's step [m]; 0 for none.
         out: outward displacement of both feet [m].
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
     """
     cos, sin = math.cos(worker.start_yaw), math.sin(worker.start_yaw)
     worker.step_start, worker.step_period = STEP_AT_S, STEP_PERIOD_S
@@ -139,7 +139,7 @@ def _bulge_way(at: int, goal_z: float, out: float, worker: Worker) -> None:
         at: column of the point's x.
         goal_z: height of the point's goal [m].
         out: share of the path that has been covered.
-        worker: record; its `q` is changed.
+        worker: record of the worker; its `q` is changed.
     """
     q = worker.q
     high = RISE * max(goal_z - q[c.PELVIS_Z] - 0.3, 0.0)
@@ -195,7 +195,7 @@ def _pass_belly(hand: int, at: int, share: float, worker: Worker) -> None:
         hand: 0 left, 1 right.
         at: column of the target's x.
         share: share of the move.
-        worker: record; its `q` is changed.
+        worker: record of the worker; its `q` is changed.
     """
     q, goal = worker.q, worker.target[3 * hand : 3 * hand + 3]
     x, y = locate_from_root(BELLY_AHEAD_M, (1.0 - 2.0 * hand) * BELLY_SIDE_M, worker)
@@ -210,7 +210,7 @@ def work(t: float, worker: Worker) -> None:
 
     Args:
         t: time since the activity began [s].
-        worker: record with the plan; its `q`, standing at ease, is changed.
+        worker: record with the plan; its `q`, a relaxed stance, is changed.
     """
     near_end = min(t, worker.total_s - t)
     down = min_jerk(near_end / worker.settle_s)

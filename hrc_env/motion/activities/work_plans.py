@@ -74,7 +74,7 @@ def plan_hammer(draws: Floats, height: float, worker: Worker) -> float:
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         height: height of the work [m]; 0 to draw one.
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The peak speed of the hands on their way to the work [m/s].
@@ -112,7 +112,7 @@ def plan_drill(draws: Floats, height: float, worker: Worker) -> float:
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         height: height of the work [m]; 0 to draw one.
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The peak speed of the hands on their way to the work [m/s].
@@ -146,7 +146,7 @@ def plan_screw(draws: Floats, height: float, worker: Worker) -> float:
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         height: height of the first screw [m].
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The peak speed of the hands on their way to the work [m/s].
@@ -173,7 +173,7 @@ def plan_saw(draws: Floats, height: float, worker: Worker) -> float:
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         height: height of the work [m]; 0 to draw one.
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The peak speed of the hands on their way to the work [m/s].
@@ -200,7 +200,7 @@ def plan_measure(draws: Floats, height: float, worker: Worker) -> float:
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         height: height of the work [m]; 0 to draw one.
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The peak speed of the hands on their way to the work [m/s].
@@ -224,7 +224,7 @@ def plan_point(draws: Floats, height: float, worker: Worker) -> float:
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         height: height of the work [m].
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The peak speed of the hand [m/s].
@@ -254,7 +254,7 @@ def plan_lunge(draws: Floats, height: float, worker: Worker) -> float:
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         height: height of the work [m]; 0 to draw one.
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The peak speed of the hands on their way to the work [m/s].
@@ -281,7 +281,7 @@ def plan_kneel(draws: Floats, height: float, worker: Worker) -> float:
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         height: height of the work [m]; 0 to draw one.
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The peak speed of the hands on their way to the work [m/s].
@@ -298,7 +298,7 @@ def plan_squat(draws: Floats, height: float, worker: Worker) -> float:
     Args:
         draws: uniform draws (N_START,) in [0, 1).
         height: height of the work [m]; 0 to draw one.
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The peak speed of the hands on their way to the work [m/s].
@@ -316,7 +316,7 @@ def _plan_hands_low(ahead: float, draws: Floats, height: float, worker: Worker) 
         ahead: distance of the work ahead of the feet [m].
         draws: uniform draws (N_START,) in [0, 1).
         height: height of the work [m]; 0 to draw one.
-        worker: record that the plan is written into.
+        worker: record into which the plan is written.
 
     Returns:
         The peak speed of the hands on their way to the work [m/s].
