@@ -266,7 +266,7 @@ class _Nodes(NamedTuple):
 def _list_nodes(skeleton: _Skeleton) -> _Nodes:
     """Return the bones and chain tips of a skeleton, parents first."""
     names, parent, along, tips = [ROOT], [-1], [np.zeros(3)], []
-    for node, name in enumerate(names):  # grows while it is read
+    for node, name in enumerate(names):  # the list grows during the iteration
         children = [child for child, above in skeleton.parent.items() if above == name]
         names += children
         parent += [node] * len(children)

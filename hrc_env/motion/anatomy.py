@@ -75,7 +75,7 @@ def measure_body(body: Body) -> Anatomy:
     offset[0] = rest[0]
     frame = np.zeros((len(rest), 3, 3))
     for first in (LEFT, LEFT + SIDE_STRIDE):
-        # Elbows point backwards, knees forwards: the pole each hinge is made with.
+        # Poles of the hinges: elbows point backwards, knees forwards.
         for bone, pole in ((UPPER_ARM, -1.0), (FOREARM, -1.0), (THIGH, 1.0), (SHANK, 1.0)):
             along = rest[first + bone + 1] - rest[first + bone]
             frame[first + bone] = _make_rest_frame(along, np.array([pole, 0.0, 0.0]))

@@ -164,7 +164,7 @@ def _store_action(decision: Decision, action: Action) -> None:
     draw = decision.draws.item(dc.REACTION)
     pauses = draw < people.pause_probability
     backs = draw < people.pause_probability + people.step_back_probability
-    pauses |= activity == st.CLIP and backs  # a recording may go anywhere, but not backwards
+    pauses |= activity == st.CLIP and backs  # a pause replaces a step back during a clip
     worker.planned_reaction = st.PAUSE if pauses else st.BACK_AWAY if backs else st.NO_REACTION
     worker.reaction_delay_s = decision.draw(dc.DELAY, people.delay_s)
     worker.reaction_s = decision.draw(dc.REACTION_S, people.pause_s)
@@ -242,7 +242,7 @@ def _begin_activity(decision: Decision, activity: int) -> Action:
     if check_traffic(decision, action).time_s >= 0.0:
         cancel_plan(decision)
         if decision.kind_here:
-            decision.set_travel(UNDER_WAY)  # that is, the job comes next
+            decision.set_travel(UNDER_WAY)  # so that the job comes next
         return _begin_standing(decision.draw(dc.LASTS, WAIT_S))
     if row >= 0:
         lying.remove_load(decision.loads, row)

@@ -80,7 +80,7 @@ def stop(worker: Worker) -> float:
     if worker.activity in st.GIVING or worker.activity == st.PUSH:
         worker.load_prop = 0
     count = worker.step_count if worker.undo_at == 0.0 else 0
-    if worker.activity == st.FALL:  # the feet on which they got up
+    if worker.activity == st.FALL:  # the footprints on which the worker got up
         count += 2
     for k in range(max(count - 2, 0), count):
         side = (k + worker.step_first) % 2

@@ -114,7 +114,7 @@ def place_foot(t: float, side: int, footprints: Floats, stance: Floats, worker: 
             heel, toes = _pitch_foot(t, lift, lift + aloft, period, stride)
             heel_up, toes_up = heel_up + heel, toes_up + toes
             step_up = footprints[k, 4] - ground
-            if step_up != 0.0:  # up early, before the foot comes over the tread; down late
+            if step_up != 0.0:  # rise early, before the foot is above the tread; descend late
                 ground += step_up * min_jerk((u if step_up > 0.0 else u - 0.4) / 0.6)
             rise = (LIFT_BASE_M + LIFT_STRIDE_M * stride) * hump(u)
             flown = min_jerk(2.0 * u) if u < 1.0 else 0.0

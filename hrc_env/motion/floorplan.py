@@ -74,7 +74,7 @@ def locate_beside_robot(grounds: Grounds, radius_m: float, angle_rad: float) -> 
 
 def count_room(plan: Floorplan, apart_m: float) -> int:
     """Return the number of places at least a distance apart, chosen greedily in grid order."""
-    coarse = 4  # grid points of the field to one that is tried
+    coarse = 4  # every fourth grid point is tried
     taken = np.zeros((0, 2))
     for point in np.argwhere(plan.grid.slack[::coarse, ::coarse] >= 0.0) * coarse * CELL_M:
         if not len(taken) or np.hypot(*(taken - point).T).min() >= apart_m:

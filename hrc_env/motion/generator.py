@@ -176,7 +176,7 @@ def make_state(
     mind = BehaviourParams(
         config, hand_params, plan, schedule, pieces, bones, loads, fewest, robot_girth_m
     )
-    # Each worker may also bring or receive a load, which needs a row.
+    # One more row per worker, because each may bring or receive a load.
     rows = np.zeros((batch, len(loads) + n_workers), LOAD)
     return MotionState(np.zeros((batch, n_workers), st.WORKER), rows, mind)
 

@@ -121,7 +121,7 @@ def _find_lean(worker: Worker) -> None:
         far = measure_overreach(worker)
         if attempt == 0 and far <= 0.0:
             return
-        if far > 0.0:  # at first from `low` itself
+        if far > 0.0:  # `low` is unchanged at the first attempt
             low = worker.lean
         else:
             high = worker.lean

@@ -45,7 +45,7 @@ def lay_path(start: Point, via: Floats, end: Point, worker: Worker) -> None:
             next_x, next_y = (via[k + 1, 0], via[k + 1, 1]) if k + 1 < n else (end.x, end.y)
             turn = wrap(math.atan2(next_y - to_y, next_x - to_x) - heading)
             before, after = math.hypot(to_x - x, to_y - y), math.hypot(next_x - to_x, next_y - to_y)
-            own_share = OWN_EDGE if k == 0 else 1.0  # all that the corner before has left
+            own_share = OWN_EDGE if k == 0 else 1.0  # the rest after the previous corner's arc
             next_share = SHARED_EDGE if k + 1 < n else OWN_EDGE
             arm = min(via[k, 2], own_share * before, next_share * after)
         straight = max(math.hypot(to_x - x, to_y - y) - arm, 0.0)

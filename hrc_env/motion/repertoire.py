@@ -149,7 +149,7 @@ def _hammer(lightly: bool, height_m: float) -> tuple[Act, ...]:
     def start(draws: Floats, height_m: float, worker: Worker) -> float:
         """Plan to hammer with light taps or with blows."""
         chosen = draws.copy()
-        chosen[2] = 0.0 if lightly else 1.0  # which decides between taps and blows
+        chosen[2] = 0.0 if lightly else 1.0  # this draw decides between taps and blows
         return STARTS[st.HAMMER](chosen, height_m, worker)
 
     return (Act(st.HAMMER, start, height_m),)

@@ -240,7 +240,7 @@ def _begin_clip_here(decision: Decision, piece: int) -> Action | None:
         room = min(read_slack(x, y, mind.plan.grid) for x, y in roots)
         if room >= 0.0 and check_traffic(decision, action).time_s < 0.0:
             if decision.kind_here:
-                decision.set_travel(UNDER_WAY)  # that is, back to the place afterwards
+                decision.set_travel(UNDER_WAY)  # so that the worker returns to the place afterwards
             else:
                 decision.set_travel(THERE)
                 worker.place[:] = worker.end_x, worker.end_y, worker.end_yaw, 0.0

@@ -86,7 +86,7 @@ PROPS: tuple[Prop, ...] = (
         None,
         ORIGIN,
     ),
-    _make_prop(  # cordless: the bit points ahead, above the fist
+    _make_prop(  # cordless: the bit points forward, above the fist
         "drill",
         [
             _make_rod((-0.06, 0, 0.09), (0.10, 0, 0.09), 0.034),
@@ -145,9 +145,9 @@ PROPS: tuple[Prop, ...] = (
         (0, 0.28, 0.685),
         (0, -0.28, 0.685),
     ),
-    # A spirit level, flat to a wall ahead, in both hands.
+    # A spirit level in both hands, flat against a wall ahead.
     _make_prop("level", [_make_box(ORIGIN, (0.025, 0.80, 0.06))], (0, 0.22, 0), (0, -0.22, 0)),
-    # A piece of a stud, flat, by its ends.
+    # A piece of a stud, flat, held at its ends.
     _make_prop("stud", [_make_box(ORIGIN, (0.089, 0.30, 0.038))], (0, 0.11, 0), (0, -0.11, 0)),
 )
 """All props; the first one stands for empty hands."""

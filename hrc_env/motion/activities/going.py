@@ -167,14 +167,14 @@ def push(t: float, clock_s: float, worker: Worker) -> None:
     if worker.load_prop == WHEELBARROW:
         low = 1.0 - min_jerk((near_end - TAKE_S) / LIFT_S)
         lean((BEND * low + stooped * (1.0 - low)) * held, 0.1, 0.0, worker)
-        tipped = STANDS_RAD * low - worker.tilt * (1.0 - low)  # back about its axle, handles down
+        tipped = STANDS_RAD * low - worker.tilt * (1.0 - low)  # about its axle, handles down
         ahead, up = _tilt_point(tipped, 0.0)
         shift(q, c.PROP_POSE, yaw, ahead, 0.0)
         q[c.PROP_POSE + 2] += up
         q[c.PROP_POSE + 4] -= tipped
     else:
         lean((CART_LEAN + stooped) * held, 0.0, 0.0, worker)
-    grip_load(held * (2.0 - held), worker)  # before the bent trunk takes them to the knees
+    grip_load(held * (2.0 - held), worker)  # before the bent trunk lowers them to the knees
 
 
 @kernel

@@ -199,7 +199,7 @@ def _plan_carrying(prop: int, on_shoulder: bool, side: int, worker: Worker) -> N
     upper = LEFT + SIDE_STRIDE * side + UPPER_ARM
     at[0], at[1] = ON_SHOULDER_M[0], (1.0 - 2.0 * side) * ON_SHOULDER_M[1]
     at[2] = worker.p[upper, 2] + ON_SHOULDER_M[2]
-    sign = 1.0 - 2.0 * side  # the end of the other hand comes to the front
+    sign = 1.0 - 2.0 * side  # the end at the other hand points forward
     at[3], at[5] = 0.5 * math.pi * sign, -NOSE_UP_RAD * sign
     worker.load_used[1 - side] = 0.0
     worker.load_grip[3 * side + 1] = -STEADY_M * sign
