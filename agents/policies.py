@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from hrc_env.core.errors import CheckpointError, ConfigError, unknown
+from hrc_env.core.errors import CheckpointError, ConfigError, make_unknown_name_error
 from hrc_env.core.mapping import from_mapping
 from hrc_env.core.results import Metric
 from hrc_env.tasks.goal import ACHIEVED, DESIRED
@@ -107,7 +107,11 @@ def find_path(policy: str) -> Path:
         return Path(policy)
     if policy not in list_names():
         names = list_names()
-        error = unknown("policy", policy, names) if names else "The package has no policies yet."
+        error = (
+            make_unknown_name_error("policy", policy, names)
+            if names
+            else "The package has no policies yet."
+        )
         raise ConfigError(f"{error} Or train your own, and: {EXPORT}")
     return FOLDER / f"{policy.removeprefix(PREFIX)}{SUFFIX}"
 

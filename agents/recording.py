@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from hrc_env.core.errors import ConfigError, MissingExtraError
-from hrc_env.core.infos import matching
+from hrc_env.core.infos import match_keys
 from hrc_env.core.mapping import for_json
 from hrc_env.core.progress import progress_bar
 from hrc_env.core.results import provenance, write_whole
@@ -230,7 +230,7 @@ def _choose_parts(
         ConfigError: an info does not exist, or there are more images than memory holds.
     """
     available = [name for name in info if not name.startswith("_")]
-    names = dict.fromkeys((*TOP, *matching(request.infos, available)))
+    names = dict.fromkeys((*TOP, *match_keys(request.infos, available)))
     if (images := env.shards.first.images) is not None:
         n_moments = (env.max_episode_steps + 1) * n
         n_bytes = n_moments * len(images.names) * int(np.prod(images.shape))

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from hrc_env.core.brought import check_arguments, function_called
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, make_unknown_name_error
 
 from . import experts, policies, random
 from .env_info import Agent, EnvInfo
@@ -76,7 +76,7 @@ def check_agent(name: str) -> None:
     if ":" in name:
         find_function(name)
         return
-    raise ConfigError(f"{unknown('agent', name, AGENTS)} Or {OTHERS}.")
+    raise ConfigError(f"{make_unknown_name_error('agent', name, AGENTS)} Or {OTHERS}.")
 
 
 def is_policy(name: str) -> bool:

@@ -24,7 +24,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from hrc_env.control import CONTROLS
-from hrc_env.core.brought import described
+from hrc_env.core.brought import describe
 from hrc_env.core.errors import CheckpointError, learner
 from hrc_env.observations import FLAT
 from hrc_env.tasks.goal import ACHIEVED, DESIRED
@@ -385,7 +385,7 @@ def _unpickle(path: Path, name: str, saved: Mapping[str, Any], expected: type) -
         ) from error
     if not isinstance(found, expected):
         raise CheckpointError(
-            f"The {name} of {path} must be a {expected.__name__}, got {described(found)}."
+            f"The {name} of {path} must be a {expected.__name__}, got {describe(found)}."
         )
     return found
 

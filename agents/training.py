@@ -14,13 +14,13 @@ import numpy as np
 from rich.console import Console
 
 from hrc_env.core.errors import CheckpointError, RenderingError, learner
-from hrc_env.core.mapping import restored
+from hrc_env.core.mapping import convert_to_hint
 from hrc_env.core.progress import Meter, progress_bar
 from hrc_env.core.results import provenance, write_whole
 from hrc_env.evaluation.episodes import Score, describe_contradiction, evaluate
 from hrc_env.pipeline.ready import make_ready
 from hrc_env.sb3 import HRCVecEnv
-from hrc_env.settings import settle
+from hrc_env.settings import resolve_settings
 
 from . import checkpoints, ppo, sac
 from .callbacks import (
@@ -108,7 +108,7 @@ def run(arguments: TrainingRequest) -> int:
         return STOPPED
     score = judge(mine, folder, console)
     _write(folder / "score.json", {**asdict(score), **times})
-    config = settle(task=mine.task, config=mine.keywords()["config"]).config
+    config = resolve_settings(task=mine.task, config=mine.keywords()["config"]).config
     title = f"{mine.algorithm.upper()}, {mine.perception}"
     title += f", {describe_weight(curve, config.reward.proximity)}"
     title += f", shield {mine.shield}" if mine.shield else ""
@@ -189,7 +189,9 @@ def read_arguments(folder: Path) -> TrainingRequest:
     left = {*ONLY_OF_A_RUN} - {"timesteps"}
     known, hints = {each.name for each in fields(TrainingRequest)}, get_type_hints(TrainingRequest)
     names = [name for name in saved if name in known - left]
-    return TrainingRequest(**{name: restored(hints[name], saved[name], name) for name in names})
+    return TrainingRequest(
+        **{name: convert_to_hint(hints[name], saved[name], name) for name in names}
+    )
 
 
 def train(arguments: Run, folder: Path, console: Console) -> TrainingResult:

@@ -15,9 +15,9 @@ import numpy as np
 from hrc_env import infos, observations, rewards
 from hrc_env.belief import Belief, drop_distant_unknown, estimated_separation, find_unseen_floor
 from hrc_env.control import joint_command, max_command, n_actions
-from hrc_env.core.batching import State, Stateful, picked, rows, write_rows
+from hrc_env.core.batching import State, Stateful, rows, select_streams, write_rows
 from hrc_env.core.declared import Records2
-from hrc_env.core.errors import ConfigError, check_shape, needed
+from hrc_env.core.errors import ConfigError, check_shape, require
 from hrc_env.core.infos import Info
 from hrc_env.core.records import PoseEstimate, WorkerMotion, WorkerTruth
 from hrc_env.core.streams import children
@@ -451,7 +451,9 @@ class Simulation(Stateful):
         """Expose the cameras, update the estimates, measure objects, and return the belief."""
         ids, everyone = truth.ids, truth.ids is self._everyone
         self._expose(truth)
-        sensor, tracker = (picked(self.streams[name], ids) for name in ("sensor", "tracker"))
+        sensor, tracker = (
+            select_streams(self.streams[name], ids) for name in ("sensor", "tracker")
+        )
         estimate = self.pipeline.perceive(ids, sensor, tracker)
         later = (self.pipeline.forecast(estimate, ids, t) for t in self.config.forecast_s)
         estimates = (estimate, *later)
@@ -461,7 +463,7 @@ class Simulation(Stateful):
             for whole, part in zip(self.estimates, estimates, strict=True):
                 write_rows(whole, ids, part)
         if truth.world.objects is not None:
-            rngs = picked(self.streams[MEASURING], ids)
+            rngs = select_streams(self.streams[MEASURING], ids)
             measured = handling.measure_objects(truth.world.objects, rngs, self.config.objects)
             write_rows(self.measured, ids, measured)
         return self._believe(ids, truth.world, estimates)
@@ -519,7 +521,7 @@ class Simulation(Stateful):
 
     def _judge(self, command: Command, truth: Truth, belief: Belief) -> StepResult:
         """Compute cost and metrics from the truth, reward and observation from the belief."""
-        config, paths = self.config, needed(truth.paths, "A step's paths")
+        config, paths = self.config, require(truth.paths, "A step's paths")
         cost = measure_cost(paths.gaps_m, config.cost)
         happened = self.monitor.step(truth.world, paths)
         terms = self._reward_terms(command, truth, belief)
@@ -550,7 +552,7 @@ class Simulation(Stateful):
 
     def _draw_starts(self, ids: Ints, given: Mapping[int, Fixed] = NOTHING_GIVEN) -> JointAngles:
         """Return (n, N) the drawn or given joint angles with which robots `ids` (n,) start."""
-        rngs = picked(self.streams["robot"], ids)
+        rngs = select_streams(self.streams["robot"], ids)
         q = self.task.draw_start(rngs, self.place, self.scene.home_q, self._spread_rad)
         expected = (len(ids), self.chain.n_joints)
         check_shape(f"{self.task.id}: draw_start", np.shape(q), expected, "an angle a joint")

@@ -19,7 +19,7 @@ from hrc_env.geometry.cameras import projections
 from hrc_env.geometry.sight import Surroundings, no_surroundings
 from hrc_env.motion import generator
 from hrc_env.perception import emulator
-from hrc_env.settings import settle
+from hrc_env.settings import resolve_settings
 from hrc_env.simulation import Simulation
 from hrc_env.tracking.config import ParticleConfig, cast_config
 from hrc_env.worker.body import worker_truth
@@ -151,4 +151,6 @@ def _stack(records: list[Keypoints]) -> Keypoints:
 def simulate(batch: int, config: HRCConfig | None = None) -> Simulation:
     """Return environments without rendered cameras."""
     config = config or HRCConfig()
-    return Simulation(batch, settle(perception="none", estimator="triangulation", config=config))
+    return Simulation(
+        batch, resolve_settings(perception="none", estimator="triangulation", config=config)
+    )

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hrc_env.core.errors import unknown
+from hrc_env.core.errors import make_unknown_name_error
 from hrc_env.core.typing import Floats
 from hrc_env.geometry.cameras import PinholeCamera, projections
 from hrc_env.geometry.rotations import look_at
@@ -48,7 +48,7 @@ def make_rig(name: str) -> Rig:
         return _rig("lab", (2.945, 2.64, 2.4), 0.9, focal_px, (1.745, 1.44), 1.5)
     if name == "site":
         return _rig("site", (10.0, 10.0, 5.0), 1.0, (960.0, 960.0), (6.0, 6.0), 4.0)
-    raise unknown("rig", name, RIGS)
+    raise make_unknown_name_error("rig", name, RIGS)
 
 
 RIGS = ("lab", "site")

@@ -49,8 +49,8 @@ class List(EnvironmentArguments):
         return 0
 
     def _show_config(self) -> int:
-        from hrc_env.core.mapping import plain, to_toml
-        from hrc_env.settings import settle
+        from hrc_env.core.mapping import convert_to_plain, to_toml
+        from hrc_env.settings import resolve_settings
 
-        print(to_toml(plain(asdict(settle(**self.keywords()).config))), end="")
+        print(to_toml(convert_to_plain(asdict(resolve_settings(**self.keywords()).config))), end="")
         return 0

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 import tyro
 
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, make_unknown_name_error
 
 BOOLEANS = {"true": True, "false": False}
 ALWAYS = ("help",)
@@ -35,7 +35,7 @@ def normalize_words(command: type[Any], words: Sequence[str], program: str) -> l
     while (kinds := _find_subcommands(command)) and given and not given[0].startswith("-"):
         result.append(given.pop(0))
         if result[-1] not in kinds:
-            raise unknown("command", result[-1], kinds)
+            raise make_unknown_name_error("command", result[-1], kinds)
         command, program = kinds[result[-1]], f"{program} {result[-1]}"
     options = _find_options(command)
     switches = {name for name, kind in options.items() if kind is bool}

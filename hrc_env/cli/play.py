@@ -107,9 +107,9 @@ class Demo(EnvironmentArguments):
         check_at_least("--seed", self.seed, 0)
         check_writable_file(self.out, ".mp4")
         Console().print("Loading the simulator ...")
-        from hrc_env.settings import settle  # here: --help imports no simulator
+        from hrc_env.settings import resolve_settings  # here: --help imports no simulator
 
-        ctrl_dt = settle(**self.keywords()).config.ctrl_dt
+        ctrl_dt = resolve_settings(**self.keywords()).config.ctrl_dt
         check_at_least("--seconds", self.seconds, ctrl_dt)
         make_ready(Console(), self.perception, draws=True, installs=True)
         title = "the worker is known through four cameras only"

@@ -5,7 +5,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from hrc_env.core.errors import ConfigError, check_names, whole
+from hrc_env.core.errors import ConfigError, check_integer, check_names
 
 Tick = Callable[[float], None]
 """Receives the increase of the completed share of a call."""
@@ -69,7 +69,7 @@ def engine_called(
     if name is not None:
         check_names("engine", [name], ENGINES)
     if workers is not None:
-        whole("workers", workers, 1, 100_000)
+        check_integer("workers", workers, 1, 100_000)
     if workers is not None and name in (None, "serial"):
         raise ConfigError("--workers goes with --engine processes or --engine ray.")
     if address is not None and name != "ray":

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.core.errors import ConfigError, HRCError, whole
+from hrc_env.core.errors import ConfigError, HRCError, check_integer
 from hrc_env.core.records import Keypoints
 from hrc_env.evaluation.moments import PROJECTIONS
 
@@ -91,7 +91,7 @@ class EpisodeSet(Sequence[Episode]):
         if isinstance(k, int | np.integer) and not -n <= k < n:  # ends a loop over the set
             raise IndexError(f"There are {n} episodes in {self.path}, got number {k}.")
         return _make_episode(
-            read_arrays(self.path / format_file_name(whole("number", k, -n, n - 1) % n))
+            read_arrays(self.path / format_file_name(check_integer("number", k, -n, n - 1) % n))
         )
 
     def __iter__(self) -> Iterator[Episode]:

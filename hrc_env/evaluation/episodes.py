@@ -11,8 +11,8 @@ import gymnasium
 import numpy as np
 
 from hrc_env.agents.env_info import Agent, AgentFactory, EnvInfo, env_info
-from hrc_env.core.brought import check_arguments, described
-from hrc_env.core.errors import ConfigError, whole
+from hrc_env.core.brought import check_arguments, describe
+from hrc_env.core.errors import ConfigError, check_integer
 from hrc_env.core.machine import n_cores
 from hrc_env.core.results import Metric
 from hrc_env.engines.engine import Engine, Tick, engine_called
@@ -122,7 +122,7 @@ def evaluate_episodes(
     Raises:
         ConfigError: the agent or the engine does not exist, or there is no episode.
     """
-    whole("n_episodes", n_episodes, 1, 10**9)
+    check_integer("n_episodes", n_episodes, 1, 10**9)
     if isinstance(engine, str):
         engine = engine_called(engine)
     if isinstance(make, str):
@@ -240,9 +240,7 @@ def _make_agent(make: AgentFactory, info: EnvInfo) -> Agent:
     check_arguments("The function that makes an agent", make, "env_info")
     agent = make(info)
     if not callable(getattr(agent, "act", None)):
-        raise ConfigError(
-            f"An agent must have act(observation) -> actions, got {described(agent)}."
-        )
+        raise ConfigError(f"An agent must have act(observation) -> actions, got {describe(agent)}.")
     check_arguments("act", agent.act, "observation")
     return agent
 

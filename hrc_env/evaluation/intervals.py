@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from hrc_env.core.brought import described
+from hrc_env.core.brought import describe
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Bools, Floats, Ints
@@ -211,7 +211,7 @@ def estimate_rate(counts: Numbers, exposure: Numbers | float, unit: str = "1") -
     if not (np.isfinite(events).all() and (events >= 0).all() and (events % 1 == 0).all()):
         raise ConfigError(
             "counts must be whole numbers from 0 on, one per seed; estimate_mean takes other "
-            f"numbers; got {described(counts)}."
+            f"numbers; got {describe(counts)}."
         )
     if np.ndim(exposure) and len(_check_column("exposure", exposure)) != len(events):
         raise ConfigError(
@@ -219,7 +219,7 @@ def estimate_rate(counts: Numbers, exposure: Numbers | float, unit: str = "1") -
             f"{np.size(exposure)} numbers; a single number is the exposure of all seeds."
         )
     if not np.all(np.asarray(exposure, float) >= 0):
-        raise ConfigError(f"exposure must not be negative, got {described(exposure)}.")
+        raise ConfigError(f"exposure must not be negative, got {describe(exposure)}.")
     total, over = float(np.sum(counts)), float(np.sum(exposure))
     if not over:
         return Metric(np.nan, np.nan, np.nan, unit, len(counts))
@@ -244,7 +244,7 @@ def estimate_share(outcomes: Sequence[bool] | Bools) -> Metric:
     """
     column = _check_column("outcomes", outcomes)
     if not np.isin(column, (0.0, 1.0)).all():
-        raise ConfigError(f"outcomes must be true or false per trial, got {described(outcomes)}.")
+        raise ConfigError(f"outcomes must be true or false per trial, got {describe(outcomes)}.")
     n, n_true = len(column), int(column.sum())
     if n == 0:
         return Metric(np.nan, np.nan, np.nan, "share", 0)
@@ -351,7 +351,7 @@ def _check_column(name: str, values: Any) -> Floats:
     try:
         column = np.asarray(values, float)
     except (TypeError, ValueError) as error:
-        raise ConfigError(f"{name} must be numbers, got {described(values)}: {error}.") from error
+        raise ConfigError(f"{name} must be numbers, got {describe(values)}: {error}.") from error
     if column.ndim != 1:
         raise ConfigError(f"{name} must have shape (n,), one number per seed, got {column.shape}.")
     return column

@@ -9,7 +9,7 @@ from typing import Any
 from hrc_env.agents import policies
 from hrc_env.agents.env_info import AgentFactory
 from hrc_env.agents.registry import AGENTS, OTHERS, check_agent, find_function, make_agent
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, make_unknown_name_error
 from hrc_env.experiments.versions import hash_file, hash_source
 
 AgentChoice = str | AgentFactory
@@ -25,7 +25,7 @@ def check_choice(agent: AgentChoice) -> None:
         ".zip", policies.SUFFIX
     )  # fmt: skip
     if is_file and not Path(agent).is_file():
-        raise ConfigError(f"{unknown('agent', agent, AGENTS)} Or {OTHERS}.")
+        raise ConfigError(f"{make_unknown_name_error('agent', agent, AGENTS)} Or {OTHERS}.")
 
 
 def get_agent_factory(agent: AgentChoice, trust: bool = False) -> AgentFactory:

@@ -19,7 +19,7 @@ from hrc_env.core.typing import Bools, Floats
 from hrc_env.experiments.cache import PartProgress
 from hrc_env.experiments.rigs import Turn
 from hrc_env.experiments.setups import PerceptionSetup
-from hrc_env.settings import settle
+from hrc_env.settings import resolve_settings
 from hrc_env.simulation import Simulation
 from hrc_env.step_result import Observation
 from hrc_env.vector.shards import Shards
@@ -71,7 +71,7 @@ class Stage:
 
     def _get_env(self, k: int, turn: Turn, n_episodes: int) -> Shards:
         if (k, n_episodes) not in self._envs:
-            settings = settle(
+            settings = resolve_settings(
                 perception=self.setup.level, estimator=self.setup.estimator, people=PEOPLE,
                 faults=list(turn.faults), cameras=list(turn.cameras), **self.made_with,
             )  # fmt: skip

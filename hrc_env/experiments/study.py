@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError, check_names, unknown
+from hrc_env.core.errors import ConfigError, check_names, make_unknown_name_error
 from hrc_env.core.results import Metric
 from hrc_env.core.typing import Ints
 from hrc_env.engines.files import carried
@@ -30,7 +30,7 @@ from hrc_env.experiments.versions import check_subsystems, hash_source, make_key
 from hrc_env.pipeline.levels import LEVELS
 from hrc_env.safety.shield import SHIELDS
 from hrc_env.scene.rigs import RIGS
-from hrc_env.settings import settle
+from hrc_env.settings import resolve_settings
 from hrc_env.tasks import DEFAULT
 from hrc_env.tasks.task import find_task
 from hrc_env.tracking.estimators import ESTIMATORS
@@ -92,7 +92,9 @@ class Row:
             known["estimator"] = setup.estimator
         if setup.is_plain:
             return [known]
-        scene = settle(**{name: known[name] for name in ("task", "scene") if name in known}).scene
+        scene = resolve_settings(
+            **{name: known[name] for name in ("task", "scene") if name in known}
+        ).scene
         faults = list(known.pop("faults", ()))
         return [
             {**known, "cameras": list(turn.cameras), "faults": [*turn.faults, *faults]}
@@ -127,7 +129,7 @@ class Row:
         check_choice(self.agent)
         for keywords in self.keywords():
             keywords.pop("max_episode_steps", None)  # Gymnasium's own
-            settle(**keywords)
+            resolve_settings(**keywords)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -236,7 +238,7 @@ class Study:
         """
         for each in beginnings:
             if not any(name.startswith(each) for name in self.rows):
-                raise unknown(f"row of {self.name!r}", each, self.rows)
+                raise make_unknown_name_error(f"row of {self.name!r}", each, self.rows)
         kept = {name for name in self.rows if name.startswith(tuple(beginnings))}
         kept |= {baseline for name in kept if (baseline := self.rows[name].baseline) is not None}
         return replace(self, rows={name: row for name, row in self.rows.items() if name in kept})

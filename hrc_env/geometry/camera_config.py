@@ -22,7 +22,13 @@ from typing import Any, NoReturn, cast
 import numpy as np
 
 from hrc_env.core.errors import ConfigError, check_names
-from hrc_env.core.mapping import answer_unknown_fields, from_mapping, plain, read_toml, to_toml
+from hrc_env.core.mapping import (
+    answer_unknown_fields,
+    convert_to_plain,
+    from_mapping,
+    read_toml,
+    to_toml,
+)
 from hrc_env.core.typing import Floats, Rotations, Transforms
 from hrc_env.geometry.lens import COEFFICIENTS, Lens, distorted_radius, rays_cam
 from hrc_env.geometry.rotations import about_axis, look_at
@@ -195,7 +201,7 @@ def parse_camera(content: Mapping[str, Any], path: str) -> CameraConfig:
     """
     if "T_world_from_cam" not in content:
         return from_mapping(CameraConfig, content, f"{path}.")
-    given = from_mapping(_Matrices, plain(content), f"{path}.")
+    given = from_mapping(_Matrices, convert_to_plain(content), f"{path}.")
     size = given.width_px, given.height_px
     K, T_world_from_cam = np.array(given.K), np.array(given.T_world_from_cam)
     camera = CameraConfig.from_matrices(

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hrc_env.core.batching import flat
+from hrc_env.core.batching import flatten_axes
 from hrc_env.core.errors import check_shape
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import RobotState
@@ -72,7 +72,7 @@ class RobotPath(NamedTuple):
 
 def link_frames(chain: SerialChain, q: JointAngles) -> Transforms:
     """Return the frames of all links, (..., N, 4, 4) world_from_link, at angles q (..., N)."""
-    angles = flat(_check_joints(chain, "q", q), 1)
+    angles = flatten_axes(_check_joints(chain, "q", q), 1)
     frames = np.empty((len(angles), chain.n_joints, 4, 4))
     _write_frames(angles, chain.slides, chain.T_world_from_base, chain.parent_from_joint, frames)
     return frames.reshape(*np.shape(q)[:-1], chain.n_joints, 4, 4)
@@ -89,7 +89,7 @@ def jacobian(chain: SerialChain, q: JointAngles) -> Floats:
     Returns:
         (..., 3, N) in the world frame [m/rad; of a slide m/m].
     """
-    frames = flat(link_frames(chain, q), 3)
+    frames = flatten_axes(link_frames(chain, q), 3)
     result = np.empty((len(frames), 3, chain.n_joints))
     _write_jacobian(frames, chain.slides, chain.link_from_tool, result)
     return result.reshape(*np.shape(q)[:-1], 3, chain.n_joints)
@@ -120,9 +120,9 @@ def robot_path(chain: SerialChain, q_path: JointAngles, qd: JointVelocities) -> 
     """
     frames = link_frames(chain, q_path)
     ends = _place_capsules(chain, frames)
-    rates = flat(_check_joints(chain, "qd", qd), 1)
+    rates = flatten_axes(_check_joints(chain, "qd", qd), 1)
     lead = np.shape(qd)[:-1]
-    last = flat(frames[..., -1, :, :, :], 3)
+    last = flatten_axes(frames[..., -1, :, :, :], 3)
     tool_world, velocity = np.empty((len(rates), 3)), np.empty((len(rates), 3))
     _write_tool_motion(last, chain.slides, rates, chain.link_from_tool, tool_world, velocity)
     axes = frames[..., -1, -1, :3, :3] @ chain.link_from_tool[:3, :3]
@@ -142,7 +142,7 @@ def robot_path(chain: SerialChain, q_path: JointAngles, qd: JointVelocities) -> 
 def _place_capsules(chain: SerialChain, frames: Transforms) -> Capsules:
     """Return the capsules (..., K, 2, 3) on links with frames (..., N, 4, 4)."""
     shape = chain.capsule_ends.shape
-    stacked = flat(frames, 3)
+    stacked = flatten_axes(frames, 3)
     ends = np.empty((len(stacked), *shape))
     _write_capsules(stacked, chain.capsule_link, chain.capsule_ends, ends)
     return ends.reshape(*frames.shape[:-3], *shape)

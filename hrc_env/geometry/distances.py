@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hrc_env.core.batching import flat
+from hrc_env.core.batching import flatten_axes
 from hrc_env.core.kernels import kernel
 from hrc_env.core.skeleton import HAND_SEGMENTS, SEGMENT_ENDS, SEGMENT_RADIUS_M
 from hrc_env.core.typing import Capsules, Floats, Ints, Points3
@@ -59,9 +59,11 @@ def least_separation(
         radius_b_m: (..., Kb) likewise [m]; or those of one body where the second sets are several.
     """
     lead = capsules_b.shape[:-3]
-    flat_a, flat_b = flat(capsules_a, 3), flat(capsules_b, 3)
+    flat_a, flat_b = flatten_axes(capsules_a, 3), flatten_axes(capsules_b, 3)
     gap, points = np.empty(len(flat_b)), np.empty((len(flat_b), 2, 3))
-    _find_narrowest(flat_a, flat(radius_a_m, 1), flat_b, flat(radius_b_m, 1), gap, points)
+    _find_narrowest(
+        flat_a, flatten_axes(radius_a_m, 1), flat_b, flatten_axes(radius_b_m, 1), gap, points
+    )
     points = points.reshape(*lead, 2, 3)
     return Separation(gap.reshape(lead), points[..., 0, :], points[..., 1, :])
 
@@ -193,7 +195,7 @@ def segments(joints_world: Points3) -> Capsules:
     Returns:
         (..., 16, 2, 3) end points, the hands last [m]; the radii are `SEGMENT_RADIUS_M`.
     """
-    joints = flat(joints_world, 2)
+    joints = flatten_axes(joints_world, 2)
     ends = np.empty((len(joints), len(SEGMENT_RADIUS_M), 2, 3))
     _write_segments(joints, ends)
     return ends.reshape(*joints_world.shape[:-2], *ends.shape[1:])

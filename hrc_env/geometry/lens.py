@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hrc_env.core.batching import flat
+from hrc_env.core.batching import flatten_axes
 from hrc_env.core.errors import ConfigError, check_names
 from hrc_env.core.kernels import kernel
 from hrc_env.core.mapping import answer_unknown_fields
@@ -97,7 +97,7 @@ def lens_row(lens: Lens) -> Floats:
 
 def distort(lens: Lens, undistorted: Floats) -> Floats:
     """Return the distorted places of undistorted ones (..., 2)."""
-    places = flat(np.asarray(undistorted, float), 1)
+    places = flatten_axes(np.asarray(undistorted, float), 1)
     out = np.empty(places.shape)
     _distort_all(lens_row(lens), places, out)
     return out.reshape(np.shape(undistorted))
@@ -113,7 +113,7 @@ def magnification(lens: Lens, undistorted: Floats) -> Floats:
     Returns:
         (...,) mean of the factors in both directions.
     """
-    places = flat(np.asarray(undistorted, float), 1)
+    places = flatten_axes(np.asarray(undistorted, float), 1)
     out = np.empty(len(places))
     _magnify_all(lens_row(lens), places, out)
     return out.reshape(np.shape(undistorted)[:-1])
@@ -128,7 +128,7 @@ def undistort(lens: Lens, distorted: Floats) -> Floats:
 
 def rays_cam(lens: Lens, distorted: Floats) -> Points3:
     """Return unit directions (..., 3) in camera axes of distorted places (..., 2), NaN of none."""
-    places = flat(np.asarray(distorted, float), 1)
+    places = flatten_axes(np.asarray(distorted, float), 1)
     out = np.empty((len(places), 3))
     _cast_rays(lens_row(lens), places, out)
     return out.reshape(*np.shape(distorted)[:-1], 3)

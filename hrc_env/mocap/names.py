@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from hrc_env.core.errors import ConfigError, check_names, unknown
+from hrc_env.core.errors import ConfigError, check_names, make_unknown_name_error
 from hrc_env.core.mapping import read_toml
 from hrc_env.core.skeleton import JOINTS
 
@@ -227,7 +227,7 @@ def find_node(name: object, names: Sequence[str], source: str) -> int:
         for node, known in enumerate(names):
             if known == name or (not exact and known.lower() == str(name).lower()):
                 return node
-    raise unknown(f"node of {source}", name, names)
+    raise make_unknown_name_error(f"node of {source}", name, names)
 
 
 def find_nodes(joints: Mapping[str, str], names: Sequence[str], source: str) -> dict[str, int]:

@@ -11,7 +11,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from hrc_env.core.declared import Records1, dtype_of
-from hrc_env.core.errors import unknown
+from hrc_env.core.errors import make_unknown_name_error
 from hrc_env.core.typing import Bools, Floats
 from hrc_env.motion import controls as c
 from hrc_env.motion.activities.going import CART, WHEELBARROW
@@ -104,7 +104,7 @@ def make_loads(places: Sequence[Workplace], jobs: Sequence[Job]) -> Records1[Loa
         stand = get_place(place)
         for prop in (*place.loads, *more):
             if prop not in PROP_NAMES[1:]:
-                raise unknown(f"load at {place.name!r}", prop, PROP_NAMES[1:])
+                raise make_unknown_name_error(f"load at {place.name!r}", prop, PROP_NAMES[1:])
             kind = PROP_NAMES.index(prop)
             row = np.zeros(1, LOAD)
             row["shown"][0, 0] = kind

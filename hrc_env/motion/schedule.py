@@ -5,7 +5,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, make_unknown_name_error
 from hrc_env.motion.state import ACTIVITY_NAMES, WAYS
 from hrc_env.worker.props import PROP_NAMES
 from hrc_env.world import WORKPLACE_KINDS
@@ -208,7 +208,7 @@ def check_jobs(jobs: Sequence[Job]) -> None:
             *(("job after", name, names) for name, _ in job.then),
         ):
             if got not in valid:
-                raise unknown(f"{noun} {job.name!r}", got, valid)
+                raise make_unknown_name_error(f"{noun} {job.name!r}", got, valid)
         if not 0.0 <= job.height_m <= HIGHEST_M:
             raise ConfigError(
                 f"{job.name!r}: height_m must be 0 to {HIGHEST_M} m, got {job.height_m}."

@@ -48,6 +48,7 @@ from hrc_env.perception.sightlines import (
     view_worker,
 )
 
+_LEFT_HIP, _RIGHT_HIP = JOINT["left_hip"], JOINT["right_hip"]
 N_NORMALS = 6
 """Number of normal variables of a joint in an image: two of lasting errors, two of new ones, one of
 the errors' size, one of the confidence."""
@@ -273,19 +274,25 @@ def emulate_batch(
 
 @kernel
 def _find_track(joints: Points3, expected: Points3, tracked: Bools) -> int:
-    """Return the track (W) with windows that show a worker (J, 3): the nearest by the hips.
+    """Return the index of the track whose image windows show a worker, or -1 if there is none.
 
-    Returns:
-        Its index; -1 if there is none.
+    It is the track whose expected middle of the hips is nearest to the worker's, if that is nearer
+    than `FOLLOWED_M`: the detector looks for a person in windows around the expected body.
+
+    Args:
+        joints: (J, 3) true joints of the worker in the world frame [m].
+        expected: (W, J, 3) joints that the tracker expects, in the world frame [m].
+        tracked: (W,) whether there is a track.
     """
-    nearest, track = FOLLOWED_M, -1
-    for t in range(len(tracked)):
-        squared = 0.0
+    nearest_m, track = FOLLOWED_M, -1
+    for w in range(len(tracked)):
+        squared_m2 = 0.0
         for i in range(3):
-            off = joints[7, i] + joints[8, i] - expected[t, 7, i] - expected[t, 8, i]
-            squared += 0.25 * off * off
-        if tracked[t] and squared < nearest * nearest:
-            nearest, track = math.sqrt(squared), t
+            hips = joints[_LEFT_HIP, i] + joints[_RIGHT_HIP, i]
+            twice_m = hips - expected[w, _LEFT_HIP, i] - expected[w, _RIGHT_HIP, i]
+            squared_m2 += 0.25 * twice_m * twice_m  # of the middles, which are half of the sums
+        if tracked[w] and squared_m2 < nearest_m * nearest_m:
+            nearest_m, track = math.sqrt(squared_m2), w
     return track
 
 
@@ -314,40 +321,53 @@ def _advance_wander(
     joints: Points3,
     front: Facing,
     keep: float,
-    here: PostureTables,
-    common: Settings,
+    posture: PostureTables,
+    shared: Settings,
     meant: Points3,
 ) -> None:
-    """Write where in space the detector places the joints, the same for every camera.
+    """Advance the errors that all cameras share, and write the joints with these errors.
+
+    Each joint has an error of unit variance along three axes of the body: ahead, to the joint's own
+    side, up. It is a mixture of the error of the next joint towards the trunk and of its own error
+    w, which follows an autoregression:
+
+        w = keep w + sqrt(1 - keep^2) n,    e = r e_parent + sqrt(1 - r^2) w
+        displacement = offset + deviation (1 + tail |e|^2 / 3) e
+
+    with n from `normals`, and the correlation r, offset, deviation and tail from the calibration.
 
     Args:
-        wander: (J, 3) state, which is changed.
+        wander: (J, 3) own errors w in standard deviations, changed in place.
         normals: (3 J or more,) standard normal numbers.
-        joints: (J, 3) true joints [m].
-        front: direction to the front of the body.
-        keep: coefficient of the autoregression.
-        here: tables of the worker's posture.
-        common: tables that do not depend on the posture.
-        meant: (J, 3) is filled [m].
+        joints: (J, 3) true joints in the world frame [m].
+        front: horizontal unit vector to the front of the body in the world frame.
+        keep: coefficient of the autoregression, 0 to 1.
+        posture: tables of the worker's posture.
+        shared: tables that do not depend on the posture.
+        meant: (J, 3) receives the joints where the detector believes them, in the world frame [m];
+            an array other than `joints`.
     """
-    renew, scale = math.sqrt(1.0 - keep * keep), common.error_scale
-    tail = here.tail / 3.0
+    renew, error_scale = math.sqrt(1.0 - keep * keep), shared.error_scale
+    errors = meant  # the array holds the errors e first, and then the joints
     for j in range(len(joints)):
-        before: int = NEXT[j]
+        parent: int = NEXT[j]  # before joint j in the order of joints; j itself without a parent
         for i in range(3):
             wander[j, i] = keep * wander[j, i] + renew * normals[3 * j + i]
-            limb = common.space_limb[KIND[j], i] if before != j else 0.0
-            meant[j, i] = limb * meant[before, i] + math.sqrt(1.0 - limb * limb) * wander[j, i]
+            correlation = shared.space_limb[KIND[j], i] if parent != j else 0.0
+            own_share = math.sqrt(1.0 - correlation * correlation)
+            errors[j, i] = correlation * errors[parent, i] + own_share * wander[j, i]
+    tail = posture.tail / 3.0  # the mean of |e|^2 is 3
     for j in range(len(joints)):
-        kind, n = KIND[j], meant[j]
-        offset, spread = here.offset_m[kind], here.wander_m[kind]
-        far = 1.0 + tail * (n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
-        ahead = offset[0] + spread[0] * far * n[0]
-        left = HAND[j] * (offset[1] + spread[1] * far * n[1])
-        up = offset[2] + spread[2] * far * n[2]
-        meant[j, 0] = joints[j, 0] + scale * (front.x * ahead - front.y * left)
-        meant[j, 1] = joints[j, 1] + scale * (front.y * ahead + front.x * left)
-        meant[j, 2] = joints[j, 2] + scale * up
+        kind, error = KIND[j], errors[j]
+        offset_m, deviation_m = posture.offset_m[kind], posture.wander_m[kind]
+        squared = error[0] * error[0] + error[1] * error[1] + error[2] * error[2]
+        tail_factor = 1.0 + tail * squared
+        ahead_m = offset_m[0] + deviation_m[0] * tail_factor * error[0]
+        left_m = HAND[j] * (offset_m[1] + deviation_m[1] * tail_factor * error[1])
+        up_m = offset_m[2] + deviation_m[2] * tail_factor * error[2]
+        meant[j, 0] = joints[j, 0] + error_scale * (front.x * ahead_m - front.y * left_m)
+        meant[j, 1] = joints[j, 1] + error_scale * (front.y * ahead_m + front.x * left_m)
+        meant[j, 2] = joints[j, 2] + error_scale * up_m
 
 
 @kernel

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hrc_env.core.brought import described
+from hrc_env.core.brought import describe
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Roi
 from hrc_env.core.typing import Image
@@ -29,7 +29,7 @@ class Frames:
         if not (is_array or isinstance(images, list | tuple)) or len(images) != len(cameras):
             raise ConfigError(
                 f"There must be one image for each of {len(cameras)} cameras, or an object with "
-                f"crop(camera_index, window), got {described(images)}."
+                f"crop(camera_index, window), got {describe(images)}."
             )
         for c, (camera, image) in enumerate(zip(cameras, images, strict=True)):
             size = (camera.height_px, camera.width_px, 3)
@@ -38,7 +38,7 @@ class Frames:
                 raise ConfigError(
                     f"The image of camera {c} must be an array of uint8 with shape {size}, as the "
                     f"camera is calibrated: rows, columns, RGB from 0 to 255; got "
-                    f"{described(image)}. Convert the image, or calibrate for its size."
+                    f"{describe(image)}. Convert the image, or calibrate for its size."
                 )
         self.images = list(images)
 

@@ -14,7 +14,7 @@ import flatbuffers
 from ai_edge_litert import schema_py_generated as schema
 from ai_edge_litert.interpreter import Interpreter
 
-from hrc_env.core.errors import unknown
+from hrc_env.core.errors import make_unknown_name_error
 from hrc_env.core.typing import Tensor
 from hrc_env.perception import vino
 from hrc_env.perception.vino import Network
@@ -64,7 +64,7 @@ Landmarker: TypeAlias = Callable[[Tensor], LandmarkTensors]
 def resolve_runtime(name: str) -> str:
     """Return the runtime of a name of `RUNTIMES`; `ConfigError` for one unknown or missing."""
     if name not in RUNTIMES:
-        raise unknown("runtime", name, RUNTIMES)
+        raise make_unknown_name_error("runtime", name, RUNTIMES)
     if name == "openvino":
         vino.check_installed()
     if name == "auto":

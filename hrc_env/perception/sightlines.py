@@ -182,21 +182,30 @@ def project_worker(camera: ImageCamera, joints: Points3, uv: Points2, depth: Flo
 
 @kernel
 def _distort_joints(camera: ImageCamera, uv: Points2, depth: Floats) -> float:
-    """Distort pinhole pixels (J, 2) in place; return the magnification.
+    """Distort pinhole pixels in place, and return the mean magnification of the pinhole image.
 
-    That is how many times longer the pinhole shows the body.
+    The magnification is the ratio of lengths in the pinhole image to lengths in the image of the
+    lens, at the joint. Joints nearer than `MIN_DEPTH_M` are left as they are and do not count.
+
+    Args:
+        camera: the camera.
+        uv: (J, 2) pixels of the joints without distortion, replaced by those with distortion [px].
+        depth: (J,) distances along the camera's axis [m].
+
+    Returns:
+        The mean over the joints; 1 if none counts.
     """
-    fx, fy = camera.focal_px[0], camera.focal_px[1]
-    cx, cy = camera.centre_px[0], camera.centre_px[1]
-    total, n = 0.0, 0
+    focal_x, focal_y = camera.focal_px[0], camera.focal_px[1]
+    centre_x, centre_y = camera.centre_px[0], camera.centre_px[1]
+    total, n_joints = 0.0, 0
     for j in range(len(depth)):
         if depth[j] >= MIN_DEPTH_M:
-            x, y = (uv[j, 0] - cx) / fx, (uv[j, 1] - cy) / fy
+            x, y = (uv[j, 0] - centre_x) / focal_x, (uv[j, 1] - centre_y) / focal_y
             total += magnification_at(camera.lens, x, y)
-            n += 1
-            x, y = distort_point(camera.lens, x, y)
-            uv[j, 0], uv[j, 1] = x * fx + cx, y * fy + cy
-    return total / n if n > 0 else 1.0
+            n_joints += 1
+            lens_x, lens_y = distort_point(camera.lens, x, y)
+            uv[j, 0], uv[j, 1] = lens_x * focal_x + centre_x, lens_y * focal_y + centre_y
+    return total / n_joints if n_joints > 0 else 1.0
 
 
 @kernel

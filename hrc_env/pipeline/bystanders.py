@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hrc_env.core.batching import Stateful
-from hrc_env.core.errors import needed
+from hrc_env.core.errors import require
 from hrc_env.core.skeleton import JOINT
 from hrc_env.core.typing import Capsules, Ints, Points3
 from hrc_env.core.vacancy import MOST_OTHERS, Others, no_others
@@ -191,7 +191,7 @@ class Bystanders(Stateful):
             windows = [each[c] for each in taken]
             if any(is_same_person(other, window) for other in found[c] for window in windows):
                 return False
-            mine = needed(one.windows[c], "A window")
+            mine = require(one.windows[c], "A window")
             return any(is_same_person(mine, window, BESIDE) for window in windows)
         return robot_world is not None and _away_m(one.hips_world, robot_world) < ROBOT_M
 

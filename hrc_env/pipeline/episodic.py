@@ -11,8 +11,8 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-from hrc_env.core.batching import mapped, one, rows, write_rows
-from hrc_env.core.errors import needed
+from hrc_env.core.batching import map_arrays, one, rows, write_rows
+from hrc_env.core.errors import require
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.typing import Bools, Floats, Image, Ints
 from hrc_env.core.vacancy import Coverage, Vacancy
@@ -182,12 +182,12 @@ class EpisodicPipeline(PerceptionPipeline):
         A camera that is not in an episode's rig has neither keypoints nor a time.
         """
         shared = self.shared.measurements
-        whole = replace(mapped(shared, np.copy), time_s=self._times_s(self.shared, shared))
+        whole = replace(map_arrays(shared, np.copy), time_s=self._times_s(self.shared, shared))
         for b, own in self._own.items():
             seen, columns = own.pipeline.measurements, self._columns(own)
             seen = replace(seen, time_s=self._times_s(own.pipeline, seen))
             whole.px[b], whole.confidence[b], whole.sigma_px[b] = np.nan, 0.0, np.inf
-            needed(whole.time_s, "Times of frames")[b] = np.nan
+            require(whole.time_s, "Times of frames")[b] = np.nan
             write_rows(one(whole, b), columns, one(seen, 0))
         return whole
 
@@ -332,7 +332,7 @@ def _join(n: int, parts: list[_PartRecord[RecordT]]) -> RecordT:
     first = parts[0].record
     if len(parts) == 1 and len(parts[0].part.rows) == n:
         return first
-    whole = mapped(first, lambda array: np.empty((n, *array.shape[1:]), array.dtype))
+    whole = map_arrays(first, lambda array: np.empty((n, *array.shape[1:]), array.dtype))
     for each in parts:
         write_rows(whole, each.part.rows, each.record)
     return whole

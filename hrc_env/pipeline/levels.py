@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 from hrc_env.config import HRCConfig
 from hrc_env.core.batching import rows, write_rows
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.errors import ConfigError, make_unknown_name_error
 from hrc_env.core.kernels import ahead
 from hrc_env.core.records import PoseEstimate
 from hrc_env.core.typing import Ints
@@ -80,7 +80,7 @@ def make_pipeline(
         RenderingError: there is no OpenGL for level "pixels".
     """
     if level not in LEVELS:
-        raise unknown("perception", level, LEVELS)
+        raise make_unknown_name_error("perception", level, LEVELS)
     check_supported(level, config.appearance, config.faults, shows_images)
     schedule = Schedule(scene.rig, config.faults, config.ctrl_dt)
     memory_s = max(config.tracker.max_delay_s, min(schedule.max_delay_s, 1.0))

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.core.batching import one
-from hrc_env.core.errors import ConfigError, unknown, whole
+from hrc_env.core.errors import ConfigError, check_integer, make_unknown_name_error
 from hrc_env.core.records import Roi
 from hrc_env.core.typing import Image
 from hrc_env.geometry.camera_config import CameraConfig
@@ -105,11 +105,11 @@ def _select_cameras(
     for choice in range(len(rig)) if choices is None else choices:
         if isinstance(choice, str):
             if choice not in names:
-                raise unknown("camera of observe_images", choice, names)
+                raise make_unknown_name_error("camera of observe_images", choice, names)
             chosen.append(names.index(choice))
         else:
             label = f"Camera of observe_images (of {', '.join(names)})"
-            chosen.append(whole(label, choice, 0, len(rig) - 1))
+            chosen.append(check_integer(label, choice, 0, len(rig) - 1))
     for index in chosen:
         if chosen.count(index) > 1:
             raise ConfigError(

@@ -19,7 +19,7 @@ from hrc_env.core.brought import (
     points_of,
     positive,
 )
-from hrc_env.core.errors import needed, whole
+from hrc_env.core.errors import check_integer, require
 from hrc_env.core.records import PoseEstimate, Roi
 from hrc_env.core.typing import Bools, Capsules, Floats, Image, Ints, Points3
 from hrc_env.geometry.camera_config import CameraConfig
@@ -77,7 +77,7 @@ class _Films(ImageSensor):
 
     def crop(self, camera_index: int, window: Roi) -> Image:
         """Return a window of the source's image, (256, 256, 3)."""
-        crop = crop_image(needed(self.source, "The image source"), camera_index, window)
+        crop = crop_image(require(self.source, "The image source"), camera_index, window)
         new, key = zlib.crc32(crop.tobytes()), (camera_index, window)
         if key in self.sums:
             same = self.sums[key] == new
@@ -126,7 +126,7 @@ class PoseTracker:
         check_kinds("cameras", cameras, CameraConfig, PinholeCamera)
         check_kind("tracker", tracker, TrackerConfig, None)
         check_kind("detector", detector, DetectorConfig, None)
-        n_workers = whole("n_workers", n_workers, 1, MOST_WORKERS)
+        n_workers = check_integer("n_workers", n_workers, 1, MOST_WORKERS)
         dt_s = positive("dt_s", dt_s, "s")
         if floor_world is not None:
             floor_world = points_of("floor_world [m]", floor_world)

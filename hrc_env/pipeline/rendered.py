@@ -3,7 +3,7 @@
 import numpy as np
 
 from hrc_env.config import HRCConfig
-from hrc_env.core.batching import copied, one
+from hrc_env.core.batching import copy_arrays, one
 from hrc_env.core.typing import Capsules, Floats, Ints
 from hrc_env.geometry.chains import robot_state
 from hrc_env.perception.faults.camera_film import CameraFilm, ScenePose, Shot
@@ -65,7 +65,7 @@ class RenderedCameras(ImageSensor):
     def show(self, b: int) -> Floats:
         """Make the images present that have arrived in environment b; return their times (C,)."""
         row, history = self.now.ids.tolist().index(b), self.history
-        pose = ScenePose(self.now.qpos[row].copy(), copied(one(self.now.motion, row)))
+        pose = ScenePose(self.now.qpos[row].copy(), copy_arrays(one(self.now.motion, row)))
         step = history.begin_step(b)
         before: Shot | None = history.record_at(b, step - 1)
         seed = history.seeds[b]

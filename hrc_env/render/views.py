@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hrc_env.core.batching import one, rows
-from hrc_env.core.errors import unknown, whole
+from hrc_env.core.errors import check_integer, make_unknown_name_error
 from hrc_env.core.records import Keypoints, PoseEstimate, Roi, WorkerMotion
 from hrc_env.core.typing import Floats, Image, Points3
 from hrc_env.env_config import PICTURE_SIZE
@@ -83,7 +83,9 @@ class Pose(NamedTuple):
 def check_size(width: object, height: object) -> Size:
     """Return the size of a picture, or raise `ConfigError` unless it is from 16 to 4096 px."""
     limits = SMALLEST_PX, LARGEST_PX
-    return Size(whole("width [px]", width, *limits), whole("height [px]", height, *limits))
+    return Size(
+        check_integer("width [px]", width, *limits), check_integer("height [px]", height, *limits)
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -367,9 +369,9 @@ def _choose(choice: CameraChoice, cameras: Sequence[PinholeCamera]) -> str | Pin
         return make_cameras([choice])[0]
     if isinstance(choice, str):
         if choice not in rig and choice not in VIEWPOINTS:
-            raise unknown("camera or viewpoint", choice, [*rig, *VIEWPOINTS])
+            raise make_unknown_name_error("camera or viewpoint", choice, [*rig, *VIEWPOINTS])
         return rig.get(choice, choice)
-    return cameras[whole(f"camera (of {', '.join(rig)})", choice, 0, len(rig) - 1)]
+    return cameras[check_integer(f"camera (of {', '.join(rig)})", choice, 0, len(rig) - 1)]
 
 
 _MAKERS: dict[str, Callable[..., Canvas]] = {

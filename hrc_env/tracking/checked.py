@@ -7,8 +7,8 @@ from typing import Any, Generic, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.core.batching import copied
-from hrc_env.core.brought import check_arguments, described, flags_of, numbers_of
+from hrc_env.core.batching import copy_arrays
+from hrc_env.core.brought import check_arguments, describe, flags_of, numbers_of
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import JOINTS, N_JOINTS
@@ -53,7 +53,7 @@ class CheckedEstimator(Generic[State]):
         if not isinstance(getattr(inner, "config", None), TrackerConfig):
             raise ConfigError(
                 f"{name}: the estimator must have its settings, a TrackerConfig, as `config`; got "
-                f"{described(getattr(inner, 'config', None))}."
+                f"{describe(getattr(inner, 'config', None))}."
             )
         self.name, self.inner, self.n_workers = name, inner, 1
 
@@ -69,7 +69,7 @@ class CheckedEstimator(Generic[State]):
         if _find_batch(state) not in (None, batch):
             raise ConfigError(
                 f"{self.name}: arrays of a state must begin with (B, W) = ({batch}, {n_workers}), "
-                f"got {described(state)}."
+                f"got {describe(state)}."
             )
         return state
 
@@ -83,7 +83,7 @@ class CheckedEstimator(Generic[State]):
 
     def update(self, state: State, keypoints: Keypoints, rngs: Rngs) -> None:
         """Update with one set of frames, of which the estimator receives a copy."""
-        self.inner.update(state, copied(keypoints), rngs)
+        self.inner.update(state, copy_arrays(keypoints), rngs)
 
     def estimate(self, state: State) -> PoseEstimate:
         """Return the present estimate, checked."""
@@ -108,7 +108,7 @@ class CheckedEstimator(Generic[State]):
         """
         if not isinstance(given, PoseEstimate):
             raise ConfigError(
-                f"{self.name}: {method} must give a PoseEstimate, got {described(given)}."
+                f"{self.name}: {method} must give a PoseEstimate, got {describe(given)}."
             )
         n = len(given.mean_world) if batch is None else batch
         slots = (n, self.n_workers)

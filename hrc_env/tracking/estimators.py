@@ -18,9 +18,9 @@ from typing import Any, cast
 
 import numpy as np
 
-from hrc_env.core.batching import copied, rows
-from hrc_env.core.brought import check_arguments, check_kind, described
-from hrc_env.core.errors import ConfigError, unknown
+from hrc_env.core.batching import copy_arrays, rows
+from hrc_env.core.brought import check_arguments, check_kind, describe
+from hrc_env.core.errors import ConfigError, make_unknown_name_error
 from hrc_env.core.mapping import answer_unknown_fields
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.registry import Registry
@@ -129,14 +129,14 @@ def find_estimator(estimator: EstimatorChoice) -> EstimatorSpec:
     if not isinstance(given, str):
         raise ConfigError(
             "estimator must be a name, an EstimatorSpec or a function of (P, ctrl_dt, config), got "
-            f"{described(estimator)}."
+            f"{describe(estimator)}."
         )
     if estimator in OFFLINE:
         raise ConfigError(
             f"{estimator!r} needs the future: call {OFFLINE[estimator]} for a whole clip."
         )
     if estimator not in ESTIMATORS:
-        raise unknown("estimator", estimator, ESTIMATORS)
+        raise make_unknown_name_error("estimator", estimator, ESTIMATORS)
     return ESTIMATORS[estimator]
 
 
@@ -260,7 +260,7 @@ def _track_people(spec: EstimatorSpec, seeds: Sequence[int]) -> list[PoseEstimat
 
     estimates: list[PoseEstimate] = []
     for k in range(6):
-        detected, before = detect(), (copied(state), copied(rngs))
+        detected, before = detect(), (copy_arrays(state), copy_arrays(rngs))
         made.predict(state, _DT_S, rngs)
         made.update(state, detected, rngs)
         estimates.append(made.estimate(state))

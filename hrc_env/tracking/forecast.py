@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hrc_env.core.batching import mapped
+from hrc_env.core.batching import map_arrays
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import PoseEstimate
@@ -231,7 +231,7 @@ def forecast(now: PoseEstimate, horizon_s: float, config: TrackerConfig) -> Pose
     if not 0 < horizon_s <= LONGEST_S:
         raise ConfigError(f"A horizon must be in (0, {LONGEST_S:g}] s, got {horizon_s}.")
     age_s = np.minimum(now.age_s + horizon_s, config.max_age_s)
-    later = replace(mapped(now, lambda array: array.copy()), age_s=age_s)
+    later = replace(map_arrays(now, lambda array: array.copy()), age_s=age_s)
     workers = EstimateArrays(*(getattr(later, name) for name in EstimateArrays._fields))
     drift = Drift(
         heading_m2=config.root_acceleration * horizon_s**3 / 3,

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hrc_env.core.batching import mapped, write_rows
+from hrc_env.core.batching import map_arrays, write_rows
 from hrc_env.core.records import Keypoints
 from hrc_env.core.skeleton import N_JOINTS
 from hrc_env.core.typing import Bools, Floats, Ints
@@ -119,7 +119,7 @@ def remember(frames: Frames, keypoints: Keypoints, time_s: Floats, use: Bools) -
     n = frames.n_taken[b, c] % frames.time_s.shape[2]
     old_s = frames.time_s[b, c, n]
     np.maximum.at(frames.forgotten_s, b, np.where(np.isfinite(old_s), old_s, -np.inf))
-    write_rows(frames.keypoints, (b, c, n), mapped(keypoints, lambda array: array[b, c]))
+    write_rows(frames.keypoints, (b, c, n), map_arrays(keypoints, lambda array: array[b, c]))
     frames.time_s[b, c, n] = frames.newest_s[b, c] = time_s[b, c]
     frames.n_taken[b, c] += 1
 
@@ -240,6 +240,6 @@ def _select_newest(frames: Frames, ids: Ints, among: Bools, at_s: Floats) -> Fra
     """
     n = np.where(among, frames.time_s[ids], -np.inf).argmax(2)
     b, c = ids[:, None], np.arange(n.shape[1], dtype=np.int64)
-    keypoints = mapped(frames.keypoints, lambda array: array[b, c, n])
+    keypoints = map_arrays(frames.keypoints, lambda array: array[b, c, n])
     has = np.asarray(among.any(2))
     return FrameSet(keypoints if has.all() else drop_cameras(keypoints, ~has), has, at_s)

@@ -16,7 +16,7 @@ from typing import Any, Generic, NamedTuple
 
 import numpy as np
 
-from hrc_env.core.batching import mapped, picked, rows, write_rows
+from hrc_env.core.batching import map_arrays, rows, select_streams, write_rows
 from hrc_env.core.errors import check_shape
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS
@@ -104,7 +104,7 @@ class OutOfSequence(Generic[State]):
             n_kept=np.zeros(batch, np.int64),
             end_s=np.zeros((batch, n_slots)),
             step_s=np.zeros((batch, n_slots)),
-            kept=mapped(now, lambda array: np.repeat(array[:, None], n_slots, axis=1)),
+            kept=map_arrays(now, lambda array: np.repeat(array[:, None], n_slots, axis=1)),
             frames=make_frames(batch, self.n_cameras, 2 * n_slots, n_workers),
             ignored=np.zeros((batch, len(IGNORED)), np.int64),
         )
@@ -181,30 +181,37 @@ class OutOfSequence(Generic[State]):
             return
         part, used = self._select_states(state, ids), use[ids]
         frame_set = FrameSet(drop_cameras(rows(keypoints, ids), ~used), used, state.clock_s[ids])
-        self._use_frames(part, state, ids, frame_set, picked(rngs, ids))
+        self._use_frames(part, state, ids, frame_set, select_streams(rngs, ids))
         self._write(state, ids, part)
 
     def _repeat_step(self, state: LateState[State], ids: Ints, age: int, rngs: Rngs) -> None:
-        """Predict and update through a past step again.
+        """Repeat a past control step with all of its frames, late ones included.
+
+        `state.now` goes from the beginning to the end of that step: it is predicted to the time of
+        each set of frames and updated with it, and is then predicted to the end of the step.
 
         Args:
-            state: changed in place.
-            ids: indices of the environments.
-            age: the step ended `age` - 1 slots before the open one.
-            rngs: one generator for each environment of the batch.
+            state: `now` of these environments is changed in place.
+            ids: (n,) indices of the environments.
+            age: 1 for the step that ends at the present time (the open slot), 2 for the step before
+                it, and so on.
+            rngs: one generator for each environment of the batch, which draw new random numbers.
         """
-        slot = (state.slot[ids] - age + 1) % state.end_s.shape[1]
-        ends_s, steps_s = state.end_s[ids, slot], state.step_s[ids, slot]
-        for members, step_s, frame_sets in group_frames(state.frames, ids, ends_s, steps_s):
-            group, done_s = ids[members], 0.0
-            part, streams = self._select_states(state, group), picked(rngs, group)
-            for at_s, frame_set in frame_sets:
-                self.inner.predict(part, at_s - done_s, streams)
-                self._use_frames(part, state, group, frame_set, streams)
-                done_s = at_s
-            if step_s > done_s:
-                self.inner.predict(part, step_s - done_s, streams)
-            self._write(state, group, part)
+        n_slots = state.end_s.shape[1]
+        slots = (state.slot[ids] - age + 1) % n_slots
+        end_s, lengths_s = state.end_s[ids, slots], state.step_s[ids, slots]
+        for members, length_s, frame_sets in group_frames(state.frames, ids, end_s, lengths_s):
+            group_ids = ids[members]  # environments with the same frame times
+            group_state = self._select_states(state, group_ids)
+            group_rngs = select_streams(rngs, group_ids)
+            reached_s = 0.0  # from the beginning of the step
+            for since_start_s, frame_set in frame_sets:
+                self.inner.predict(group_state, since_start_s - reached_s, group_rngs)
+                self._use_frames(group_state, state, group_ids, frame_set, group_rngs)
+                reached_s = since_start_s
+            if length_s > reached_s:
+                self.inner.predict(group_state, length_s - reached_s, group_rngs)
+            self._write(state, group_ids, group_state)
 
     def _use_frames(
         self, part: State, state: LateState[State], ids: Ints, frame_set: FrameSet, rngs: Rngs
@@ -312,4 +319,4 @@ def _find_slots(state: LateState[Any], ids: Ints, age: int) -> Ints:
 
 def _flatten_slots(kept: State) -> State:
     """Return views (B K, ...) of the arrays (B, K, ...) of a state."""
-    return mapped(kept, lambda a: a.reshape(a.shape[0] * a.shape[1], *a.shape[2:]))
+    return map_arrays(kept, lambda a: a.reshape(a.shape[0] * a.shape[1], *a.shape[2:]))

@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hrc_env.core.batching import mapped
+from hrc_env.core.batching import map_arrays
 from hrc_env.core.errors import ConfigError
 from hrc_env.core.records import Keypoints, PoseEstimate
 from hrc_env.core.skeleton import N_JOINTS, TORSO
@@ -287,6 +287,6 @@ def _make_estimate(
         age_s=smoothed.age_s.reshape(joints),
         tracked=tracked,
     )
-    return mapped(
+    return map_arrays(
         bound_estimate(estimate, config), lambda a: a.reshape(n_frames, batch, *a.shape[1:])
     )

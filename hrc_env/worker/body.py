@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hrc_env.core.batching import flat
-from hrc_env.core.errors import ConfigError, check_shape, unknown
+from hrc_env.core.batching import flatten_axes
+from hrc_env.core.errors import ConfigError, check_shape, make_unknown_name_error
 from hrc_env.core.kernels import kernel
 from hrc_env.core.records import WorkerMotion, WorkerPath, WorkerTruth
 from hrc_env.core.typing import Capsules, Floats, Ints, Points3, QuaternionsWxyz, Velocities3
@@ -112,7 +112,7 @@ def select_bodies(worker: str | tuple[str, ...]) -> tuple[str, ...]:
         )
     for name in names:
         if name not in worker_names():
-            raise unknown("worker", name, valid)
+            raise make_unknown_name_error("worker", name, valid)
     return names
 
 
@@ -128,14 +128,14 @@ def worker_truth(body: Body, motion: WorkerMotion) -> WorkerTruth:
     rows = _find_rows(body, motion.body, lead)
     capsules = _place_capsules(body, position, quaternion, rows)
     segments = _Segments(
-        flat(position, 2),
-        flat(quaternion, 2),
-        flat(motion.velocity_world, 2),
-        flat(motion.angular_velocity_world, 2),
+        flatten_axes(position, 2),
+        flatten_axes(quaternion, 2),
+        flatten_axes(motion.velocity_world, 2),
+        flatten_axes(motion.angular_velocity_world, 2),
     )
     offset = body.joint_offset.reshape(-1, n_joints, 3)
     joints, velocity = np.empty((2, *lead, n_joints, 3))
-    written = _Joints(flat(joints, 2), flat(velocity, 2))
+    written = _Joints(flatten_axes(joints, 2), flatten_axes(velocity, 2))
     _write_joints(segments, rows, body.joint_segment, offset, written)
     radius = body.capsule_radius_m.reshape(-1, len(body.capsule_names))[rows]
     return WorkerTruth(joints, velocity, capsules, radius.reshape(*lead, radius.shape[1]))
@@ -180,7 +180,14 @@ def _place_capsules(
     shape = (len(body.capsule_segment), 2, 3)
     ends = np.empty((len(rows), *shape))
     known = body.capsule_ends.reshape(-1, *shape)
-    _write_capsules(flat(position, 2), flat(quaternion, 2), rows, body.capsule_segment, known, ends)
+    _write_capsules(
+        flatten_axes(position, 2),
+        flatten_axes(quaternion, 2),
+        rows,
+        body.capsule_segment,
+        known,
+        ends,
+    )
     return ends.reshape(*position.shape[:-2], *shape)
 
 
@@ -265,7 +272,7 @@ def _write_capsules(
 def find_baked(name: str) -> Path:
     """Return the path of a baked worker's file; raise `ConfigError` if the name is unknown."""
     if name not in worker_names():
-        raise unknown("worker", name, worker_names())
+        raise make_unknown_name_error("worker", name, worker_names())
     return assets_dir() / "workers" / f"{name}.npz"
 
 

@@ -31,6 +31,10 @@ from hrc_env.motion.walk import (
     write_footprint,
 )
 
+_STEPS_BEFORE, _STEPS_AFTER = 2, 3
+"""Least numbers of steps of a walk before and after the step in which a foot is caught."""
+_LAST_STEPS = 2
+"""Number of footprints that a fall adds after that of the caught foot, for standing up again."""
 PELVIS_X, PELVIS_Z, PITCH, ROLL, FLEX, NOD, TURN, GRASP, ELBOWS, KNEES = range(10)
 """Columns of `PLACES` for the trunk, in radians, and in metres for a leg of length `LEG_M`.
 
@@ -246,33 +250,40 @@ def _fall_foot(at: float, side: int, column: int, sign: float, worker: Worker) -
 def plan_fall(
     draws: Floats, end_yaw: float, pace_m_s: float, lie_s: float, grid: FloorGrid, worker: Worker
 ) -> float:
-    """Plan to fall during a walk along the worker's path.
+    """Plan a walk along the worker's path with a fall on the way, and getting up again.
+
+    The steps are tried cyclically from a random one on, each in the directions `TURNS_RAD`, until
+    the floor has room for a fall.
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
-        end_yaw: heading at the end of the path [rad].
+        draws: (N_START,) uniform draws in [0, 1): 0 the step, 1 the rate of the fall, 2 the roll of
+            the lying trunk, 3 the foot on which the worker gets up first.
+        end_yaw: heading at the end of the path [rad], in the world frame.
         pace_m_s: walking speed [m/s].
         lie_s: time for which the worker lies on the floor [s].
         grid: slack on the floor.
-        worker: record with the path; the plan is written into it.
+        worker: record with the path; the plan is written into it, even if a fall has no room.
 
     Returns:
-        The duration [s]; -1 if there is no room.
+        The duration [s]; -1 if there is no room for a fall, or the path is too short or too long.
     """
     plan_walk(end_yaw, pace_m_s, worker)
-    n = worker.step_count - 5
-    if worker.follow == 0.0 or n < 1 or worker.step_count > MAX_STEPS - 2:
+    n_candidates = worker.step_count - (_STEPS_BEFORE + _STEPS_AFTER)
+    is_side_stepping = worker.follow == 0.0
+    has_space = worker.step_count <= MAX_STEPS - _LAST_STEPS
+    if is_side_stepping or n_candidates < 1 or not has_space:
         return -1.0
     worker.fall_pace, worker.lie_s = scale_draw(draws[1], SLOWEST, QUICKEST), lie_s
     worker.lie_roll = MOST_ROLL_RAD * (2.0 * draws[2] - 1.0)
     worker.front = 1 if draws[3] < 0.5 else 0
-    first = int(draws[0] * n)
-    for k in range(n):
-        for turn in TURNS_RAD:
-            if _plan_stumble(2 + (first + k) % n, turn, grid, worker):
-                worker.total_s = (
-                    worker.trip_at + LIES_S / worker.fall_pace + lie_s + STANDS_S - LIES_S
-                )
+    first = int(draws[0] * n_candidates)
+    for k in range(n_candidates):
+        step = _STEPS_BEFORE + (first + k) % n_candidates
+        for turn_rad in TURNS_RAD:
+            if _plan_stumble(step, turn_rad, grid, worker):
+                down_s = LIES_S / worker.fall_pace
+                # getting up takes the rest of the time in POSES
+                worker.total_s = worker.trip_at + down_s + lie_s + STANDS_S - LIES_S
                 return worker.total_s
     return -1.0
 

@@ -12,6 +12,10 @@ from hrc_env.motion.holding import GRIPS, TWO_HANDED, grip
 from hrc_env.motion.posture import lean, locate_from_root, look_at
 from hrc_env.motion.state import Worker
 
+_X, _Y, _STRIDE_SHARE = 0, 1, 3
+"""Columns of a footprint: world x and y [m], and share of a full stride."""
+_SHORT_STEP_SHARE = 0.3
+"""Share of a full stride of the steps that widen a stance; judgement."""
 GAZE_LEAD_S = 0.25
 """Lead of eyes and head over the hand [s] (Land & Hayhoe 2001: up to half a second)."""
 BELT_AHEAD_M = 0.10
@@ -85,28 +89,35 @@ def get_down(down: float, worker: Worker) -> None:
 
 
 @kernel
-def step_into(first: int, ahead: float, other: float, out: float, worker: Worker) -> None:
-    """Plan a forward step of one foot, and optionally one of the other foot.
+def step_into(
+    first: int, first_m: float, second_m: float, outward_m: float, worker: Worker
+) -> None:
+    """Plan a step of one foot, then optionally a step of the other foot.
+
+    Each foot moves from its footprint in `worker.stance`; displacements are relative to the initial
+    heading.
 
     Args:
         first: foot of the first step, 0 left, 1 right.
-        ahead: length of the first step [m].
-        other: length of the other foot's step [m]; 0 for none.
-        out: outward displacement of both feet [m].
-        worker: record into which the plan is written.
+        first_m: forward displacement of the first foot [m]; negative for a backward step.
+        second_m: forward displacement of the other foot [m]; 0 for no step.
+        outward_m: displacement of each foot away from the body's midline [m].
+        worker: record into which step times and both footprints in the world frame are written.
     """
     cos, sin = math.cos(worker.start_yaw), math.sin(worker.start_yaw)
     worker.step_start, worker.step_period = STEP_AT_S, STEP_PERIOD_S
     worker.step_swing = STEP_SWING_S
-    worker.step_first, worker.step_count = first, 1 if other == 0.0 else 2
-    for k in range(2):
-        side = (first + k) % 2
-        forward, left = (other if k else ahead), (1.0 - 2.0 * side) * out
-        for i in range(5):
-            worker.footprints[k, i] = worker.stance[side, i]
-        worker.footprints[k, 0] += cos * forward - sin * left
-        worker.footprints[k, 1] += sin * forward + cos * left
-        worker.footprints[k, 3] = 0.3
+    worker.step_first, worker.step_count = first, 1 if second_m == 0.0 else 2
+    for step in range(2):
+        side = (first + step) % 2
+        sign = 1.0 - 2.0 * side  # 1 on the left, -1 on the right
+        forward_m, left_m = (second_m if step else first_m), sign * outward_m
+        stance, footprint = worker.stance[side], worker.footprints[step]
+        for column in range(len(footprint)):
+            footprint[column] = stance[column]
+        footprint[_X] += cos * forward_m - sin * left_m
+        footprint[_Y] += sin * forward_m + cos * left_m
+        footprint[_STRIDE_SHARE] = _SHORT_STEP_SHARE
 
 
 @kernel

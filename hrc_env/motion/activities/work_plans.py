@@ -21,6 +21,14 @@ HAMMER = PROP_NAMES.index("hammer")
 DRILL = PROP_NAMES.index("drill")
 HAND_SAW = PROP_NAMES.index("saw")
 TAPE = PROP_NAMES.index("tape_measure")
+_SCREW_STEP_M = 0.12
+"""Forward step of the foot opposite to the drill when driving screws [m]; judgement."""
+_SCREW_S = (1.0, 1.3)
+"""Range of the time to drive one screw [s]; judgement."""
+_GAZE_M = 0.18
+"""Distance of the gaze point ahead of the fist, and to its right, when driving screws [m]."""
+_GAZE_DOWN_M = 0.2
+"""Distance of the gaze point below the first screw when driving screws [m]."""
 LEVEL = Vector3(0.0, 0.0, 0.0)
 """Orientation of a tool that points straight ahead: yaw, pitch, roll [rad]."""
 HEAD_M = 0.25
@@ -141,10 +149,12 @@ def plan_drill(draws: Floats, height: float, worker: Worker) -> float:
 
 @kernel
 def plan_screw(draws: Floats, height: float, worker: Worker) -> float:
-    """Plan to drive screws into the robot's workpiece, from top to bottom.
+    """Plan to drive screws into the robot's workpiece with a drill, from top to bottom.
+
+    Positions are relative to the initial position and heading: ahead, left, height [m].
 
     Args:
-        draws: uniform draws (N_START,) in [0, 1).
+        draws: (N_START,) uniform draws in [0, 1): 0 the hand, 2 the time for a screw.
         height: height of the first screw [m].
         worker: record into which the plan is written.
 
@@ -152,16 +162,22 @@ def plan_screw(draws: Floats, height: float, worker: Worker) -> float:
         The peak speed of the hands on their way to the work [m/s].
     """
     side = to.begin_plan(draws[0], worker)
-    to.plan_step_ahead(1 - side, 0.12, worker)
-    to.plan_tool(
-        DRILL,
-        side,
-        Vector3(FIST_AHEAD_M, FIST_LEFT_M, height - BIT_UP_M),
-        Vector3(ASKEW_RAD, 0.0, 0.0),
-        worker,
+    other_side = 1 - side
+    to.plan_step_ahead(other_side, _SCREW_STEP_M, worker)
+    fist = Vector3(FIST_AHEAD_M, FIST_LEFT_M, height - BIT_UP_M)
+    yaw_pitch_roll = Vector3(ASKEW_RAD, 0.0, 0.0)
+    to.plan_tool(DRILL, side, fist, yaw_pitch_roll, worker)
+    gaze = Vector3(FIST_AHEAD_M + _GAZE_M, FIST_LEFT_M - _GAZE_M, height - _GAZE_DOWN_M)
+    to.plan_gaze(gaze, worker)
+    screw_s = scale_draw(draws[2], _SCREW_S[0], _SCREW_S[1])
+    to.plan_strokes(
+        kind=strokes.PRESS,
+        size_m=THRUST_M,
+        rate_hz=0.0,
+        burst_s=screw_s,
+        n=SCREWS,
+        worker=worker,
     )
-    to.plan_gaze(Vector3(FIST_AHEAD_M + 0.18, FIST_LEFT_M - 0.18, height - 0.2), worker)
-    to.plan_strokes(strokes.PRESS, THRUST_M, 0.0, scale_draw(draws[2], 1.0, 1.3), SCREWS, worker)
     worker.down_m = SCREW_PITCH_M
     return CALM_M_S
 

@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from hrc_env.core.batching import mapped, rows, write_rows
+from hrc_env.core.batching import map_arrays, rows, write_rows
 from hrc_env.core.records import Held, Roi, WorkerMotion
 from hrc_env.core.typing import Floats, Image, JointAngles
 from hrc_env.geometry.cameras import PinholeCamera
@@ -106,7 +106,7 @@ def _pose_before(shot: Shot, share: float) -> ScenePose:
     moved, held = _interpolate(motion, last, share), motion.held
     if held is not None and last.held is not None:
         same = (held.kind == last.held.kind) & (held.kind > 0)  # an absent prop has no place
-        there = mapped(held, np.copy)
+        there = map_arrays(held, np.copy)
         write_rows(there, same, _interpolate(rows(held, same), rows(last.held, same), share))
         moved = replace(moved, held=there)
     return ScenePose(_mix(shot.pose.q, shot.before.q, share), moved)

@@ -11,7 +11,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from hrc_env.core.errors import ConfigError, unknown, whole
+from hrc_env.core.errors import ConfigError, check_integer, make_unknown_name_error
 from hrc_env.core.mapping import answer_unknown_fields
 
 FOREVER_S = 1e9
@@ -98,7 +98,7 @@ class FaultConfig:
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
-            raise unknown("fault", self.kind, KINDS)
+            raise make_unknown_name_error("fault", self.kind, KINDS)
         named = isinstance(self.cameras, tuple) and all(map(_is_choice, self.cameras))
         if not named or not self.cameras:
             raise ConfigError(
@@ -159,9 +159,11 @@ def check_cameras(faults: Sequence[FaultConfig], names: Sequence[str]) -> None:
         for camera in fault.cameras:
             if not isinstance(camera, str):
                 label = f"Camera index of fault {fault.kind!r} (of {', '.join(names)})"
-                whole(label, camera, 0, len(names) - 1)
+                check_integer(label, camera, 0, len(names) - 1)
             elif camera not in (*names, ALL):
-                raise unknown(f"camera of fault {fault.kind!r}:", camera, (*names, ALL))
+                raise make_unknown_name_error(
+                    f"camera of fault {fault.kind!r}:", camera, (*names, ALL)
+                )
 
 
 def _is_number(value: object) -> bool:

@@ -22,6 +22,8 @@ from hrc_env.tracking.tree.gaussian import PARENT, is_positive_definite
 from hrc_env.tracking.tree.report import forget_pace
 from hrc_env.tracking.tree.state import STANDING_M, Tree, Work, WorkerHypotheses
 
+_LEAST_VARIANCE = 1e-4
+"""Lower bound on the variances of a repaired joint [m^2, m^2/s^2]."""
 WIDEST_STD_M = 0.5
 """Standard deviation above which a triangulated joint is not used [m]."""
 _GUESS_STD_M = 0.3
@@ -386,33 +388,44 @@ def _acquire_anew(tree: Tree, frame: Frame, settings: Settings) -> bool:
 
 @kernel
 def _repair(tree: Tree, settings: Settings) -> bool:
-    """Keep covariances positive definite; put a body that has left the world back to the prior.
+    """Repair covariances that are not positive definite, and reset an implausible body.
+
+    Such a covariance loses everything but its diagonal. If any joint is not finite, or more than
+    `_FURTHEST_STD` standard deviations of the prior away from its mean, all joints are put back to
+    the prior, at rest, and the track is lost.
+
+    Args:
+        tree: the hypothesis, changed in place: `body` (J, 6) positions [m] and velocities [m/s] in
+            the world frame, `cov` (J, 6, 6) their covariances.
+        settings: mean and standard deviation of the prior position, and greatest age.
 
     Returns:
-        Whether nothing had to be changed.
+        True if nothing had to be changed.
     """
-    body, cov, is_inside, is_proper = tree.body, tree.cov, True, True
-    for j in range(len(body)):
-        if not is_positive_definite(cov[j]):
+    states, covariances = tree.body, tree.cov
+    prior_mean, prior_std_m = settings.prior_mean_world, settings.prior_std_m
+    is_inside, is_proper = True, True
+    for j in range(len(states)):
+        if not is_positive_definite(covariances[j]):
             is_proper = False
             for i in range(6):
-                variance = cov[j, i, i]
-                cov[j, i, :], cov[j, :, i] = 0.0, 0.0
-                cov[j, i, i] = max(variance, 1e-4)
-        away = distance(body[j], settings.prior_mean_world)
-        variances, numbers = 0.0, 0.0
+                variance = covariances[j, i, i]
+                covariances[j, i, :], covariances[j, :, i] = 0.0, 0.0
+                covariances[j, i, i] = max(variance, _LEAST_VARIANCE)
+        from_prior_m = distance(states[j], prior_mean)
+        variance_sum, state_sum = 0.0, 0.0
         for i in range(6):
-            variances += cov[j, i, i]  # where these are finite, the covariances between them are
-            numbers += body[j, i]
-        is_near = away < _FURTHEST_STD * settings.prior_std_m
-        is_inside &= is_near and math.isfinite(variances + numbers)
+            variance_sum += covariances[j, i, i]  # if finite, all covariances of the joint are
+            state_sum += states[j, i]
+        is_near = from_prior_m < _FURTHEST_STD * prior_std_m
+        is_inside &= is_near and math.isfinite(variance_sum + state_sum)
     if is_inside:
         return is_proper
     tree.tracked = False
-    for j in range(len(body)):
+    for j in range(len(states)):
         tree.age_s[j] = settings.max_age_s
         for i in range(6):
-            body[j, i] = settings.prior_mean_world[i] if i < 3 else 0.0
+            states[j, i] = prior_mean[i] if i < 3 else 0.0
             for k in range(6):
-                cov[j, i, k] = settings.prior_std_m**2 if i == k else 0.0
+                covariances[j, i, k] = prior_std_m**2 if i == k else 0.0
     return False

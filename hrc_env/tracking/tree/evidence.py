@@ -115,22 +115,28 @@ def log_evidence(prior: Tree, tree: Tree, frame: Frame, settings: Settings, work
 def _log_likelihood_of_pixels(body: Floats, frame: Frame, inlier_odds: float) -> float:
     """Return the log-likelihood of all pixels, relative to all being outliers.
 
+    An inlier is Gaussian about the projected joint, an outlier is uniform in the image. The result
+    is the sum over joints and cameras of log(1 + odds exp(-|error|^2 / (2 sigma^2))), in which
+    odds = inlier_odds / sigma^2 are the odds of an inlier without error.
+
     Args:
-        body: (J, 6) positions and velocities.
-        frame: the measurements.
-        inlier_odds: odds of a perfect inlier, times the variance of its pixel [px^2].
+        body: (J, 6) positions [m] and velocities [m/s] of the joints in the world frame.
+        frame: the measurements: `P` (C, 3, 4) projections, `z` (J, C, 2) pixels, `sigma` (J, C)
+            their standard deviations [px], `ok` (J, C) whether they exist.
+        inlier_odds: odds of an inlier, times the outliers' area in the image, over 2 pi [px^2].
     """
-    P, z, sigma, ok = frame.P, frame.z, frame.sigma, frame.ok
+    projections, pixels, sigma, ok = frame.P, frame.z, frame.sigma, frame.ok
     total = 0.0
     for j in range(len(ok)):
-        for c in range(len(P)):
+        for c in range(len(projections)):
             if not ok[j, c]:
                 continue
-            u, v, depth = pixel_of(P[c], body[j, 0], body[j, 1], body[j, 2])
-            if depth > NEAREST_DEPTH_M:
-                near = 1.0 / (sigma[j, c] * sigma[j, c])
-                miss = (z[j, c, 0] - u) ** 2 + (z[j, c, 1] - v) ** 2
-                total += math.log1p(inlier_odds * near * math.exp(-0.5 * miss * near))
+            u, v, depth_m = pixel_of(projections[c], body[j, 0], body[j, 1], body[j, 2])
+            if depth_m > NEAREST_DEPTH_M:  # otherwise it counts as an outlier
+                precision = 1.0 / (sigma[j, c] * sigma[j, c])
+                squared_error = (pixels[j, c, 0] - u) ** 2 + (pixels[j, c, 1] - v) ** 2
+                odds = inlier_odds * precision
+                total += math.log1p(odds * math.exp(-0.5 * squared_error * precision))
     return total
 
 

@@ -120,36 +120,40 @@ def _find_jump(
     spread: Floats,
     use: Bools,
 ) -> bool:
-    """Return whether views agree on another place of a joint than the predicted one.
+    """Return whether cameras agree on a position of a joint far from the predicted one.
+
+    If the fitted pose is supported by enough cameras, its position counts. If not, they may agree
+    on another one, which is triangulated: its covariance and the prediction's are added.
 
     Args:
-        j: the joint.
-        tree: the predicted hypothesis.
-        frame: the measurements, with weights.
+        j: index of the joint.
+        tree: the predicted hypothesis, in the world frame.
+        frame: the measurements, with the weights `belief` (J, C) as `find_pose` leaves them.
         settings: settings of the estimator.
-        work: scratch with the pose that was found.
-        point: (3,) receives the place [m].
-        spread: (3, 3) scratch.
-        use: (C,) scratch.
+        work: `point` (J, 3) is the fitted pose [m]; the matrix `c` is overwritten.
+        point: (3,) receives the position [m]; meaningless if False is returned.
+        spread: (3, 3) scratch for the covariance of a triangulated position [m^2].
+        use: (C,) scratch for the cameras that agree.
     """
-    ok, body, cov = frame.ok[j], tree.body[j], tree.cov[j]
-    n_believed = 0.0
+    ok, predicted, predicted_cov = frame.ok[j], tree.body[j], tree.cov[j]
+    scratch = work.c
+    n_supporting = 0.0  # a sum of weights
     for c in range(len(ok)):
-        n_believed += frame.belief[j, c] if ok[c] else 0.0
-    if n_believed > _SURE_VIEWS:
+        n_supporting += frame.belief[j, c] if ok[c] else 0.0
+    if n_supporting > _SURE_VIEWS:
         for i in range(3):
             point[i] = work.point[j, i]
-        return _is_far(point, body, cov, work.c)
+        return _is_far(point, predicted, predicted_cov, scratch)
     if ok.sum() < _AGREEING_VIEWS:
         return False
-    gate = settings.gate_sigma
-    z, sigma = frame.z[j], frame.sigma[j]
-    if consensus_point(frame.P, z, sigma, ok, gate, point, spread, use) < _AGREEING_VIEWS:
+    pixels, sigma, gate = frame.z[j], frame.sigma[j], settings.gate_sigma
+    n_agreeing = consensus_point(frame.P, pixels, sigma, ok, gate, point, cov=spread, use=use)
+    if n_agreeing < _AGREEING_VIEWS:
         return False
     for i in range(3):
         for k in range(3):
-            spread[i, k] += cov[i, k]
-    return _is_far(point, body, spread, work.c)
+            spread[i, k] += predicted_cov[i, k]  # the covariance of the difference
+    return _is_far(point, predicted, spread, scratch)
 
 
 @kernel
