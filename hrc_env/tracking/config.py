@@ -126,7 +126,7 @@ class ParticleConfig(TrackerConfig):
     """Standard deviation of the pseudo-measurement that returns a joint below the floor, z < 0, to
     the floor [m]. With infinity, no floor is assumed."""
     bone_variation_scale: float = 1.5
-    """Factor on the variation of bone lengths. The default suits a detector whose joints shift on
+    """Factor on the variation of bone lengths. The default suits a detector of joints that shift on
     the body, which makes even rigid bones seem to change in length; use 1 for fixed points."""
     gauss_newton_steps: int = 2
     """Number of Gauss-Newton steps in the search for the posterior mode. More than two make no
@@ -158,7 +158,7 @@ class ParticleConfig(TrackerConfig):
     initial_foot_height_std_m: float = 0.0
     """Standard deviation of the height of the lowest joint above the floor, z = 0, assumed when a
     body is started from one view [m]. This assumption determines the size of the body; 0.1 suits
-    people who stand on the floor. With 0, people may be at any height."""
+    people on the floor. With 0, people may be at any height."""
     mirrored_parts: tuple[str, ...] = ("body", "limbs")
     """Parts that may be mirrored in depth while only one view shows them: "body", "limbs" or
     both."""

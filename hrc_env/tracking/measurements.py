@@ -4,11 +4,11 @@ A detection is a measurement unless its pixel is not finite or far outside the i
 is outside (0, 1], or its standard deviation is not finite and positive. Wrong but plausible pixels
 are left to the robust likelihoods.
 
-Cameras whose left and right labels are swapped are detected by a hidden Markov model over all
-joints of the body. It has two states per camera: labels as reported, or swapped. A camera that sees
-the worker again after an interval is trusted for some updates, because the body may have been
-tracked mirrored in depth in the meantime. Likewise, several cameras are trusted if all of them seem
-to be swapped.
+Cameras with swapped left and right labels are detected by a hidden Markov model over all joints of
+the body. It has two states per camera: labels as reported, or swapped. A camera that sees the
+worker again after an interval is trusted for some updates, because the body may have been tracked
+mirrored in depth in the meantime. Likewise, several cameras are trusted if all of them seem to be
+swapped.
 """
 
 import math
@@ -290,7 +290,7 @@ def scale_sigma(noise: Records2[Noise], sigma: Floats) -> None:
 
 @kernel
 def undo_swaps(tree: Tree, frame: Frame, views: Records1[View], settings: Settings) -> bool:
-    """Correct the measurements of cameras whose labels are probably swapped, in place.
+    """Correct the measurements of cameras with probably swapped labels, in place.
 
     Args:
         tree: the body of the hypothesis.

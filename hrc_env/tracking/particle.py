@@ -1,4 +1,4 @@
-"""The default estimator: a particle filter whose particles are hypotheses with Gaussian bodies.
+"""The default estimator: a particle filter with hypotheses about Gaussian bodies as particles.
 
 It is a Rao-Blackwellised particle filter (Doucet, de Freitas, Murphy and Russell, UAI 2000). The
 particles represent discrete variables, such as whether the body or a limb is mirrored in depth; the
@@ -101,7 +101,7 @@ class ParticleEstimator:
     def _widen(self, state: Hypotheses, estimate: PoseEstimate) -> PoseEstimate:
         """Widen covariances for unknown body sizes and misaligned cameras; return the estimate.
 
-        A worker whose track was started from one view may be larger and, by the same factor,
+        A worker with a track started from one view may be larger and, by the same factor,
         farther from that camera. A worker seen by two misaligned cameras may be displaced as a
         whole.
 
