@@ -25,7 +25,7 @@ class TrackerConfig:
         "forget_s": "lost_relaxation_s",
         "longest_delay_s": "max_delay_s",
     }
-    """Present names of fields that were renamed, by their old names."""
+    """Current names of renamed fields, by their former names."""
 
     prior_mean_world: tuple[float, float, float] = (1.3, 0.0, 1.0)
     """Assumed position of a worker before any measurement, x, y, z in the world frame [m]. The
@@ -108,7 +108,7 @@ class ParticleConfig(TrackerConfig):
         "swap_begins": "swap_start_probability",
         "swap_ends": "swap_end_probability",
     }
-    """Present names of fields that were renamed, by their old names."""
+    """Current names of renamed fields, by their former names."""
 
     noise_bounds: tuple[float, float] = (1.0, 6.0)
     """Lower and upper bounds of the factor on the detector's variance that is learnt for every
@@ -142,7 +142,7 @@ class ParticleConfig(TrackerConfig):
     With 0, the depth of a body seen by one camera drifts towards the lens; 1 overshoots a
     little."""
     one_view_inflation: float = 1.21
-    """Factor on the reported covariance of a worker seen by only one camera for a while."""
+    """Factor on the reported covariance of a worker seen by only one camera for several updates."""
     lying_inflation: float = 4.5
     """Additional factor on the reported covariance of a lying body seen by only one camera, because
     the depth inferred from one view relies on an upright posture."""
@@ -244,7 +244,7 @@ class PaperConfig(TrackerConfig):
         **TrackerConfig.RENAMED,
         "place_m": "initial_bounds_m",
     }
-    """Present names of fields that were renamed, by their old names."""
+    """Current names of renamed fields, by their former names."""
 
     velocity_tau_s: float = 0.2
     """Time constant of the low-pass filter on differenced velocities [s]."""

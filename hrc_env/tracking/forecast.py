@@ -152,7 +152,7 @@ def describe(
 
 @kernel(makes_arrays=True, fastmath=_REORDER)
 def _apply_layer(inputs: Tensor, weight: Tensor, bias: Tensor, out: Tensor) -> None:
-    """Compute out = bias + inputs @ weight, in place."""
+    """Compute a linear layer, out = bias + inputs @ weight."""
     for k in range(len(out)):
         out[k] = bias[k]
     for i in range(len(inputs)):
@@ -163,7 +163,7 @@ def _apply_layer(inputs: Tensor, weight: Tensor, bias: Tensor, out: Tensor) -> N
 
 @kernel(makes_arrays=True)
 def _apply_hidden_layer(inputs: Tensor, weight: Tensor, bias: Tensor, out: Tensor) -> None:
-    """Compute out = max(bias + inputs @ weight, 0), in place."""
+    """Compute a hidden layer, out = max(bias + inputs @ weight, 0)."""
     _apply_layer(inputs, weight, bias, out)
     for k in range(len(out)):
         out[k] = max(out[k], np.float32(0.0))

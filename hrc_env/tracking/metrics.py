@@ -50,7 +50,7 @@ class TrackingError:
     id_switches: float
     """Number of identity switches of all workers since the episode began."""
     idf1: float
-    """IDF1 since the episode began."""
+    """IDF1 (identity F1 score) since the episode began."""
 
 
 TRACKING = dtype_of(TrackingError)
@@ -81,10 +81,11 @@ def measure_errors(
     A match between a worker and a track is kept while they are within `SAME_M`. As many of the
     other workers and tracks as possible are matched within that distance, with the smallest sum of
     distances (CLEAR MOT). A worker matched with another slot than before counts as an identity
-    switch; if two workers swap their slots, that is two switches. IDF1 is 2 m / n. In the
-    assignment of one slot to each worker for the whole episode that maximizes m, m is the number of
-    steps in which assigned pairs were within `SAME_M`; n is the sum of the numbers of steps of all
-    workers and of all tracks (Ristani et al. 2016, doi:10.1007/978-3-319-48881-3_2).
+    switch; if two workers swap their slots, that is two switches. IDF1 is 2 m / n. For it, each
+    worker is assigned to one slot for the whole episode; m is the number of steps in which assigned
+    pairs were within `SAME_M`, in the assignment that maximizes this number; n is the number of
+    steps in which workers were present plus the number of steps in which slots had tracks (Ristani
+    et al. 2016, doi:10.1007/978-3-319-48881-3_2).
 
     Args:
         estimate: (B, W, ...) tracks.
@@ -146,8 +147,8 @@ def _match_tracks(off_m: Floats, tracked: Bools, cost: Floats, chosen: Ints) -> 
     Args:
         off_m: (W, W) distance of each worker from each track [m].
         tracked: (W,) whether the slot has a track.
-        cost: (W, W) scratch.
-        chosen: (W,) scratch.
+        cost: (W, W) work array.
+        chosen: (W,) work array.
     """
     count, total = 0, 0.0
     for k in range(len(tracked)):
@@ -168,8 +169,8 @@ def _match_workers(off_m: Floats, workers: Records1[Identity], cost: Floats, cho
     Args:
         off_m: (W, W) distance of each worker from each track [m]; infinite if one is missing.
         workers: (W,) history of each worker, changed in place.
-        cost: (W, W) scratch.
-        chosen: (W,) scratch.
+        cost: (W, W) work array.
+        chosen: (W,) work array.
 
     Returns:
         The mean distance of workers from the tracks with which they were matched last [m]; NaN if
@@ -201,8 +202,8 @@ def _compute_idf1(near: Ints, workers: Records1[Identity], cost: Floats, chosen:
     Args:
         near: (W, W) number of steps in which each worker and each track were within `SAME_M`.
         workers: (W,) history of each worker.
-        cost: (W, W) scratch.
-        chosen: (W,) scratch.
+        cost: (W, W) work array.
+        chosen: (W,) work array.
     """
     for w in range(len(workers)):
         for k in range(len(workers)):

@@ -46,7 +46,8 @@ from hrc_env.tracking.tracks import Track, make_tracks, report_tracks, reset_tra
 from hrc_env.tracking.tree.update import count_conflict
 
 BEHIND = -1e12
-"""Log-likelihood of a particle behind the camera that saw the joint; practically zero."""
+"""Log-likelihood of a particle behind a camera that detected the joint; it all but excludes the
+particle."""
 HEIGHTS_M = (0.0, 2.2)
 """Bounds of z of the initial particles, unless `PaperConfig.initial_bounds_m` is given [m]."""
 _NARROWEST_M = 1.0
@@ -314,7 +315,7 @@ def add_log_likelihood(
 
 @kernel(makes_arrays=True)
 def normalise(log_weights: Floats, weights: Floats) -> None:
-    """Compute normalised weights (M,) from log-weights (M,), in place."""
+    """Compute normalised `weights` (M,) from log-weights (M,)."""
     largest = log_weights.max()
     total = 0.0
     for m in range(len(log_weights)):

@@ -69,7 +69,7 @@ class Settings(NamedTuple):
     min_ambiguous_depth_std_m: float
     """Smallest standard deviation of a part's depth at which hypotheses are searched for [m]."""
     turn_std_rad: float
-    """Standard deviation of the turn between a new hypothesis and a known one [rad]."""
+    """Standard deviation of the rotation between a new hypothesis and an existing one [rad]."""
     evidence_exponent: float
     """Exponent on the evidence of a set of frames when hypotheses are weighted."""
     anatomy_exponent: float

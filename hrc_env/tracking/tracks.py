@@ -18,7 +18,7 @@ _ROUNDING = 1e-6
 
 
 class Track:
-    """The estimate of one worker, and the counts from which joints are acquired anew."""
+    """The estimate of one worker, and the number of successive contradictions of each joint."""
 
     mean_world: Annotated[Points3, (N_JOINTS, 3)]
     """Position of each joint in the world frame [m]."""

@@ -59,7 +59,7 @@ class AssociationConfig:
         "apart_m": "merge_distance_m",
         "rejoin_m": "rejoin_distance_m",
     }
-    """Present names of fields that were renamed, by their old names."""
+    """Current names of renamed fields, by their former names."""
 
     gate_sigma: float = 5.0
     """Gate of a joint around its predicted pixel, in standard deviations. At least half of a pose's

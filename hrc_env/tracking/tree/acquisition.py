@@ -374,7 +374,7 @@ def _find_joints_again(
 
 @kernel
 def _acquire_anew(tree: Tree, frame: Frame, settings: Settings) -> bool:
-    """Reacquire the whole body if views have contradicted it for long; return whether it was."""
+    """Reacquire the whole body if enough joints are contradicted; return whether it succeeded."""
     n_wrong = 0
     for j in range(len(tree.conflict)):
         n_wrong += tree.conflict[j] >= settings.conflict_frames

@@ -71,7 +71,7 @@ class NoiseModel(NamedTuple):
     """Constants for learning the factors on the reported variances."""
 
     keep: float
-    """Share of a joint's statistics that is kept at the joint's next turn."""
+    """Share of a joint's statistics that is kept when the joint is used again."""
     correlation: float
     """Correlation r of persistent errors over one update."""
     share: float
@@ -256,7 +256,7 @@ def _find_prediction_weight(cov: Floats, predicted: Floats, work: Floats) -> flo
 
 @kernel(fastmath=_REORDER)
 def _set_factors(noise: Records2[Noise], persistence: Floats, model: NoiseModel) -> None:
-    """Compute the factors from the statistics, in place.
+    """Compute the factors on the variances from the statistics.
 
     Args:
         noise: (J, C) the noise, changed in place.

@@ -361,10 +361,7 @@ def _project(
     inlier_odds: float,
     image: Floats,
 ) -> None:
-    """Compute Jacobians, residuals and odds of all joints in one camera, in place in `image`.
-
-    The arguments are those of `_add_view`.
-    """
+    """Compute Jacobians, residuals and odds of all joints in one camera; see `_add_view`."""
     p00, p01, p02, p03 = p[0, 0], p[0, 1], p[0, 2], p[0, 3]
     p10, p11, p12, p13 = p[1, 0], p[1, 1], p[1, 2], p[1, 3]
     p20, p21, p22, p23 = p[2, 0], p[2, 1], p[2, 2], p[2, 3]
