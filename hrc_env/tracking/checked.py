@@ -78,7 +78,7 @@ class CheckedEstimator(Generic[State]):
         self.inner.reset(state, ids.copy(), rngs)
 
     def predict(self, state: State, dt_s: float, rngs: Rngs) -> None:
-        """Let `dt_s` seconds pass."""
+        """Predict the state after `dt_s` [s]."""
         self.inner.predict(state, dt_s, rngs)
 
     def update(self, state: State, keypoints: Keypoints, rngs: Rngs) -> None:

@@ -154,7 +154,7 @@ def group_frames(frames: Frames, ids: Ints, end_s: Floats, step_s: Floats) -> It
 def add_held_frames(frames: Frames, ids: Ints, frame_set: FrameSet, wanted: Bools) -> Keypoints:
     """Complete a set with the last frames of other cameras for some workers; return its keypoints.
 
-    Two views that are slightly out of synchronization locate a worker better than one view alone.
+    Two views that are slightly out of synchronisation locate a worker better than one view alone.
     The standard deviations of detections in an older frame grow by the distance that a walking
     person may have moved in the image.
 

@@ -59,7 +59,7 @@ class Estimator(Protocol[State]):
         Args:
             state: changed in place.
             dt_s: time since the last call, above 0 [s]. It is a control step or, if cameras are
-                late or not synchronized, the part of a step up to the next frame.
+                late or not synchronised, the part of a step up to the next frame.
             rngs: one generator for each environment of the batch.
         """
         ...

@@ -83,7 +83,7 @@ def measure_errors(
     distances (CLEAR MOT). A worker matched with another slot than before counts as an identity
     switch; if two workers swap their slots, that is two switches. IDF1 is 2 m / n. For it, each
     worker is assigned to one slot for the whole episode; m is the number of steps in which assigned
-    pairs were within `SAME_M`, in the assignment that maximizes this number; n is the number of
+    pairs were within `SAME_M`, in the assignment that maximises this number; n is the number of
     steps in which workers were present plus the number of steps in which slots had tracks (Ristani
     et al. 2016, doi:10.1007/978-3-319-48881-3_2).
 
@@ -180,7 +180,7 @@ def _match_workers(off_m: Floats, workers: Records1[Identity], cost: Floats, cho
     for w in range(len(workers)):
         worker = workers[w]
         for k in range(len(workers)):
-            cost[w, k] = off_m[w, k] if off_m[w, k] <= SAME_M else 1e3  # more than all within it
+            cost[w, k] = off_m[w, k] if off_m[w, k] <= SAME_M else 1e3  # exceeds sums within it
         if worker.matched and off_m[w, worker.track] <= SAME_M:
             cost[w, worker.track] = -1e6
     assign_rows(cost, chosen)

@@ -142,7 +142,7 @@ class OutOfSequence(Generic[State]):
         first_s = np.where(use, time_s, np.inf).min(1)
         late = first_s < state.clock_s - SAME_S
         seen_now = (state.frames.newest_s >= state.clock_s[:, None] - SAME_S).any(1)
-        late |= seen_now & use.any(1) & np.isfinite(ends_s[:, 0])  # one update, not two
+        late |= seen_now & use.any(1) & np.isfinite(ends_s[:, 0])  # repeat it as one update
         remember(state.frames, keypoints, time_s, use)
         back = np.where(late, 1 + (ends_s >= first_s[:, None] - SAME_S).sum(1), 0)
         self._use_present(state, keypoints, use & ~late[:, None], rngs)

@@ -157,7 +157,7 @@ class PaperEstimator:
         tracks, particles, config = state.tracks, state.particles[b, w], self.config
         for n in range(config.n_iterations):  # line 2: for n = 1 to N
             if n > 0:
-                roll(particles, config.sigma_m, rng)  # line 7, of further passes
+                roll(particles, config.sigma_m, rng)  # line 7 of further passes
             waits = rng.standard_exponential((N_JOINTS, particles.shape[-1] + 1))
             weigh_and_resample(frame, particles, waits)
         mean, cov = np.empty((N_JOINTS, 3)), np.empty((N_JOINTS, 3, 3))
@@ -205,7 +205,7 @@ def weigh_and_resample(frame: Frame, particles: Points3, waits: Floats) -> None:
     n_particles = particles.shape[2]
     log_weights, weights = np.empty(n_particles), np.empty(n_particles)
     ancestors, before = np.empty(n_particles, np.int64), np.empty((3, n_particles))
-    for j in range(n_joints):  # each joint is a filter of its own
+    for j in range(n_joints):  # each joint has a separate filter
         log_weights[:] = 0.0  # line 8: W[m] = 0 (a logarithm)
         for c in range(n_cameras):  # line 9
             if ok[j, c]:

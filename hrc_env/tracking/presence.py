@@ -305,7 +305,7 @@ def _update_slots(
                 slot.lost, slot.absent, slot.unobserved_s = True, False, age_s[row, w]
                 level[:] = POSSIBLE
             else:
-                if evidence.has_strangers[row]:  # the last estimated place need not be theirs
+                if evidence.has_strangers[row]:  # the last position may be another person's
                     _forget_place(slot)
                 state.age_s[ids[row], w] = _judge_floor(
                     slot, search, level, state.cameras, shown, evidence

@@ -216,7 +216,7 @@ def _filter_clip(
         predicted, was_tracked = copy_field("body"), copy_field("tracked")
         estimator.update(state, keypoints, [])
         body, tracked = copy_field("body"), copy_field("tracked")
-        begins = ~body[..., 3:].any((-2, -1))  # at rest: in the first frame of a track only
+        begins = ~body[..., 3:].any((-2, -1))  # only a new track is at rest
         frame = _FilteredFrame(
             predicted=predicted.reshape(-1, _N),
             mean=body.reshape(-1, _N),

@@ -126,7 +126,7 @@ def _score_reading(
             continue
         variance = sigma[k] * sigma[k] + image[j, 2]
         misfit = ((z[k, 0] - image[j, 0]) ** 2 + (z[k, 1] - image[j, 1]) ** 2) / variance
-        product *= variance  # one logarithm for all; absurd variances overflow to "no fit"
+        product *= variance  # one logarithm for all; huge variances overflow and do not fit
         total -= 0.5 * min(misfit, gate)
         n += 1
         n_near += misfit < gate

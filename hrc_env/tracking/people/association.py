@@ -216,7 +216,7 @@ def _assign_to_tracked(
         assign_rows(fit, column)
         for w in range(n_workers):
             d: int = column[w]
-            if fit[w, d] < 0.0:  # 0: no pose fits, or it fits another better
+            if fit[w, d] < 0.0:  # 0 if no pose fits or another worker fits better
                 chosen[c, w] = d
                 poses[c, d].free = False
 

@@ -112,7 +112,7 @@ def intersect_poses(
         if not (ok_1[j] and ok_2[j]):
             continue
         if n_common - n_met > (1.0 - AGREEING_SHARE) * len(points):
-            return 0  # the rest cannot make it good
+            return 0  # the remaining joints cannot suffice
         n_common += 1
         far_1, far_2, gap = nearest_places(
             camera_1.eye, pose_1.sight[j], camera_2.eye, pose_2.sight[j], points[j]

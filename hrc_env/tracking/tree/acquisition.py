@@ -402,7 +402,7 @@ def _repair(tree: Tree, settings: Settings) -> bool:
         away = distance(body[j], settings.prior_mean_world)
         variances, numbers = 0.0, 0.0
         for i in range(6):
-            variances += cov[j, i, i]  # where these are finite, the covariances between them are
+            variances += cov[j, i, i]  # finite variances imply finite covariances
             numbers += body[j, i]
         is_near = away < _FURTHEST_STD * settings.prior_std_m
         is_inside &= is_near and math.isfinite(variances + numbers)

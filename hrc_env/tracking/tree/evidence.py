@@ -49,15 +49,16 @@ class Feature(NamedTuple):
 
 
 _FEATURES = (
-    Feature(0, 1, 2, 0.12, 0.10),  # the nose before the middle of the shoulders
-    Feature(13, 11, 11, 0.12, 0.10),  # toes before the ankles
+    Feature(0, 1, 2, 0.12, 0.10),  # the nose in front of the shoulders
+    Feature(13, 11, 11, 0.12, 0.10),  # the toes in front of the ankles
     Feature(14, 12, 12, 0.12, 0.10),
-    Feature(9, 7, 11, 0.06, 0.12),  # knees before the middle of the leg
+    Feature(9, 7, 11, 0.06, 0.12),  # the knees in front of the legs
     Feature(10, 8, 12, 0.06, 0.12),
-    Feature(3, 1, 5, -0.05, 0.12),  # elbows behind the middle of the arm
+    Feature(3, 1, 5, -0.05, 0.12),  # the elbows behind the arms
     Feature(4, 2, 6, -0.05, 0.12),
 )
-"""Estimates from common proportions, wide enough for turned heads and feet."""
+"""Expected positions of nose, toes, knees and elbows, estimated from common proportions; the
+standard deviations allow for turned heads and feet."""
 _MOST = 4.5
 """Upper bound of the penalty of one feature [nat], which corresponds to three standard
 deviations."""
@@ -165,7 +166,7 @@ def measure_change(tree: Tree, change: Floats, work: Work) -> TreeMeasure:
 
 @kernel
 def _measure_joint(a: Floats, x: Floats, factor: Floats) -> TreeMeasure:
-    """Return x' a^-1 x and log det a by Cholesky factorization.
+    """Return x' a^-1 x and log det a by Cholesky factorisation.
 
     Args:
         a: (6, 6) symmetric matrix.

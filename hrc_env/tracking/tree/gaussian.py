@@ -32,7 +32,7 @@ EDGE_BONE = tuple(
 """Row of `skeleton.BONES` with the bone from each joint to its parent; -1 for the root."""
 _LEAST_PIVOT = 1e-13
 """Pivot below which a matrix is considered singular."""
-_REORDER = {"reassoc", "contract", "nsz"}  # lets sums vectorise; NaN and infinity keep meaning
+_REORDER = {"reassoc", "contract", "nsz"}  # for vectorised sums; NaN and infinity remain valid
 
 
 class Row6(NamedTuple):

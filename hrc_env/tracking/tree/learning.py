@@ -60,7 +60,7 @@ _GATE_SIGMA = 3.0
 _LEAST_VARIANCE = 1e-5
 """Minimum variance of a bone's length [m^2]."""
 _OPEN_M = 0.5
-"""Standard deviation of a joint about its mean in the triangulation [m]. It regularizes positions
+"""Standard deviation of a joint about its mean in the triangulation [m]. It regularises positions
 along a ray that two views share."""
 _LEAST_BELIEF = 0.5
 """Inlier probability up to which a measurement is not used for learning."""
@@ -192,7 +192,7 @@ def _linearise(p: Floats, body: Floats, pixel: Floats, sigma: float, out: Floats
     depth = p[2, 0] * x + p[2, 1] * y + p[2, 2] * z + p[2, 3]
     if not depth > NEAREST_DEPTH_M:
         return False
-    near = 1.0 / (depth * sigma)  # over sigma; the only division
+    near = 1.0 / (depth * sigma)  # divided by sigma; the only division
     nearer, inverse = near * sigma, near * depth
     u = (p[0, 0] * x + p[0, 1] * y + p[0, 2] * z + p[0, 3]) * nearer
     v = (p[1, 0] * x + p[1, 1] * y + p[1, 2] * z + p[1, 3]) * nearer
@@ -312,7 +312,7 @@ def learn_lengths(tree: Tree, n_views: Ints) -> None:
                 difference = cov[j, i, k] + cov[q, i, k] - 2.0 * edge
                 spread += along[i] * along[k] * difference
                 total += difference if i == k else 0.0
-        measured = apart - 0.5 * (total - spread) / apart  # errors across a bone lengthen it
+        measured = apart - 0.5 * (total - spread) / apart  # lateral errors bias the length
         noise = _CORRELATED_UPDATES * max(spread, EDGE_STIFFNESS_M[j] ** 2)
         miss = measured - length[j]
         if miss * miss > _GATE_SIGMA**2 * (noise + variance[j]):

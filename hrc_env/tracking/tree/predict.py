@@ -28,7 +28,7 @@ from hrc_env.core.typing import Floats, Vector3
 from hrc_env.tracking.tree.gaussian import ORDER, PARENT, invert, multiply, multiply_transposed
 from hrc_env.tracking.tree.state import Tree, Work
 
-_LEFT, _RIGHT, _LEFT_HIP, _RIGHT_HIP = 1, 2, 7, 8  # shoulders: _RIGHT, _LEFT_HIP hang on _LEFT
+_LEFT, _RIGHT, _LEFT_HIP, _RIGHT_HIP = 1, 2, 7, 8  # _LEFT is parent of _RIGHT, _LEFT_HIP
 _REORDER = {"reassoc", "contract", "nsz"}
 _UPRIGHT_COSINE = math.cos(math.radians(25.0))
 """Cosine of the largest angle from the vertical of an upright trunk (an estimate)."""

@@ -2,7 +2,7 @@
 
 The motion model describes people who walk and work. With one view, the errors for a person that
 spins, falls or runs exceed the Gaussian's standard deviations, because the depths of joints follow
-from the orientation of the body, which is then recognized late. `find_pace_factor` returns the
+from the orientation of the body, which is then recognised late. `find_pace_factor` returns the
 factor on the covariance that accounts for this.
 """
 

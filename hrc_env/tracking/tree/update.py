@@ -79,7 +79,7 @@ def condition_on_frame(
     if widen_jumped_joints(tree, frame, settings, work):
         find_pose(tree, frame, settings, work)
     update_tree(tree, work)
-    if is_weighed:  # the mean correction needs the factors that the evidence leaves alone
+    if is_weighed:  # before the correction of the mean; it keeps the factors in `work`
         evidence = log_evidence(prior[0], tree, frame, settings, work)
     correct_mean(tree, frame, settings, work)
     return evidence
@@ -99,7 +99,7 @@ def widen_jumped_joints(tree: Tree, frame: Frame, settings: Settings, work: Work
     use, point, spread = np.empty(len(frame.P), np.bool_), np.empty(3), np.empty((3, 3))
     for j in ORDER:
         growth[j] = 0.0
-        if has_jumped and PARENT[j] >= 0:  # joints beyond one that jumped go with it
+        if has_jumped and PARENT[j] >= 0:  # descendants move with a joint that jumped
             multiply(tree.slope[j], growth[PARENT[j]], work.a)
             multiply_transposed(work.a, tree.slope[j], growth[j])
         if _find_jump(j, tree, frame, settings, work, point, spread, use):
