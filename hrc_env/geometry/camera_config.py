@@ -269,7 +269,7 @@ def _check_image(camera: CameraConfig, K: Floats) -> None:
     if not ((centre > 0) & (centre < size)).all():
         _refuse(camera, f"the principal point must lie in the image of {size} px", centre)
     (cx, cy), (right, low) = centre, size
-    middles = np.array([[0, cy], [right, cy], [cx, 0], [cx, low]])  # of the edges
+    middles = np.array([[0, cy], [right, cy], [cx, 0], [cx, low]])  # midpoints of the edges
     if np.isnan(rays_cam(camera.lens, (middles - centre) / focal * (1 - 1e-9))).any():
         _refuse(
             camera,

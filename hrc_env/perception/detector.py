@@ -320,7 +320,7 @@ class PoseDetector(Stateful):
         for job in jobs:
             try:
                 results.append(threads.submit(self._run_job, job).result)
-            except RuntimeError:  # the interpreter is ending, and its threads take no more work
+            except RuntimeError:  # the interpreter shuts down, and its threads reject new jobs
                 results.append(functools.partial(self._run_job, job))
         return [result() for result in results]
 

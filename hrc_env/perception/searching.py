@@ -274,7 +274,7 @@ def sightings(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> list[
 
 
 def _find_agreed(candidates: Candidates, cameras: Sequence[PinholeCamera]) -> Sighting | None:
-    """Return the person on which the most cameras agree, and best; None unless two agree."""
+    """Return the person on which most cameras agree, or None if no two cameras agree."""
     best, best_rank = None, (1, 0.0)
     for point in _find_crossings(candidates, cameras):
         support = _find_support(point, candidates, cameras)

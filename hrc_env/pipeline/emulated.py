@@ -26,7 +26,7 @@ class _Exposure(NamedTuple):
     """The scene of a step, and the conditions under which the detector works."""
 
     now: TrueSensorInput
-    """The scene."""
+    """The scene with the true states of the workers."""
     expected: PoseEstimate
     """Prediction of the tracker for this step."""
     dim: Quality | None

@@ -164,7 +164,7 @@ class EpisodicPipeline(PerceptionPipeline):
         return self._gather(ids, perceive)
 
     def forecast(self, now: PoseEstimate, ids: Ints, horizon_s: float) -> PoseEstimate:
-        """Return the belief about a time ahead; see `PerceptionPipeline.forecast`."""
+        """Forecast the belief for a future time; see `PerceptionPipeline.forecast`."""
         return self._gather(
             ids,
             lambda part: part.pipeline.forecast(rows(now, part.rows), part.ids, horizon_s),

@@ -77,7 +77,7 @@ class _Films(ImageSensor):
         return np.zeros(self.n_cameras)
 
     def crop(self, camera_index: int, window: Roi) -> Image:
-        """Return a window of the source's image, (256, 256, 3)."""
+        """Return a window (256, 256, 3) of a camera's image, and compare it with the last one."""
         crop = crop_image(needed(self.source, "The image source"), camera_index, window)
         new, key = zlib.crc32(crop.tobytes()), (camera_index, window)
         if key in self.sums:
@@ -192,7 +192,7 @@ class PoseTracker:
         return bool(self._tracking.vacancy(_ALONE).others.any[0])
 
     def forget(self) -> None:
-        """Delete all tracks, so that the tracker is as after its construction."""
+        """Delete all tracks; the tracker is then in its initial state."""
         rngs = [np.random.default_rng(0)]
         self._tracking.reset(_ALONE, rngs, rngs)
 

@@ -107,8 +107,8 @@ class Stage(Canvas):
 
     Args:
         scene: the scene.
-        width: greatest width of a picture [px].
-        height: greatest height of a picture [px].
+        width: maximum width of a picture [px].
+        height: maximum height of a picture [px].
     """
 
     def __init__(self, scene: Scene, width: int, height: int) -> None:
@@ -233,7 +233,7 @@ class Stage(Canvas):
         return Layer(np.ascontiguousarray(rgb[::-1]), np.ascontiguousarray(z[::-1]))
 
     def _cast_shadows(self, image: Image, backdrop: _Backdrop, dark: Image) -> None:
-        """Darken a picture in the shadows of moving geoms to the backdrop without the sun."""
+        """Darken a picture in the shadows of moving geoms, as in the backdrop without the sun."""
         shade = self._shade = self._shade or self.draw_shade()
         if shade is None:
             return
@@ -284,7 +284,7 @@ def _bound_spheres(camera: PinholeCamera, middles: Points3, radii_m: Floats) -> 
 
 
 def _reach(x: Floats, depth: Floats, radii_m: Floats) -> Floats:
-    """Return the least and greatest image coordinates (2,) of spheres, in focal lengths."""
+    """Return the minimum and maximum image coordinates (2,) of spheres, in focal lengths."""
     nearest, furthest = depth - radii_m, depth + radii_m
     low = np.minimum((x - radii_m) / nearest, (x - radii_m) / furthest)
     high = np.maximum((x + radii_m) / nearest, (x + radii_m) / furthest)
