@@ -65,7 +65,7 @@ class CameraConfig:
     lens: Lens = field(default_factory=Lens)
     """Distortion of the image by the lens."""
     rate_hz: float = 0.0
-    """Frame rate; images are taken at control steps. If 0, at every control step [Hz]."""
+    """Frame rate; images are taken at control steps, and at all of them if it is 0 [Hz]."""
     latency_s: float = 0.0
     """Delay from the exposure of an image to its arrival, at most 1 s; the tracker applies an image
     at the time of its exposure [s]."""

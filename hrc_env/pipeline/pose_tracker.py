@@ -77,7 +77,7 @@ class _Films(ImageSensor):
         return np.zeros(self.n_cameras)
 
     def crop(self, camera_index: int, window: Roi) -> Image:
-        """Return a window (256, 256, 3) of a camera's image, and compare it with the last one."""
+        """Return a window (256, 256, 3) of a camera's image, and check if the crop has changed."""
         crop = crop_image(needed(self.source, "The image source"), camera_index, window)
         new, key = zlib.crc32(crop.tobytes()), (camera_index, window)
         if key in self.sums:
