@@ -1,4 +1,4 @@
-"""Whole images of a calibrated rig as an `ImageSource`."""
+"""An `ImageSource` of whole images of a calibrated rig."""
 
 from collections.abc import Sequence
 
@@ -21,7 +21,7 @@ class Frames:
             cameras are calibrated.
 
     Raises:
-        ConfigError: there is no such image for a camera.
+        ConfigError: an image is missing, or has the wrong size or type.
     """
 
     def __init__(self, cameras: Sequence[PinholeCamera], images: Sequence[Image]) -> None:
@@ -43,5 +43,5 @@ class Frames:
         self.images = list(images)
 
     def crop(self, camera_index: int, window: Roi) -> Image:
-        """Return a window of a camera's image, (256, 256, 3)."""
+        """Return a window (256, 256, 3) of a camera's image."""
         return crop_window(self.images[camera_index], window)
