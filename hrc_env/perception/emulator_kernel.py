@@ -278,10 +278,15 @@ def emulate_batch(
 
 @kernel
 def _find_track(joints: Points3, expected: Points3, tracked: Bools) -> int:
-    """Find the track with windows that show a worker (J, 3), which is the nearest at the hips.
+    """Return the index of the track whose image windows show a worker, or -1 if there is none.
 
-    Returns:
-        Index of the track, or -1 if there is none.
+    It is the track whose expected middle of the hips is nearest to the worker's, if that is nearer
+    than `FOLLOWED_M`: the detector looks for a person in windows around the expected body.
+
+    Args:
+        joints: (J, 3) true joints of the worker in the world frame [m].
+        expected: (W, J, 3) joints that the tracker expects, in the world frame [m].
+        tracked: (W,) whether there is a track.
     """
     nearest_m, track = FOLLOWED_M, -1
     for w in range(len(tracked)):
@@ -324,17 +329,27 @@ def _advance_wander(
     shared: Settings,
     meant: Points3,
 ) -> None:
-    """Advance the errors in space, and compute the erroneous positions that all cameras share.
+    """Advance the errors that all cameras share, and write the joints with these errors.
+
+    Each joint has an error of unit variance along three axes of the body: ahead, to the joint's own
+    side, up. It is a mixture of the error of the next joint towards the trunk and of its own error
+    w, which follows an autoregression:
+
+        w = keep w + sqrt(1 - keep^2) n,    e = r e_parent + sqrt(1 - r^2) w
+        displacement = offset + deviation (1 + tail |e|^2 / 3) e
+
+    with n from `normals`, and the correlation r, offset, deviation and tail from the calibration.
 
     Args:
-        wander: (J, 3) state of the errors, which is changed.
+        wander: (J, 3) own errors w in standard deviations, changed in place.
         normals: (3 J or more,) standard normal numbers.
-        joints: (J, 3) true positions of the joints [m].
-        front: direction to the front of the body.
-        keep: coefficient of the autoregressive process.
-        here: tables of the worker's posture.
-        common: tables that do not depend on the posture.
-        meant: (J, 3) output: the positions at which the detector sees the joints [m].
+        joints: (J, 3) true joints in the world frame [m].
+        front: horizontal unit vector to the front of the body in the world frame.
+        keep: coefficient of the autoregression, 0 to 1.
+        posture: tables of the worker's posture.
+        shared: tables that do not depend on the posture.
+        meant: (J, 3) receives the joints where the detector believes them, in the world frame [m];
+            an array other than `joints`.
     """
     renew, error_scale = math.sqrt(1.0 - keep * keep), shared.error_scale
     errors = meant  # the array holds the errors e first, and then the joints

@@ -182,9 +182,18 @@ def project_worker(camera: ImageCamera, joints: Points3, uv: Points2, depth: Flo
 
 @kernel
 def _distort_joints(camera: ImageCamera, uv: Points2, depth: Floats) -> float:
-    """Distort pinhole pixels (J, 2) in place, and return the magnification.
+    """Distort pinhole pixels in place, and return the mean magnification of the pinhole image.
 
-    It is the ratio of the body's size in the pinhole image to that in the real image.
+    The magnification is the ratio of lengths in the pinhole image to lengths in the image of the
+    lens, at the joint. Joints nearer than `MIN_DEPTH_M` are left as they are and do not count.
+
+    Args:
+        camera: the camera.
+        uv: (J, 2) pixels of the joints without distortion, replaced by those with distortion [px].
+        depth: (J,) distances along the camera's axis [m].
+
+    Returns:
+        The mean over the joints; 1 if none counts.
     """
     focal_x, focal_y = camera.focal_px[0], camera.focal_px[1]
     centre_x, centre_y = camera.centre_px[0], camera.centre_px[1]
